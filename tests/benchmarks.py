@@ -1,0 +1,64 @@
+"""How long the parts take here: `make bench`. The bounds are those the README promises for a 2-core machine."""
+
+import statistics
+import time
+
+import numpy as np
+import pytest
+
+import vsp
+from vsp import geometry
+from vsp.evaluate import outcomes
+
+DISTILLATION = {"SimpleGoal-v0": 3.0, "MountainCarContinuous-v0": 4.0}  # seconds
+
+
+def seconds(work, repeats: int = 5) -> float:
+    """Median time of `work` over `repeats` calls, after one that does not count."""
+    work()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def report(capsys, what: str, value: float, unit: str) -> None:
+    with capsys.disabled():
+        print(f"\n{what:60s} {value:10.4g} {unit}", end="")
+
+
+@pytest.mark.parametrize("task", vsp.tasks())
+def test_one_distillation(task, capsys):
+    teacher = vsp.load_teacher(task)
+    taken = seconds(lambda: vsp.distill(teacher, task, seed=0), repeats=3)
+    report(capsys, f"one distillation, {task}", taken, "s")
+    assert taken < DISTILLATION[task]
+
+
+@pytest.mark.parametrize("task", vsp.tasks())
+def test_one_evaluation(task, capsys):
+    policy = vsp.paper.published_policy(task)
+    taken = seconds(lambda: outcomes(policy, task, 1000, seed=0))
+    report(capsys, f"1000 episodes of a distilled policy, {task}", taken, "s")
+    assert taken < 2
+
+
+@pytest.mark.parametrize("task", vsp.tasks())
+def test_teacher_states_per_second(task, capsys):
+    teacher, space = vsp.load_teacher(task), vsp.get_task(task)
+    states = np.random.default_rng(0).uniform(space.low, space.high, size=(500, len(space.low))).astype(np.float32)
+    rate = len(states) / seconds(lambda: teacher.predict(states), repeats=50)
+    report(capsys, f"teacher, states per second, {task}", rate, "1/s")
+    assert rate > 10_000
+
+
+@pytest.mark.parametrize("k", [13, 32, geometry.KDTREE_FROM, 4 * geometry.KDTREE_FROM])
+def test_look_up(k, capsys):
+    rng = np.random.default_rng(0)
+    codewords, states = rng.uniform(size=(k, 2)), rng.uniform(size=(1000, 2))
+    for name in ("nearest_brute", "nearest_kdtree"):
+        taken = seconds(lambda: getattr(geometry, name)(codewords, states), repeats=20)
+        report(capsys, f"{name}, 1000 states, {k} codewords", 1000 * taken, "ms")
+    assert (geometry.nearest_brute(codewords, states) == geometry.nearest_kdtree(codewords, states)).all()

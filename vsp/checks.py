@@ -1,0 +1,26 @@
+"""Checks of arrays at the boundary: one clear error that shows the offending value and what was expected."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def check_finite(what: str, values: np.ndarray) -> np.ndarray:
+    """`values` in float64. Raises ValueError, naming the first offender, for a wrong type, NaN or infinity."""
+    values = np.asarray(values)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"{what} have type {values.dtype}, expected numbers")
+    values = values.astype(np.float64, copy=False)
+    if not np.isfinite(values).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+        raise ValueError(f"{what} hold {values[where]} at index {where}, expected finite numbers")
+    return values
+
+
+def check_array(what: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """`values` in float64. Raises ValueError unless they are finite and of `shape`, where -1 stands for any number."""
+    values = check_finite(what, values)
+    if values.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, values.shape)):
+        wanted = str(shape).replace("-1", "n")
+        raise ValueError(f"{what} have shape {values.shape}, expected {wanted}")
+    return values

@@ -1,0 +1,149 @@
+"""The hyperparameters of the paper (table T2) and the readings of what it leaves open, in one frozen dataclass.
+
+The paper's open questions are numbered R1-R15 as in the comments below. Each reading is a field; `distill.py` turns it
+into a small function once, before the loop. R11 (which states a splitting pass reads) has one reading in the prose,
+"this iteration's episode", and so it is no field.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args, get_origin, get_type_hints
+
+from .envs import get_task
+
+
+@dataclass(frozen=True)
+class Config:
+    """Everything a distillation depends on beside the teacher, the task and the seed.
+
+    Raises ValueError for a value out of range, showing the value and what was expected.
+    """
+
+    # Table T2
+    n_epochs: int
+    """Iterations of Algorithm 1; each plays one teacher episode."""
+    n_split: int
+    """A splitting pass every `n_split` iterations."""
+    n_merge: int
+    """A merging pass every `n_merge` iterations."""
+    n_freeze: int
+    """Length of the phase that `freeze` (R1) speaks of, in iterations."""
+    n_reset: int
+    """Period of the reset that `periodic_reset` (R5) speaks of, in iterations."""
+    min_param_distance: float
+    """Neighbours whose parameters are closer than this (L-infinity) are merged."""
+    min_pol_distance: float
+    """A state closer to its codeword than this never becomes a codeword; in units of the (scaled) state."""
+    max_pol_loss: float
+    """A running mean loss above this splits the cell; in squared units of the action."""
+    one_split: bool = False
+    """R4. At most one split per pass; in T2 only, False in both columns, so the name is all there is to go by."""
+
+    # Readings
+    freeze: Literal["last_n_freeze", "first_n_freeze", "last_n_split"] = "last_n_freeze"
+    """R1. When the partition stands still: the last `n_freeze` iterations, as the prose says twice; all but the first
+    `n_freeze`, as Algorithm 1 prints ("first_n_freeze" is the phase that may alter); or the last `n_split`, said once."""
+    split_lookup: Literal["refreshed", "kept"] = "refreshed"
+    """R2. Whether a state is looked up among the codewords added earlier in the same pass, as Algorithm 2 line 4 reads
+    where it stands in the loop, or among those the pass began with."""
+    split_metric: Literal["manhattan", "euclidean"] = "manhattan"
+    """R3. Norm of `min_pol_distance`. T3 has one pair of codewords nearer than 0.3 in Manhattan distance, the distance
+    of the look-up, and 12 in Euclidean distance."""
+    periodic_reset: Literal["buffers", "off"] = "buffers"
+    """R5. What happens every `n_reset` iterations: all buffers are cleared, which also bounds their memory."""
+    merge_reset: Literal["survivor_and_neighbours", "neighbours"] = "survivor_and_neighbours"
+    """R6. Whose buffers a merge resets: the prose names the survivor and its neighbours, Algorithm 3 the neighbours."""
+    merge_visits_removed: bool = False
+    """R6. Whether a cell removed earlier in a pass still takes its turn in it. Algorithm 3 removes while it iterates;
+    a cell that is gone has no claim on its neighbours, so the default is no."""
+    batch_size: int = 64
+    """R7. States per minibatch and cell; unstated in the paper."""
+    n_minibatches: int = 1
+    """R7. Minibatches per iteration and cell; unstated. With the rate below, a parameter can move by about 5 in 5000
+    iterations and by 2 in 2000: the largest printed coefficients are 5.3 (T3) and 3.0 (T4)."""
+    learning_rate: float = 1e-3
+    """R7. Step size of Adam; unstated, so Adam's own default."""
+    initial: Literal["uniform", "zeros"] = "uniform"
+    """R7. First parameters of a sub-policy, "initialized randomly": uniform in +-1/sqrt(d), as torch.nn.Linear does."""
+    adam_on_reset: Literal["keep", "restart"] = "keep"
+    """R7. Whether Adam's moments survive a buffer reset: the paper resets buffers and nothing else."""
+    scale: Literal["raw", "box"] = "raw"
+    """R8. Distances between raw states, or between states divided by the widths of the state box. T4's codewords are
+    in raw units."""
+    neighbours: Literal["delaunay", "lookup"] = "delaunay"
+    """R9. The Euclidean Delaunay graph that the prose names, or the cells that touch under the look-up's metric."""
+    split_loss: Literal["raw", "clipped"] = "raw"
+    """R10. Loss of the linear output, or of the output limited to the action box. Training uses the raw output, so
+    the loss that splits does too."""
+    merge_parameters: Literal["all", "weights"] = "all"
+    """R12. Whether biases count in `min_param_distance`: "both sets of parameters" includes them."""
+    split_reset: Literal["cell_and_neighbours", "neighbours"] = "cell_and_neighbours"
+    """R13. Whether a split also resets the cell that was split, whose buffer holds states that it just lost; Algorithm
+    2 resets the neighbours alone."""
+    split_neighbours: Literal["old", "new"] = "old"
+    """R13. Neighbours of the cell that was split (prose: "of the old region") or of the new one."""
+    loss_after_split: Literal["reset", "kept"] = "reset"
+    """R14. Whether the running loss starts afresh after a split. Not stated; after a split the loss that led to it has
+    been acted upon."""
+    inclusive: bool = False
+    """R15. False: n = 0 ... n_epochs - 1, and n = 0, with one cell trained once, neither splits nor merges. True: n =
+    n_epochs is played too ("n = 0 to n_epochs") and n = 0 splits and merges."""
+
+    def __post_init__(self) -> None:
+        for name, kind in get_type_hints(type(self)).items():
+            _check(name, getattr(self, name), kind)
+        if self.n_freeze > self.n_epochs:
+            raise ValueError(
+                f"n_freeze is {self.n_freeze}, expected at most n_epochs = {self.n_epochs}: "
+                "lower n_freeze or raise n_epochs"
+            )
+
+    def quick(self) -> Config:
+        """The same method in a tenth of the iterations: for a first look, not for results."""
+        return dataclasses.replace(self, n_epochs=self.n_epochs // 10, n_freeze=self.n_freeze // 10)
+
+
+def _check(name: str, value: object, kind: object) -> None:
+    if get_origin(kind) is Literal:
+        good, expected = value in get_args(kind), f"one of {list(get_args(kind))}"
+    elif kind is bool:
+        good, expected = isinstance(value, bool), "True or False"
+    elif kind is int:
+        good, expected = isinstance(value, int) and not isinstance(value, bool) and value > 0, "a positive integer"
+    else:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        good, expected = number and math.isfinite(value) and value > 0, "a positive number"
+    if not good:
+        raise ValueError(f"{name} is {value!r}, expected {expected}")
+
+
+_PRESETS = {
+    "SimpleGoal-v0": Config(
+        n_epochs=5000,
+        n_split=20,
+        n_merge=100,
+        n_freeze=1000,
+        n_reset=500,
+        min_param_distance=0.5,
+        min_pol_distance=0.3,
+        max_pol_loss=1e-4,
+    ),
+    "MountainCarContinuous-v0": Config(
+        n_epochs=2000,
+        n_split=50,
+        n_merge=100,
+        n_freeze=400,
+        n_reset=500,
+        min_param_distance=0.3,
+        min_pol_distance=0.04,
+        max_pol_loss=1e-5,
+    ),
+}
+
+
+def preset(task: str) -> Config:
+    """The paper's hyperparameters for `task` (table T2) with the default readings. Raises ValueError if unknown."""
+    return _PRESETS[get_task(task).name]

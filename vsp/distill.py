@@ -1,0 +1,219 @@
+"""Algorithms 1, 2 and 3 of the paper, in this order: distil a teacher to linear policies in Voronoi cells.
+
+The teacher never sees the partition, so its episodes are rolled out in large batches ahead of the loop; the cells'
+models are stacked, so one step trains them all. Neither changes the algorithm. Line numbers below refer to the
+algorithms as the paper prints them, "R" numbers to `config.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from . import geometry
+from .buffers import Buffers
+from .config import Config, preset
+from .envs import Task, get_task
+from .history import History
+from .policy import VoronoiPolicy
+from .rollouts import Episode, Policy, record
+from .subpolicies import LinearCells
+
+EPISODES_AHEAD = 500  # teacher episodes rolled out together
+
+
+def distill(
+    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int
+) -> tuple[VoronoiPolicy, History]:
+    """Distil `teacher` to a `VoronoiPolicy` (Algorithm 1). Same arguments, same policy.
+
+    `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
+    of the task. The history lets a notebook replay the run. Raises ValueError when the teacher does not fit the task or
+    its states or actions are not finite.
+    """
+    task = get_task(task)
+    config = preset(task.name) if config is None else config
+    with threadpool_limits(1):  # the same sums in the same order on any machine, and no threads to wait for
+        return _distill(teacher, task, config, seed)
+
+
+def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[VoronoiPolicy, History]:
+    starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    n_iterations = config.n_epochs + config.inclusive
+    episodes = teacher_episodes(teacher, task, n_iterations, starts)
+    partition, history = Partition(task, config), History()
+    for n in range(n_iterations):
+        episode = next(episodes)
+        if n == 0:
+            partition.add(episode.states[0], init)  # l. 1: the first state is the first codeword
+        partition.observe(episode)  # l. 3-12
+        loss = partition.train(batches)  # l. 13-15
+        if may_alter(n, config):  # l. 16
+            if due(n, config.n_split, config):  # l. 17-19
+                history.add_events(n, "split", split_regions(partition, episode, config, init))
+            if due(n, config.n_merge, config):  # l. 20-22
+                history.add_events(n, "merge", merge_regions(partition, config))
+        if config.periodic_reset == "buffers" and due(n, config.n_reset, config):
+            partition.buffers.clear()
+        history.observe(n, loss, partition)
+    return partition.policy(), history
+
+
+def split_regions(partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[np.ndarray]:
+    """Walk along the episode and split each cell where the running mean loss is too high (Algorithm 2).
+
+    Returns the new codewords, each (d,).
+    """
+    locate = partition.locate if config.split_lookup == "refreshed" else partition.snapshot()  # R2
+    previous, losses, added = None, [], []
+    for state, action in zip(episode.states, episode.actions):
+        i = locate(state)  # l. 4
+        if i != previous:  # l. 5-8
+            previous, losses = i, []
+        losses.append(partition.loss(i, state, action))  # l. 9
+        if np.mean(losses) > config.max_pol_loss and partition.far(i, state):  # l. 10
+            old_neighbours = partition.neighbours()[i]
+            j = partition.add(state, rng)  # l. 11-12
+            near = partition.neighbours()[j] if config.split_neighbours == "new" else np.append(old_neighbours, False)
+            if config.split_reset == "cell_and_neighbours":
+                near[i] = True
+            partition.reset(near)  # l. 13-14
+            added.append(state)
+            if config.loss_after_split == "reset":  # R14
+                losses = []
+            if config.one_split:  # R4
+                break
+    return added
+
+
+def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
+    """Remove neighbours whose parameters agree with a cell's own (Algorithm 3). Returns the removed codewords."""
+    k = len(partition.codewords)
+    parameters = partition.comparable_parameters()
+    alive = np.ones(k, dtype=bool)
+    for i in range(k):  # l. 1
+        if not (alive[i] or config.merge_visits_removed):  # R6
+            continue
+        members = alive.copy()
+        members[i] = True
+        near = np.zeros(k, dtype=bool)
+        near[members] = partition.neighbours(members)[np.flatnonzero(members) == i][0]  # l. 2
+        apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
+        similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
+        if similar.any():
+            alive &= ~similar  # l. 5-6
+            if config.merge_reset == "survivor_and_neighbours":
+                near[i] = True
+            partition.reset(near)  # l. 7
+    removed = list(partition.codewords[~alive])
+    partition.keep(alive)
+    return removed
+
+
+class Partition:
+    """The state of a distillation: codewords, the cells' models, their buffers."""
+
+    def __init__(self, task: Task, config: Config):
+        d, m = len(task.low), len(task.action_low)
+        self.task, self.config = task, config
+        self.codewords = np.zeros((0, d))
+        self.models = LinearCells(d, m, initial=config.initial)
+        self.buffers = Buffers(d, m)
+        self.scale = task.high - task.low if config.scale == "box" else np.ones(d)  # R8
+
+    def observe(self, episode: Episode) -> None:
+        """Put each state and action into the buffer of its cell."""
+        cells = geometry.nearest(self.codewords / self.scale, episode.states / self.scale)
+        self.buffers.append(cells, episode.states, episode.actions)
+
+    def train(self, rng: np.random.Generator) -> float:
+        """Train every cell that has data; returns the mean loss over cells."""
+        cells = np.flatnonzero(self.buffers.counts)
+        for _ in range(self.config.n_minibatches):
+            inputs, actions = self.buffers.sample(cells, self.config.batch_size, rng)
+            losses = self.models.train(cells, inputs, actions, learning_rate=self.config.learning_rate)
+        return float(losses.mean())
+
+    def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
+        """Make `state` (d,) the codeword of a new, untrained cell; returns its index."""
+        self.codewords = np.concatenate([self.codewords, state[None]])
+        self.models.add(rng)
+        self.buffers.add()
+        return len(self.codewords) - 1
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Drop all cells but those of the mask `kept` (k,)."""
+        self.codewords = self.codewords[kept]
+        self.models.keep(kept)
+        self.buffers.keep(kept)
+
+    def reset(self, cells: np.ndarray) -> None:
+        """Empty the buffers of `cells`, a mask (k,)."""
+        self.buffers.reset(cells)
+        if self.config.adam_on_reset == "restart":
+            self.models.restart_adam(cells)
+
+    def locate(self, state: np.ndarray) -> int:
+        """Cell of one state (d,)."""
+        return self.snapshot()(state)
+
+    def snapshot(self):
+        """The look-up among the codewords of this moment, as a function of one state."""
+        codewords = self.codewords / self.scale
+        return lambda state: int(geometry.nearest(codewords, (state / self.scale)[None])[0])
+
+    def far(self, i: int, state: np.ndarray) -> bool:
+        """Whether `state` is far enough from codeword i to become one, and is not a codeword already."""
+        gap = geometry.distances(
+            (state / self.scale)[None], (self.codewords[i] / self.scale)[None], self.config.split_metric
+        )
+        # A teacher pushing against the border stands still; with split_lookup="kept" it could offer one state twice.
+        return gap[0, 0] > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
+
+    def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
+        """Mean squared error of cell i's action at `state` against the teacher's."""
+        own = self.models.predict(i, state)
+        if self.config.split_loss == "clipped":  # R10
+            own = np.clip(own, self.task.action_low, self.task.action_high)
+        return float(np.square(own - action).mean())
+
+    def neighbours(self, members: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Which cells of `members` are neighbours. (k, k) bool"""
+        codewords = self.codewords[members] / self.scale
+        if self.config.neighbours == "delaunay":  # R9
+            return geometry.delaunay_neighbours(codewords)
+        return geometry.lookup_neighbours(codewords, self.task.low / self.scale, self.task.high / self.scale)
+
+    def comparable_parameters(self) -> np.ndarray:
+        """What a merge compares, one row per cell. (k, p)"""
+        parameters = self.models.parameters
+        if self.config.merge_parameters == "weights":  # R12
+            parameters = parameters[:, :-1]
+        return parameters.reshape(len(parameters), -1)
+
+    def policy(self) -> VoronoiPolicy:
+        """The partition as a policy of its own."""
+        scale = None if self.config.scale == "raw" else self.scale
+        return VoronoiPolicy(self.codewords, self.models.parameters.copy(), task=self.task, scale=scale)
+
+
+def may_alter(n: int, config: Config) -> bool:
+    """R1: whether iteration n may split and merge."""
+    if config.freeze == "first_n_freeze":
+        return n < config.n_freeze
+    return n < config.n_epochs - (config.n_freeze if config.freeze == "last_n_freeze" else config.n_split)
+
+
+def due(n: int, every: int, config: Config) -> bool:
+    """R15: whether something that happens `every` so many iterations happens in iteration n."""
+    return n % every == 0 and (n > 0 or config.inclusive)
+
+
+def teacher_episodes(teacher: Policy, task: Task, n: int, rng: np.random.Generator) -> Iterator[Episode]:
+    """Yield n episodes of the teacher from random starts, rolled out `EPISODES_AHEAD` at a time."""
+    while n > 0:
+        batch = record(teacher, task, task.start(rng, EPISODES_AHEAD)[:n])
+        yield from batch
+        n -= len(batch)

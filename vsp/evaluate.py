@@ -1,0 +1,102 @@
+"""Episodic returns on shared start states, the paper's spread metrics, coverage, and intervals over policies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from .envs import OUTCOMES, Task, get_task
+from .rollouts import Outcomes, Policy, play
+
+
+def start_states(task: Task, n_episodes: int, seed: int) -> np.ndarray:
+    """The start states that belong to `seed`, the same for every policy. (n, d)"""
+    if n_episodes < 1:
+        raise ValueError(f"n_episodes is {n_episodes}, expected at least 1")
+    return task.start(np.random.default_rng(np.random.SeedSequence(seed)), n_episodes)
+
+
+def outcomes(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> Outcomes:
+    """Play `policy` from the start states of `seed`; arrays, one entry per episode."""
+    task = get_task(task)
+    return play(policy, task, start_states(task, n_episodes, seed))
+
+
+def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> pd.DataFrame:
+    """Play `policy` from the start states of `seed`: one row per episode with return, length and outcome."""
+    result = outcomes(policy, task, n_episodes, seed=seed)
+    named = np.array(OUTCOMES)[result.outcomes]
+    return pd.DataFrame({"return": result.returns, "length": result.lengths, "outcome": named}).rename_axis("episode")
+
+
+def spread(returns: np.ndarray) -> dict[str, float]:
+    """The paper's spread metrics (tables T5, T6) and what its text adds: whisker bounds and outliers.
+
+    Whiskers end 1.5 interquartile ranges beyond the quartiles; outliers lie outside; coverage is the share that does
+    not. `std` is that of the sample (n - 1).
+    """
+    returns = np.ravel(returns)
+    q1, median, q3 = np.percentile(returns, [25, 50, 75])
+    lower, upper = q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)
+    below, above = returns < lower, returns > upper
+    return {
+        "min": returns.min(),
+        "max": returns.max(),
+        "mean": returns.mean(),
+        "std": returns.std(ddof=1) if len(returns) > 1 else 0.0,
+        "q1": q1,
+        "median": median,
+        "q3": q3,
+        "iqr": q3 - q1,
+        "coverage": 1.0 - (below | above).mean(),
+        "lower_whisker": lower,
+        "upper_whisker": upper,
+        "outliers_below": int(below.sum()),
+        "outliers_above": int(above.sum()),
+    }
+
+
+def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
+    """What the paper's text says about outliers, under the names that end its ids in `data/paper/text_numbers.csv`.
+
+    Means, standard deviations and ranges of a set without members are NaN.
+    """
+    returns = np.ravel(returns)
+    facts = spread(returns)
+    below = returns[returns < facts["lower_whisker"]]
+    above = returns[returns > facts["upper_whisker"]]
+    outside = np.concatenate([below, above])
+    numbers = {f"outliers_{name}": value for name, value in _moments(outside).items()}
+    for side, values in (("below", below), ("above", above)):
+        moments = _moments(values)
+        numbers[f"outliers_{side}_share"] = 100 * len(values) / len(outside) if len(outside) else np.nan
+        numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
+    return {
+        **{name: facts[name] for name in ("mean", "std", "min", "max")},
+        "whisker_low": facts["lower_whisker"],
+        "whisker_high": facts["upper_whisker"],
+        "outliers": len(outside),
+        **numbers,
+    }
+
+
+def _moments(values: np.ndarray) -> dict[str, float]:
+    if not len(values):
+        return dict.fromkeys(("mean", "std", "min", "max"), np.nan)
+    deviation = values.std(ddof=1) if len(values) > 1 else 0.0
+    return {"mean": values.mean(), "std": deviation, "min": values.min(), "max": values.max()}
+
+
+def interval(
+    returns: np.ndarray, statistic, *, level: float = 0.95, n_resamples: int = 2000, seed: int = 0
+) -> tuple[float, float]:
+    """Percentile bootstrap interval of `statistic(returns)` that resamples policies, the rows of `returns` (p, n).
+
+    All policies share start states, so single episodes are not independent and are never resampled on their own.
+    """
+    rng = np.random.default_rng(seed)
+    draws = rng.integers(len(returns), size=(n_resamples, len(returns)))
+    values = [statistic(returns[draw]) for draw in draws]
+    tail = 50 * (1 - level)
+    low, high = np.percentile(values, [tail, 100 - tail])
+    return float(low), float(high)

@@ -1,0 +1,246 @@
+"""Many distillations: seeds, workers, one sealed file per run, resume, progress.
+
+A run is named by its settings (configuration, teacher, evaluation) and by the code that it ran with; both are hashed
+into the name of its folder, so a changed configuration never picks up old runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from . import store
+from .config import Config, preset
+from .distill import distill
+from .envs import GOAL, PIT, TRUNCATED, get_task, tasks
+from .evaluate import interval, outcomes, spread
+from .policy import VoronoiPolicy
+from .rollouts import Outcomes
+from .teachers import Teacher, load_teacher
+
+N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
+N_EPISODES = 1000
+EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states to report on, and to choose the best run on
+QUICK_RUNS, QUICK_EPISODES = 4, 100
+_CODE = ("buffers", "checks", "distill", "envs", "evaluate", "geometry", "history", "policy", "rollouts", "subpolicies")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One distillation and its evaluation."""
+
+    seed: int
+    policy: VoronoiPolicy
+    outcomes: Outcomes  # on the shared start states
+    validation_mean: float  # mean return on the validation starts
+    cells: np.ndarray  # number of cells after each iteration
+    splits: int
+    merges: int
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a set of runs has in common: task, configuration, teacher, and the episodes of the evaluation."""
+
+    task: str
+    config: Config
+    teacher: Teacher
+    n_episodes: int = N_EPISODES
+
+    @property
+    def settings(self) -> dict:
+        """All that decides the result of a run beside its seed and the code, as JSON-able values."""
+        return {
+            "task": self.task,
+            "config": asdict(self.config),
+            "teacher": self.teacher.digest,
+            "n_episodes": self.n_episodes,
+            "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
+        }
+
+    @property
+    def id(self) -> str:
+        """Ten hexadecimal digits that stand for the settings."""
+        return hashlib.sha256(json.dumps(self.settings, sort_keys=True).encode()).hexdigest()[:10]
+
+    def folder(self, runs: str | os.PathLike) -> Path:
+        """Where the runs of this experiment lie below the folder `runs`."""
+        return Path(runs) / self.task / f"{self.id}-{code_id()}"
+
+
+def code_id() -> str:
+    """Ten hexadecimal digits that stand for the modules that decide a run's result."""
+    content = b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in _CODE)
+    return hashlib.sha256(content).hexdigest()[:10]
+
+
+def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
+    """The paper's experiment on `task`: its hyperparameters, the shipped teacher, 1000 episodes."""
+    task = get_task(task).name
+    config = preset(task).quick() if quick else preset(task)
+    return Experiment(task, config, load_teacher(task), QUICK_EPISODES if quick else N_EPISODES)
+
+
+def paper_runs(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = 1) -> list[Run]:
+    """All runs of the paper's experiment on `task`, in the order of their seeds; those that are missing are made."""
+    n = QUICK_RUNS if quick else N_RUNS[task]
+    return make_runs(paper_experiment(task, quick=quick), range(n), runs=runs, jobs=jobs)
+
+
+def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int = 1) -> list[Run]:
+    """Distil once per seed with `jobs` workers, skip what is there, and return the runs in the order of `seeds`."""
+    folder = experiment.folder(runs)
+    missing = [seed for seed in seeds if not _run_path(folder, seed).exists()]
+    if missing:
+        from joblib import Parallel, delayed, parallel_config
+        from tqdm import tqdm
+
+        with parallel_config("loky", inner_max_num_threads=1):
+            work = Parallel(n_jobs=jobs, return_as="generator_unordered")(
+                delayed(make_run)(experiment, seed, folder) for seed in missing
+            )
+            done = len(list(seeds)) - len(missing)
+            calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
+            bar = tqdm(work, experiment.task, initial=done, total=done + len(missing), unit="run", mininterval=calm)
+            for _ in bar:
+                pass
+    return [load_run(_run_path(folder, seed), experiment) for seed in seeds]
+
+
+def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> None:
+    """One distillation, evaluated and written to its own sealed file."""
+    task, n = experiment.task, experiment.n_episodes
+    policy, history = distill(experiment.teacher, task, experiment.config, seed=seed)
+    result = outcomes(policy, task, n, seed=EVALUATION_SEED)
+    validation = outcomes(policy, task, n, seed=VALIDATION_SEED)
+    arrays = {
+        "codewords": policy.codewords,
+        "coefficients": policy.coefficients,
+        "scale": policy.scale,
+        "returns": result.returns,
+        "lengths": result.lengths,
+        "outcomes": result.outcomes,
+        "cells": np.array(history.cells),
+    }
+    about = {
+        "kind": "Run",
+        "seed": seed,
+        "settings": experiment.settings,
+        "validation_mean": float(validation.returns.mean()),
+        "splits": sum(event.kind == "split" for event in history.events),
+        "merges": sum(event.kind == "merge" for event in history.events),
+    }
+    store.save(_run_path(folder, seed), arrays, about)
+
+
+def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
+    """Read one run. Raises `store.DamagedFile`, and ValueError for a run that was made with other settings."""
+    a, about = store.load(path, kind="Run")
+    for name, expected in experiment.settings.items():
+        if about["settings"].get(name) != expected:
+            raise ValueError(
+                f"{path}: made with {name} = {about['settings'].get(name)}, expected {expected}: "
+                "delete it, and `make runs` makes it again"
+            )
+    return Run(
+        seed=about["seed"],
+        policy=VoronoiPolicy(a["codewords"], a["coefficients"], scale=a["scale"], task=experiment.task),
+        outcomes=Outcomes(a["returns"], a["lengths"], a["outcomes"]),
+        validation_mean=about["validation_mean"],
+        cells=a["cells"],
+        splits=about["splits"],
+        merges=about["merges"],
+    )
+
+
+def load_runs(experiment: Experiment, *, runs: str | os.PathLike) -> list[Run]:
+    """All runs that are there, by seed. Raises FileNotFoundError if there are none."""
+    folder = experiment.folder(runs)
+    paths = sorted(folder.glob("*.run"))
+    if not paths:
+        raise FileNotFoundError(f"{folder}: no runs, expected one or more: `make runs` makes them")
+    return [load_run(path, experiment) for path in paths]
+
+
+def best(runs: list[Run]) -> Run:
+    """The run with the highest mean return on the validation starts; the lowest seed among equals."""
+    return max(runs, key=lambda run: (run.validation_mean, -run.seed))
+
+
+def returns(runs: list[Run]) -> np.ndarray:
+    """Returns on the shared start states, one row per run. (n_runs, n_episodes)"""
+    return np.stack([run.outcomes.returns for run in runs])
+
+
+def teacher_outcomes(experiment: Experiment) -> Outcomes:
+    """The teacher on the start states that the runs are evaluated on."""
+    return outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+
+
+def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
+    """One row per run: seed, cells, splits, merges, spread of the returns and shares of the outcomes."""
+    return pd.DataFrame(
+        {
+            "settings": experiment.id,
+            "seed": run.seed,
+            "cells": len(run.policy),
+            "splits": run.splits,
+            "merges": run.merges,
+            "validation_mean": run.validation_mean,
+            **spread(run.outcomes.returns),
+            **{name: np.mean(run.outcomes.outcomes == code) for name, code in _SHARES.items()},
+        }
+        for run in runs
+    )
+
+
+def comparison(teacher: np.ndarray, runs: np.ndarray) -> dict[str, float]:
+    """Teacher against distilled policies from returns (n,) and (p, n): means, 95 % interval over policies, extremes."""
+    means = runs.mean(axis=1)
+    low, high = interval(runs, np.mean)
+    return {
+        "TD3, mean": teacher.mean(),
+        "distilled, mean": runs.mean(),
+        "95 % interval from": low,
+        "to": high,
+        "runs above TD3": np.mean(means > teacher.mean()),
+        "worst run": means.min(),
+        "best run": means.max(),
+    }
+
+
+def write_summary(frame: pd.DataFrame, task: str, *, out: str | os.PathLike) -> None:
+    """Write the summary of the paper's runs on `task` to OUT/data/results/, where it is committed."""
+    text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+    store.write_text(Path(out) / "data" / "results" / f"{task}.csv", text)
+
+
+_SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
+
+
+def _run_path(folder: str | os.PathLike, seed: int) -> Path:
+    return Path(folder) / f"{seed:04d}.run"
+
+
+def main() -> None:
+    """Make the runs that the paper reports, or those of them that are missing."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="runs go to OUT/data/runs")
+    parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
+    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    arguments = parser.parse_args()
+    for task in tasks():
+        made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
+        print(f"{task}: {len(made)} runs are there")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,231 @@
+"""Drawing: arrays in, `Axes` out. One colour for one thing everywhere, and one `save_figure`.
+
+Colours come from seaborn's colour-blind palette; the force map runs from purple (push left) to orange (push right).
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from . import store
+from .envs import GOAL_EDGE, PIT_HIGH, PIT_LOW, Task
+from .rollouts import Episode
+
+TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
+_COLOURS = sns.color_palette("colorblind").as_hex()
+TEACHER, DISTILLED, GOAL, PIT = _COLOURS[0], _COLOURS[1], _COLOURS[2], _COLOURS[3]
+BORDER, CODEWORD = "0.25", "black"
+FORCE_MAP = "PuOr_r"
+
+_STYLE = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.0,
+    "figure.dpi": 150,
+    "figure.facecolor": "white",
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,  # TrueType fonts, embedded
+    "svg.hashsalt": "vsp",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+
+
+def panels(n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, **subplots) -> tuple[Figure, np.ndarray]:
+    """A figure of LNCS text width with n panels in a row; height in inches. Returns figure and axes (n,).
+
+    Sets the style for everything drawn from here on.
+    """
+    mpl.rcParams.update(_STYLE)
+    fig, axes = plt.subplots(1, n, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
+    return fig, axes[0]
+
+
+class Picture:
+    """A saved figure as a notebook shows it: an HTML figure whose alternative text survives every conversion."""
+
+    def __init__(self, png: bytes, alt: str):
+        self.png, self.alt = png, alt
+
+    def _repr_html_(self) -> str:
+        data = base64.b64encode(self.png).decode()
+        return f'<figure><img alt="{html.escape(self.alt)}" src="data:image/png;base64,{data}" width="720"></figure>'
+
+    def __repr__(self) -> str:
+        return self.alt
+
+
+def save_figure(fig: Figure, name: str, *, alt: str, out: str | os.PathLike, quick: bool = False) -> Picture:
+    """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show.
+
+    `alt` describes what there is to see for someone who cannot; it goes into both files too. `quick` adds a watermark.
+    The files hold no dates and no version numbers, so that the same figure gives the same bytes.
+    """
+    if quick:
+        fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
+    path = Path(out) / "figures" / name
+    with store.atomic_path(path.with_suffix(".pdf")) as temporary:
+        fig.savefig(temporary, metadata={"Title": name, "Subject": alt, "CreationDate": None, "Producer": None})
+    with store.atomic_path(path.with_suffix(".png")) as temporary:
+        fig.savefig(temporary, metadata={"Title": name, "Description": alt, "Software": None})
+    plt.close(fig)
+    return Picture(path.with_suffix(".png").read_bytes(), alt)
+
+
+def letter(axes: np.ndarray, titles: list[str]) -> None:
+    """Title the panels (a), (b), ..."""
+    for ax, mark, title in zip(axes, "abcdefgh", titles):
+        ax.set_title(f"({mark}) {title}", loc="left")
+
+
+def cells(
+    ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6
+) -> Axes:
+    """Borders of Voronoi cells, `width` points wide, from the cell of each grid point; `fill` colours the cells."""
+    index = index.reshape(x.shape)
+    if fill:
+        colours = np.array(sns.color_palette("pastel").as_hex())
+        shades = mpl.colors.to_rgba_array(colours)[index % len(colours)]
+        ax.imshow(shades, origin="lower", extent=_extent(x, y), aspect="auto", interpolation="nearest", zorder=0)
+    for i in np.unique(index):
+        inside = (index == i).astype(float)
+        if inside.min() < 1:
+            ax.contour(x, y, inside, levels=[0.5], colors=BORDER, linewidths=width)
+    return ax
+
+
+def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False) -> Axes:
+    """Codewords (k, 2) as black dots with a white rim."""
+    ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label)
+    if numbers:
+        for i, point in enumerate(points):
+            ax.annotate(str(i), point, xytext=(3, 3), textcoords="offset points", fontsize=6, zorder=6)
+    return ax
+
+
+def square(ax: Axes) -> Axes:
+    """The unit square of SimpleGoal with goal and pit."""
+    ax.add_patch(Rectangle((0, 0), GOAL_EDGE, GOAL_EDGE, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
+    side = PIT_HIGH - PIT_LOW
+    ax.add_patch(Rectangle((PIT_LOW, PIT_LOW), side, side, color=PIT, alpha=0.5, lw=0, zorder=1, label="pit"))
+    ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x", ylabel="y", aspect="equal", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
+    return ax
+
+
+def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
+    """The direction and size of each action (n, 2) at its state (n, 2); a full diagonal step spans one grid step."""
+    step = np.diff(np.unique(states[:, 0]))[0]
+    ax.quiver(
+        *states.T, *actions.T, color=color, angles="xy", scale_units="xy", scale=1.4 / step, width=0.006, zorder=3
+    )
+    return ax
+
+
+def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray):
+    """Force in [-1, 1] over position and velocity. Returns the image, for `force_bar`."""
+    image = ax.imshow(
+        force.reshape(x.shape), origin="lower", extent=_extent(x, y), aspect="auto", cmap=FORCE_MAP, vmin=-1, vmax=1
+    )
+    ax.set(xlabel="position", ylabel="velocity (per step)")
+    return image
+
+
+def force_bar(fig: Figure, image, axes: np.ndarray) -> None:
+    """One colour bar for all force maps of a figure."""
+    bar = fig.colorbar(image, ax=list(axes), label="force", ticks=[-1, 0, 1], aspect=30)
+    bar.ax.set_yticklabels(["−1 (left)", "0", "+1 (right)"])
+
+
+def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str):
+    """A non-negative quantity over a two-dimensional state, dark where it is large, with its own colour bar."""
+    image = ax.imshow(
+        error.reshape(x.shape), origin="lower", extent=_extent(x, y), aspect="auto", cmap="Greys", vmin=0
+    )
+    ax.figure.colorbar(image, ax=ax, label=label)
+    return image
+
+
+def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> Axes:
+    """Box plots of the teacher's and the distilled policies' returns, in this order; outliers hidden as in the paper."""
+    colours = dict(zip(returns, (TEACHER, DISTILLED)))
+    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=False, linewidth=0.8)
+    ax.set(ylabel="return per episode")
+    ax.set_xticks(range(len(returns)), [f"{name}\n(n = {values.size:,})" for name, values in returns.items()])
+    return ax
+
+
+def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
+    """The way of one episode in a two-dimensional state, from a ring to where its last action led."""
+    last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
+    way = np.concatenate([episode.states, last])
+    ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
+    ax.plot(*way[0], color=color, marker="o", mfc="white", ms=5, zorder=5)
+    return ax
+
+
+def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> Axes:
+    """One quantity over the iterations of a distillation."""
+    ax.plot(np.arange(len(values)), values, color=DISTILLED)
+    ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
+    return ax
+
+
+def phase(ax: Axes, begin: int, name: str) -> Axes:
+    """Shade the iterations from `begin` on and name them."""
+    ax.axvspan(begin, ax.dataLim.x1, color="0.9", lw=0, zorder=0)
+    ax.text(begin, 1.0, f" {name}", transform=ax.get_xaxis_transform(), va="bottom", fontsize=6)
+    return ax
+
+
+def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
+    """Mean return of each run, sorted, against the teacher's."""
+    ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
+    ax.axhline(teacher, color=TEACHER, label="teacher")
+    ax.set(xlabel="run, by mean return", ylabel="mean return")
+    ax.legend(frameon=False, loc="lower right")
+    return ax
+
+
+def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER) -> Axes:
+    """How the returns (n,) of one policy spread, with their mean as a line."""
+    sns.histplot(returns, ax=ax, color=color, bins=40, edgecolor="white", linewidth=0.3)
+    ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}")
+    ax.set(xlabel="return per episode", ylabel="episodes")
+    ax.legend(frameon=False, loc="upper left")
+    return ax
+
+
+def upper_bound(ax: Axes, value: float) -> Axes:
+    """A dashed line where the mean return of every policy must stop."""
+    ax.axvline(value, color="black", lw=0.8, ls="--", label=f"bound {value:.2f}")
+    ax.legend(frameon=False, loc="upper left")
+    return ax
+
+
+def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: str = "mean return") -> Axes:
+    """Mean return of the teacher over its training steps."""
+    ax.plot(steps / 1000, means, color=TEACHER)
+    ax.set(xlabel="training steps (thousands)", ylabel=ylabel)
+    return ax
+
+
+def _extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
+    """Edges of the outer pixels of a grid whose points are pixel centres."""
+    dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
+    return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy

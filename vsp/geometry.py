@@ -1,0 +1,106 @@
+"""Distances, nearest codewords, neighbouring cells, and grids to draw them on.
+
+A metric is a name that `scipy.spatial.distance.cdist` knows; `METRICS` maps the names used here to SciPy's and to the
+order p of the kd-tree. All functions take codewords (k, d) already divided by the scale of the distance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial.distance import cdist
+
+METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
+KDTREE_FROM = 512  # codewords from which the kd-tree is faster than comparing with all of them
+WITNESSES = 4096  # points that look for touching cells
+
+
+def distances(states: np.ndarray, codewords: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+    """Distance of every state (n, d) to every codeword (k, d). (n, k)"""
+    return cdist(states, codewords, METRICS[metric][0])
+
+
+def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+    """Index of the nearest codeword (k, d) of each state (n, d); of equally near ones the lowest. (n,)
+
+    Paper, Algorithm 1 line 6: kd-tree(C, s_t). For the few dozen codewords of the paper comparing with all of them is
+    faster than a kd-tree and gives the same indices.
+    """
+    lookup = nearest_kdtree if len(codewords) >= KDTREE_FROM else nearest_brute
+    return lookup(codewords, states, metric)
+
+
+def nearest_brute(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+    """`nearest`, by comparing with every codeword."""
+    return distances(states, codewords, metric).argmin(axis=1)
+
+
+def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+    """`nearest`, by kd-tree. The tree answers ties in any order, so states between two codewords are compared again."""
+    if len(codewords) == 1:
+        return np.zeros(len(states), dtype=np.intp)
+    found, index = cKDTree(codewords).query(states, k=2, p=METRICS[metric][1])
+    index = index[:, 0]
+    tied = np.isclose(found[:, 0], found[:, 1], rtol=1e-12, atol=0)
+    if tied.any():
+        index[tied] = nearest_brute(codewords, states[tied], metric)
+    return index
+
+
+def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
+    """Which codewords share an edge of the Euclidean Delaunay triangulation. (k, k) bool, symmetric, diagonal False.
+
+    Qhull refuses points in a line or plane, so they are first projected onto the flat they span; up to r + 1 points in
+    r dimensions are all neighbours. Raises ValueError for duplicate codewords: Qhull leaves them without neighbours.
+    """
+    k = len(codewords)
+    if len(np.unique(codewords, axis=0)) < k:
+        raise ValueError(f"{k} codewords, expected all to differ: {codewords.tolist()}")
+    points = _flatten(codewords)
+    rank = points.shape[1]
+    if k <= rank + 1:
+        return ~np.eye(k, dtype=bool)
+    if rank == 1:
+        order = points[:, 0].argsort()
+        edges = np.column_stack([order[:-1], order[1:]])
+    else:
+        starts, others = Delaunay(points).vertex_neighbor_vertices
+        edges = np.column_stack([np.repeat(np.arange(k), np.diff(starts)), others])
+    return _adjacency(k, edges)
+
+
+def lookup_neighbours(
+    codewords: np.ndarray, low: np.ndarray, high: np.ndarray, metric: str = "manhattan"
+) -> np.ndarray:
+    """Which cells touch inside the box [low, high] under the look-up's metric. (k, k) bool, symmetric.
+
+    Two cells are neighbours when some point has their codewords as its two nearest (Martinetz & Schulten 1994), for
+    any metric and dimension; the points are an unscrambled Halton sequence, so the answer is always the same.
+    """
+    from scipy.stats import qmc
+
+    k = len(codewords)
+    if k <= 2:
+        return ~np.eye(k, dtype=bool)
+    points = qmc.scale(qmc.Halton(len(low), scramble=False).random(WITNESSES), low, high)
+    return _adjacency(k, np.argpartition(distances(points, codewords, metric), 1, axis=1)[:, :2])
+
+
+def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A grid over a two-dimensional box, for drawing: x (r, r), y (r, r), and the same as states (r * r, 2)."""
+    x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))
+    return x, y, np.column_stack([x.ravel(), y.ravel()])
+
+
+def _flatten(points: np.ndarray) -> np.ndarray:
+    """Coordinates of `points` (k, d) in the flat of rank r that they span. (k, r)"""
+    centred = points - points.mean(axis=0)
+    _, singular, axes = np.linalg.svd(centred, full_matrices=False)
+    rank = max(1, int((singular > 1e-9 * max(singular[0], 1e-300)).sum()))
+    return points if rank == points.shape[1] else centred @ axes[:rank].T
+
+
+def _adjacency(k: int, edges: np.ndarray) -> np.ndarray:
+    graph = np.zeros((k, k), dtype=bool)
+    graph[edges[:, 0], edges[:, 1]] = graph[edges[:, 1], edges[:, 0]] = True
+    return graph

@@ -1,0 +1,119 @@
+"""What the paper (arXiv:2511.13322) prints: its tables, the numbers in its text, and its policies as runnable ones.
+
+The values stand in `data/paper/*.csv`, as printed; each row says `where` in the paper it was read. A file is read only
+if it is byte for byte the one that was checked against the paper.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from .store import sha256
+
+if TYPE_CHECKING:
+    from .policy import VoronoiPolicy
+
+FOLDER = Path(__file__).resolve().parents[1] / "data" / "paper"
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
+
+_POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
+_CHECKSUMS = {
+    "hyperparameters.csv": "44459d7b16ee35e0037a83bda80763a927d69dfa799694395c270806b4ff9bc8",
+    "mountaincar_linear_policies.csv": "0b91c2a7f72a416596747c37bc93470d7d05a44897538e1ba5cda8f48cb2a062",
+    "simplegoal_linear_policies.csv": "03f216ab6ba16a7501b9399210566913f98876fb0cdbbf23b3138e5f3c5dd618",
+    "spread.csv": "72af94b0ea650f9683157b790f9fa0954ed26bdaded0ab6df4948b45b0a59919",
+    "tdavq_comparison.csv": "09840d27a9798a76f33680b094f6102fc53b6056eba784680a5c91e90d376fc9",
+    "text_numbers.csv": "82411e4b47d010216504cadb694427dbeb4f11df801a86665a2cbeece33b6917",
+}
+
+
+def hyperparameters(task: str) -> dict[str, int | float | bool]:
+    """The hyperparameters of `task`, by the name that the paper gives them (appendix, first table)."""
+    column = _check_task(task)
+    frame = _read("hyperparameters.csv")
+    return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
+
+
+def spread(task: str) -> pd.DataFrame:
+    """How the returns on `task` spread: one row per metric (the index), columns drl, ours, unit, where.
+
+    Coverage, the share of episodes that are no outliers, is in percent; all else is in units of return.
+    """
+    frame = _read("spread.csv", numbers=["drl", "ours"])
+    return frame[frame["task"] == _check_task(task)].drop(columns="task").set_index("metric")
+
+
+def text_numbers(task: str | None = None) -> pd.DataFrame:
+    """The numbers in running text and captions: one row per number, its id as index.
+
+    Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
+    (NaN for a version or a name), unit, printed (the paper's spelling), where. With `task`, its rows and those of both.
+    """
+    frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
+    return frame if task is None else frame[frame["task"].isin([_check_task(task), "both"])]
+
+
+def value(id: str) -> float:
+    """The number called `id` in `text_numbers()`; shares are in percent."""
+    frame = text_numbers()
+    if id not in frame.index:
+        raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
+    number = float(frame.at[id, "value"])
+    if np.isnan(number):
+        raise ValueError(f"{id!r} is the text {frame.at[id, 'printed']!r}, expected the id of a number")
+    return number
+
+
+def tdavq_comparison() -> pd.DataFrame:
+    """TD-AVQ beside the paper's method, in words: one row per aspect (the index), columns TD-AVQ, Ours, where."""
+    return _read("tdavq_comparison.csv").set_index("aspect")
+
+
+def linear_policies(task: str) -> pd.DataFrame:
+    """The best partition that the paper found for `task`: one row per cell, in the paper's order.
+
+    Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
+    such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
+    """
+    file = _POLICIES[_check_task(task)]
+    frame = _read(file)
+    numbers = [name for name in frame.columns if not name.endswith(("_printed", "colour", "where"))]
+    frame[numbers] = frame[numbers].astype(np.float64)
+    return frame
+
+
+def published_policy(task: str) -> VoronoiPolicy:
+    """The paper's best distilled policy for `task`, from its printed coefficients, ready to run."""
+    frame = linear_policies(task)
+    from .policy import VoronoiPolicy  # here, so that the tables can be read without it
+
+    inputs = [name.removeprefix("codeword_") for name in frame if name.startswith("codeword_")]
+    outputs = [name.removesuffix("_printed") for name in frame if name.endswith("_printed")]
+    codewords = frame[[f"codeword_{name}" for name in inputs]].to_numpy()  # (k, d)
+    terms = [*inputs, "bias"]
+    coefficients = np.stack([frame[[f"{output}_{term}" for term in terms]] for output in outputs], axis=-1)
+    return VoronoiPolicy(codewords=codewords, coefficients=coefficients, task=task)  # (k, d + 1, m)
+
+
+def _check_task(task: str) -> str:
+    if task not in TASKS:
+        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no other")
+    return task
+
+
+def _read(file: str, numbers: list[str] | None = None) -> pd.DataFrame:
+    """The rows of `file` as text, the columns `numbers` as float64 (NaN where empty)."""
+    path = FOLDER / file
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing: it comes with the repository, restore it from git")
+    if (found := sha256(path)) != _CHECKSUMS[file]:
+        raise ValueError(f"{path} was altered: SHA-256 {found}, expected {_CHECKSUMS[file]}; restore it from git")
+    frame = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
+    for column in numbers or []:
+        frame[column] = pd.to_numeric(frame[column]).astype(np.float64)
+    return frame

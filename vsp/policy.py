@@ -1,0 +1,143 @@
+"""`VoronoiPolicy`: codewords and linear sub-policies that act, explain themselves, and go to disk and back."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from . import geometry, store
+from .checks import check_array, check_finite
+from .envs import Task, get_task
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a policy acts as it does in one state."""
+
+    cell: int
+    codeword: np.ndarray  # (d,)
+    equations: tuple[str, ...]  # one per action, such as "F = 0.5 x - 1.2 v + 0.3"
+    contributions: pd.DataFrame  # one row per action; a column per input and the bias, which add up to `raw`
+    raw: np.ndarray  # (m,) output of the linear map
+    action: np.ndarray  # (m,) `raw` limited to the action box
+    next_cell: int | None  # the cell with the second nearest codeword; None if there is one cell
+    margin: float  # how much nearer the own codeword is than that one, in units of the look-up distance
+
+
+class VoronoiPolicy:
+    """k linear policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
+
+    `codewords` (k, d); `coefficients` (k, d + 1, m): weights, then bias; `scale` (d,): distances are taken between
+    states divided by it (None: raw states). Everything is float64. Raises ValueError for wrong shapes, numbers that
+    are not finite, or equal codewords.
+    """
+
+    def __init__(
+        self,
+        codewords: np.ndarray,
+        coefficients: np.ndarray,
+        *,
+        task: str | Task,
+        metric: str = "manhattan",
+        scale: np.ndarray | None = None,
+    ):
+        self.task = get_task(task)
+        d, m = len(self.task.low), len(self.task.action_low)
+        self.codewords = check_array("codewords", codewords, (-1, d))
+        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), d + 1, m))
+        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
+        if metric not in geometry.METRICS:
+            raise ValueError(f"metric is {metric!r}, expected one of {list(geometry.METRICS)}")
+        if not len(self.codewords) or len(np.unique(self.codewords, axis=0)) < len(self.codewords):
+            raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
+        if not (self.scale > 0).all():
+            raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers")
+        self.metric = metric
+        self._scaled = self.codewords / self.scale
+
+    def __len__(self) -> int:
+        return len(self.codewords)
+
+    def cells(self, obs: np.ndarray) -> np.ndarray:
+        """Index of the cell of each observation (n, d), or of one (d,)."""
+        states = self._states(obs)
+        found = geometry.nearest(self._scaled, np.atleast_2d(states) / self.scale, self.metric)
+        return found.reshape(states.shape[:-1])
+
+    def linear(self, obs: np.ndarray) -> np.ndarray:
+        """Output of the linear maps before it is limited to the action box: (n, m), or (m,) for one observation."""
+        states = self._states(obs)
+        maps = self.coefficients[self.cells(states)]
+        return np.einsum("...d,...dm->...m", states, maps[..., :-1, :]) + maps[..., -1, :]
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions within the task's limits, in Stable-Baselines3's convention.
+
+        `obs` is one observation (d,) or a batch (n, d); returns actions (m,) or (n, m) in float64, and None for the
+        recurrent state that this policy does not have. Raises ValueError for a wrong shape or numbers not finite.
+        """
+        return np.clip(self.linear(obs), self.task.action_low, self.task.action_high), None
+
+    def explain(self, obs: np.ndarray) -> Explanation:
+        """Cell, equation, contribution of each input and margin to the border, for one observation (d,)."""
+        state = self._states(obs)
+        if state.ndim != 1:
+            raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
+        gaps = geometry.distances((state / self.scale)[None], self._scaled, self.metric)[0]
+        order = gaps.argsort(kind="stable")
+        cell, raw = int(order[0]), self.linear(state)
+        terms = self.coefficients[cell].T * np.append(state, 1.0)
+        return Explanation(
+            cell=cell,
+            codeword=self.codewords[cell],
+            equations=self.equations(cell),
+            contributions=pd.DataFrame(terms, index=self.task.outputs, columns=[*self.task.inputs, "bias"]),
+            raw=raw,
+            action=self.predict(state)[0],
+            next_cell=int(order[1]) if len(self) > 1 else None,
+            margin=float(gaps[order[1]] - gaps[order[0]]) if len(self) > 1 else float("inf"),
+        )
+
+    def equations(self, cell: int, digits: int = 3) -> tuple[str, ...]:
+        """The linear maps of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300"."""
+        return tuple(
+            f"{output} = {expression(self.coefficients[cell, :, j], self.task.inputs, digits)}"
+            for j, output in enumerate(self.task.outputs)
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per cell: the codeword's coordinates, then the coefficients of each action, as in T3 and T4."""
+        columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
+        for j, output in enumerate(self.task.outputs):
+            for i, name in enumerate([*self.task.inputs, "bias"]):
+                columns[f"{output}_{name}"] = self.coefficients[:, i, j]
+        return pd.DataFrame(columns).rename_axis("cell")
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the policy to one sealed file, atomically."""
+        arrays = {"codewords": self.codewords, "coefficients": self.coefficients, "scale": self.scale}
+        store.save(path, arrays, {"kind": "VoronoiPolicy", "task": self.task.name, "metric": self.metric})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> VoronoiPolicy:
+        """Read a policy that `save` wrote. Raises `store.DamagedFile` if a bit is missing or altered."""
+        arrays, about = store.load(path, kind="VoronoiPolicy")
+        return cls(**arrays, task=about["task"], metric=about["metric"])
+
+    def _states(self, obs: np.ndarray) -> np.ndarray:
+        states = np.asarray(obs)
+        d = len(self.task.low)
+        if states.ndim not in (1, 2) or states.shape[-1] != d:
+            raise ValueError(f"observations have shape {states.shape}, expected ({d},) or (n, {d}) for {self.task.name}")
+        return check_finite("observations", states)
+
+
+def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int = 3) -> str:
+    """A linear expression as text: coefficients (d + 1,), the last one the bias, of the inputs `names` (d,)."""
+    terms = [f"{abs(c):.{digits}f} {name}".rstrip() for c, name in zip(coefficients, [*names, ""])]
+    signs = ["-" if c < 0 else "+" for c in coefficients]
+    text = " ".join(f"{sign} {term}" for sign, term in zip(signs, terms))
+    return text.removeprefix("+ ") if signs[0] == "+" else "-" + text[2:]

@@ -1,0 +1,87 @@
+"""Batched episodes of any policy in any task: all episodes of a batch advance together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from .checks import check_array, check_finite
+from .envs import RUNNING, TRUNCATED, Task
+
+
+class Policy(Protocol):
+    """Anything with Stable-Baselines3's `predict`: observations (n, d) to clipped actions (n, m) and no state."""
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]: ...
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One recorded episode of T steps: the states acted in and the actions taken there."""
+
+    states: np.ndarray  # (T, d) float64, as the policy observed them
+    actions: np.ndarray  # (T, m) float64
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """How n episodes ended."""
+
+    returns: np.ndarray  # (n,) undiscounted sum of rewards
+    lengths: np.ndarray  # (n,) steps
+    outcomes: np.ndarray  # (n,) codes of vsp.envs.OUTCOMES
+
+
+def play(policy: Policy, task: Task, starts: np.ndarray) -> Outcomes:
+    """Play one episode of `policy` from each start state (n, d)."""
+    result, _ = _advance(policy, task, starts, record=False)
+    return result
+
+
+def record(policy: Policy, task: Task, starts: np.ndarray) -> list[Episode]:
+    """Play one episode from each start state (n, d) and keep every state and action, in the order of `starts`."""
+    _, steps = _advance(policy, task, starts, record=True)
+    index = np.concatenate([active for active, _, _ in steps])
+    order = np.argsort(index, kind="stable")  # by episode; steps stay in time order
+    states = np.concatenate([s for _, s, _ in steps])[order]
+    actions = np.concatenate([a for _, _, a in steps])[order]
+    cuts = np.cumsum(np.bincount(index, minlength=len(starts)))[:-1]
+    return [Episode(s, a) for s, a in zip(np.split(states, cuts), np.split(actions, cuts))]
+
+
+def _advance(policy: Policy, task: Task, starts: np.ndarray, *, record: bool):
+    """The loop behind `play` and `record`; finished episodes leave the batch."""
+    states = check_array("start states", starts, (-1, len(task.low)))
+    n = len(states)
+    returns, lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
+    outcomes = np.full(n, TRUNCATED)
+    active = np.arange(n)
+    steps = []
+    for t in range(task.max_steps):
+        observations = task.observe(states)
+        actions = _act(policy, task, observations)
+        if record:
+            steps.append((active, observations.astype(np.float64), actions))
+        states, rewards, ended = task.step(states, actions)
+        returns[active] += rewards
+        done = ended != RUNNING
+        outcomes[active[done]] = ended[done]
+        lengths[active] = t + 1
+        active, states = active[~done], states[~done]
+        if not len(active):
+            break
+    return Outcomes(returns, lengths, outcomes), steps
+
+
+def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:
+    """The policy's actions (n, m) in float64. Raises ValueError unless it fits the task and they are finite."""
+    (n, d), m = observations.shape, len(task.action_low)
+    try:
+        actions = np.asarray(policy.predict(observations)[0])
+    except ValueError as error:
+        raise ValueError(f"the policy fails on the {d} inputs of {task.name}: {error}") from error
+    if actions.shape != (n, m):
+        raise ValueError(f"the policy's actions have shape {actions.shape}, expected {(n, m)} for {task.name}")
+    return check_finite("the policy's actions", actions)

@@ -1,0 +1,129 @@
+"""Tables: frames in, LaTeX (booktabs) and CSV out. The CSV holds the numbers, the LaTeX what a reader sees."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+
+from . import paper, store
+from .config import preset
+from .evaluate import outlier_numbers, spread
+from .figures import FORCE_MAP
+from .policy import VoronoiPolicy, expression
+
+PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}
+MISSING = "–"  # in print, where the paper gives no number
+
+
+def save_table(
+    frame: pd.DataFrame, name: str, *, caption: str, out: str | os.PathLike, latex: pd.DataFrame | None = None
+) -> pd.DataFrame:
+    """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
+
+    `latex` is the same table as LaTeX code, for equations; without it numbers get three decimals. The LaTeX needs the
+    packages booktabs and xcolor.
+    """
+    path = Path(out) / "figures" / "tables" / name
+    store.write_text(path.with_suffix(".csv"), frame.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+    shown = as_text(frame) if latex is None else latex
+    code = shown.map(_escape).rename(columns=_escape) if latex is None else latex
+    body = code.style.hide(axis="index").to_latex(
+        hrules=True, caption=caption, label=f"tab:{name}", position="t", position_float="centering"
+    )
+    store.write_text(path.with_suffix(".tex"), body)
+    return shown
+
+
+def hyperparameters(tasks: list[str]) -> pd.DataFrame:
+    """T2 as configured here, beside what the paper prints: one row per hyperparameter, two columns per task."""
+    names = paper.hyperparameters(tasks[0])
+    columns = {"hyperparameter": list(names)}
+    for task in tasks:
+        printed, here = paper.hyperparameters(task), preset(task)
+        columns[f"{task}, paper"] = [printed[name] for name in names]
+        columns[f"{task}, here"] = [getattr(here, name) for name in names]
+    return pd.DataFrame(columns, dtype=object)
+
+
+def readings(task: str) -> pd.DataFrame:
+    """What the paper leaves open: one row per field of the configuration that T2 does not print, with its default."""
+    here, printed = preset(task), paper.hyperparameters(task)
+    fields = {field.name: getattr(here, field.name) for field in dataclasses.fields(here) if field.name not in printed}
+    return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
+
+
+def printed_policy(policy: VoronoiPolicy, *, digits: int = 3, swatch: bool = False) -> pd.DataFrame:
+    """T3 and T4: one row per cell, the codeword and an equation per action in LaTeX.
+
+    `swatch` puts a patch in the force map's colour of the action at the codeword before the equation, for one action.
+    """
+    symbols, rows = policy.task.inputs, []
+    outputs = ["$" + output.replace("Δ", r"\Delta ") + "$" for output in policy.task.outputs]
+    for codeword, maps in zip(policy.codewords, policy.coefficients):
+        row = {"codeword": "$[" + ",\\ ".join(f"{c:.{digits}f}" for c in codeword) + "]$"}
+        for j, output in enumerate(outputs):
+            patch = _patch(policy.predict(codeword)[0][j]) if swatch else ""
+            row[output] = f"{patch}${expression(maps[:, j], symbols, digits)}$"
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
+    """T5 and T6: the paper's columns beside ours; `teacher` (n,) and `runs` (p, n) are returns. Coverage in percent."""
+    printed, columns = paper.spread(task), {}
+    for name, values in (("drl", teacher), ("ours", runs)):
+        here = spread(values) | {"median/q2": spread(values)["median"]}
+        found = [here[metric.lower()] * (100 if metric == "Coverage" else 1) for metric in printed.index]
+        label = {"drl": "TD3", "ours": "distilled"}[name]
+        columns |= {f"{label}, paper": printed[name].to_numpy(), f"{label}, here": found}
+    return pd.DataFrame({"metric": printed.index, **columns})
+
+
+def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
+    """N: the numbers of the running text beside ours; NaN where the paper gives none.
+
+    `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
+    """
+    printed, rows = paper.text_numbers(task)["value"], []
+    for subject, values in (("drl", teacher), ("ours", runs)):
+        numbers = outlier_numbers(values)
+        if subject == "ours":
+            means = runs.mean(axis=1)
+            numbers |= {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
+            numbers["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
+        rows += [(task, f"{PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
+    rows.append((task, f"{PREFIX[task]}_cells", cells))
+    rows = [(task, name, _like(printed.get(name, np.nan), value), value) for task, name, value in rows]
+    return pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
+
+
+def _like(printed: float, here: float) -> float | int:
+    """The paper's value as an integer where ours is one (a count)."""
+    return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
+
+
+def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
+    """The frame as text: floats with `digits` decimals, all else as it is."""
+    return frame.map(lambda value: _text(value, digits))
+
+
+def _text(value: object, digits: int) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    if np.isnan(value):
+        return MISSING
+    return f"{value:.{digits}f}" if abs(value) >= 0.001 or not value else f"{value:g}"
+
+
+def _escape(text: str) -> str:
+    return text.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&")
+
+
+def _patch(force: float) -> str:
+    colour = mpl.colors.to_hex(mpl.colormaps[FORCE_MAP]((force + 1) / 2)).lstrip("#").upper()
+    return rf"\textcolor[HTML]{{{colour}}}{{\rule{{1.2em}}{{1.4ex}}}} "
