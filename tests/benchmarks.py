@@ -2,6 +2,7 @@
 
 import statistics
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def test_teacher_states_per_second(task, capsys):
 def test_look_up(k, capsys):
     rng = np.random.default_rng(0)
     codewords, states = rng.uniform(size=(k, 2)), rng.uniform(size=(1000, 2))
-    for name in ("nearest_brute", "nearest_kdtree"):
-        taken = seconds(lambda: getattr(geometry, name)(codewords, states), repeats=20)
-        report(capsys, f"{name}, 1000 states, {k} codewords", 1000 * taken, "ms")
+    for look_up in (geometry.nearest_brute, geometry.nearest_kdtree):
+        taken = seconds(partial(look_up, codewords, states), repeats=20)
+        report(capsys, f"{look_up.__name__}, 1000 states, {k} codewords", 1000 * taken, "ms")
     assert (geometry.nearest_brute(codewords, states) == geometry.nearest_kdtree(codewords, states)).all()

@@ -1,9 +1,22 @@
 """vsp: distil reinforcement-learning policies to linear policies in Voronoi cells of the state space."""
 
-from . import config, envs, paper
+from . import envs, paper
 from .config import Config, preset
 from .distill import distill
 from .envs import get_task, tasks
 from .evaluate import evaluate
 from .policy import VoronoiPolicy
 from .teachers import load_teacher
+
+__all__ = [
+    "Config",
+    "VoronoiPolicy",
+    "distill",
+    "envs",
+    "evaluate",
+    "get_task",
+    "load_teacher",
+    "paper",
+    "preset",
+    "tasks",
+]

@@ -10,12 +10,14 @@ import argparse
 import hashlib
 import json
 import os
+import platform
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from threadpoolctl import threadpool_info
 
 from . import store
 from .config import Config, preset
@@ -218,9 +220,21 @@ def comparison(teacher: np.ndarray, runs: np.ndarray) -> dict[str, float]:
 
 
 def write_summary(frame: pd.DataFrame, task: str, *, out: str | os.PathLike) -> None:
-    """Write the summary of the paper's runs on `task` to OUT/data/results/, where it is committed."""
+    """Write the summary of the paper's runs on `task` to OUT/data/results/, and the CPU type that they were made on."""
+    folder = Path(out) / "data" / "results"
     text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
-    store.write_text(Path(out) / "data" / "results" / f"{task}.csv", text)
+    store.write_text(folder / f"{task}.csv", text)
+    store.write_text(folder / "made_on.txt", cpu_type() + "\n")
+
+
+def cpu_type() -> str:
+    """What decides how sums are rounded here: system, processor family, and the instructions NumPy and BLAS use.
+
+    On one type the same command gives the same bytes; on another, runs may part ways.
+    """
+    blas = sorted({f"{lib['internal_api']} {lib.get('architecture')}" for lib in threadpool_info()})
+    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
+    return " · ".join([platform.system(), platform.machine(), *blas, *simd])
 
 
 _SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}

@@ -94,9 +94,7 @@ def letter(axes: np.ndarray, titles: list[str]) -> None:
         ax.set_title(f"({mark}) {title}", loc="left")
 
 
-def cells(
-    ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6
-) -> Axes:
+def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6) -> Axes:
     """Borders of Voronoi cells, `width` points wide, from the cell of each grid point; `fill` colours the cells."""
     index = index.reshape(x.shape)
     if fill:
@@ -154,9 +152,7 @@ def force_bar(fig: Figure, image, axes: np.ndarray) -> None:
 
 def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str):
     """A non-negative quantity over a two-dimensional state, dark where it is large, with its own colour bar."""
-    image = ax.imshow(
-        error.reshape(x.shape), origin="lower", extent=_extent(x, y), aspect="auto", cmap="Greys", vmin=0
-    )
+    image = ax.imshow(error.reshape(x.shape), origin="lower", extent=_extent(x, y), aspect="auto", cmap="Greys", vmin=0)
     ax.figure.colorbar(image, ax=ax, label=label)
     return image
 

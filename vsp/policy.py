@@ -131,7 +131,9 @@ class VoronoiPolicy:
         states = np.asarray(obs)
         d = len(self.task.low)
         if states.ndim not in (1, 2) or states.shape[-1] != d:
-            raise ValueError(f"observations have shape {states.shape}, expected ({d},) or (n, {d}) for {self.task.name}")
+            raise ValueError(
+                f"observations have shape {states.shape}, expected ({d},) or (n, {d}) for {self.task.name}"
+            )
         return check_finite("observations", states)
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-
 ROOT = Path(__file__).resolve().parents[1]  # the checkout: data/ lies beside vsp/
 
 
@@ -82,7 +81,9 @@ def load(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.ndarray], 
     seal, payload = content[:64], content[65:]
     found = hashlib.sha256(payload).hexdigest()
     if content[64:65] != b"\n" or seal != found.encode():
-        raise DamagedFile(f"{path}: SHA-256 is {found}, expected {seal.decode(errors='replace')}: delete it and remake it")
+        raise DamagedFile(
+            f"{path}: SHA-256 is {found}, expected {seal.decode(errors='replace')}: delete it and remake it"
+        )
     header = json.loads(payload[8 : 8 + int.from_bytes(payload[:8], "little")])
     about = json.loads(header["__metadata__"]["about"])
     if about.get("kind") != kind:

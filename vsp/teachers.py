@@ -79,7 +79,9 @@ class Teacher:
         self.task, self.card = get_task(task), card or {}
         indices = sorted(int(name.split(".")[1]) for name in weights if name.startswith("mu.") and "weight" in name)
         if not indices:
-            raise ValueError(f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}")
+            raise ValueError(
+                f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
+            )
         self.layers = [(weights[f"mu.{i}.weight"].T.copy(), weights[f"mu.{i}.bias"]) for i in indices]
         inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
         d, m = len(self.task.low), len(self.task.action_low)
@@ -137,7 +139,9 @@ def _read_zip(path: Path) -> dict[str, np.ndarray]:
             about = json.loads(archive.read("data"))
             tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True, map_location="cpu")
     except (zipfile.BadZipFile, KeyError, ValueError, RuntimeError, pickle.UnpicklingError) as error:
-        raise store.DamagedFile(f"{path}: not a zip of a Stable-Baselines3 agent with tensors alone: {error}") from error
+        raise store.DamagedFile(
+            f"{path}: not a zip of a Stable-Baselines3 agent with tensors alone: {error}"
+        ) from error
     activation = about.get("policy_kwargs", {}).get("activation_fn", "ReLU")
     if "ReLU" not in str(activation):
         raise ValueError(f"{path}: the agent's activation is {activation}, expected ReLU")

@@ -1,0 +1,66 @@
+"""The sources of the notebooks: prose first, short cells, no output; and what they import."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+
+@pytest.fixture(params=NOTEBOOKS, ids=lambda path: path.stem)
+def notebook(request):
+    return nbformat.read(request.param, as_version=4)
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def test_there_are_notebooks():
+    assert [path.stem[:2] for path in NOTEBOOKS] == [f"{n:02d}" for n in range(1, len(NOTEBOOKS) + 1)]
+
+
+def test_sources_hold_no_output(notebook):
+    assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(notebook))
+
+
+def test_cells_are_short_and_define_no_helpers(notebook):
+    for cell in code_cells(notebook):
+        assert len(cell.source.splitlines()) < 15, cell.id
+        tree = ast.parse(cell.source)
+        assert not any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(tree)), cell.id
+
+
+def test_more_words_than_code(notebook):
+    words = sum(len(cell.source.split()) for cell in notebook.cells if cell.cell_type == "markdown")
+    code = sum(len(cell.source.split()) for cell in code_cells(notebook))
+    assert words > code
+
+
+def test_every_saved_figure_has_alternative_text(notebook):
+    for cell in code_cells(notebook):
+        for call in (node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)):
+            if isinstance(call.func, ast.Attribute) and call.func.attr == "save_figure":
+                assert {"alt", "out", "quick"} <= {keyword.arg for keyword in call.keywords}, cell.id
+
+
+def test_first_code_cell_holds_the_parameters(notebook):
+    first = code_cells(notebook)[0]
+    assert first.metadata["tags"] == ["parameters"]
+    assert {node.targets[0].id for node in ast.parse(first.source).body} == {"out", "runs", "quick"}
+
+
+def test_notebooks_import_no_training_library(notebook):
+    for cell in code_cells(notebook):
+        assert "import torch" not in cell.source and "stable_baselines3" not in cell.source, cell.id
+
+
+def test_drawing_loads_no_training_library():
+    code = "import vsp, vsp.experiments, vsp.figures, vsp.tables, sys; vsp.load_teacher(vsp.tasks()[0]); "
+    code += "sys.exit(bool({'torch', 'stable_baselines3'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
