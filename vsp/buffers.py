@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Buffers:
-    """Growing per-cell buffers with uniform minibatches. Rows live until `clear`, so memory is bounded by its period."""
+    """Growing per-cell buffers with uniform minibatches. Rows live until `clear`, whose period bounds the memory."""
 
     def __init__(self, d: int, m: int):
         self._inputs = np.ones((1024, d + 1))  # states, then a column of ones for the bias
@@ -52,6 +52,6 @@ class Buffers:
         self.counts[cells] = 0
 
     def clear(self) -> None:
-        """Empty all buffers and release the log."""
+        """Empty all buffers and use the log from its start again."""
         self.counts[:] = 0
         self._size = 0

@@ -45,7 +45,7 @@ class Config:
     # Readings
     freeze: Literal["last_n_freeze", "first_n_freeze", "last_n_split"] = "last_n_freeze"
     """R1. When the partition stands still: the last `n_freeze` iterations, as the prose says twice; all but the first
-    `n_freeze`, as Algorithm 1 prints ("first_n_freeze" is the phase that may alter); or the last `n_split`, said once."""
+    `n_freeze`, as Algorithm 1 prints (n < n_freeze may alter it); or the last `n_split`, as the prose says once."""
     split_lookup: Literal["refreshed", "kept"] = "refreshed"
     """R2. Whether a state is looked up among the codewords added earlier in the same pass, as Algorithm 2 line 4 reads
     where it stands in the loop, or among those the pass began with."""
@@ -103,7 +103,8 @@ class Config:
 
     def quick(self) -> Config:
         """The same method in a tenth of the iterations: for a first look, not for results."""
-        return dataclasses.replace(self, n_epochs=self.n_epochs // 10, n_freeze=self.n_freeze // 10)
+        tenth = {name: max(1, getattr(self, name) // 10) for name in ("n_epochs", "n_freeze")}
+        return dataclasses.replace(self, **tenth)
 
 
 def _check(name: str, value: object, kind: object) -> None:

@@ -56,7 +56,7 @@ def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[Vo
             if due(n, config.n_merge, config):  # l. 20-22
                 history.add_events(n, "merge", merge_regions(partition, config))
         if config.periodic_reset == "buffers" and due(n, config.n_reset, config):
-            partition.buffers.clear()
+            partition.clear()
         history.observe(n, loss, partition)
     return partition.policy(), history
 
@@ -102,6 +102,8 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
         near[members] = partition.neighbours(members)[np.flatnonzero(members) == i][0]  # l. 2
         apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
         similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
+        if not alive[i]:
+            similar[:i] = False  # those before it had their turn: two equal cells must not remove each other
         if similar.any():
             alive &= ~similar  # l. 5-6
             if config.merge_reset == "survivor_and_neighbours":
@@ -155,6 +157,12 @@ class Partition:
         if self.config.adam_on_reset == "restart":
             self.models.restart_adam(cells)
 
+    def clear(self) -> None:
+        """Empty all buffers and use their memory again."""
+        self.buffers.clear()
+        if self.config.adam_on_reset == "restart":
+            self.models.restart_adam(np.arange(len(self.codewords)))
+
     def locate(self, state: np.ndarray) -> int:
         """Cell of one state (d,)."""
         return self.snapshot()(state)
@@ -196,7 +204,7 @@ class Partition:
     def policy(self) -> VoronoiPolicy:
         """The partition as a policy of its own."""
         scale = None if self.config.scale == "raw" else self.scale
-        return VoronoiPolicy(self.codewords, self.models.parameters.copy(), task=self.task, scale=scale)
+        return VoronoiPolicy(self.codewords, self.models.parameters, task=self.task, scale=scale)
 
 
 def may_alter(n: int, config: Config) -> bool:

@@ -15,6 +15,8 @@ from functools import partial
 import gymnasium
 import numpy as np
 
+from .checks import check_array
+
 RUNNING, GOAL, PIT, TRUNCATED = range(4)
 OUTCOMES = ("running", "goal", "pit", "truncated")
 
@@ -97,7 +99,7 @@ class SimpleGoalEnv(gymnasium.Env):
         return self.state.astype(np.float32), {}
 
     def step(self, action: np.ndarray):
-        action = np.asarray(action, dtype=np.float64)
+        action = check_array("action", action, (2,))
         (self.state,), (reward,), (outcome,) = self._step(self.state[None], action[None])
         info = {"outcome": OUTCOMES[outcome]}
         return self.state.astype(np.float32), float(reward), bool(outcome != RUNNING), False, info

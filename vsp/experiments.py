@@ -32,7 +32,19 @@ N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section
 N_EPISODES = 1000
 EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states to report on, and to choose the best run on
 QUICK_RUNS, QUICK_EPISODES = 4, 100
-_CODE = ("buffers", "checks", "distill", "envs", "evaluate", "geometry", "history", "policy", "rollouts", "subpolicies")
+_CODE = (
+    "buffers",
+    "checks",
+    "distill",
+    "envs",
+    "evaluate",
+    "geometry",
+    "history",
+    "policy",
+    "rollouts",
+    "subpolicies",
+    "teachers",
+)
 
 
 @dataclass(frozen=True)
@@ -93,13 +105,14 @@ def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
 
 def paper_runs(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = 1) -> list[Run]:
     """All runs of the paper's experiment on `task`, in the order of their seeds; those that are missing are made."""
-    n = QUICK_RUNS if quick else N_RUNS[task]
-    return make_runs(paper_experiment(task, quick=quick), range(n), runs=runs, jobs=jobs)
+    experiment = paper_experiment(task, quick=quick)
+    n = QUICK_RUNS if quick else N_RUNS[experiment.task]
+    return make_runs(experiment, range(n), runs=runs, jobs=jobs)
 
 
 def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int = 1) -> list[Run]:
     """Distil once per seed with `jobs` workers, skip what is there, and return the runs in the order of `seeds`."""
-    folder = experiment.folder(runs)
+    folder, seeds = experiment.folder(runs), list(seeds)
     missing = [seed for seed in seeds if not _run_path(folder, seed).exists()]
     if missing:
         from joblib import Parallel, delayed, parallel_config
@@ -109,7 +122,7 @@ def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: i
             work = Parallel(n_jobs=jobs, return_as="generator_unordered")(
                 delayed(make_run)(experiment, seed, folder) for seed in missing
             )
-            done = len(list(seeds)) - len(missing)
+            done = len(seeds) - len(missing)
             calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
             bar = tqdm(work, experiment.task, initial=done, total=done + len(missing), unit="run", mininterval=calm)
             for _ in bar:
@@ -152,6 +165,8 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
                 f"{path}: made with {name} = {about['settings'].get(name)}, expected {expected}: "
                 "delete it, and `make runs` makes it again"
             )
+    if Path(path).name != _run_path("", about["seed"]).name:
+        raise ValueError(f"{path}: holds the run of seed {about['seed']}, expected that of its name: delete it")
     return Run(
         seed=about["seed"],
         policy=VoronoiPolicy(a["codewords"], a["coefficients"], scale=a["scale"], task=experiment.task),
@@ -166,7 +181,7 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
 def load_runs(experiment: Experiment, *, runs: str | os.PathLike) -> list[Run]:
     """All runs that are there, by seed. Raises FileNotFoundError if there are none."""
     folder = experiment.folder(runs)
-    paths = sorted(folder.glob("*.run"))
+    paths = sorted(folder.glob("[0-9]*.run"))
     if not paths:
         raise FileNotFoundError(f"{folder}: no runs, expected one or more: `make runs` makes them")
     return [load_run(path, experiment) for path in paths]

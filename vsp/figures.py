@@ -81,7 +81,9 @@ def save_figure(fig: Figure, name: str, *, alt: str, out: str | os.PathLike, qui
         fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
     path = Path(out) / "figures" / name
     with store.atomic_path(path.with_suffix(".pdf")) as temporary:
-        fig.savefig(temporary, metadata={"Title": name, "Subject": alt, "CreationDate": None, "Producer": None})
+        fig.savefig(
+            temporary, metadata={"Title": name, "Subject": alt, "CreationDate": None, "Creator": None, "Producer": None}
+        )
     with store.atomic_path(path.with_suffix(".png")) as temporary:
         fig.savefig(temporary, metadata={"Title": name, "Description": alt, "Software": None})
     plt.close(fig)
@@ -158,7 +160,7 @@ def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, labe
 
 
 def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> Axes:
-    """Box plots of the teacher's and the distilled policies' returns, in this order; outliers hidden as in the paper."""
+    """Box plots of the returns of the teacher and of the distilled policies, in this order; outliers are hidden."""
     colours = dict(zip(returns, (TEACHER, DISTILLED)))
     sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=False, linewidth=0.8)
     ax.set(ylabel="return per episode")

@@ -41,7 +41,7 @@ class History:
         """Note how iteration n left the partition."""
         self.cells.append(len(partition.codewords))
         self.losses.append(loss)
-        changed = n == 0 or self.cells[-2] != self.cells[-1]
+        changed = n and not np.array_equal(partition.codewords, self._snapshots[-1][1].codewords)
         if changed or n % SNAPSHOT_EVERY == 0:
             self._snapshots.append((n, partition.policy()))
 

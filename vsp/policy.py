@@ -46,8 +46,8 @@ class VoronoiPolicy:
     ):
         self.task = get_task(task)
         d, m = len(self.task.low), len(self.task.action_low)
-        self.codewords = check_array("codewords", codewords, (-1, d))
-        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), d + 1, m))
+        self.codewords = check_array("codewords", codewords, (-1, d)).copy()
+        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), d + 1, m)).copy()
         self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
         if metric not in geometry.METRICS:
             raise ValueError(f"metric is {metric!r}, expected one of {list(geometry.METRICS)}")

@@ -54,22 +54,23 @@ def run(
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
-    staging = out / "build" / "staging" / notebook.stem
+    work = out / "build" / "running" / notebook.stem
+    staging = work / "out"
     values = {**(parameters or {}), "out": str(staging)}
     if "runs" in declared:
         values.setdefault("runs", str(out / "data" / "runs"))
     _check_parameters(notebook, declared, values)
     with _alone(out / "build" / "lock"):
-        shutil.rmtree(staging, ignore_errors=True)  # of a run that was killed
+        shutil.rmtree(work, ignore_errors=True)  # of a run that was killed
         staging.mkdir(parents=True)
         try:
-            cells = _execute(notebook, staging.with_suffix(".ipynb"), values, timeout)
+            cells = _execute(notebook, work / notebook.name, values, timeout)
             _check_outputs(notebook, cells, out)
             _write_copy(source, cells, staging / "figures" / "executed" / notebook.name)
             _check_files(notebook, staging, expect)
             return _publish(staging, out)
         finally:
-            shutil.rmtree(staging, ignore_errors=True)
+            shutil.rmtree(work, ignore_errors=True)
 
 
 def _read(notebook: Path) -> tuple[nbformat.NotebookNode, dict[str, object]]:
@@ -95,7 +96,9 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
             raise NotebookError(f"{notebook.name}: unknown parameter {name!r}, expected one of {sorted(declared)}")
         if type(value) is not type(declared[name]):
             kind = type(declared[name]).__name__
-            raise NotebookError(f"{notebook.name}: parameter {name} is {value!r}, expected {kind} as {declared[name]!r}")
+            raise NotebookError(
+                f"{notebook.name}: parameter {name} is {value!r}, expected {kind} as {declared[name]!r}"
+            )
 
 
 @contextlib.contextmanager
@@ -116,12 +119,12 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
     for name in ("MPLBACKEND", "JUPYTER_PATH"):  # pictures go into the notebook; the kernel is this Python
         os.environ.pop(name, None)
     os.environ["JUPYTER_PREFER_ENV_PATH"] = "1"
-    os.environ["IPYTHONDIR"] = str(copy_path.parents[1] / "ipython")  # nobody's start-up files
+    os.environ["IPYTHONDIR"] = str(copy_path.parent / "ipython")  # nobody's start-up files
+    os.environ["SDL_VIDEODRIVER"] = "dummy"  # no search for a screen, nor words about it on standard error
     os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # no note of the debugger's on standard error
     import papermill
 
     stopped = None
-    copy_path.unlink(missing_ok=True)
     try:
         papermill.execute_notebook(
             notebook,
@@ -139,7 +142,6 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
     executed = nbformat.read(copy_path, as_version=4).cells if copy_path.exists() else []
     cells = [c for c in executed if c.cell_type == "code" and "injected-parameters" not in c.metadata.get("tags", [])]
     _check_cells(notebook, cells, stopped)
-    copy_path.unlink()
     return cells
 
 

@@ -29,7 +29,8 @@ def save_table(
     packages booktabs and xcolor.
     """
     path = Path(out) / "figures" / "tables" / name
-    store.write_text(path.with_suffix(".csv"), frame.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+    rounded = frame.map(lambda value: float(f"{value:.6g}") if isinstance(value, float) else value)
+    store.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
     shown = as_text(frame) if latex is None else latex
     code = shown.map(_escape).rename(columns=_escape) if latex is None else latex
     body = code.style.hide(axis="index").to_latex(

@@ -12,7 +12,9 @@ import io
 import json
 import os
 import pickle
+import re
 import zipfile
+import zlib
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from . import store
+from .checks import check_finite
 from .envs import GOAL, PIT, Task, get_task, tasks
 from .evaluate import outcomes
 
@@ -77,12 +80,14 @@ class Teacher:
 
     def __init__(self, weights: dict[str, np.ndarray], task: str | Task, *, card: dict | None = None):
         self.task, self.card = get_task(task), card or {}
-        indices = sorted(int(name.split(".")[1]) for name in weights if name.startswith("mu.") and "weight" in name)
+        indices = sorted(int(found[1]) for name in weights if (found := re.fullmatch(r"mu\.(\d+)\.weight", name)))
         if not indices:
             raise ValueError(
                 f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
             )
-        self.layers = [(weights[f"mu.{i}.weight"].T.copy(), weights[f"mu.{i}.bias"]) for i in indices]
+        self.layers = [
+            (_tensor(weights, f"mu.{i}.weight", 2).T.copy(), _tensor(weights, f"mu.{i}.bias", 1)) for i in indices
+        ]
         inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
         d, m = len(self.task.low), len(self.task.action_low)
         if (inputs, outputs) != (d, m):
@@ -100,11 +105,22 @@ class Teacher:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) or (m,) in float32 for observations (n, d) or (d,)."""
-        hidden = np.asarray(obs, dtype=np.float32)
+        hidden = check_finite("observations", obs).astype(np.float32)
+        d = len(self.task.low)
+        if hidden.ndim not in (1, 2) or hidden.shape[-1] != d:
+            raise ValueError(
+                f"observations have shape {hidden.shape}, expected ({d},) or (n, {d}) for {self.task.name}"
+            )
         for weight, bias in self.layers[:-1]:
             hidden = np.maximum(hidden @ weight + bias, 0.0)
         weight, bias = self.layers[-1]
         return self._centre + self._half * np.tanh(hidden @ weight + bias), None
+
+
+def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
+    if name not in weights or weights[name].ndim != ndim:
+        raise ValueError(f"expected a tensor {name} of {ndim} dimensions among {sorted(weights)[:6]}")
+    return check_finite(name, weights[name]).astype(np.float32)
 
 
 def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
@@ -121,11 +137,16 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
         return Teacher(_read_zip(path), task)
     if path.suffix != ".safetensors":
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
+    from safetensors import SafetensorError
     from safetensors.numpy import load
 
     content, card = store.read_carded(path)
-    actor = {name.removeprefix("actor."): array for name, array in load(content).items() if name.startswith("actor.")}
-    return Teacher(actor, task or card["task"], card=card)
+    try:
+        tensors = load(content)
+    except SafetensorError as error:
+        raise store.DamagedFile(f"{path}: not a safetensors file: {error}") from error
+    actor = {name.removeprefix("actor."): array for name, array in tensors.items() if name.startswith("actor.")}
+    return Teacher(actor, task or card.get("task"), card=card)
 
 
 def _read_zip(path: Path) -> dict[str, np.ndarray]:
@@ -138,15 +159,21 @@ def _read_zip(path: Path) -> dict[str, np.ndarray]:
         with zipfile.ZipFile(path) as archive:
             about = json.loads(archive.read("data"))
             tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True, map_location="cpu")
-    except (zipfile.BadZipFile, KeyError, ValueError, RuntimeError, pickle.UnpicklingError) as error:
-        raise store.DamagedFile(
-            f"{path}: not a zip of a Stable-Baselines3 agent with tensors alone: {error}"
-        ) from error
-    activation = about.get("policy_kwargs", {}).get("activation_fn", "ReLU")
+        activation = about.get("policy_kwargs", {}).get("activation_fn", "ReLU")
+        actor = {name.removeprefix("actor."): t.numpy() for name, t in tensors.items() if name.startswith("actor.")}
+    except _NO_AGENT as error:
+        reason = f"not a zip of a Stable-Baselines3 agent with tensors alone: {error!r:.300}"
+        raise store.DamagedFile(f"{path}: {reason}") from error
     if "ReLU" not in str(activation):
         raise ValueError(f"{path}: the agent's activation is {activation}, expected ReLU")
-    actor = {name.removeprefix("actor."): t.numpy() for name, t in tensors.items() if name.startswith("actor.")}
     return actor
+
+
+# What reading a zip that holds something else ends in
+_NO_AGENT = (
+    zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError, KeyError, ValueError, RuntimeError, AttributeError,
+    TypeError, pickle.UnpicklingError,
+)  # fmt: skip
 
 
 # Training

@@ -1,0 +1,112 @@
+"""What several test files share: teachers that need no file, a short configuration, small partitions."""
+
+import dataclasses
+import hashlib
+
+import numpy as np
+
+from vsp.config import Config
+from vsp.distill import Partition
+from vsp.envs import get_task
+from vsp.rollouts import Episode
+from vsp.teachers import Teacher
+
+SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
+TASKS = (SIMPLEGOAL, MOUNTAINCAR)
+
+TINY = Config(
+    n_epochs=120,
+    n_split=4,
+    n_merge=10,
+    n_freeze=30,
+    n_reset=25,
+    min_param_distance=0.6,
+    min_pol_distance=0.2,
+    max_pol_loss=0.02,
+    batch_size=8,
+    learning_rate=0.01,
+)
+
+
+def softsign(x):
+    """Like tanh, but of additions and divisions alone: the same number on every machine and in every batch."""
+    return x / (1 + np.abs(x))
+
+
+class CurvedTeacher:
+    """Goes to the goal of SimpleGoal along a curve; row by row, so the batch has no say in the numbers."""
+
+    digest = hashlib.sha256(b"curved").hexdigest()
+
+    def predict(self, obs):
+        x, y = np.asarray(obs, dtype=np.float64).T
+        return np.stack([softsign(3 * y * y - 4 * x), softsign(x * y - 5 * y + 2 * y * x * x)], axis=-1), None
+
+
+class PumpingTeacher:
+    """Pushes MountainCar the way it moves."""
+
+    digest = hashlib.sha256(b"pumping").hexdigest()
+
+    def predict(self, obs):
+        return softsign(60 * np.asarray(obs, dtype=np.float64)[..., 1:]), None
+
+
+class RandomPolicy:
+    """Uniform actions, also beyond the limits; `gain` pushes along the last state variable on top."""
+
+    def __init__(self, m, *, seed=0, bound=1.5, gain=0.0):
+        self.m, self.bound, self.gain = m, bound, gain
+        self.rng = np.random.default_rng(seed)
+
+    def predict(self, obs):
+        noise = self.rng.uniform(-self.bound, self.bound, size=(len(obs), self.m))
+        return (noise + self.gain * np.sign(obs[:, -1:])).astype(np.float32), None
+
+
+class Constant:
+    """The same action everywhere."""
+
+    def __init__(self, *action):
+        self.action = np.array(action)
+
+    def predict(self, obs):
+        return np.tile(self.action, (len(obs), 1)), None
+
+
+def network_teacher(task, *, seed=0, width=(40, 30)):
+    """A `Teacher` with random weights."""
+    rng, task = np.random.default_rng(seed), get_task(task)
+    sizes, weights = [len(task.low), *width, len(task.action_low)], {}
+    for i, (rows, columns) in enumerate(zip(sizes, sizes[1:])):
+        weights[f"mu.{2 * i}.weight"] = rng.normal(size=(columns, rows)).astype(np.float32) / np.float32(rows**0.5)
+        weights[f"mu.{2 * i}.bias"] = rng.normal(size=columns).astype(np.float32)
+    return Teacher(weights, task)
+
+
+def tiny(**changes):
+    return dataclasses.replace(TINY, **changes)
+
+
+def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL, filled=True):
+    """A partition with these codewords; each cell's map has zero weights, its bias for every action, and one sample."""
+    partition = Partition(get_task(task), config)
+    for codeword in np.asarray(codewords, dtype=np.float64):
+        partition.add(codeword, np.random.default_rng(0))
+    partition.models.parameters[:] = 0.0
+    if biases is not None:
+        partition.models.parameters[:, -1, :] = np.asarray(biases, dtype=np.float64)[:, None]
+    if filled:
+        m = len(partition.task.action_low)
+        partition.observe(Episode(partition.codewords.copy(), np.zeros((len(codewords), m))))
+    return partition
+
+
+def walk(states, actions):
+    """An episode with the same number for every action of a state."""
+    states = np.asarray(states, dtype=np.float64)
+    return Episode(states, np.repeat(np.asarray(actions, dtype=np.float64)[:, None], 2, axis=1))
+
+
+def same_arrays(*pairs):
+    return all(a.dtype == b.dtype and np.array_equal(a, b) for a, b in pairs)

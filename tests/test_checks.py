@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from vsp.checks import check_array, check_finite
+
+
+@pytest.mark.parametrize("values", [[1, 2], np.float32([1, 2]), np.uint8([1, 2]), np.array([1.0, 2.0])])
+def test_numbers_become_float64(values):
+    checked = check_finite("weights", values)
+    assert checked.dtype == np.float64 and checked.tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([[1, 2], [3, np.nan]], r"weights hold nan at index \(1, 1\), expected finite numbers"),
+        ([np.inf], r"weights hold inf at index \(0,\)"),
+        (-np.inf, r"weights hold -inf at index \(\)"),
+        (["a"], "weights have type <U1, expected numbers"),
+        ([None, 1], "weights have type object"),
+        ([1j], "weights have type complex128"),
+        ([True], "weights have type bool"),
+        (np.array(["2020-01-01"], dtype="M8[D]"), "weights have type datetime64"),
+    ],
+)
+def test_the_first_offender_is_shown(values, message):
+    with pytest.raises(ValueError, match=message):
+        check_finite("weights", values)
+
+
+@pytest.mark.parametrize(
+    ("shape", "wanted", "shown"),
+    [
+        ((3,), (2,), r"\(2,\)"),
+        ((2, 3), (-1, 2), r"\(n, 2\)"),
+        ((2,), (-1, 2), r"\(n, 2\)"),
+        ((1, 2, 2), (-1, 2), r"\(n, 2\)"),
+    ],
+)
+def test_a_wrong_shape_shows_both(shape, wanted, shown):
+    got = str(shape).replace("(", r"\(").replace(")", r"\)")
+    with pytest.raises(ValueError, match=f"weights have shape {got}, expected {shown}"):
+        check_array("weights", np.zeros(shape), wanted)
+
+
+def test_a_right_shape_passes():
+    assert check_array("weights", np.zeros((7, 2)), (-1, 2)).shape == (7, 2)
+    assert check_array("weights", np.zeros((0, 2)), (-1, 2)).shape == (0, 2)

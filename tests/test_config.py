@@ -1,0 +1,111 @@
+import dataclasses
+
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TINY, tiny
+
+from vsp import paper
+from vsp.config import Config, preset
+
+INTEGERS = ("n_epochs", "n_split", "n_merge", "n_freeze", "n_reset", "batch_size", "n_minibatches")
+NUMBERS = ("min_param_distance", "min_pol_distance", "max_pol_loss", "learning_rate")
+WORDS = (
+    "freeze", "split_lookup", "split_metric", "periodic_reset", "merge_reset", "initial", "adam_on_reset", "scale",
+    "neighbours", "split_loss", "merge_parameters", "split_reset", "split_neighbours", "loss_after_split",
+)  # fmt: skip
+FLAGS = ("one_split", "merge_visits_removed", "inclusive")
+
+
+def test_the_lists_above_name_every_field():
+    assert sorted(INTEGERS + NUMBERS + WORDS + FLAGS) == sorted(f.name for f in dataclasses.fields(Config))
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_preset_is_the_papers_table(task):
+    printed = paper.hyperparameters(task)
+    assert {name: getattr(preset(task), name) for name in printed} == printed
+
+
+def test_presets_by_hand():
+    goal, car = preset(SIMPLEGOAL), preset(MOUNTAINCAR)
+    assert (goal.n_epochs, goal.n_split, goal.n_freeze, goal.max_pol_loss) == (5000, 20, 1000, 1e-4)
+    assert (car.n_epochs, car.n_split, car.n_freeze, car.min_pol_distance) == (2000, 50, 400, 0.04)
+
+
+@pytest.mark.parametrize("name", INTEGERS)
+@pytest.mark.parametrize("value", [0, -1, 1.5, 2.0, "3", None, True])
+def test_a_bad_integer_is_shown(name, value):
+    with pytest.raises(ValueError, match=f"{name} is {value!r}, expected a positive integer"):
+        tiny(**{name: value})
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("value", [0, -1e-9, float("nan"), float("inf"), "0.1", None, False])
+def test_a_bad_number_is_shown(name, value):
+    with pytest.raises(ValueError, match=f"{name} is {value!r}, expected a positive number"):
+        tiny(**{name: value})
+
+
+@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize("value", ["typo", "", None, True])
+def test_a_bad_word_is_shown_with_the_choices(name, value):
+    with pytest.raises(ValueError, match=rf"{name} is {value!r}, expected one of \['{getattr(TINY, name)}"):
+        tiny(**{name: value})
+
+
+@pytest.mark.parametrize("name", FLAGS)
+@pytest.mark.parametrize("value", [0, 1, "yes", None])
+def test_a_bad_flag_is_shown(name, value):
+    with pytest.raises(ValueError, match=f"{name} is {value!r}, expected True or False"):
+        tiny(**{name: value})
+
+
+def test_a_freeze_longer_than_the_run_is_refused():
+    with pytest.raises(ValueError, match="n_freeze is 121, expected at most n_epochs = 120"):
+        tiny(n_freeze=121)
+    assert tiny(n_freeze=120).n_freeze == 120
+
+
+def test_an_unknown_task_and_an_unknown_field():
+    with pytest.raises(ValueError, match="unknown task 'Pendulum-v1', expected one of"):
+        preset("Pendulum-v1")
+    with pytest.raises(TypeError, match="n_spilt"):
+        tiny(n_spilt=3)
+
+
+def test_a_config_never_changes():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        TINY.n_epochs = 1
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_quick_is_a_tenth_and_nothing_else(task):
+    quick = preset(task).quick()
+    assert (quick.n_epochs, quick.n_freeze) == (preset(task).n_epochs // 10, preset(task).n_freeze // 10)
+    changed = dataclasses.replace(quick, n_epochs=preset(task).n_epochs, n_freeze=preset(task).n_freeze)
+    assert changed == preset(task)
+
+
+@pytest.mark.parametrize(("n_epochs", "n_freeze"), [(5, 1), (100, 5), (9, 9)])
+def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
+    quick = tiny(n_epochs=n_epochs, n_freeze=n_freeze).quick()
+    assert 0 < quick.n_freeze <= quick.n_epochs <= n_epochs
+
+
+def test_every_field_says_what_it_is():
+    import ast
+    import inspect
+
+    body = ast.parse(inspect.getsource(Config)).body[0].body
+    documented = {
+        field.target.id
+        for field, text in zip(body, body[1:])
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+    }
+    assert documented == {f.name for f in dataclasses.fields(Config)}
+
+
+@pytest.mark.parametrize("reading", [n for n in range(1, 16) if n != 11])
+def test_every_open_question_is_a_field(reading):
+    import inspect
+
+    assert f"R{reading}." in inspect.getsource(Config) or f"R{reading}:" in inspect.getsource(Config)

@@ -1,0 +1,271 @@
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, RandomPolicy
+
+import vsp
+from vsp.envs import (
+    GOAL,
+    OUTCOMES,
+    PIT,
+    RUNNING,
+    TRUNCATED,
+    SimpleGoalEnv,
+    Task,
+    get_task,
+    mountaincar_step,
+    simplegoal_start,
+    simplegoal_step,
+    tasks,
+)
+from vsp.rollouts import play, record
+
+
+def step(state, action, **options):
+    (moved,), (reward,), (outcome,) = simplegoal_step(np.array([state]), np.array([action]), **options)
+    return moved.tolist(), reward, outcome
+
+
+# SimpleGoal by hand
+
+
+def test_a_step_moves_by_a_tenth_and_pays_ten_times_the_distance_gained():
+    moved, reward, outcome = step([0.3, 0.4], [0, 0.5])
+    assert moved == pytest.approx([0.3, 0.45]) and outcome == RUNNING
+    assert reward == pytest.approx(10 * (0.5 - np.hypot(0.3, 0.45)))
+    assert step([0.8, 0.0], [-1, 0])[1] == pytest.approx(1.0) and step([0.8, 0.0], [1, 0])[1] == pytest.approx(-1.0)
+
+
+def test_actions_are_limited_to_one_and_states_to_the_square():
+    assert step([0.5, 0.9], [-7, 3])[0] == pytest.approx([0.4, 1.0])
+    assert step([0.05, 0.7], [-1, 0])[0] == pytest.approx([0.0, 0.7])
+
+
+@pytest.mark.parametrize(
+    ("state", "action", "outcome", "bonus"),
+    [([0.15, 0.05], [-1, 0], GOAL, 10), ([0.3, 0.5], [1.0, 0], RUNNING, 0), ([0.35, 0.5], [1, 0], PIT, -10)],
+)
+def test_goal_reward_replaces_progress_or_comes_on_top(state, action, outcome, bonus):
+    moved, replaced, found = step(state, action)
+    progress = 10 * (np.hypot(*state) - np.hypot(*moved))
+    assert found == outcome and replaced == pytest.approx(bonus or progress)
+    assert step(state, action, goal_reward="add")[1] == pytest.approx(progress + bonus)
+
+
+def test_goal_reward_reaches_the_gymnasium_class_and_only_two_are_known():
+    for goal_reward, expected in (
+        ("replace", 10.0),
+        ("add", 10.0 + 10 * (np.hypot(0.15, 0.05) - np.hypot(0.05, 0.05))),
+    ):
+        env = gymnasium.make(SIMPLEGOAL, goal_reward=goal_reward).unwrapped
+        env.reset(seed=0)
+        env.state = np.array([0.15, 0.05])
+        assert env.step(np.array([-1.0, 0.0], np.float32))[1] == pytest.approx(expected)
+    with pytest.raises(ValueError, match='\'both\', expected "replace" or "add"'):
+        SimpleGoalEnv(goal_reward="both")
+
+
+@pytest.mark.parametrize(
+    ("state", "outcome"),
+    [
+        ([0.0, 0.0], GOAL), ([0.0999, 0.0999], GOAL), ([0.1, 0.05], RUNNING), ([0.05, 0.1], RUNNING),
+        ([0.4, 0.5], RUNNING), ([0.6, 0.5], RUNNING), ([0.5, 0.4], RUNNING), ([0.5, 0.6], RUNNING),
+        ([0.4001, 0.5999], PIT), ([0.5, 0.5], PIT), ([0.5, 0.61], RUNNING), ([0.05, 0.5], RUNNING),
+    ],
+)  # fmt: skip
+def test_borders_of_goal_and_pit_are_outside(state, outcome):
+    assert step(state, [0, 0])[2] == outcome
+
+
+def test_a_start_inside_the_pit_or_the_goal_is_legal():
+    env = gymnasium.make(SIMPLEGOAL)
+    for inside, away in (([0.55, 0.5], [1, 0]), ([0.05, 0.05], [1, 0])):
+        env.reset(seed=0)
+        env.unwrapped.state = np.array(inside)
+        _, reward, terminated, _, info = env.step(np.array(away, np.float32))
+        assert not terminated and info["outcome"] == "running" and abs(reward) < 1.5
+
+
+def test_starts_cover_the_whole_square_evenly():
+    starts = simplegoal_start(np.random.default_rng(0), 20_000)
+    counts, _, _ = np.histogram2d(*starts.T, bins=5, range=[[0, 1], [0, 1]])
+    assert starts.shape == (20_000, 2) and counts.sum() == 20_000 and 680 < counts.min() and counts.max() < 920
+
+
+# SimpleGoal for Gymnasium
+
+
+def test_check_env_has_nothing_to_say():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for options in ({}, {"render_mode": "rgb_array"}, {"goal_reward": "add"}):
+            check_env(gymnasium.make(SIMPLEGOAL, **options).unwrapped)
+
+
+def test_reset_repeats_with_its_seed_and_differs_without():
+    env = gymnasium.make(SIMPLEGOAL)
+    first, again, other = env.reset(seed=1)[0], env.reset(seed=1)[0], env.reset()[0]
+    assert np.array_equal(first, again) and not np.array_equal(first, other) and first.dtype == np.float32
+
+
+@pytest.mark.parametrize("state", [[0.8, 0.9], [0.25, 0.7]])
+def test_the_picture_shows_agent_goal_and_pit_in_their_places(state):
+    env = gymnasium.make(SIMPLEGOAL, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.unwrapped.state = np.array(state)
+    image = env.render()
+    assert image.dtype == np.uint8 and image.shape[2] == 3
+    height, width, _ = image.shape
+
+    def colour(x, y):
+        return tuple(int(c) for c in image[int((1 - y) * height), int(x * width)])
+
+    agent, goal, pit, free = colour(*state), colour(0.05, 0.05), colour(0.5, 0.5), colour(0.95, 0.05)
+    assert len({agent, goal, pit, free}) == 4
+    assert colour(0.09, 0.09) == goal and colour(0.12, 0.05) == free and colour(0.05, 0.12) == free
+    assert colour(0.41, 0.59) == pit and colour(0.38, 0.5) == free and colour(0.5, 0.62) == free
+    x, y = np.argwhere((image == agent).all(axis=2)).mean(axis=0)[::-1]
+    assert [x / width, 1 - y / height] == pytest.approx(state, abs=0.005)
+
+
+def test_the_agent_is_drawn_over_the_pit():
+    env = SimpleGoalEnv(render_mode="rgb_array")
+    env.state = np.array([0.9, 0.9])
+    agent = tuple(env.render()[40, 360])
+    env.state = np.array([0.5, 0.5])
+    assert tuple(env.render()[200, 200]) == agent
+
+
+@pytest.mark.parametrize("action", [[np.nan, 0], [np.inf, 0], [0.0], [0, 0, 0], 0.5])
+def test_a_bad_action_is_refused(action):
+    env = SimpleGoalEnv()
+    env.reset(seed=0)
+    before = env.state.copy()
+    with pytest.raises(ValueError, match="expected"):
+        env.step(np.array(action))
+    assert np.array_equal(env.state, before)
+
+
+# Batched = Gymnasium, step by step
+
+
+def replay(env, task, start, actions):
+    """One episode in Gymnasium: states before each step and after the last, rewards, outcome."""
+    env.reset(seed=0)
+    env.unwrapped.state = np.array(start)
+    states, rewards = [start.astype(np.float32)], []
+    for action in actions:
+        state, reward, terminated, truncated, info = env.step(action)
+        states.append(state)
+        rewards.append(reward)
+        if terminated or truncated:
+            break
+    outcome = info.get("outcome", "goal") if terminated else "truncated" if truncated else "running"
+    return np.array(states), rewards, outcome
+
+
+def compare(name, n, **policy):
+    task = get_task(name)
+    starts = task.start(np.random.default_rng(7), n)
+    m = len(task.action_low)
+    episodes, result = record(RandomPolicy(m, **policy), task, starts), play(RandomPolicy(m, **policy), task, starts)
+    env = gymnasium.make(name, disable_env_checker=True)
+    for i, (start, episode) in enumerate(zip(starts, episodes)):
+        states, rewards, outcome = replay(env, task, start, episode.actions.astype(np.float32))
+        assert len(rewards) == len(episode.actions) == result.lengths[i]
+        assert outcome == OUTCOMES[result.outcomes[i]]
+        assert np.abs(states[:-1] - episode.states).max() <= 1e-3
+        assert sum(rewards) == pytest.approx(result.returns[i], abs=1e-3)
+    return result
+
+
+def test_simplegoal_batched_equals_step_by_step():
+    result = compare(SIMPLEGOAL, 1000)
+    assert {GOAL, PIT, TRUNCATED} == set(result.outcomes) and result.lengths.max() == 50
+
+
+def test_mountaincar_batched_equals_step_by_step():
+    result = compare(MOUNTAINCAR, 1000)
+    assert TRUNCATED in result.outcomes and result.lengths.max() == 999
+
+
+def test_mountaincar_batched_equals_step_by_step_where_the_goal_is_reached():
+    for gain, seed in ((0.5, 1), (0.9, 2)):
+        result = compare(MOUNTAINCAR, 150, gain=gain, seed=seed)
+        assert (result.outcomes == GOAL).mean() > 0.9 and result.returns.max() > 50
+
+
+def test_mountaincar_batched_equals_gymnasium_from_anywhere():
+    """Single steps from all over the box, walls and limits of speed and action included."""
+    task, env, rng = get_task(MOUNTAINCAR), gymnasium.make(MOUNTAINCAR).unwrapped, np.random.default_rng(8)
+    states = rng.uniform(task.low, task.high, size=(3000, 2))
+    states[:200, 0], states[200:400, 1], states[400:600, 1] = -1.2, -0.07, 0.07
+    states[600:800, 0] = rng.uniform(0.4, 0.6, 200)
+    actions = rng.uniform(-3, 3, size=(3000, 1))
+    moved, rewards, outcomes = mountaincar_step(states, actions)
+    env.reset(seed=0)
+    for i in range(3000):
+        env.state = states[i].copy()
+        state, reward, terminated, _, _ = env.step(actions[i])
+        assert np.abs(state - moved[i]).max() < 1e-6 and reward == pytest.approx(rewards[i])
+        assert terminated == (outcomes[i] == GOAL)
+    assert 10 < (outcomes == GOAL).sum() < 1000
+    assert np.array_equal(moved, moved.astype(np.float32))  # Gymnasium keeps the state in float32 from here on
+
+
+def test_mountaincar_pays_for_the_action_before_it_is_limited():
+    state = np.array([[-0.5, 0.0]])
+    moved, rewards, _ = mountaincar_step(np.tile(state, (3, 1)), np.array([[1.0], [3.0], [-3.0]]))
+    assert rewards == pytest.approx([-0.1, -0.9, -0.9]) and moved[0].tolist() == moved[1].tolist() != moved[2].tolist()
+
+
+def test_mountaincar_starts_at_rest_in_the_valley():
+    starts = get_task(MOUNTAINCAR).start(np.random.default_rng(0), 5000)
+    assert -0.6 <= starts[:, 0].min() < -0.595 and -0.405 < starts[:, 0].max() <= -0.4 and not starts[:, 1].any()
+    assert starts.dtype == np.float64
+
+
+# Registry
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_task_agrees_with_gymnasium(name):
+    task, env = get_task(name), gymnasium.make(name)
+    assert np.allclose(env.observation_space.low, task.low) and np.allclose(env.observation_space.high, task.high)
+    assert np.allclose(env.action_space.low, task.action_low) and np.allclose(env.action_space.high, task.action_high)
+    assert env.spec.max_episode_steps == task.max_steps
+    assert len(task.inputs) == len(task.input_labels) == len(task.low) and len(task.outputs) == len(task.action_low)
+    starts = task.start(np.random.default_rng(0), 100)
+    assert (starts >= task.low).all() and (starts <= task.high).all()
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_states_stay_in_the_box_and_rows_do_not_mix(name):
+    task, rng = get_task(name), np.random.default_rng(0)
+    states = rng.uniform(task.low, task.high, size=(200, len(task.low)))
+    actions = rng.uniform(-2, 2, size=(200, len(task.action_low)))
+    moved, rewards, outcomes = task.step(states, actions)
+    assert (moved >= task.low - 1e-6).all() and (moved <= task.high + 1e-6).all()
+    alone = [task.step(states[i : i + 1], actions[i : i + 1]) for i in range(200)]
+    assert np.array_equal(moved, np.concatenate([a[0] for a in alone]))
+    assert np.array_equal(rewards, np.concatenate([a[1] for a in alone]))
+    assert np.array_equal(outcomes, np.concatenate([a[2] for a in alone]))
+
+
+def test_tasks_by_name():
+    assert tasks() == list(TASKS) == vsp.tasks() and all(isinstance(get_task(name), Task) for name in TASKS)
+    task = get_task(SIMPLEGOAL)
+    assert get_task(task) is task and task.name == SIMPLEGOAL
+
+
+@pytest.mark.parametrize(
+    ("typo", "near"), [("simplegoal", SIMPLEGOAL), ("MountainCar-v0", MOUNTAINCAR), ("SimpleGoal-v1", SIMPLEGOAL)]
+)
+def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
+    with pytest.raises(ValueError, match=f"unknown task '{typo}', expected one of .*did you mean '{near}'"):
+        get_task(typo)
+    with pytest.raises(ValueError, match="unknown task None"):
+        get_task(None)

@@ -1,0 +1,262 @@
+import dataclasses
+import os
+import shutil
+
+import numpy as np
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, same_arrays, tiny
+
+from vsp import experiments, store
+from vsp.envs import GOAL, PIT, TRUNCATED
+from vsp.evaluate import outcomes, spread
+from vsp.experiments import (
+    EVALUATION_SEED,
+    N_RUNS,
+    VALIDATION_SEED,
+    Experiment,
+    best,
+    code_id,
+    load_run,
+    load_runs,
+    make_run,
+    make_runs,
+    paper_experiment,
+    paper_runs,
+    returns,
+    summary,
+    teacher_outcomes,
+)
+
+CONFIG = tiny(n_epochs=30, n_freeze=5)
+SMALL = Experiment(SIMPLEGOAL, CONFIG, CurvedTeacher(), n_episodes=20)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Three runs, in a folder that tests only read."""
+    runs = tmp_path_factory.mktemp("runs")
+    return runs, make_runs(SMALL, range(3), runs=runs)
+
+
+def files(runs, experiment=SMALL):
+    return {path.name: path.read_bytes() for path in sorted(experiment.folder(runs).iterdir())}
+
+
+def changed(**changes):
+    return dataclasses.replace(SMALL, **changes)
+
+
+# Making runs
+
+
+def test_a_run_is_a_distillation_and_its_evaluation(made):
+    run = made[1][1]
+    policy, history = experiments.distill(SMALL.teacher, SIMPLEGOAL, CONFIG, seed=1)
+    on_shared, on_validation = (outcomes(policy, SIMPLEGOAL, 20, seed=s) for s in (EVALUATION_SEED, VALIDATION_SEED))
+    assert run.seed == 1 and EVALUATION_SEED != VALIDATION_SEED
+    assert same_arrays(
+        (run.policy.codewords, policy.codewords), (run.policy.coefficients, policy.coefficients),
+        (run.outcomes.returns, on_shared.returns), (run.outcomes.lengths, on_shared.lengths),
+        (run.outcomes.outcomes, on_shared.outcomes), (run.cells, np.array(history.cells)),
+    )  # fmt: skip
+    assert run.validation_mean == on_validation.returns.mean() != on_shared.returns.mean()
+    assert (run.splits, run.merges) == tuple(sum(e.kind == k for e in history.events) for k in ("split", "merge"))
+
+
+def test_runs_come_in_the_order_of_the_seeds(made):
+    runs, in_order = made
+    assert [run.seed for run in in_order] == [0, 1, 2] == [run.seed for run in load_runs(SMALL, runs=runs)]
+    assert [run.seed for run in make_runs(SMALL, [2, 0], runs=runs)] == [2, 0]
+
+
+def test_seeds_may_be_any_iterable(made):
+    assert [run.seed for run in make_runs(SMALL, iter([2, 0]), runs=made[0])] == [2, 0]
+
+
+@pytest.mark.parametrize(("jobs", "order"), [(1, [2, 1, 0]), (2, [0, 1, 2]), (2, [2, 1, 0])])
+def test_workers_and_order_have_no_say_in_the_bytes(made, tmp_path, jobs, order):
+    make_runs(SMALL, order, runs=tmp_path, jobs=jobs)
+    assert files(tmp_path) == files(made[0])
+
+
+def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monkeypatch):
+    shutil.copytree(made[0], tmp_path / "runs")
+    (SMALL.folder(tmp_path / "runs") / "0001.run").unlink()
+    times = {p: p.stat().st_mtime_ns for p in SMALL.folder(tmp_path / "runs").iterdir()}
+    seeds, original = [], experiments.make_run
+    monkeypatch.setattr(
+        experiments, "make_run", lambda e, seed, folder: (seeds.append(seed), original(e, seed, folder))
+    )
+    make_runs(SMALL, range(3), runs=tmp_path / "runs")
+    assert seeds == [1] and files(tmp_path / "runs") == files(made[0])
+    assert all(path.stat().st_mtime_ns == time for path, time in times.items())
+    make_runs(SMALL, range(3), runs=tmp_path / "runs")
+    assert seeds == [1]
+
+
+def test_progress_says_how_many_are_done(tmp_path, capsys):
+    make_runs(SMALL, [0], runs=tmp_path)
+    capsys.readouterr()
+    make_runs(SMALL, [0, 1], runs=tmp_path)
+    shown = capsys.readouterr().err
+    assert SIMPLEGOAL in shown and "2/2" in shown
+    make_runs(SMALL, [0, 1], runs=tmp_path)
+    assert capsys.readouterr().err == ""
+
+
+def test_an_interrupted_write_leaves_no_torn_run(tmp_path, monkeypatch):
+    def interrupted(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        make_run(SMALL, 0, tmp_path)
+    assert not list(tmp_path.glob("*.run")) and not list(tmp_path.iterdir())
+
+
+def test_what_a_killed_writer_left_is_no_run(made, tmp_path):
+    """A killed process cannot tidy up: its temporary file stays and must not be taken for a run."""
+    folder = SMALL.folder(tmp_path)
+    shutil.copytree(SMALL.folder(made[0]), folder)
+
+    with store.atomic_path(folder / "0003.run") as temporary:
+        temporary.write_bytes(b"half a run")
+        assert [run.seed for run in load_runs(SMALL, runs=tmp_path)] == [0, 1, 2]
+
+
+# Which runs belong to an experiment
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        changed(config=dataclasses.replace(CONFIG, n_reset=26)),
+        changed(config=dataclasses.replace(CONFIG, max_pol_loss=0.0200001)),
+        changed(config=dataclasses.replace(CONFIG, split_lookup="kept")),
+        changed(n_episodes=21),
+        changed(teacher=PumpingTeacher()),
+        changed(task=MOUNTAINCAR),
+    ],
+)
+def test_changed_settings_use_another_folder(made, other):
+    assert other.id != SMALL.id and other.folder(made[0]) != SMALL.folder(made[0])
+    with pytest.raises(FileNotFoundError, match="no runs, expected one or more"):
+        load_runs(other, runs=made[0])
+
+
+def test_equal_settings_use_the_same_folder():
+    assert Experiment(SIMPLEGOAL, dataclasses.replace(CONFIG), CurvedTeacher(), 20).id == SMALL.id
+    assert SMALL.folder("runs").parts[:2] == ("runs", SIMPLEGOAL)
+
+
+@pytest.mark.parametrize(
+    "name", ["distill", "envs", "geometry", "policy", "subpolicies", "buffers", "rollouts", "teachers"]
+)
+def test_changed_code_uses_another_folder(name, monkeypatch):
+    before, read = code_id(), type(store.ROOT).read_bytes
+    assert code_id() == before
+    monkeypatch.setattr(
+        type(store.ROOT), "read_bytes", lambda path: read(path) + (b"\n# changed" if path.stem == name else b"")
+    )
+    assert code_id() != before
+
+
+def test_a_run_with_other_settings_is_refused_with_both_values(made, tmp_path):
+    other = changed(config=dataclasses.replace(CONFIG, n_split=5))
+    make_runs(other, [0], runs=tmp_path)
+    shutil.copy(other.folder(tmp_path) / "0000.run", tmp_path / "0000.run")
+    with pytest.raises(
+        ValueError, match="(?s)0000.run: made with config = .*'n_split': 5.*expected .*'n_split': 4.*delete it"
+    ):
+        load_run(tmp_path / "0000.run", SMALL)
+    shutil.copytree(SMALL.folder(made[0]), SMALL.folder(tmp_path))
+    shutil.copy(tmp_path / "0000.run", SMALL.folder(tmp_path) / "0007.run")
+    for read in (lambda: load_runs(SMALL, runs=tmp_path), lambda: make_runs(SMALL, [7], runs=tmp_path)):
+        with pytest.raises(ValueError, match="0007.run: made with config"):
+            read()
+
+
+def test_a_run_under_the_name_of_another_seed_is_refused(made, tmp_path):
+    shutil.copytree(made[0], tmp_path / "runs")
+    folder = SMALL.folder(tmp_path / "runs")
+    shutil.copy(folder / "0000.run", folder / "0005.run")
+    with pytest.raises(ValueError, match="seed"):
+        load_runs(SMALL, runs=tmp_path / "runs")
+
+
+def test_a_damaged_run_is_named(made, tmp_path):
+    shutil.copytree(made[0], tmp_path / "runs")
+    path = SMALL.folder(tmp_path / "runs") / "0001.run"
+    content = path.read_bytes()
+    for damaged in (content[:-1], b"", content[:300] + bytes([content[300] ^ 4]) + content[301:]):
+        path.write_bytes(damaged)
+        with pytest.raises(store.DamagedFile, match="0001.run: SHA-256"):
+            load_runs(SMALL, runs=tmp_path / "runs")
+
+
+def test_an_empty_folder_is_one_clear_error(tmp_path):
+    for _ in range(2):
+        with pytest.raises(FileNotFoundError, match=f"{SIMPLEGOAL}.*: no runs, expected one or more: `make runs`"):
+            load_runs(SMALL, runs=tmp_path)
+        assert not list(tmp_path.iterdir())
+        tmp_path = tmp_path / "missing"
+        tmp_path.mkdir()
+
+
+def test_a_failing_run_writes_nothing_and_keeps_the_others(tmp_path, monkeypatch):
+    original = experiments.make_run
+
+    def fails(experiment, seed, folder):
+        if seed == 1:
+            raise ValueError("the policy's actions hold nan")
+        original(experiment, seed, folder)
+
+    monkeypatch.setattr(experiments, "make_run", fails)
+    with pytest.raises(ValueError, match="hold nan"):
+        make_runs(SMALL, [0, 1], runs=tmp_path)
+    assert list(files(tmp_path)) == ["0000.run"]
+
+
+# What is made of runs
+
+
+def test_best_goes_by_the_validation_starts_and_then_by_the_seed(made):
+    first, second, third = (
+        dataclasses.replace(run, validation_mean=mean) for run, mean in zip(made[1], (1.0, 3.0, 3.0))
+    )
+    assert best([first, second, third]).seed == best([third, second, first]).seed == 1
+    most = dataclasses.replace(first, outcomes=dataclasses.replace(first.outcomes, returns=np.full(20, 1e6)))
+    assert best([most, second]).seed == 1
+
+
+def test_returns_has_a_row_per_run(made):
+    table = returns(made[1])
+    assert table.shape == (3, 20) and np.array_equal(table[2], made[1][2].outcomes.returns)
+
+
+def test_teacher_outcomes_are_on_the_same_starts():
+    expected = outcomes(SMALL.teacher, SIMPLEGOAL, 20, seed=EVALUATION_SEED)
+    assert np.array_equal(teacher_outcomes(SMALL).returns, expected.returns)
+
+
+def test_summary_tells_each_run(made):
+    frame = summary(made[1], SMALL)
+    assert frame["seed"].tolist() == [0, 1, 2] and set(frame["settings"]) == {SMALL.id}
+    assert np.allclose(frame[["goal", "pit", "truncated"]].sum(axis=1), 1)
+    for row, run in zip(frame.to_dict("records"), made[1]):
+        assert row["cells"] == len(run.policy) == 1 + row["splits"] - row["merges"]
+        assert {name: row[name] for name in spread(run.outcomes.returns)} == spread(run.outcomes.returns)
+        assert row["pit"] == np.mean(run.outcomes.outcomes == PIT) and row["goal"] == np.mean(
+            run.outcomes.outcomes == GOAL
+        )
+        assert row["truncated"] == np.mean(run.outcomes.outcomes == TRUNCATED)
+
+
+@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
+def test_the_papers_experiment(task):
+    paper, quick = paper_experiment(task), paper_experiment(task, quick=True)
+    assert paper.config == experiments.preset(task) and paper.n_episodes == 1000
+    assert quick.config == paper.config.quick() and quick.n_episodes == 100 and quick.id != paper.id
+    assert N_RUNS == {SIMPLEGOAL: 85, MOUNTAINCAR: 40}
+    with pytest.raises(ValueError, match="unknown task"):
+        paper_runs("Pendulum-v1", runs="unused")

@@ -1,0 +1,232 @@
+import base64
+import re
+import zlib
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from vsp import figures, geometry
+from vsp.envs import get_task
+from vsp.figures import TEXT_WIDTH, letter, panels, save_figure
+from vsp.rollouts import Episode
+
+mpl.use("Agg")
+ALT = 'Two "cells" & their border <drawn> in grey'
+
+
+def drawn(seed=0):
+    """A figure with everything the paper's figures have: patches, arrows, images, colour bar, text, Greek, legend."""
+    rng = np.random.default_rng(seed)
+    fig, axes = panels(2)
+    x, y, states = geometry.grid(np.zeros(2), np.ones(2), 40)
+    codewords = rng.random((5, 2))
+    figures.cells(axes[0], x, y, geometry.nearest(codewords, states), fill=True)
+    figures.codewords(figures.square(axes[0]), codewords, numbers=True)
+    coarse = geometry.grid(np.zeros(2), np.ones(2), 6)[2]
+    figures.arrows(axes[0], coarse, rng.uniform(-1, 1, coarse.shape))
+    axes[0].legend()
+    figures.force_bar(fig, figures.force_map(axes[1], x, y, np.sin(5 * states[:, 0])), axes[1:])
+    letter(axes, [r"cells $\Delta x$", "force"])
+    return fig
+
+
+@pytest.fixture
+def saved(tmp_path):
+    picture = save_figure(drawn(), "cells_example", alt=ALT, out=tmp_path)
+    return picture, tmp_path / "figures" / "cells_example.pdf", tmp_path / "figures" / "cells_example.png"
+
+
+def streams(pdf):
+    """A PDF's text with its compressed parts unpacked."""
+    content = pdf.read_bytes()
+    for part in re.findall(rb"stream\r?\n(.*?)endstream", content, flags=re.S):
+        try:
+            content += zlib.decompress(part)
+        except zlib.error:
+            pass
+    return content
+
+
+def png_size(png):
+    header = png.read_bytes()[:24]
+    return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
+
+
+def test_both_files_are_there_and_the_figure_is_closed(saved, tmp_path):
+    assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == ["cells_example.pdf", "cells_example.png"]
+    assert saved[1].read_bytes().startswith(b"%PDF-") and saved[2].read_bytes().startswith(b"\x89PNG")
+    assert not plt.get_fignums()
+
+
+def test_the_picture_is_as_wide_as_a_page_of_the_proceedings(saved):
+    width, _ = png_size(saved[2])
+    assert abs(width - 12.2 / 2.54 * 300) <= 1 and TEXT_WIDTH == pytest.approx(12.2 / 2.54)
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+) ?\]", saved[1].read_bytes())
+    assert float(box[1]) == pytest.approx(12.2 / 2.54 * 72, abs=0.1)
+
+
+def test_fonts_are_embedded_truetype(saved):
+    content = streams(saved[1])
+    assert b"/Type3" not in content and b"/Type 3" not in content
+    assert b"/FontFile2" in content and b"/BaseFont" in content
+    assert content.count(b"/FontDescriptor ") >= 1
+
+
+def test_no_dates_and_no_versions(saved):
+    _, pdf, png = saved
+    for content in (streams(pdf), png.read_bytes()):
+        assert b"CreationDate" not in content and b"ModDate" not in content and b"Software" not in content
+        assert mpl.__version__.encode() not in content and b"Matplotlib v" not in content
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path, monkeypatch):
+    for folder, epoch in (("a", "0"), ("b", "1000000000")):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+        save_figure(drawn(), "x", alt=ALT, out=tmp_path / folder)
+    save_figure(drawn(seed=1), "x", alt=ALT, out=tmp_path / "c")
+    for name in ("x.pdf", "x.png"):
+        a, b, c = ((tmp_path / folder / "figures" / name).read_bytes() for folder in "abc")
+        assert a == b != c
+
+
+def test_the_alternative_text_is_in_the_html_and_in_the_files(saved):
+    picture, pdf, png = saved
+    shown = picture._repr_html_()
+    assert "<figure>" in shown and 'alt="Two &quot;cells&quot; &amp; their border &lt;drawn&gt; in grey"' in shown
+    assert base64.b64decode(re.search(r"base64,([^\"]+)", shown)[1]) == png.read_bytes()
+    assert ALT.encode() in png.read_bytes() and b"border" in streams(pdf) and repr(picture) == ALT
+
+
+def test_a_quick_figure_is_marked(tmp_path):
+    save_figure(drawn(), "x", alt=ALT, out=tmp_path / "full")
+    save_figure(drawn(), "x", alt=ALT, out=tmp_path / "quick", quick=True)
+    full, quick = (plt.imread(tmp_path / kind / "figures" / "x.png") for kind in ("full", "quick"))
+    middle = np.s_[full.shape[0] // 3 : -full.shape[0] // 3, full.shape[1] // 3 : -full.shape[1] // 3]
+    assert full.shape == quick.shape and (full[middle] != quick[middle]).any()
+
+
+def test_a_failed_save_leaves_the_previous_figure(saved, tmp_path, monkeypatch):
+    before = saved[1].read_bytes()
+    fig = drawn(seed=1)
+
+    def fail(path, **kwargs):
+        path.write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(fig, "savefig", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_figure(fig, "cells_example", alt=ALT, out=tmp_path)
+    plt.close(fig)
+    assert saved[1].read_bytes() == before and len(list((tmp_path / "figures").iterdir())) == 2
+
+
+def test_style_does_not_leak():
+    before = dict(mpl.rcParams)
+    plt.close(panels(2)[0])
+    assert dict(mpl.rcParams) == before
+
+
+# What is drawn
+
+
+@pytest.fixture
+def ax():
+    fig, axes = panels()
+    yield axes[0]
+    plt.close(fig)
+
+
+def test_panels():
+    fig, axes = panels(3, height=1.5, sharey=True)
+    assert axes.shape == (3,) and fig.get_size_inches() == pytest.approx([12.2 / 2.54, 1.5])
+    letter(axes, ["one", "two", "three"])
+    assert [a.get_title(loc="left") for a in axes] == ["(a) one", "(b) two", "(c) three"]
+    plt.close(fig)
+
+
+def test_cell_borders_lie_between_the_codewords(ax):
+    x, y, states = geometry.grid(np.zeros(2), np.ones(2), 201)
+    index = geometry.nearest(np.array([[0.2, 0.5], [0.6, 0.5]]), states)
+    figures.cells(ax, x, y, index)
+    corners = np.concatenate([path.vertices for c in ax.collections for path in c.get_paths()])
+    assert len(corners) and np.abs(corners[:, 0] - 0.4).max() < 0.01
+
+
+def test_one_cell_has_no_border(ax):
+    x, y, states = geometry.grid(np.zeros(2), np.ones(2), 20)
+    figures.cells(ax, x, y, np.zeros(len(states), int), fill=True)
+    assert not ax.collections and len(ax.images) == 1
+
+
+def test_codewords_lie_where_they_are(ax):
+    points = np.array([[0.2, 0.5], [0.6, 0.1]])
+    figures.codewords(ax, points, numbers=True)
+    assert np.allclose(ax.collections[0].get_offsets(), points)
+    assert [t.get_text() for t in ax.texts] == ["0", "1"]
+
+
+def test_the_square_shows_goal_and_pit(ax):
+    figures.square(ax)
+    goal, pit = ax.patches
+    assert (goal.get_xy(), goal.get_width(), goal.get_height()) == ((0, 0), 0.1, 0.1)
+    assert pit.get_xy() == (0.4, 0.4) and pit.get_width() == pytest.approx(0.2)
+    assert ax.get_xlim() == ax.get_ylim() == (0, 1) and (ax.get_xlabel(), ax.get_ylabel()) == ("x", "y")
+
+
+def test_a_full_diagonal_action_spans_one_grid_step(ax):
+    states = geometry.grid(np.zeros(2), np.ones(2), 11)[2]
+    figures.arrows(ax, states, np.tile([1.0, -1.0], (121, 1)))
+    quiver = ax.collections[0]
+    assert np.hypot(1, 1) / quiver.scale == pytest.approx(0.1, rel=0.02)
+    assert np.allclose(quiver.U, 1) and np.allclose(quiver.V, -1) and quiver.scale_units == quiver.angles == "xy"
+
+
+def test_the_force_map_has_pixels_centred_on_its_grid(ax):
+    x, y, states = geometry.grid(np.array([-1.2, -0.07]), np.array([0.6, 0.07]), 19)
+    image = figures.force_map(ax, x, y, states[:, 0])
+    left, right, bottom, top = image.get_extent()
+    assert (left, right) == pytest.approx((-1.25, 0.65)) and bottom < -0.07 < 0.07 < top
+    assert image.get_clim() == (-1, 1) and image.origin == "lower"
+    assert image.get_array()[0, 0] == pytest.approx(-1.2) and image.get_array()[0, -1] == pytest.approx(0.6)
+
+
+def test_box_plots_show_the_quartiles_and_no_outliers(ax):
+    returns = {"TD3": np.append(np.arange(1.0, 10), 100), "distilled": np.arange(20.0).reshape(4, 5).ravel()}
+    figures.box_plot(ax, returns)
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
+    heights = np.concatenate([line.get_ydata() for line in ax.lines])
+    assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
+
+
+def test_run_means_are_sorted_against_the_teacher(ax):
+    figures.run_means(ax, np.array([3.0, 1.0, 2.0]), 2.5)
+    assert ax.lines[0].get_ydata().tolist() == [1, 2, 3] and set(ax.lines[1].get_ydata()) == {2.5}
+
+
+def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
+    episode = Episode(np.array([[0.5, 0.2], [0.4, 0.2]]), np.array([[-1.0, 0.0], [0.0, 0.5]]))
+    figures.trail(ax, episode, get_task("SimpleGoal-v0"), color="k")
+    assert np.allclose(ax.lines[0].get_xydata(), [[0.5, 0.2], [0.4, 0.2], [0.4, 0.25]])
+    assert ax.lines[1].get_xydata().tolist() == [[0.5, 0.2]]
+
+
+def test_curves_and_histograms_show_their_numbers(ax):
+    figures.over_iterations(ax, np.array([3.0, 1.0, 2.0]), ylabel="cells", log=True)
+    assert ax.lines[0].get_xydata().tolist() == [[0, 3], [1, 1], [2, 2]]
+    assert (ax.get_ylabel(), ax.get_yscale()) == ("cells", "log")
+    fig, (other,) = panels()
+    figures.histogram(other, np.repeat([1.0, 2.0, 6.0], 10))
+    figures.upper_bound(other, 7.0)
+    assert sum(bar.get_height() for bar in other.patches) == 30
+    assert [line.get_xdata()[0] for line in other.lines] == [3.0, 7.0]
+    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00", "bound 7.00"]
+    plt.close(fig)
+
+
+def test_things_have_colours_of_their_own():
+    assert len({figures.TEACHER, figures.DISTILLED, figures.GOAL, figures.PIT}) == 4
+    rgb = np.array([mpl.colors.to_rgb(c) for c in (figures.TEACHER, figures.DISTILLED, figures.GOAL, figures.PIT)])
+    gaps = np.abs(rgb[:, None] - rgb).max(axis=2)[~np.eye(4, dtype=bool)]
+    assert gaps.min() > 0.1

@@ -1,0 +1,211 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from vsp import geometry
+from vsp.geometry import (
+    METRICS,
+    delaunay_neighbours,
+    distances,
+    grid,
+    lookup_neighbours,
+    nearest,
+    nearest_brute,
+    nearest_kdtree,
+)
+
+
+def edges(graph):
+    return {(int(i), int(j)) for i, j in np.argwhere(graph) if i < j}
+
+
+def is_graph(graph):
+    return graph.dtype == bool and np.array_equal(graph, graph.T) and not graph.diagonal().any()
+
+
+# Look-up
+
+
+def test_distances_by_hand():
+    states, codewords = np.array([[0.0, 0.0]]), np.array([[3.0, -4.0], [1.0, 0.0]])
+    found = {metric: distances(states, codewords, metric).tolist() for metric in METRICS}
+    assert found == {"manhattan": [[7, 1]], "euclidean": [[5, 1]], "chebyshev": [[4, 1]]}
+
+
+@pytest.mark.parametrize("lookup", [nearest, nearest_brute, nearest_kdtree])
+def test_nearest_by_hand_and_the_metric_matters(lookup):
+    codewords = np.array([[0.0, 0.75], [0.5, 0.5]])  # from the origin: 0.75 or 1; 0.75 or 0.71
+    origin = np.zeros((1, 2))
+    assert lookup(codewords, origin).tolist() == [0]
+    assert lookup(codewords, origin, "euclidean").tolist() == [1]
+    assert lookup(codewords, origin, "chebyshev").tolist() == [1]
+
+
+@pytest.mark.parametrize("lookup", [nearest, nearest_brute, nearest_kdtree])
+@pytest.mark.parametrize("metric", METRICS)
+def test_ties_go_to_the_lowest_index(lookup, metric):
+    corners = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
+    for order in ([0, 1, 2, 3], [3, 1, 0, 2], [2, 3, 1, 0]):
+        assert lookup(corners[order], np.array([[0.5, 0.5]]), metric).tolist() == [0]
+    assert lookup(np.zeros((5, 2)), np.array([[0.0, 0.0], [0.3, 0.1]]), metric).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("k", [1, 2, 3, 50, 300, 700])
+@pytest.mark.parametrize("d", [1, 2, 5])
+def test_kdtree_equals_brute_force_on_random_codewords(metric, k, d):
+    rng = np.random.default_rng(k * d)
+    codewords, states = rng.random((k, d)), rng.random((2000, d))
+    expected = nearest_brute(codewords, states, metric)
+    assert np.array_equal(nearest_kdtree(codewords, states, metric), expected)
+    assert np.array_equal(nearest(codewords, states, metric), expected)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("step", [1.0, 0.1, 1 / 3])
+def test_kdtree_equals_brute_force_on_grids(metric, step):
+    """Codewords on a shuffled grid and states on a finer one: most states are between two or more codewords."""
+    rng = np.random.default_rng(0)
+    codewords = rng.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(20)), -1).reshape(-1, 2)) * step
+    states = np.stack(np.meshgrid(np.arange(80), np.arange(80)), -1).reshape(-1, 2) * step / 4
+    expected = nearest_brute(codewords, states, metric)
+    assert np.array_equal(nearest_kdtree(codewords, states, metric), expected)
+
+
+@given(
+    arrays(np.int8, st.tuples(st.integers(1, 12), st.just(2)), elements=st.integers(-3, 3)),
+    arrays(np.int8, st.tuples(st.integers(1, 12), st.just(2)), elements=st.integers(-4, 4)),
+    st.sampled_from(sorted(METRICS)),
+)
+def test_the_answer_is_a_minimum_and_the_first_one(codewords, states, metric):
+    codewords, states = codewords / 2, states / 2
+    gaps = distances(states, codewords, metric)
+    for lookup in (nearest_brute, nearest_kdtree):
+        for row, i in zip(gaps, lookup(codewords, states, metric)):
+            assert row[i] == row.min() and (row[:i] > row[i]).all()
+
+
+# Delaunay
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [
+        ([[0.3, 0.3]], set()),
+        ([[0, 0], [1, 1]], {(0, 1)}),
+        ([[0, 0], [1, 0], [0, 1]], {(0, 1), (0, 2), (1, 2)}),
+        ([[0, 0], [3, 0], [1, 0]], {(0, 2), (1, 2)}),  # in a row, out of order
+        ([[0, 0], [1, 1], [2, 2], [3, 3]], {(0, 1), (1, 2), (2, 3)}),
+        ([[0, 0], [0.1, 0.3], [0.2, 0.6], [0.3, 0.9]], {(0, 1), (1, 2), (2, 3)}),  # in a row up to rounding
+        ([[0, 0], [4, 0], [2, 1], [2, -1]], {(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),  # the short diagonal
+        ([[0, 0], [2, 0], [0, 2], [2, 2], [1, 1]], {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),
+        ([[5], [1], [3]], {(0, 2), (1, 2)}),
+        ([[7], [2]], {(0, 1)}),
+        ([[0, 0, 1], [2, 0, 1], [0, 2, 1], [2, 2, 1], [1, 1, 1]],
+         {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),  # in a plane of three dimensions
+        ([[0, 0, 0], [1, 1, 1], [3, 3, 3]], {(0, 1), (1, 2)}),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], {(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),
+    ],
+)  # fmt: skip
+def test_delaunay_by_hand(points, expected):
+    graph = delaunay_neighbours(np.array(points, dtype=float))
+    assert is_graph(graph) and edges(graph) == expected
+
+
+def test_a_square_has_its_sides_and_at_most_one_diagonal():
+    found = edges(delaunay_neighbours(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])))
+    assert {(0, 1), (0, 2), (1, 3), (2, 3)} <= found <= {(0, 1), (0, 2), (1, 3), (2, 3), (0, 3), (1, 2)}
+    assert len(found) == 5
+
+
+def test_delaunay_refuses_duplicates_and_shows_them():
+    with pytest.raises(ValueError, match=r"3 codewords, expected all to differ.*0\.25"):
+        delaunay_neighbours(np.array([[0.25, 0.5], [0.75, 0.5], [0.25, 0.5]]))
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-9, 1e-12])
+def test_no_codeword_is_left_without_neighbours_however_close_another_lies(gap):
+    points = np.random.default_rng(1).random((12, 2))
+    graph = delaunay_neighbours(np.vstack([points, points[3] + [gap, 0]]))
+    assert is_graph(graph) and graph.any(axis=1).all()
+
+
+@pytest.mark.parametrize("bend", [1e-4, 1e-7, 1e-8, 1e-10, 1e-13])
+def test_points_almost_in_a_row_are_no_failure(bend):
+    points = np.column_stack([np.arange(6.0), bend * np.array([0, 1, 0, -1, 0, 1])])
+    graph = delaunay_neighbours(points)
+    assert is_graph(graph) and all(graph[i, i + 1] for i in range(5))
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 5, 30])
+def test_delaunay_does_not_depend_on_order_position_or_size(d, k):
+    rng = np.random.default_rng(10 * d + k)
+    points, order = rng.random((k, d)), rng.permutation(k)
+    graph = delaunay_neighbours(points)
+    assert is_graph(graph)
+    assert np.array_equal(delaunay_neighbours(points[order]), graph[np.ix_(order, order)])
+    assert np.array_equal(delaunay_neighbours(3 * points - 5), graph)
+
+
+def test_every_delaunay_edge_has_an_empty_circle():
+    """The property that defines the graph: some circle through both ends holds no third codeword."""
+    points = np.random.default_rng(3).random((15, 2))
+    graph = delaunay_neighbours(points)
+    for i in range(15):
+        for j in range(i):
+            middle, across = (points[i] + points[j]) / 2, (points[i] - points[j])[::-1] * [1, -1]
+            centres = middle + np.linspace(-50, 50, 40001)[:, None] * across
+            radius = np.hypot(*(centres - points[i]).T)
+            others = np.delete(points, [i, j], axis=0)
+            empty = (np.hypot(*(centres[:, None] - others).transpose(2, 0, 1)) > radius[:, None]).all(axis=1)
+            assert empty.any() == graph[i, j]
+
+
+# Look-up neighbours
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_lookup_neighbours_against_a_dense_grid(metric):
+    codewords = np.random.default_rng(4).random((13, 2))
+    _, _, points = grid(np.zeros(2), np.ones(2), 401)
+    pairs = np.sort(np.argsort(distances(points, codewords, metric), axis=1, kind="stable")[:, :2], axis=1)
+    seen, counts = np.unique(pairs, axis=0, return_counts=True)
+    seen = [tuple(map(int, pair)) for pair in seen]
+    graph = lookup_neighbours(codewords, np.zeros(2), np.ones(2), metric)
+    found = edges(graph)
+    assert is_graph(graph) and found <= set(seen)
+    assert {pair for pair, count in zip(seen, counts) if count > len(points) / 500} <= found
+
+
+def test_lookup_neighbours_by_hand():
+    row = np.array([[0.1, 0.5], [0.5, 0.5], [0.9, 0.5]])
+    assert edges(lookup_neighbours(row, np.zeros(2), np.ones(2))) == {(0, 1), (1, 2)}
+    bent = np.array([[0.1, 0.5], [0.5, 0.49], [0.9, 0.5]])  # the outer cells meet far above the box
+    assert edges(delaunay_neighbours(bent)) - edges(lookup_neighbours(bent, np.zeros(2), np.ones(2))) == {(0, 2)}
+    assert edges(lookup_neighbours(row[:2], np.zeros(2), np.ones(2))) == {(0, 1)}
+    assert edges(lookup_neighbours(row[:1], np.zeros(2), np.ones(2))) == set()
+
+
+def test_lookup_neighbours_repeat_and_follow_the_box():
+    codewords = np.random.default_rng(5).random((20, 3))
+    args = codewords, np.zeros(3), np.ones(3)
+    assert np.array_equal(lookup_neighbours(*args), lookup_neighbours(*args))
+    scaled = lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0))
+    assert np.array_equal(scaled, lookup_neighbours(*args))
+
+
+def test_grid():
+    x, y, states = grid(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), 5)
+    assert x[0].tolist() == [-1, -0.5, 0, 0.5, 1] and y[:, 0].tolist() == [0, 1, 2, 3, 4]
+    assert states[7].tolist() == [x.ravel()[7], y.ravel()[7]] == [0.0, 1.0]
+
+
+def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):
+    monkeypatch.setattr(geometry, "KDTREE_FROM", 4)
+    monkeypatch.setattr(geometry, "nearest_kdtree", lambda *args: "tree")
+    assert nearest(np.zeros((4, 2)), np.zeros((1, 2))) == "tree" and nearest(
+        np.ones((3, 2)), np.ones((1, 2))
+    ).tolist() == [0]

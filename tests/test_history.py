@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+from support import SIMPLEGOAL, TINY, CurvedTeacher, partition_of, tiny
+
+from vsp.distill import distill
+from vsp.history import SNAPSHOT_EVERY, History
+
+
+@pytest.fixture(scope="module")
+def run():
+    return distill(CurvedTeacher(), SIMPLEGOAL, TINY, seed=0)
+
+
+def test_the_frame_counts_what_the_events_say(run):
+    _, history = run
+    frame = history.to_frame()
+    assert frame.columns.tolist() == ["cells", "loss", "splits", "merges"] and frame.index.name == "iteration"
+    assert len(frame) == TINY.n_epochs and not frame.isna().any().any()
+    assert frame["splits"].sum() == sum(e.kind == "split" for e in history.events) > 0
+    assert frame["merges"].sum() == sum(e.kind == "merge" for e in history.events) > 0
+    assert (1 + (frame["splits"] - frame["merges"]).cumsum() == frame["cells"]).all()
+
+
+def test_events_replay_to_the_codewords(run):
+    policy, history = run
+    codewords = [history.policy_at(0).codewords[0].tolist()]
+    for event in history.events:
+        codewords.append(event.codeword.tolist()) if event.kind == "split" else codewords.remove(
+            event.codeword.tolist()
+        )
+    assert sorted(codewords) == sorted(policy.codewords.tolist())
+
+
+def test_policy_at_follows_the_partition_in_every_iteration(run):
+    policy, history = run
+    codewords = {tuple(history.policy_at(0).codewords[0])}
+    for n, cells in enumerate(history.cells):
+        for event in (e for e in history.events if e.iteration == n):
+            (codewords.add if event.kind == "split" else codewords.remove)(tuple(event.codeword))
+        assert {tuple(c) for c in history.policy_at(n).codewords} == codewords and len(codewords) == cells
+    assert np.array_equal(history.policy_at(len(history.cells) - 1).codewords, policy.codewords)
+
+
+def test_policy_at_is_right_where_one_cell_comes_and_another_goes():
+    history, old = History(), partition_of([[0.1, 0.1], [0.9, 0.9]])
+    history.observe(0, 1.0, old)
+    new = partition_of([[0.1, 0.1], [0.5, 0.9]])
+    history.add_events(1, "split", [np.array([0.5, 0.9])])
+    history.add_events(1, "merge", [np.array([0.9, 0.9])])
+    history.observe(1, 1.0, new)
+    assert history.policy_at(1).codewords.tolist() == new.codewords.tolist()
+
+
+def test_a_snapshot_is_at_most_so_many_iterations_old():
+    history, partition = History(), partition_of([[0.5, 0.5]])
+    for n in range(35):
+        partition.models.parameters = np.full((1, 3, 2), float(n))
+        history.observe(n, 0.0, partition)
+    ages = [n - history.policy_at(n).coefficients[0, 0, 0] for n in range(35)]
+    assert min(ages) == 0 and max(ages) == SNAPSHOT_EVERY - 1
+
+
+def test_snapshots_do_not_change_afterwards(run):
+    history, partition = History(), partition_of([[0.5, 0.5]])
+    history.observe(0, 0.0, partition)
+    partition.models.parameters[:] = 9.0
+    partition.codewords[:] = 9.0
+    assert not (history.policy_at(0).coefficients == 9).any() and not (history.policy_at(0).codewords == 9).any()
+
+
+@pytest.mark.parametrize("n", [-1, 120, 1000])
+def test_an_iteration_outside_the_run_is_shown(run, n):
+    with pytest.raises(ValueError, match=f"iteration {n}, expected 0 to 119"):
+        run[1].policy_at(n)
+
+
+def test_a_run_without_events_has_a_frame():
+    _, history = distill(CurvedTeacher(), SIMPLEGOAL, tiny(n_epochs=3, n_freeze=3), seed=0)
+    assert history.to_frame()[["splits", "merges"]].to_numpy().tolist() == [[0, 0]] * 3

@@ -1,0 +1,133 @@
+import dataclasses
+import inspect
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pandas as pd
+import pytest
+from support import TASKS
+
+import vsp
+
+
+@pytest.fixture(scope="module")
+def made():
+    teacher = vsp.load_teacher("SimpleGoal-v0")
+    config = dataclasses.replace(vsp.preset("SimpleGoal-v0").quick(), n_epochs=200, n_freeze=40)
+    return teacher, config, *vsp.distill(teacher, "SimpleGoal-v0", config, seed=0)
+
+
+def test_tasks():
+    assert vsp.tasks()[:2] == list(TASKS)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_gymnasium_knows_every_task(task):
+    env = gymnasium.make(task)
+    obs, _ = env.reset(seed=0)
+    obs, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+    assert env.observation_space.contains(obs) and not terminated and not truncated and np.isfinite(reward)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_teacher_config_distill_evaluate(task, tmp_path):
+    teacher, config = vsp.load_teacher(task), vsp.preset(task)
+    obs = np.array([0.3, 0.05], np.float32)
+    action, state = teacher.predict(obs)
+    assert state is None and action.shape == gymnasium.make(task).action_space.shape
+    short = dataclasses.replace(config.quick(), n_epochs=60, n_freeze=5)
+    policy, history = vsp.distill(teacher, task, short, seed=0)
+    k, d, m = len(policy.codewords), 2, len(action)
+    assert policy.codewords.shape == (k, d) and policy.coefficients.shape == (k, d + 1, m)
+    assert policy.predict(obs)[0].shape == (m,) and policy.predict(np.tile(obs, (5, 1)))[0].shape == (5, m)
+    policy.save(tmp_path / "policy")
+    back = vsp.VoronoiPolicy.load(tmp_path / "policy")
+    assert np.array_equal(back.predict(obs)[0], policy.predict(obs)[0])
+    returns = vsp.evaluate(policy, task, n_episodes=20, seed=0)
+    assert isinstance(returns, pd.DataFrame) and {"return", "length", "outcome"} <= set(returns) and len(returns) == 20
+    assert len(history.to_frame()) == 60
+
+
+def test_explain_has_what_is_promised(made):
+    told = made[2].explain(np.array([0.7, 0.3]))
+    assert told.cell >= 0 and told.equations and told.margin >= 0
+    assert np.allclose(told.contributions.sum(axis=1), told.raw)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_published_policy_plays(task):
+    policy = vsp.paper.published_policy(task)
+    assert isinstance(policy, vsp.VoronoiPolicy) and len(vsp.evaluate(policy, task, n_episodes=5, seed=0)) == 5
+
+
+def test_the_whole_face_from_a_fresh_prompt():
+    """In a process of its own, so that no other test has imported a part for it."""
+    code = """
+import gymnasium, vsp
+gymnasium.make("SimpleGoal-v0")
+assert vsp.tasks()[:2] == ["SimpleGoal-v0", "MountainCarContinuous-v0"]
+teacher, config = vsp.load_teacher("SimpleGoal-v0"), vsp.preset("SimpleGoal-v0").quick()
+vsp.paper.published_policy("SimpleGoal-v0").predict([0.5, 0.5])
+vsp.distill, vsp.evaluate, vsp.VoronoiPolicy, vsp.Config
+import sys
+print({"torch", "stable_baselines3", "matplotlib", "sklearn"} & set(sys.modules))
+"""
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "set()"
+
+
+def test_a_good_student_is_close_to_its_teacher(made):
+    teacher, _, policy, _ = made
+    student, random = vsp.evaluate(policy, "SimpleGoal-v0", 200, seed=1)["return"].mean(), -2
+    assert student > random and vsp.evaluate(teacher, "SimpleGoal-v0", 200, seed=1)["return"].mean() > student - 1
+
+
+MODULES = (
+    "buffers", "checks", "config", "distill", "envs", "evaluate", "experiments", "figures",
+    "geometry", "history", "policy", "rollouts", "store", "subpolicies", "tables", "teachers",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_everything_public_says_what_it_does(name):
+    import importlib
+
+    module = importlib.import_module(f"vsp.{name}")
+    assert module.__doc__
+    public = [
+        v for n, v in vars(module).items() if not n.startswith("_") and getattr(v, "__module__", "") == module.__name__
+    ]
+    for thing in public:
+        if inspect.isfunction(thing) or inspect.isclass(thing):
+            assert thing.__doc__, thing
+        for n, member in vars(thing).items() if inspect.isclass(thing) else ():
+            if inspect.isfunction(member) and not n.startswith("_") and not issubclass(thing, gymnasium.Env):
+                assert member.__doc__ or thing.__name__ == "Policy", f"{thing}.{n}"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: vsp.load_teacher("Nowhere-v0"),
+        lambda: vsp.preset("Nowhere-v0"),
+        lambda: vsp.distill(None, "Nowhere-v0", seed=0),
+        lambda: vsp.evaluate(None, "Nowhere-v0", seed=0),
+        lambda: vsp.paper.published_policy("Nowhere-v0"),
+        lambda: vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task="Nowhere-v0"),
+    ],
+)
+def test_an_unknown_task_is_the_same_clear_error_everywhere(call):
+    with pytest.raises(ValueError, match="unknown task 'Nowhere-v0', expected one of .*SimpleGoal-v0"):
+        call()
+
+
+def test_a_path_to_a_teacher_may_be_relative(tmp_path, monkeypatch):
+    import shutil
+
+    for suffix in (".safetensors", ".json"):
+        shutil.copy(vsp.teachers.SHIPPED / f"SimpleGoal-v0{suffix}", tmp_path / f"own{suffix}")
+    monkeypatch.chdir(tmp_path)
+    assert vsp.load_teacher("own.safetensors").digest == vsp.load_teacher("SimpleGoal-v0").digest

@@ -1,0 +1,143 @@
+"""vsp.runner: a notebook succeeds as a whole or changes nothing, and says which cell was at fault."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from vsp import runner
+
+DRAW = """\
+from pathlib import Path
+folder = Path(out) / "figures"
+folder.mkdir(parents=True)
+(folder / "a.txt").write_text(f"quick is {quick}")
+(folder / "b.txt").write_text("always the same")"""
+
+
+def write(folder: Path, *cells: str, parameters: str = 'out = ".."\nruns = "../data/runs"\nquick = False') -> Path:
+    """A notebook of code cells; a cell that begins with `# skip` is tagged so that it never runs."""
+    notebook = nbformat.v4.new_notebook()
+    notebook.metadata.kernelspec = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    for number, source in enumerate((parameters, *cells)):
+        cell = nbformat.v4.new_code_cell(source, id=f"cell-{number}")
+        cell.metadata.tags = (
+            ["parameters"] if number == 0 else ["skip-execution"] if source.startswith("# skip") else []
+        )
+        notebook.cells.append(cell)
+    path = folder / "story.ipynb"
+    nbformat.write(notebook, path)
+    return path
+
+
+def tree(folder: Path) -> dict[str, tuple[bytes, int]]:
+    """Content and time of every file outside build/."""
+    files = (p for p in folder.rglob("*") if p.is_file() and "build" not in p.relative_to(folder).parts)
+    return {p.relative_to(folder).as_posix(): (p.read_bytes(), p.stat().st_mtime_ns) for p in files}
+
+
+def test_success_twice(tmp_path):
+    """Files arrive; the executed copy is clean; a second run touches nothing; another value changes one file."""
+    show = "print(Path(runs).name)\ndisplay(1)\nprint('two', flush=True)\nprint('three')\n40 + 2"
+    notebook, out = write(tmp_path, DRAW, "", show), tmp_path / "out with space"
+    assert runner.main([str(notebook), "--out", str(out), "--expect", "figures/a.txt", "figures/b.txt"]) == 0
+    first = tree(out)
+    assert set(first) == {"figures/a.txt", "figures/b.txt", "figures/executed/story.ipynb"}
+    executed = nbformat.read(out / "figures" / "executed" / "story.ipynb", as_version=4)
+    assert [cell.id for cell in executed.cells] == ["cell-0", "cell-1", "cell-2", "cell-3"]
+    assert [cell.execution_count for cell in executed.cells] == [1, 2, 3, 4]
+    assert [output.output_type for output in executed.cells[3].outputs] == [
+        "stream", "display_data", "stream", "execute_result"
+    ]  # fmt: skip
+    text = first["figures/executed/story.ipynb"][0].decode()
+    assert "papermill" not in text and str(tmp_path) not in text and "injected" not in text
+    assert runner.run(notebook, out) == []
+    assert tree(out) == first
+    assert runner.run(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
+    assert not (out / "build" / "running" / "story").exists()
+
+
+FAULTS = {
+    "failing cell": (["1 / 0"], "code cell 3 (1 / 0) failed: ZeroDivisionError"),
+    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell 3 (import os) did not end: DeadKernel"),
+    "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell 3 (import sys) failed: SystemExit"),
+    "sys.exit(0) at the end": (["import sys; sys.exit(0)"], "code cell 3 (import sys; sys.exit(0)) failed: SystemExit"),
+    "never ran": (["# skip", "2"], "code cell 3 (# skip) never ran"),
+    "too slow": (["import time; time.sleep(60)"], "code cell 3 (import time; time.sleep(60)) did not end: CellTimeout"),
+    "address": (["object()"], "code cell 3 (object()) shows a memory address"),
+    "path": (["print(out)"], "code cell 3 (print(out)) shows a folder of this machine"),
+    "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
+    "missing": (["2"], "did not make figures/c.pdf"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_leaves_previous_figures(tmp_path, capsys, fault):
+    cells, message = FAULTS[fault]
+    (tmp_path / "figures" / "executed").mkdir(parents=True)
+    for name in ("a.txt", "executed/story.ipynb"):
+        (tmp_path / "figures" / name).write_text("from an earlier run")
+    notebook = write(tmp_path, DRAW, *cells)
+    before = tree(tmp_path)
+    expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
+    timeout = "3" if fault == "too slow" else "60"
+    assert runner.main([str(notebook), "--out", str(tmp_path), "--timeout", timeout, "--expect", *expect]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: story.ipynb") and message in error
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"quik": True}, r"story.ipynb: unknown parameter 'quik', expected one of \['out', 'quick', 'runs'\]"),
+        ({"quick": 3}, "story.ipynb: parameter quick is 3, expected bool as False"),
+    ],
+)
+def test_wrong_parameter(tmp_path, given, message):
+    with pytest.raises(runner.NotebookError, match=message):
+        runner.run(write(tmp_path, DRAW), tmp_path / "out", parameters=given)
+    assert not (tmp_path / "out").exists()
+
+
+def test_unfit_notebook(tmp_path):
+    with pytest.raises(runner.NotebookError, match="no such notebook"):
+        runner.run(tmp_path / "none.ipynb", tmp_path)
+    with pytest.raises(runner.NotebookError, match="story.ipynb: unknown parameter 'out'"):
+        runner.run(write(tmp_path, DRAW, parameters="quick = False"), tmp_path)
+    with pytest.raises(runner.NotebookError, match="parameters cell: expected `name = literal` lines"):
+        runner.run(write(tmp_path, DRAW, parameters="out = f()"), tmp_path)
+
+
+def test_end_by_signal_ends_kernel(tmp_path):
+    """SIGTERM to the runner: no kernel and no output is left, and its lock is free."""
+    pid = tmp_path / "pid"
+    wait = "import os, time\n(Path(out).parents[3] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
+    command = [sys.executable, "-m", "vsp.runner", str(write(tmp_path, DRAW, wait)), "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until(lambda: pid.exists() and pid.read_text())
+    process.send_signal(signal.SIGTERM)
+    assert "story.ipynb: interrupted" in process.communicate(timeout=30)[1]
+    assert process.returncode == 130
+    until(lambda: not alive(int(pid.read_text())))
+    assert not (tmp_path / "figures").exists() and not (tmp_path / "build" / "running" / "story").exists()
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def until(condition) -> None:
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline, "waited 30 s in vain"
+        time.sleep(0.05)
