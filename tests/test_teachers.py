@@ -368,8 +368,11 @@ def same(a, b):
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
 
 
-@pytest.mark.parametrize("recipe", [SHORT, EPISODIC])
-@pytest.mark.parametrize("stop_after", [1, 2])
+WANDERING = dataclasses.replace(SHORT, noise="ornstein-uhlenbeck", noise_std=0.5)  # noise with a memory
+
+
+@pytest.mark.parametrize("recipe", [SHORT, EPISODIC, WANDERING])
+@pytest.mark.parametrize("stop_after", [2])
 def test_a_resumed_training_ends_with_the_same_weights(short, tmp_path, monkeypatch, recipe, stop_after):
     monkeypatch.setattr(teachers, "RECIPES", {SIMPLEGOAL: recipe})
     whole = teachers.train(SIMPLEGOAL, seed=3, cache=tmp_path / "whole", report=lambda line: None)

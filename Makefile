@@ -1,0 +1,167 @@
+# Everything that this project makes, with GNU make 3.81 or newer. `make help` lists the targets.
+#
+# What is up to date is decided by content, never by file times (a fresh clone has no order in them): build/state holds,
+# for every notebook, the checksums of all that it read and made. An altered, deleted or never made file is made again.
+
+# What each notebook makes: figures/ (PDF and PNG), figures/tables/ (TEX and CSV) and data/results/.
+NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables
+FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
+FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
+FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
+RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv made_on.txt
+TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_policies mountaincar_linear_policies \
+  simplegoal_spread mountaincar_spread text_numbers
+# The notebooks that read data/runs.
+NEED_RUNS := 03_evaluation 04_appendix_tables
+
+OUT ?= .
+JOBS ?= $(shell getconf _NPROCESSORS_ONLN || echo 1)
+QUICK ?=
+PYTHON ?=
+
+ifeq ($(strip $(OUT)),)
+$(error OUT is empty, expected a folder, as in `make paper-figures OUT=scratch`)
+endif
+
+PY := .venv/bin/python
+PIP := $(PY) -m pip --disable-pip-version-check
+STATE = $(OUT)/build/state
+INPUTS := $(sort $(wildcard vsp/*.py data/paper/* data/teachers/*)) environment.lock
+outputs = figures/executed/$(1).ipynb $(foreach f,$(FIGURES_$(1)),figures/$(f).pdf figures/$(f).png) \
+  $(foreach t,$(TABLES_$(1)),figures/tables/$(t).tex figures/tables/$(t).csv) \
+  $(addprefix data/results/,$(RESULTS_$(1)))
+
+# The same bytes everywhere: no dates in files, no order by hash, one thread per process, nobody's personal settings.
+export SOURCE_DATE_EPOCH := 1763337600
+export PYTHONHASHSEED := 0
+export PYTHONUTF8 := 1
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+export VECLIB_MAXIMUM_THREADS := 1
+export NUMEXPR_NUM_THREADS := 1
+export JUPYTER_PREFER_ENV_PATH := 1
+export SDL_VIDEODRIVER := dummy
+export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
+unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
+
+.PHONY: help paper-figures quick runs teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
+.NOTPARALLEL: # `runs` uses every core by itself
+
+help: ## this list
+	@echo 'make TARGET [OUT=folder] [JOBS=processes] [PYTHON=/path/to/python3.11]'
+	@echo 'Times are for 2 cores; the first target also sets up .venv (about 2 minutes, and downloads).'
+	@echo
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  %-14s %s\n", $$1, $$2 }'
+	@echo
+	@echo 'or the notebook that makes one artefact (under a minute each, once the runs are there):'
+	@echo
+	@$(foreach n,$(NOTEBOOKS),echo '  $(n)'; \
+	  $(foreach f,$(FIGURES_$(n)),echo '    figures/$(f).pdf .png';) \
+	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
+	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
+
+paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: 3 to 5 minutes
+	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
+	else echo "everything is up to date: see $(OUT)/figures"; fi
+
+quick: ## the same path with tiny runs, figures watermarked, into build/quick/: under 60 s
+	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
+
+runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: 2 to 4 minutes, resumable
+	@mkdir -p "$(STATE)" "$(OUT)/data/runs"; inputs=$$(cksum $(INPUTS)) || exit 1; \
+	state() { echo "$$inputs quick=$(QUICK)"; \
+	  (cd "$(OUT)/data/runs" && find . -type f | LC_ALL=C sort | xargs cksum 2>/dev/null); }; \
+	if ! state | cmp -s - "$(STATE)/runs"; then \
+	  $(PY) -m vsp.experiments --out "$(OUT)" --jobs $(JOBS) $(if $(QUICK),--quick) && state > "$(STATE)/runs"; fi
+
+teachers: venv ## trains both TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
+	$(PY) -m vsp.teachers --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}"
+
+lab: venv ## opens JupyterLab on the notebooks
+	$(PY) -m jupyterlab notebooks
+
+test: venv ## runs the tests: about 3 minutes
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests
+
+bench: venv ## measures speed: about a minute
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py
+
+clean: ## removes build/ and data/runs/, nothing that is committed: at once
+	rm -rf "$(OUT)/build" "$(OUT)/data/runs"
+
+# Notebooks
+
+begin:
+	@mkdir -p "$(STATE)"; : > "$(STATE)/made"
+
+# $(1): a notebook. Its state is what it reads, as found before the run, and what it makes, as found after.
+define notebook-rules
+.PHONY: $(call outputs,$(1))
+$(call outputs,$(1)): $(1) ;
+$(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
+	@mkdir -p "$$(STATE)"; \
+	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
+	state() { echo "$$$$inputs quick=$$(QUICK)"; (cd "$$(OUT)" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
+	if ! state | cmp -s - "$$(STATE)/$(1)"; then \
+	  $$(PY) -m vsp.runner notebooks/$(1).ipynb --out "$$(OUT)" $$(if $$(QUICK),-p quick true) \
+	    --expect $(call outputs,$(1)) && state > "$$(STATE)/$(1)" && echo $(1) >> "$$(STATE)/made"; fi
+endef
+$(foreach n,$(NOTEBOOKS),$(eval $(call notebook-rules,$(n))))
+
+# Set-up
+
+# .venv/built-from holds the checksum of the lock and the folder that .venv was built in. It is written last, so that an
+# unfinished environment is never taken for a whole one.
+venv:
+	@{ cksum environment.lock; pwd; } | cmp -s - .venv/built-from && $(PY) -c '' 2>/dev/null \
+	  || exec $(MAKE) --no-print-directory new-venv
+
+# torch first, and by itself: pip takes the CPU build where it is pointed to one, else the registry's; the lock knows
+# the checksums of both. Only the GPU libraries that the registry's Linux builds ask for come without a checksum, in the
+# versions that torch asks for. vsp itself is found through a path file, so that edits count at once.
+new-venv:
+	@python=; for p in $(if $(PYTHON),"$(PYTHON)",python3.11 python3); do \
+	  if "$$p" -c 'import ensurepip, sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
+	    python=$$p; break; fi; done; \
+	if [ -z "$$python" ]; then \
+	  echo 'error: tried $(if $(PYTHON),$(PYTHON),python3.11 and python3), expected Python 3.11 with venv' >&2; \
+	  echo '  (Debian: apt install python3.11-venv). To say where it is: make PYTHON=/path/to/python3.11' >&2; \
+	  exit 1; fi; \
+	if ! mkdir .venv-lock 2>/dev/null; then \
+	  echo 'error: another make is setting up .venv: wait for it. If none is, remove the folder .venv-lock' >&2; \
+	  exit 1; fi; \
+	trap 'rmdir .venv-lock' EXIT; trap 'exit 1' HUP INT TERM; set -e; \
+	echo "Setting up .venv from environment.lock with $$python; this happens once and takes about 2 minutes,"; \
+	echo "longer where torch brings GPU libraries along (Linux, 2.5 GB of downloads)."; \
+	rm -rf .venv; "$$python" -m venv .venv; \
+	torch=$$(sed -n 's/^\(torch==[0-9.]*\).*/\1/p' environment.lock); \
+	echo "1/4 $$torch"; \
+	$(PIP) download -qq --no-deps --dest .venv/torch "$$torch"; \
+	if ! grep -qF -e "$$($(PIP) hash .venv/torch/*.whl | tail -n 1)" environment.lock; then \
+	  echo "error: SHA-256 of $$(ls .venv/torch) is not among those of $$torch in environment.lock" >&2; \
+	  echo "  pip was pointed to another build: unset its settings (PIP_..., pip.conf) for packages" >&2; exit 1; fi; \
+	$(PIP) install -qq --no-deps .venv/torch/*.whl; rm -r .venv/torch; \
+	echo "2/4 the other packages"; \
+	$(PIP) install -qq --no-deps --require-hashes --requirement environment.lock; \
+	echo "3/4 what torch needs on this machine"; \
+	$(PIP) install -qq "$$torch"; \
+	pwd > "$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/vsp.pth"; \
+	echo "4/4 check"; \
+	$(PIP) check; \
+	{ cksum environment.lock; pwd; } > .venv/built-from
+
+# SHA-256 of a CPU build of torch (2.13.0+cpu, Python 3.11, Linux x86_64), accepted beside the registry's builds.
+TORCH_CPU := 6746dbcbeb526eb61330b76b41ff1b4eb848951103a892eeb080dfa2b264667b
+ANYWHERE := ; (python_full_version < '3.12' and sys_platform == 'darwin') or \
+  (python_full_version < '3.12' and sys_platform == 'linux')
+
+lock: venv ## resolves pyproject.toml anew, to the newest versions, and writes environment.lock: under a minute
+	@mkdir -p build; test -x build/uv/bin/uv || { $(PY) -m venv build/uv && build/uv/bin/python -m pip install -qq uv; }
+	@build/uv/bin/uv pip compile -q --universal --generate-hashes --python-version 3.11 --extra test --no-annotate \
+	  --no-header --output-file build/resolved.lock pyproject.toml
+	@{ echo '# The whole environment with the checksums of every file, for Linux and macOS: written by `make lock`.'; \
+	  sed "s/ $(ANYWHERE)//" build/resolved.lock \
+	  | awk '{ print } /^torch==/ { print "    --hash=sha256:$(TORCH_CPU) \\" }'; } > build/environment.lock
+	@rm build/resolved.lock; mv build/environment.lock environment.lock; \
+	  echo "environment.lock: $$(grep -c '^[a-z]' environment.lock) packages"
