@@ -1,7 +1,7 @@
 """The hyperparameters of the paper (table T2) and the readings of what it leaves open, in one frozen dataclass.
 
-The paper's open questions are numbered R1-R15 as in the comments below. Each reading is a field; `distill.py` turns it
-into a small function once, before the loop. R11 (which states a splitting pass reads) has one reading in the prose,
+The paper's open questions are numbered R1-R15 as in the comments below. Each reading is a field that names
+an entry of `readings.py`, or a number. R11 (which states a splitting pass reads) has one reading in the prose,
 "this iteration's episode", and so it is no field.
 """
 

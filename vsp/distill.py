@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from . import geometry
+from . import geometry, readings
 from .buffers import Buffers
 from .config import Config, preset
 from .envs import Task, get_task
@@ -55,8 +55,8 @@ def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[Vo
                 history.add_events(n, "split", split_regions(partition, episode, config, init))
             if due(n, config.n_merge, config):  # l. 20-22
                 history.add_events(n, "merge", merge_regions(partition, config))
-        if config.periodic_reset == "buffers" and due(n, config.n_reset, config):
-            partition.clear()
+        if due(n, config.n_reset, config):
+            readings.PERIODIC_RESET[config.periodic_reset](partition)
         history.observe(n, loss, partition)
     return partition.policy(), history
 
@@ -66,7 +66,10 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
     Returns the new codewords, each (d,).
     """
-    locate = partition.locate if config.split_lookup == "refreshed" else partition.snapshot()  # R2
+    locate = readings.SPLIT_LOOKUP[config.split_lookup](partition)
+    affected = readings.SPLIT_NEIGHBOURS[config.split_neighbours]
+    carry = readings.LOSS_AFTER_SPLIT[config.loss_after_split]
+    most = 1 if config.one_split else len(episode.states)  # R4
     previous, losses, added = None, [], []
     for state, action in zip(episode.states, episode.actions):
         i = locate(state)  # l. 4
@@ -74,16 +77,14 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
             previous, losses = i, []
         losses.append(partition.loss(i, state, action))  # l. 9
         if np.mean(losses) > config.max_pol_loss and partition.far(i, state):  # l. 10
-            old_neighbours = partition.neighbours()[i]
+            before = partition.neighbours()[i]
             j = partition.add(state, rng)  # l. 11-12
-            near = partition.neighbours()[j] if config.split_neighbours == "new" else np.append(old_neighbours, False)
-            if config.split_reset == "cell_and_neighbours":
-                near[i] = True
+            near = affected(before, partition.neighbours()[j])
+            near[i] |= config.split_reset == "cell_and_neighbours"  # R13
             partition.reset(near)  # l. 13-14
+            losses = carry(losses)
             added.append(state)
-            if config.loss_after_split == "reset":  # R14
-                losses = []
-            if config.one_split:  # R4
+            if len(added) == most:
                 break
     return added
 
@@ -93,8 +94,9 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
     k = len(partition.codewords)
     parameters = partition.comparable_parameters()
     alive = np.ones(k, dtype=bool)
+    visited = np.ones(k, dtype=bool) if config.merge_visits_removed else alive  # R6
     for i in range(k):  # l. 1
-        if not (alive[i] or config.merge_visits_removed):  # R6
+        if not visited[i]:
             continue
         members = alive.copy()
         members[i] = True
@@ -106,8 +108,7 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
             similar[:i] = False  # those before it had their turn: two equal cells must not remove each other
         if similar.any():
             alive &= ~similar  # l. 5-6
-            if config.merge_reset == "survivor_and_neighbours":
-                near[i] = True
+            near[i] |= config.merge_reset == "survivor_and_neighbours"  # R6
             partition.reset(near)  # l. 7
     removed = list(partition.codewords[~alive])
     partition.keep(alive)
@@ -123,7 +124,11 @@ class Partition:
         self.codewords = np.zeros((0, d))
         self.models = LinearCells(d, m, initial=config.initial)
         self.buffers = Buffers(d, m)
-        self.scale = task.high - task.low if config.scale == "box" else np.ones(d)  # R8
+        self.scale = readings.SCALE[config.scale](task.low, task.high)
+        self._on_reset = readings.ADAM_ON_RESET[config.adam_on_reset]
+        self._seen_by_loss = readings.SPLIT_LOSS[config.split_loss]
+        self._graph = readings.NEIGHBOURS[config.neighbours]
+        self._compared = readings.MERGE_PARAMETERS[config.merge_parameters]
 
     def observe(self, episode: Episode) -> None:
         """Put each state and action into the buffer of its cell."""
@@ -154,14 +159,12 @@ class Partition:
     def reset(self, cells: np.ndarray) -> None:
         """Empty the buffers of `cells`, a mask (k,)."""
         self.buffers.reset(cells)
-        if self.config.adam_on_reset == "restart":
-            self.models.restart_adam(cells)
+        self._on_reset(self.models, cells)
 
     def clear(self) -> None:
         """Empty all buffers and use their memory again."""
         self.buffers.clear()
-        if self.config.adam_on_reset == "restart":
-            self.models.restart_adam(np.arange(len(self.codewords)))
+        self._on_reset(self.models, slice(None))
 
     def locate(self, state: np.ndarray) -> int:
         """Cell of one state (d,)."""
@@ -182,24 +185,18 @@ class Partition:
 
     def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
         """Mean squared error of cell i's action at `state` against the teacher's."""
-        own = self.models.predict(i, state)
-        if self.config.split_loss == "clipped":  # R10
-            own = np.clip(own, self.task.action_low, self.task.action_high)
+        own = self._seen_by_loss(self.models.predict(i, state), self.task.action_low, self.task.action_high)
         return float(np.square(own - action).mean())
 
     def neighbours(self, members: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Which cells of `members` are neighbours. (k, k) bool"""
-        codewords = self.codewords[members] / self.scale
-        if self.config.neighbours == "delaunay":  # R9
-            return geometry.delaunay_neighbours(codewords)
-        return geometry.lookup_neighbours(codewords, self.task.low / self.scale, self.task.high / self.scale)
+        return self._graph(
+            self.codewords[members] / self.scale, self.task.low / self.scale, self.task.high / self.scale
+        )
 
     def comparable_parameters(self) -> np.ndarray:
         """What a merge compares, one row per cell. (k, p)"""
-        parameters = self.models.parameters
-        if self.config.merge_parameters == "weights":  # R12
-            parameters = parameters[:, :-1]
-        return parameters.reshape(len(parameters), -1)
+        return self._compared(self.models.parameters).reshape(len(self.codewords), -1)
 
     def policy(self) -> VoronoiPolicy:
         """The partition as a policy of its own."""
@@ -209,9 +206,7 @@ class Partition:
 
 def may_alter(n: int, config: Config) -> bool:
     """R1: whether iteration n may split and merge."""
-    if config.freeze == "first_n_freeze":
-        return n < config.n_freeze
-    return n < config.n_epochs - (config.n_freeze if config.freeze == "last_n_freeze" else config.n_split)
+    return readings.MAY_ALTER[config.freeze](n, config)
 
 
 def due(n: int, every: int, config: Config) -> bool:

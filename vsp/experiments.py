@@ -41,6 +41,7 @@ _CODE = (
     "geometry",
     "history",
     "policy",
+    "readings",
     "rollouts",
     "subpolicies",
     "teachers",
