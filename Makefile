@@ -89,6 +89,7 @@ bench: venv ## measures speed: about a minute
 
 clean: ## removes build/ and data/runs/, nothing that is committed: at once
 	rm -rf "$(OUT)/build" "$(OUT)/data/runs"
+	@for d in figures data; do test ! -d "$(OUT)/$$d" || find "$(OUT)/$$d" -type f -name '.?*-????????.*' -delete; done
 
 # Notebooks
 

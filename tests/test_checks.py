@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vsp.checks import check_array, check_finite
+from vsp.checks import check_array, check_finite, check_seed
 
 
 @pytest.mark.parametrize("values", [[1, 2], np.float32([1, 2]), np.uint8([1, 2]), np.array([1.0, 2.0])])
@@ -46,3 +46,14 @@ def test_a_wrong_shape_shows_both(shape, wanted, shown):
 def test_a_right_shape_passes():
     assert check_array("weights", np.zeros((7, 2)), (-1, 2)).shape == (7, 2)
     assert check_array("weights", np.zeros((0, 2)), (-1, 2)).shape == (0, 2)
+
+
+@pytest.mark.parametrize("seed", [0, 7, np.int64(3), 2**40])
+def test_seeds_are_integers_from_zero_on(seed):
+    check_seed(seed)
+
+
+@pytest.mark.parametrize("seed", [None, -1, 0.5, "1", True])
+def test_other_seeds_are_refused(seed):
+    with pytest.raises(ValueError, match="seed is .*, expected an integer from 0 on"):
+        check_seed(seed)

@@ -294,6 +294,11 @@ def test_may_alter(freeze, allowed):
     assert [n for n in range(100) if may_alter(n, config)] == list(allowed)
 
 
+def test_the_last_n_freeze_are_the_last_that_are_played():
+    config = tiny(n_epochs=100, n_freeze=30, inclusive=True)
+    assert sum(not may_alter(n, config) for n in range(config.n_iterations)) == 30 and config.n_iterations == 101
+
+
 def test_due():
     assert [n for n in range(13) if due(n, 4, TINY)] == [4, 8, 12]
     assert [n for n in range(13) if due(n, 4, tiny(inclusive=True))] == [0, 4, 8, 12]

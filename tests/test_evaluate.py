@@ -88,7 +88,7 @@ def test_start_states_repeat_and_the_first_ones_stay():
     assert not np.array_equal(start_states(task, 50, 1), start_states(task, 50, 2))
     assert np.array_equal(start_states(task, 10, 1), start_states(task, 50, 1)[:10])
     for n in (0, -5):
-        with pytest.raises(ValueError, match=f"n_episodes is {n}, expected at least 1"):
+        with pytest.raises(ValueError, match=f"n_episodes is {n}, expected an integer from 1 on"):
             evaluate(CurvedTeacher(), SIMPLEGOAL, n, seed=0)
 
 
@@ -142,3 +142,15 @@ def test_an_interval_widens_with_its_level_and_covers():
     draws = (np.random.default_rng(seed).normal(size=(40, 1)) for seed in range(200))
     covered = np.mean([low < 0 < high for low, high in (interval(d, np.mean, n_resamples=300) for d in draws)])
     assert 0.89 <= covered <= 0.99
+
+
+@pytest.mark.parametrize(("returns", "message"), [([], "no returns"), ([1.0, np.nan], "returns hold nan")])
+def test_a_spread_of_nothing_or_nan_is_refused(returns, message):
+    with pytest.raises(ValueError, match=message):
+        spread(np.array(returns))
+
+
+@pytest.mark.parametrize("n", [2.5, "3", None])
+def test_a_number_of_episodes_is_an_integer(n):
+    with pytest.raises(ValueError, match="expected an integer from 1 on"):
+        start_states(get_task(SIMPLEGOAL), n, 1)

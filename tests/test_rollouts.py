@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
+from vsp import paper
 from vsp.envs import GOAL, PIT, TRUNCATED, get_task
 from vsp.rollouts import play, record
 
@@ -113,3 +114,10 @@ def test_a_policy_that_fails_is_named_with_the_task():
 
     with pytest.raises(ValueError, match="the policy fails on the 2 inputs of SimpleGoal-v0: operands"):
         play(Failing(), get_task(SIMPLEGOAL), np.array([[0.9, 0.9]]))
+
+
+@pytest.mark.parametrize("start", [[5.0, 0.5], [0.5, -0.01]])
+def test_starts_outside_the_box_are_refused(start):
+    task = get_task(SIMPLEGOAL)
+    with pytest.raises(ValueError, match=r"start state \[.*\] lies outside the box of SimpleGoal-v0, \[0.0, 0.0\] to"):
+        play(paper.published_policy(SIMPLEGOAL), task, np.array([[0.5, 0.5], start]))

@@ -410,15 +410,26 @@ def test_a_changed_recipe_or_seed_does_not_resume(short, tmp_path, monkeypatch):
         assert dataclasses.replace(SHORT, **{field.name: altered}).id != SHORT.id
 
 
-def test_export_writes_what_load_teacher_reads(short, tmp_path):
+def test_export_writes_what_load_teacher_reads(short, tmp_path, monkeypatch):
+    monkeypatch.setattr(teachers, "BARS", {SIMPLEGOAL: (-100.0, 1.0)})
     paths = {seed: teachers.train(SIMPLEGOAL, seed=seed, cache=tmp_path, report=lambda line: None) for seed in (0, 1)}
     reached = teachers.export(SIMPLEGOAL, paths, tmp_path / "out")
     teacher = load_teacher(tmp_path / "out" / f"{SIMPLEGOAL}.safetensors")
-    assert not reached and teacher.card["seed"] == 1 and [t["seed"] for t in teacher.card["seeds_tried"]] == [0, 1]
+    assert reached and teacher.card["seed"] == 1 and [t["seed"] for t in teacher.card["seeds_tried"]] == [0, 1]
     assert np.array_equal(teacher.layers[0][0].T, weights(paths[1])["actor.mu.0.weight"])
     assert [point["steps"] for point in teacher.card["learning_curve"]] == [31, 62, 90]
     found = teachers.score(teacher, SIMPLEGOAL)
     assert {name: teacher.card["score"][name] for name in found} == found
+
+
+def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatch):
+    monkeypatch.setattr(teachers, "BARS", {SIMPLEGOAL: (1000.0, 0.0)})
+    monkeypatch.setattr(teachers, "MOST_SEEDS", 2)
+    out = tmp_path / "out"
+    monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out), "--task", SIMPLEGOAL])
+    with pytest.raises(SystemExit, match="none of the seeds 0 to 1 reached the bar"):
+        teachers.main()
+    assert not out.exists() and len(list((tmp_path / "cache").iterdir())) == 2
 
 
 @pytest.mark.parametrize(

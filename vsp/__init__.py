@@ -1,4 +1,8 @@
-"""vsp: distil reinforcement-learning policies to linear policies in Voronoi cells of the state space."""
+"""vsp: distil reinforcement-learning policies to linear policies in Voronoi cells of the state space.
+
+`vsp.distill` and `vsp.evaluate` are the functions; what else their modules hold is imported by name, as in
+`from vsp.distill import split_regions`.
+"""
 
 from . import envs, paper
 from .config import Config, preset

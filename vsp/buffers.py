@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Buffers:
-    """Growing per-cell buffers with uniform minibatches. Rows live until `clear`, whose period bounds the memory."""
+    """Growing per-cell buffers with uniform minibatches. Rows live until `clear`: its period bounds the memory."""
 
     def __init__(self, d: int, m: int):
         self._inputs = np.ones((1024, d + 1))  # states, then a column of ones for the bias

@@ -17,6 +17,12 @@ def check_finite(what: str, values: np.ndarray) -> np.ndarray:
     return values
 
 
+def check_seed(seed: int) -> None:
+    """Raise ValueError unless `seed` is an integer from 0 on: None, for one, would give another result each time."""
+    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
+        raise ValueError(f"seed is {seed!r}, expected an integer from 0 on")
+
+
 def check_array(what: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """`values` in float64. Raises ValueError unless they are finite and of `shape`, where -1 stands for any number."""
     values = check_finite(what, values)

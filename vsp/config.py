@@ -58,9 +58,10 @@ class Config:
     """R6. Whose buffers a merge resets: the prose names the survivor and its neighbours, Algorithm 3 the neighbours."""
     merge_visits_removed: bool = False
     """R6. Whether a cell removed earlier in a pass still takes its turn in it. Algorithm 3 removes while it iterates;
-    a cell that is gone has no claim on its neighbours, so the default is no."""
+    a cell that is gone has no claim on its neighbours, so the default is no. With yes, it may remove those whose turn
+    comes later; without that limit two equal cells would remove each other."""
     batch_size: int = 64
-    """R7. States per minibatch and cell; unstated in the paper."""
+    """R7. States per minibatch and cell, drawn with replacement; unstated in the paper."""
     n_minibatches: int = 1
     """R7. Minibatches per iteration and cell; unstated. With the rate below, a parameter can move by about 5 in 5000
     iterations and by 2 in 2000: the largest printed coefficients are 5.3 (T3) and 3.0 (T4)."""
@@ -71,8 +72,8 @@ class Config:
     adam_on_reset: Literal["keep", "restart"] = "keep"
     """R7. Whether Adam's moments survive a buffer reset: the paper resets buffers and nothing else."""
     scale: Literal["raw", "box"] = "raw"
-    """R8. Distances between raw states, or between states divided by the widths of the state box. T4's codewords are
-    in raw units."""
+    """R8. Distances between raw states, or between states divided by the widths of the state box; for look-up,
+    `min_pol_distance` and neighbours alike. T4's codewords are in raw units."""
     neighbours: Literal["delaunay", "lookup"] = "delaunay"
     """R9. The Euclidean Delaunay graph that the prose names, or the cells that touch under the look-up's metric."""
     split_loss: Literal["raw", "clipped"] = "raw"
@@ -100,6 +101,11 @@ class Config:
                 f"n_freeze is {self.n_freeze}, expected at most n_epochs = {self.n_epochs}: "
                 "lower n_freeze or raise n_epochs"
             )
+
+    @property
+    def n_iterations(self) -> int:
+        """Iterations that are played: `n_epochs`, and one more if `inclusive`."""
+        return self.n_epochs + self.inclusive
 
     def quick(self) -> Config:
         """The same method in a tenth of the iterations: for a first look, not for results."""

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from . import geometry, readings
 from .buffers import Buffers
+from .checks import check_seed
 from .config import Config, preset
 from .envs import Task, get_task
 from .history import History
@@ -30,9 +31,10 @@ def distill(
     """Distil `teacher` to a `VoronoiPolicy` (Algorithm 1). Same arguments, same policy.
 
     `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
-    of the task. The history lets a notebook replay the run. Raises ValueError when the teacher does not fit the task or
-    its states or actions are not finite.
+    of the task. The history lets a notebook replay the run. Raises ValueError when the teacher does not fit the task,
+    its states or actions are not finite, or `seed` is no integer from 0 on.
     """
+    check_seed(seed)
     task = get_task(task)
     config = preset(task.name) if config is None else config
     with threadpool_limits(1):  # the same sums in the same order on any machine, and no threads to wait for
@@ -41,10 +43,9 @@ def distill(
 
 def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[VoronoiPolicy, History]:
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
-    n_iterations = config.n_epochs + config.inclusive
-    episodes = teacher_episodes(teacher, task, n_iterations, starts)
+    episodes = teacher_episodes(teacher, task, config.n_iterations, starts)
     partition, history = Partition(task, config), History()
-    for n in range(n_iterations):
+    for n in range(config.n_iterations):
         episode = next(episodes)
         if n == 0:
             partition.add(episode.states[0], init)  # l. 1: the first state is the first codeword

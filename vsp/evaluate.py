@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from .checks import check_finite, check_seed
 from .envs import OUTCOMES, Task, get_task
 from .rollouts import Outcomes, Policy, play
 
 
 def start_states(task: Task, n_episodes: int, seed: int) -> np.ndarray:
     """The start states that belong to `seed`, the same for every policy. (n, d)"""
-    if n_episodes < 1:
-        raise ValueError(f"n_episodes is {n_episodes}, expected at least 1")
+    check_seed(seed)
+    if not isinstance(n_episodes, int | np.integer) or n_episodes < 1:
+        raise ValueError(f"n_episodes is {n_episodes!r}, expected an integer from 1 on")
     return task.start(np.random.default_rng(np.random.SeedSequence(seed)), n_episodes)
 
 
@@ -35,7 +37,9 @@ def spread(returns: np.ndarray) -> dict[str, float]:
     Whiskers end 1.5 interquartile ranges beyond the quartiles; outliers lie outside; coverage is the share that does
     not. `std` is that of the sample (n - 1).
     """
-    returns = np.ravel(returns)
+    returns = check_finite("returns", np.ravel(returns))
+    if not len(returns):
+        raise ValueError("no returns, expected at least one")
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
     lower, upper = q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)
     below, above = returns < lower, returns > upper

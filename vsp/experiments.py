@@ -13,6 +13,7 @@ import os
 import platform
 import sys
 from dataclasses import asdict, dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,7 @@ class Experiment:
             "teacher": self.teacher.digest,
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
+            "versions": {name: version(name) for name in ("numpy", "scipy")},
         }
 
     @property

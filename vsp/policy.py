@@ -109,11 +109,11 @@ class VoronoiPolicy:
         )
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per cell: the codeword's coordinates, then the coefficients of each action, as in T3 and T4."""
+        """One row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
         columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
         for j, output in enumerate(self.task.outputs):
             for i, name in enumerate([*self.task.inputs, "bias"]):
-                columns[f"{output}_{name}"] = self.coefficients[:, i, j]
+                columns[f"{output.replace('Δ', 'd')}_{name}"] = self.coefficients[:, i, j]
         return pd.DataFrame(columns).rename_axis("cell")
 
     def save(self, path: str | os.PathLike) -> None:

@@ -12,9 +12,9 @@ from . import geometry
 
 # R1: may iteration n split and merge?
 MAY_ALTER = {
-    "last_n_freeze": lambda n, config: n < config.n_epochs - config.n_freeze,
+    "last_n_freeze": lambda n, config: n < config.n_iterations - config.n_freeze,
     "first_n_freeze": lambda n, config: n < config.n_freeze,
-    "last_n_split": lambda n, config: n < config.n_epochs - config.n_split,
+    "last_n_split": lambda n, config: n < config.n_iterations - config.n_split,
 }
 
 # R2: the look-up that a splitting pass uses, as a function of one state
