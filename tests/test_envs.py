@@ -176,7 +176,7 @@ def compare(name, n, **policy):
     for i, (start, episode) in enumerate(zip(starts, episodes)):
         states, rewards, outcome = replay(env, task, start, episode.actions.astype(np.float32))
         assert len(rewards) == len(episode.actions) == result.lengths[i]
-        assert outcome == OUTCOMES[result.outcomes[i]]
+        assert outcome == OUTCOMES[result.codes[i]]
         assert np.abs(states[:-1] - episode.states).max() <= 1e-3
         assert sum(rewards) == pytest.approx(result.returns[i], abs=1e-3)
     return result
@@ -184,18 +184,18 @@ def compare(name, n, **policy):
 
 def test_simplegoal_batched_equals_step_by_step():
     result = compare(SIMPLEGOAL, 1000)
-    assert {GOAL, PIT, TRUNCATED} == set(result.outcomes) and result.lengths.max() == 50
+    assert {GOAL, PIT, TRUNCATED} == set(result.codes) and result.lengths.max() == 50
 
 
 def test_mountaincar_batched_equals_step_by_step():
     result = compare(MOUNTAINCAR, 1000)
-    assert TRUNCATED in result.outcomes and result.lengths.max() == 999
+    assert TRUNCATED in result.codes and result.lengths.max() == 999
 
 
 def test_mountaincar_batched_equals_step_by_step_where_the_goal_is_reached():
     for gain, seed in ((0.5, 1), (0.9, 2)):
         result = compare(MOUNTAINCAR, 150, gain=gain, seed=seed)
-        assert (result.outcomes == GOAL).mean() > 0.9 and result.returns.max() > 50
+        assert (result.codes == GOAL).mean() > 0.9 and result.returns.max() > 50
 
 
 def test_mountaincar_batched_equals_gymnasium_from_anywhere():

@@ -19,7 +19,7 @@ def test_spread_by_hand():
     found = spread(HAND)
     expected = {
         "min": -100, "max": 100, "mean": 45 / 11, "q1": 2.5, "median": 5, "q3": 7.5, "iqr": 5, "coverage": 9 / 11,
-        "lower_whisker": -5, "upper_whisker": 15, "outliers_below": 1, "outliers_above": 1,
+        "lower_fence": -5, "upper_fence": 15, "outliers_below": 1, "outliers_above": 1,
     }  # fmt: skip
     assert {name: found[name] for name in expected} == pytest.approx(expected)
     assert found["std"] == pytest.approx(pd.Series(HAND).std()) and len(found) == len(expected) + 1
@@ -98,7 +98,7 @@ def test_evaluate_is_a_row_per_episode(task, player):
     result = play(player, get_task(task), start_states(get_task(task), 60, 3))
     assert frame.columns.tolist() == ["return", "length", "outcome"] and frame.index.tolist() == list(range(60))
     assert np.array_equal(frame["return"], result.returns) and np.array_equal(frame["length"], result.lengths)
-    assert frame["outcome"].tolist() == [OUTCOMES[code] for code in result.outcomes]
+    assert frame["outcome"].tolist() == [OUTCOMES[code] for code in result.codes]
     assert frame.equals(evaluate(player, task, n_episodes=60, seed=3))
 
 

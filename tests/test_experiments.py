@@ -24,7 +24,6 @@ from vsp.experiments import (
     paper_runs,
     returns,
     summary,
-    teacher_outcomes,
 )
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)
@@ -57,7 +56,7 @@ def test_a_run_is_a_distillation_and_its_evaluation(made):
     assert same_arrays(
         (run.policy.codewords, policy.codewords), (run.policy.coefficients, policy.coefficients),
         (run.outcomes.returns, on_shared.returns), (run.outcomes.lengths, on_shared.lengths),
-        (run.outcomes.outcomes, on_shared.outcomes), (run.cells, np.array(history.cells)),
+        (run.outcomes.codes, on_shared.codes), (run.cells, np.array(history.cells)),
     )  # fmt: skip
     assert run.validation_mean == on_validation.returns.mean() != on_shared.returns.mean()
     assert (run.splits, run.merges) == tuple(sum(e.kind == k for e in history.events) for k in ("split", "merge"))
@@ -234,9 +233,36 @@ def test_returns_has_a_row_per_run(made):
     assert table.shape == (3, 20) and np.array_equal(table[2], made[1][2].outcomes.returns)
 
 
-def test_teacher_outcomes_are_on_the_same_starts():
-    expected = outcomes(SMALL.teacher, SIMPLEGOAL, 20, seed=EVALUATION_SEED)
-    assert np.array_equal(teacher_outcomes(SMALL).returns, expected.returns)
+@pytest.fixture(scope="module")
+def results(made):
+    return experiments.Results(SMALL, made[1], outcomes(SMALL.teacher, SIMPLEGOAL, 20, seed=EVALUATION_SEED))
+
+
+def test_results_gather_what_figures_need(results, made):
+    assert results.returns.shape == results.codes.shape == (3, 20) and results.teacher_returns.shape == (20,)
+    assert np.array_equal(results.codes[1], made[1][1].outcomes.codes) and results.best is best(made[1])
+
+
+def test_quick_results_of_the_paper(tmp_path, monkeypatch):
+    monkeypatch.setattr(experiments, "QUICK_RUNS", 1)
+    found = experiments.paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1)
+    again = outcomes(found.experiment.teacher, SIMPLEGOAL, 100, seed=EVALUATION_SEED)
+    assert found.returns.shape == (1, 100) and np.array_equal(found.teacher_returns, again.returns)
+
+
+def test_overview_and_comparison_by_hand(results):
+    table = experiments.overview(results)
+    cells = [len(run.policy) for run in results.runs]
+    assert table.loc["cells"].tolist() == [np.mean(cells), min(cells), max(cells)]
+    facts = experiments.comparison(results)
+    means = results.returns.mean(axis=1)
+    assert facts["TD3, mean"] == results.teacher_returns.mean() and facts["lowest run"] == means.min()
+    assert facts["95 % interval from"] <= facts["distilled, mean"] <= facts["to"]
+    gap = facts["distilled, mean"] - facts["TD3, mean"]
+    assert facts["difference, from"] <= gap <= facts["difference, to"]
+    assert facts["runs above TD3"] == np.mean([mean > facts["TD3, mean"] for mean in means])
+    independent = 1.96 * results.returns.std(ddof=1) / np.sqrt(60)
+    assert facts["± if independent"] == pytest.approx(independent)
 
 
 def test_summary_tells_each_run(made):
@@ -246,10 +272,10 @@ def test_summary_tells_each_run(made):
     for row, run in zip(frame.to_dict("records"), made[1]):
         assert row["cells"] == len(run.policy) == 1 + row["splits"] - row["merges"]
         assert {name: row[name] for name in spread(run.outcomes.returns)} == spread(run.outcomes.returns)
-        assert row["pit"] == np.mean(run.outcomes.outcomes == PIT) and row["goal"] == np.mean(
-            run.outcomes.outcomes == GOAL
+        assert row["pit"] == np.mean(run.outcomes.codes == PIT) and row["goal"] == np.mean(
+            run.outcomes.codes == GOAL
         )
-        assert row["truncated"] == np.mean(run.outcomes.outcomes == TRUNCATED)
+        assert row["truncated"] == np.mean(run.outcomes.codes == TRUNCATED)
 
 
 @pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])

@@ -15,7 +15,7 @@ def test_three_episodes_by_hand():
     """Left by a tenth per step: into the goal after 2 steps, into the pit after 1, against the wall for 50."""
     starts = np.array([[0.25, 0.05], [0.65, 0.5], [0.25, 0.95]])
     result = play(Constant(-1.0, 0.0), get_task(SIMPLEGOAL), starts)
-    assert result.lengths.tolist() == [2, 1, 50] and result.outcomes.tolist() == [GOAL, PIT, TRUNCATED]
+    assert result.lengths.tolist() == [2, 1, 50] and result.codes.tolist() == [GOAL, PIT, TRUNCATED]
     first_step = 10 * (np.hypot(0.25, 0.05) - np.hypot(0.15, 0.05))
     to_the_wall = 10 * (np.hypot(0.25, 0.95) - 0.95)
     assert result.returns == pytest.approx([first_step + 10, -10, to_the_wall])
@@ -72,7 +72,7 @@ def test_finished_episodes_are_not_asked_again():
 def test_max_steps_truncates():
     short = dataclasses.replace(get_task(MOUNTAINCAR), max_steps=5)
     result = play(Constant(0.0), short, np.array([[-0.5, 0.0]]))
-    assert result.lengths.tolist() == [5] and result.outcomes.tolist() == [TRUNCATED]
+    assert result.lengths.tolist() == [5] and result.codes.tolist() == [TRUNCATED]
 
 
 @pytest.mark.parametrize(

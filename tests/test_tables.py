@@ -10,7 +10,7 @@ from vsp import paper, tables
 from vsp.config import Config, preset
 from vsp.evaluate import spread
 from vsp.policy import VoronoiPolicy
-from vsp.tables import as_text, hyperparameters, printed_policy, save_table, spread_table, text_numbers
+from vsp.tables import as_text, equation_table, hyperparameters, save_table, spread_table, text_numbers
 
 FRAME = pd.DataFrame(
     {"name_of": ["a_b", "c & d"], "value": [1 / 3, 1e-4], "count": [10, 2_000_000], "gap": [np.nan, -2.0]}
@@ -114,7 +114,7 @@ def test_hyperparameters_stand_beside_the_papers(tmp_path):
     frame = hyperparameters(list(TASKS))
     assert frame["hyperparameter"].tolist() == list(paper.hyperparameters(SIMPLEGOAL)) and frame.shape == (9, 5)
     for task in TASKS:
-        assert frame[f"{task}, paper"].tolist() == frame[f"{task}, here"].tolist()
+        assert frame[f"{tables.SHORT[task]}, paper"].tolist() == frame[f"{tables.SHORT[task]}, here"].tolist()
     row = frame.set_index("hyperparameter").loc["n_epochs"]
     assert row[f"{SIMPLEGOAL}, here"] == 5000 and row[f"{MOUNTAINCAR}, here"] == 2000
     save_table(frame, "some_table", caption="c", out=tmp_path)
@@ -123,9 +123,9 @@ def test_hyperparameters_stand_beside_the_papers(tmp_path):
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_printed_policy_is_a_row_of_equations_per_cell(tmp_path, task):
+def test_a_equation_table_is_a_row_of_equations_per_cell(tmp_path, task):
     policy = paper.published_policy(task)
-    shown = printed_policy(policy, swatch=task == MOUNTAINCAR)
+    shown = equation_table(policy, swatch=task == MOUNTAINCAR)
     assert len(shown) == len(policy) and shown.shape[1] == 1 + len(policy.task.outputs)
     first = [float(c) for c in re.findall(r"-?\d+\.\d+", shown["codeword"][0])]
     assert first == pytest.approx(policy.codewords[0], abs=5e-4)
@@ -143,7 +143,7 @@ def test_a_swatch_has_the_colour_of_the_force_at_the_codeword():
     left, none, right = ([0, 0, f] for f in (-1.0, 0.0, 5.0))
     policy = VoronoiPolicy([[-1, 0], [-0.5, 0], [0, 0]], np.array([left, none, right])[:, :, None], task=MOUNTAINCAR)
     colours = [
-        re.search(r"\\textcolor\[HTML\]\{([0-9A-F]{6})\}", row)[1] for row in printed_policy(policy, swatch=True)["$F$"]
+        re.search(r"\\textcolor\[HTML\]\{([0-9A-F]{6})\}", row)[1] for row in equation_table(policy, swatch=True)["$F$"]
     ]
     assert len(set(colours)) == 3
     red, blue = ([int(c[i : i + 2], 16) for c in colours] for i in (0, 4))

@@ -17,6 +17,14 @@ def check_finite(what: str, values: np.ndarray) -> np.ndarray:
     return values
 
 
+def check_observations(observations: np.ndarray, d: int, task: str) -> np.ndarray:
+    """`observations` in float64. Raises ValueError unless they are finite and of shape (d,) or (n, d)."""
+    observations = np.asarray(observations)
+    if observations.ndim not in (1, 2) or observations.shape[-1] != d:
+        raise ValueError(f"observations have shape {observations.shape}, expected ({d},) or (n, {d}) for {task}")
+    return check_finite("observations", observations)
+
+
 def check_seed(seed: int) -> None:
     """Raise ValueError unless `seed` is an integer from 0 on: None, for one, would give another result each time."""
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:

@@ -153,4 +153,7 @@ _PRESETS = {
 
 def preset(task: str) -> Config:
     """The paper's hyperparameters for `task` (table T2) with the default readings. Raises ValueError if unknown."""
-    return _PRESETS[get_task(task).name]
+    name = get_task(task).name
+    if name not in _PRESETS:
+        raise ValueError(f"no preset for task {name!r}, expected one of {list(_PRESETS)}: write a Config of your own")
+    return _PRESETS[name]

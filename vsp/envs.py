@@ -105,11 +105,11 @@ class SimpleGoalEnv(gymnasium.Env):
         return self.state.astype(np.float32), float(reward), bool(outcome != RUNNING), False, info
 
     def render(self) -> np.ndarray:
-        """A (400, 400, 3) picture in bytes: goal blue-green, pit vermillion, agent dark blue; y points up."""
+        """A (400, 400, 3) picture in bytes: goal blue-green, pit grey, agent dark blue; y points up."""
         x, y = np.meshgrid((np.arange(400) + 0.5) / 400, (399.5 - np.arange(400)) / 400)
         image = np.full((400, 400, 3), 255, np.uint8)
         image[(x < GOAL_EDGE) & (y < GOAL_EDGE)] = (2, 158, 115)
-        image[(x > PIT_LOW) & (x < PIT_HIGH) & (y > PIT_LOW) & (y < PIT_HIGH)] = (213, 94, 0)
+        image[(x > PIT_LOW) & (x < PIT_HIGH) & (y > PIT_LOW) & (y < PIT_HIGH)] = (128, 128, 128)
         image[np.hypot(x - self.state[0], y - self.state[1]) < 0.02] = (1, 60, 130)
         return image
 

@@ -27,15 +27,17 @@ def outcomes(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: 
 def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> pd.DataFrame:
     """Play `policy` from the start states of `seed`: one row per episode with return, length and outcome."""
     result = outcomes(policy, task, n_episodes, seed=seed)
-    named = np.array(OUTCOMES)[result.outcomes]
+    named = np.array(OUTCOMES)[result.codes]
     return pd.DataFrame({"return": result.returns, "length": result.lengths, "outcome": named}).rename_axis("episode")
 
 
 def spread(returns: np.ndarray) -> dict[str, float]:
-    """The paper's spread metrics (tables T5, T6) and what its text adds: whisker bounds and outliers.
+    """How returns of any shape spread: the metrics of the paper's tables T5 and T6, and what its text adds.
 
-    Whiskers end 1.5 interquartile ranges beyond the quartiles; outliers lie outside; coverage is the share that does
-    not. `std` is that of the sample (n - 1).
+    Keys, in units of return: min, max, mean, std (of the sample, n - 1), q1, median, q3, iqr; lower_fence and
+    upper_fence, 1.5 interquartile ranges beyond the quartiles, which the paper calls bounds; outliers_below and
+    outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError for no returns
+    or some that are not finite.
     """
     returns = check_finite("returns", np.ravel(returns))
     if not len(returns):
@@ -53,8 +55,8 @@ def spread(returns: np.ndarray) -> dict[str, float]:
         "q3": q3,
         "iqr": q3 - q1,
         "coverage": 1.0 - (below | above).mean(),
-        "lower_whisker": lower,
-        "upper_whisker": upper,
+        "lower_fence": lower,
+        "upper_fence": upper,
         "outliers_below": int(below.sum()),
         "outliers_above": int(above.sum()),
     }
@@ -67,8 +69,8 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     """
     returns = np.ravel(returns)
     facts = spread(returns)
-    below = returns[returns < facts["lower_whisker"]]
-    above = returns[returns > facts["upper_whisker"]]
+    below = returns[returns < facts["lower_fence"]]
+    above = returns[returns > facts["upper_fence"]]
     outside = np.concatenate([below, above])
     numbers = {f"outliers_{name}": value for name, value in _moments(outside).items()}
     for side, values in (("below", below), ("above", above)):
@@ -77,8 +79,8 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
         numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
     return {
         **{name: facts[name] for name in ("mean", "std", "min", "max")},
-        "whisker_low": facts["lower_whisker"],
-        "whisker_high": facts["upper_whisker"],
+        "whisker_low": facts["lower_fence"],
+        "whisker_high": facts["upper_fence"],
         "outliers": len(outside),
         **numbers,
     }

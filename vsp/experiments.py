@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_info
 from . import store
 from .config import Config, preset
 from .distill import distill
-from .envs import GOAL, PIT, TRUNCATED, get_task, tasks
+from .envs import GOAL, PIT, TRUNCATED, get_task
 from .evaluate import interval, outcomes, spread
 from .policy import VoronoiPolicy
 from .rollouts import Outcomes
@@ -145,7 +145,7 @@ def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> No
         "scale": policy.scale,
         "returns": result.returns,
         "lengths": result.lengths,
-        "outcomes": result.outcomes,
+        "outcomes": result.codes,
         "cells": np.array(history.cells),
     }
     about = {
@@ -200,9 +200,40 @@ def returns(runs: list[Run]) -> np.ndarray:
     return np.stack([run.outcomes.returns for run in runs])
 
 
-def teacher_outcomes(experiment: Experiment) -> Outcomes:
-    """The teacher on the start states that the runs are evaluated on."""
-    return outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+@dataclass(frozen=True)
+class Results:
+    """The paper's experiment on one task, with everything that its figures and tables need."""
+
+    experiment: Experiment
+    runs: list[Run]
+    teacher_outcomes: Outcomes  # on the start states that the runs are evaluated on
+
+    @property
+    def teacher_returns(self) -> np.ndarray:
+        """Returns of the teacher. (n_episodes,)"""
+        return self.teacher_outcomes.returns
+
+    @property
+    def returns(self) -> np.ndarray:
+        """Returns of the distilled policies. (n_runs, n_episodes)"""
+        return returns(self.runs)
+
+    @property
+    def codes(self) -> np.ndarray:
+        """How their episodes ended, codes of `vsp.envs.OUTCOMES`. (n_runs, n_episodes)"""
+        return np.stack([run.outcomes.codes for run in self.runs])
+
+    @property
+    def best(self) -> Run:
+        """The run with the highest mean return on the validation starts."""
+        return best(self.runs)
+
+
+def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = -1) -> Results:
+    """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
+    experiment = paper_experiment(task, quick=quick)
+    teacher = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+    return Results(experiment, paper_runs(task, runs=runs, quick=quick, jobs=jobs), teacher)
 
 
 def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
@@ -216,31 +247,48 @@ def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
             "merges": run.merges,
             "validation_mean": run.validation_mean,
             **spread(run.outcomes.returns),
-            **{name: np.mean(run.outcomes.outcomes == code) for name, code in _SHARES.items()},
+            **{name: np.mean(run.outcomes.codes == code) for name, code in _SHARES.items()},
         }
         for run in runs
     )
 
 
-def comparison(teacher: np.ndarray, runs: np.ndarray) -> dict[str, float]:
-    """Teacher against distilled policies from returns (n,) and (p, n): means, 95 % interval over policies, extremes."""
+def overview(results: Results) -> pd.DataFrame:
+    """Mean, lowest and highest value over the runs, one row per property of a run."""
+    frame = summary(results.runs, results.experiment)
+    return frame[["cells", "splits", "merges", "mean", *_SHARES]].agg(["mean", "min", "max"]).T
+
+
+def comparison(results: Results) -> dict[str, float]:
+    """Teacher against distilled policies: means, and 95 % intervals that resample policies.
+
+    The difference is taken start by start. "± if independent" is what the half-width would be if all episodes were
+    independent of each other, which they are not.
+    """
+    teacher, runs = results.teacher_returns, results.returns
     means = runs.mean(axis=1)
     low, high = interval(runs, np.mean)
+    gap_low, gap_high = interval(runs - teacher, np.mean)
     return {
         "TD3, mean": teacher.mean(),
         "distilled, mean": runs.mean(),
         "95 % interval from": low,
         "to": high,
+        "± of it": (high - low) / 2,
+        "± if independent": 1.96 * runs.std(ddof=1) / np.sqrt(runs.size),
+        "difference, from": gap_low,
+        "difference, to": gap_high,
         "runs above TD3": np.mean(means > teacher.mean()),
-        "worst run": means.min(),
-        "best run": means.max(),
+        "lowest run": means.min(),
+        "median run": np.median(means),
+        "highest run": means.max(),
     }
 
 
-def write_summary(frame: pd.DataFrame, task: str, *, out: str | os.PathLike) -> None:
-    """Write the summary of the paper's runs on `task` to OUT/data/results/, and the CPU type that they were made on."""
-    folder = Path(out) / "data" / "results"
-    text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+def write_summary(results: Results, *, out: str | os.PathLike) -> None:
+    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU type that they were made on beside it."""
+    folder, task = Path(out) / "data" / "results", results.experiment.task
+    text = summary(results.runs, results.experiment).to_csv(index=False, float_format="%.6f", lineterminator="\n")
     store.write_text(folder / f"{task}.csv", text)
     store.write_text(folder / "made_on.txt", cpu_type() + "\n")
 
@@ -269,7 +317,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
     parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
     arguments = parser.parse_args()
-    for task in tasks():
+    for task in N_RUNS:
         made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
         print(f"{task}: {len(made)} runs are there")
 

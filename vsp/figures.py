@@ -17,14 +17,15 @@ import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
-from . import store
-from .envs import GOAL_EDGE, PIT_HIGH, PIT_LOW, Task
+from . import envs, store
+from .envs import Task
 from .rollouts import Episode
 
 TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
 _COLOURS = sns.color_palette("colorblind").as_hex()
-TEACHER, DISTILLED, GOAL, PIT = _COLOURS[0], _COLOURS[1], _COLOURS[2], _COLOURS[3]
+TEACHER, DISTILLED, GOAL, PIT = _COLOURS[0], _COLOURS[1], _COLOURS[2], "0.35"
 BORDER, CODEWORD = "0.25", "black"
 FORCE_MAP = "PuOr_r"
 
@@ -112,7 +113,7 @@ def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bo
 
 def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False) -> Axes:
     """Codewords (k, 2) as black dots with a white rim."""
-    ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label)
+    ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label, clip_on=False)
     if numbers:
         for i, point in enumerate(points):
             ax.annotate(str(i), point, xytext=(3, 3), textcoords="offset points", fontsize=6, zorder=6)
@@ -121,9 +122,10 @@ def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", n
 
 def square(ax: Axes) -> Axes:
     """The unit square of SimpleGoal with goal and pit."""
-    ax.add_patch(Rectangle((0, 0), GOAL_EDGE, GOAL_EDGE, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
-    side = PIT_HIGH - PIT_LOW
-    ax.add_patch(Rectangle((PIT_LOW, PIT_LOW), side, side, color=PIT, alpha=0.5, lw=0, zorder=1, label="pit"))
+    goal, pit = envs.GOAL_EDGE, envs.PIT_HIGH - envs.PIT_LOW
+    ax.add_patch(Rectangle((0, 0), goal, goal, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
+    corner = (envs.PIT_LOW, envs.PIT_LOW)
+    ax.add_patch(Rectangle(corner, pit, pit, color=PIT, alpha=0.4, lw=0, zorder=1, label="pit"))
     ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x", ylabel="y", aspect="equal", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
     return ax
 
@@ -159,10 +161,10 @@ def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, labe
     return image
 
 
-def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> Axes:
-    """Box plots of the returns of the teacher and of the distilled policies, in this order; outliers are hidden."""
+def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
+    """Box plots of the returns of the teacher and of the distilled policies, in this order."""
     colours = dict(zip(returns, (TEACHER, DISTILLED)))
-    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=False, linewidth=0.8)
+    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=outliers, linewidth=0.8)
     ax.set(ylabel="return per episode")
     ax.set_xticks(range(len(returns)), [f"{name}\n(n = {values.size:,})" for name, values in returns.items()])
     return ax
@@ -181,6 +183,8 @@ def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = Fa
     """One quantity over the iterations of a distillation."""
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
+    if not log:
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     return ax
 
 

@@ -11,16 +11,17 @@ from scipy.spatial import Delaunay, cKDTree
 from scipy.spatial.distance import cdist
 
 METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
+LOOKUP = "manhattan"  # the distance that finds a state's cell
 KDTREE_FROM = 512  # codewords from which the kd-tree is faster than comparing with all of them
 WITNESSES = 4096  # points that look for touching cells
 
 
-def distances(states: np.ndarray, codewords: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Distance of every state (n, d) to every codeword (k, d). (n, k)"""
     return cdist(states, codewords, METRICS[metric][0])
 
 
-def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Index of the nearest codeword (k, d) of each state (n, d); of equally near ones the lowest. (n,)
 
     Paper, Algorithm 1 line 6: kd-tree(C, s_t). For the few dozen codewords of the paper comparing with all of them is
@@ -30,12 +31,12 @@ def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan"
     return lookup(codewords, states, metric)
 
 
-def nearest_brute(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+def nearest_brute(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """`nearest`, by comparing with every codeword."""
     return distances(states, codewords, metric).argmin(axis=1)
 
 
-def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = "manhattan") -> np.ndarray:
+def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """`nearest`, by kd-tree. The tree answers ties in any order, so states between two codewords are compared again."""
     if len(codewords) == 1:
         return np.zeros(len(states), dtype=np.intp)
@@ -69,9 +70,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
     return _adjacency(k, edges)
 
 
-def lookup_neighbours(
-    codewords: np.ndarray, low: np.ndarray, high: np.ndarray, metric: str = "manhattan"
-) -> np.ndarray:
+def lookup_neighbours(codewords: np.ndarray, low: np.ndarray, high: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Which cells touch inside the box [low, high] under the look-up's metric. (k, k) bool, symmetric.
 
     Two cells are neighbours when some point has their codewords as its two nearest (Martinetz & Schulten 1994), for

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import geometry, store
-from .checks import check_array, check_finite
+from .checks import check_array, check_observations
 from .envs import Task, get_task
 
 
@@ -41,7 +41,7 @@ class VoronoiPolicy:
         coefficients: np.ndarray,
         *,
         task: str | Task,
-        metric: str = "manhattan",
+        metric: str = geometry.LOOKUP,
         scale: np.ndarray | None = None,
     ):
         self.task = get_task(task)
@@ -82,7 +82,8 @@ class VoronoiPolicy:
         return np.clip(self.linear(obs), self.task.action_low, self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
-        """Cell, equation, contribution of each input and margin to the border, for one observation (d,)."""
+        """Cell, equation, contribution of each input, and how much nearer this codeword is than the next, for one
+        observation (d,). Raises ValueError for a batch, as `predict` does for bad numbers."""
         state = self._states(obs)
         if state.ndim != 1:
             raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
@@ -128,13 +129,7 @@ class VoronoiPolicy:
         return cls(**arrays, task=about["task"], metric=about["metric"])
 
     def _states(self, obs: np.ndarray) -> np.ndarray:
-        states = np.asarray(obs)
-        d = len(self.task.low)
-        if states.ndim not in (1, 2) or states.shape[-1] != d:
-            raise ValueError(
-                f"observations have shape {states.shape}, expected ({d},) or (n, {d}) for {self.task.name}"
-            )
-        return check_finite("observations", states)
+        return check_observations(obs, len(self.task.low), self.task.name)
 
 
 def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int = 3) -> str:

@@ -31,7 +31,7 @@ class Outcomes:
 
     returns: np.ndarray  # (n,) undiscounted sum of rewards
     lengths: np.ndarray  # (n,) steps
-    outcomes: np.ndarray  # (n,) codes of vsp.envs.OUTCOMES
+    codes: np.ndarray  # (n,) outcomes, codes of vsp.envs.OUTCOMES
 
 
 def play(policy: Policy, task: Task, starts: np.ndarray) -> Outcomes:

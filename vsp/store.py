@@ -1,4 +1,4 @@
-"""Files on disk: atomic writes, checksums, manifests. Nothing here ever unpickles."""
+"""Files on disk: atomic writes, checksums. Nothing here ever unpickles."""
 
 from __future__ import annotations
 

@@ -16,7 +16,8 @@ from .evaluate import outlier_numbers, spread
 from .figures import FORCE_MAP
 from .policy import VoronoiPolicy, expression
 
-PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}
+PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids of text numbers
+SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 MISSING = "–"  # in print, where the paper gives no number
 
 
@@ -46,8 +47,8 @@ def hyperparameters(tasks: list[str]) -> pd.DataFrame:
     columns = {"hyperparameter": list(names)}
     for task in tasks:
         printed, here = paper.hyperparameters(task), preset(task)
-        columns[f"{task}, paper"] = [printed[name] for name in names]
-        columns[f"{task}, here"] = [getattr(here, name) for name in names]
+        columns[f"{SHORT[task]}, paper"] = [printed[name] for name in names]
+        columns[f"{SHORT[task]}, here"] = [getattr(here, name) for name in names]
     return pd.DataFrame(columns, dtype=object)
 
 
@@ -58,7 +59,7 @@ def readings(task: str) -> pd.DataFrame:
     return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
 
 
-def printed_policy(policy: VoronoiPolicy, *, digits: int = 3, swatch: bool = False) -> pd.DataFrame:
+def equation_table(policy: VoronoiPolicy, *, digits: int = 3, swatch: bool = False) -> pd.DataFrame:
     """T3 and T4: one row per cell, the codeword and an equation per action in LaTeX.
 
     `swatch` puts a patch in the force map's colour of the action at the codeword before the equation, for one action.
@@ -90,7 +91,8 @@ def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
-    printed, rows = paper.text_numbers(task)["value"], []
+    known, rows = paper.text_numbers(task), []
+    printed = known["value"]
     for subject, values in (("drl", teacher), ("ours", runs)):
         numbers = outlier_numbers(values)
         if subject == "ours":
@@ -100,7 +102,10 @@ def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int
         rows += [(task, f"{PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
     rows.append((task, f"{PREFIX[task]}_cells", cells))
     rows = [(task, name, _like(printed.get(name, np.nan), value), value) for task, name, value in rows]
-    return pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
+    frame = pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
+    for place, column in ((2, "subject"), (3, "quantity")):
+        frame.insert(place, column, frame["id"].map(known[column]).fillna(""))
+    return frame
 
 
 def _like(printed: float, here: float) -> float | int:
@@ -118,7 +123,7 @@ def _text(value: object, digits: int) -> str:
         return str(value)
     if np.isnan(value):
         return MISSING
-    return f"{value:.{digits}f}" if abs(value) >= 0.001 or not value else f"{value:g}"
+    return f"{value:.{digits}f}" if abs(value) >= 0.001 or not value else np.format_float_positional(value)
 
 
 def _escape(text: str) -> str:
