@@ -76,7 +76,7 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: 2
 	  $(PY) -m vsp.experiments --out "$(OUT)" --jobs $(JOBS) $(if $(QUICK),--quick) && state > "$(STATE)/runs"; fi
 
 teachers: venv ## trains both TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
-	$(PY) -m vsp.teachers --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
+	$(PY) -m vsp.training --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
 
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks

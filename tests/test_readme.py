@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import nbformat
+import pandas as pd
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,3 +34,15 @@ def test_artefacts_and_cells_exist():
 def test_links_lead_somewhere():
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         assert target.startswith("https://") or (ROOT / target).exists(), target
+
+
+def test_results_are_those_of_the_tables():
+    tables = {
+        name: pd.read_csv(ROOT / "figures" / "tables" / f"{name.lower()}_spread.csv", index_col="metric")
+        for name in ("SimpleGoal", "MountainCar")
+    }
+    rows = re.findall(r"^\| (SimpleGoal|MountainCar), ([a-z]+)[^|]* \| (.*) \|$", README, flags=re.M)
+    assert len(rows) == 8
+    for task, metric, cells in rows:
+        expected = tables[task].rename(index={"Median/Q2": "Median"}).loc[metric.capitalize()]
+        assert cells.split(" | ") == [f"{value:.2f}" for value in expected]

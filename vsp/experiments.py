@@ -41,6 +41,7 @@ _CODE = (
     "evaluate",
     "geometry",
     "history",
+    "partition",
     "policy",
     "readings",
     "rollouts",

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from .partition import Partition
 from .policy import VoronoiPolicy
-
-if TYPE_CHECKING:
-    from .distill import Partition
 
 SNAPSHOT_EVERY = 10  # iterations between two stored copies of the parameters
 

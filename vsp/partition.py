@@ -1,0 +1,104 @@
+"""`Partition`: what a distillation changes as it goes, the codewords, the cells' models and their buffers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from . import geometry, readings
+from .buffers import Buffers
+from .config import Config
+from .envs import Task
+from .policy import VoronoiPolicy
+from .rollouts import Episode
+from .subpolicies import LinearCells
+
+
+class Partition:
+    """The state of a distillation: codewords, the cells' models, their buffers."""
+
+    def __init__(self, task: Task, config: Config):
+        d, m = len(task.low), len(task.action_low)
+        self.task, self.config = task, config
+        self.codewords = np.zeros((0, d))
+        self.models = LinearCells(d, m, initial=config.initial)
+        self.buffers = Buffers(d, m)
+        self.scale = readings.SCALE[config.scale](task.low, task.high)
+        self._on_reset = readings.ADAM_ON_RESET[config.adam_on_reset]
+        self._seen_by_loss = readings.SPLIT_LOSS[config.split_loss]
+        self._graph = readings.NEIGHBOURS[config.neighbours]
+        self._compared = readings.MERGE_PARAMETERS[config.merge_parameters]
+
+    def observe(self, episode: Episode) -> None:
+        """Put each state and action into the buffer of its cell."""
+        cells = geometry.nearest(self.codewords / self.scale, episode.states / self.scale)
+        self.buffers.append(cells, episode.states, episode.actions)
+
+    def train(self, rng: np.random.Generator) -> float:
+        """Train every cell that has data; returns the mean loss over cells."""
+        cells = np.flatnonzero(self.buffers.counts)
+        for _ in range(self.config.n_minibatches):
+            inputs, actions = self.buffers.sample(cells, self.config.batch_size, rng)
+            losses = self.models.train(cells, inputs, actions, learning_rate=self.config.learning_rate)
+        return float(losses.mean())
+
+    def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
+        """Make `state` (d,) the codeword of a new, untrained cell; returns its index."""
+        self.codewords = np.concatenate([self.codewords, state[None]])
+        self.models.add(rng)
+        self.buffers.add()
+        return len(self.codewords) - 1
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Drop all cells but those of the mask `kept` (k,)."""
+        self.codewords = self.codewords[kept]
+        self.models.keep(kept)
+        self.buffers.keep(kept)
+
+    def reset(self, cells: np.ndarray) -> None:
+        """Empty the buffers of `cells`, a mask (k,)."""
+        self.buffers.reset(cells)
+        self._on_reset(self.models, cells)
+
+    def clear(self) -> None:
+        """Empty all buffers and use their memory again."""
+        self.buffers.clear()
+        self._on_reset(self.models, slice(None))
+
+    def locate(self, state: np.ndarray) -> int:
+        """Cell of one state (d,)."""
+        return self.snapshot()(state)
+
+    def snapshot(self) -> Callable[[np.ndarray], int]:
+        """The look-up among the codewords of this moment, as a function of one state."""
+        codewords = self.codewords / self.scale
+        return lambda state: int(geometry.nearest(codewords, (state / self.scale)[None])[0])
+
+    def far(self, i: int, state: np.ndarray) -> bool:
+        """Whether `state` is far enough from codeword i to become one, and is not a codeword already."""
+        gap = geometry.distances(
+            (state / self.scale)[None], (self.codewords[i] / self.scale)[None], self.config.split_metric
+        )
+        # A teacher pushing against the border stands still; with split_lookup="kept" it could offer one state twice.
+        return gap[0, 0] > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
+
+    def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
+        """Mean squared error of cell i's action at `state` against the teacher's."""
+        own = self._seen_by_loss(self.models.predict(i, state), self.task.action_low, self.task.action_high)
+        return float(np.square(own - action).mean())
+
+    def neighbours(self, members: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Which cells of `members` are neighbours. (k, k) bool"""
+        return self._graph(
+            self.codewords[members] / self.scale, self.task.low / self.scale, self.task.high / self.scale
+        )
+
+    def comparable_parameters(self) -> np.ndarray:
+        """What a merge compares, one row per cell. (k, p)"""
+        return self._compared(self.models.parameters).reshape(len(self.codewords), -1)
+
+    def policy(self) -> VoronoiPolicy:
+        """The partition as a policy of its own."""
+        scale = None if self.config.scale == "raw" else self.scale
+        return VoronoiPolicy(self.codewords, self.models.parameters, task=self.task, scale=scale)

@@ -1,0 +1,222 @@
+"""Training: make a TD3 teacher with Stable-Baselines3, resumably, and export it with its card.
+
+`python -m vsp.training --cache FOLDER` trains the shipped teachers anew. torch and stable_baselines3 are imported here,
+inside the functions that train, and nowhere else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import sys
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from . import store
+from .envs import GOAL, PIT, get_task
+from .evaluate import outcomes
+from .teachers import SHIPPED, Teacher, actor_tensors
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Arguments of Stable-Baselines3's TD3 that make one teacher; the policy is MlpPolicy, [400, 300], ReLU."""
+
+    steps: int  # environment steps
+    batch_size: int = 256
+    train_freq: tuple[int, str] = (1, "step")
+    gradient_steps: int = 1  # per training phase; -1: as many as steps were taken
+    learning_rate: float = 1e-3
+    buffer_size: int = 1_000_000
+    learning_starts: int = 100
+    noise: str = "normal"  # exploration noise: "normal" or "ornstein-uhlenbeck"
+    noise_std: float = 0.1  # its standard deviation, in units of the action
+
+    @property
+    def id(self) -> str:
+        """Eight hexadecimal digits that stand for the recipe, so that no other recipe resumes its checkpoints."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
+
+
+RECIPES = {
+    # "500.000 steps using the standard parameters": the library's, with the exploration noise of the TD3 article
+    # (Fujimoto et al. 2018); without noise training never finds out that a short last step pays
+    "SimpleGoal-v0": Recipe(steps=500_000),
+    # RL Zoo's recipe with the library defaults of its day (batch 100, one training phase per episode)
+    "MountainCarContinuous-v0": Recipe(
+        steps=300_000,
+        batch_size=100,
+        train_freq=(1, "episode"),
+        gradient_steps=-1,
+        noise="ornstein-uhlenbeck",
+        noise_std=0.5,
+    ),
+}
+
+# Trainings with another recipe, given up after their score was seen (over SCORE_EPISODES)
+EARLIER_TRIALS = {
+    "SimpleGoal-v0": [{"noise_std": 0.0, "seed": 0, "steps": 140_000, "mean": 16.0875, "std": 2.9943, "pit": 0.001}],
+}
+
+# What a teacher has to reach to be shipped, over SCORE_EPISODES episodes: mean return, share of failed episodes.
+BARS = {"SimpleGoal-v0": (16.3, 0.01), "MountainCarContinuous-v0": (93.3, 0.0)}
+
+MOST_SEEDS = 5  # tried before giving up
+CHUNK = 10_000  # steps between two checkpoints
+SCORE_EPISODES = 10_000
+SELECTION_SEED, SCORE_SEED = 101, 102  # start states to choose a training seed on, and to report on
+
+
+def train(task: str, *, seed: int, cache: str | os.PathLike, report=print) -> Path:
+    """Train a TD3 teacher for `task` and return the path of its last checkpoint; resume from `cache` if it was begun.
+
+    Training goes in chunks of `CHUNK` steps. Each chunk begins a fresh episode and takes fresh random streams from
+    (seed, steps so far), so that a run killed at any moment and resumed ends with the same weights as one left alone.
+    """
+    import torch
+
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)  # Adam's moments of idle weights decay into denormal numbers, which are slow
+    recipe = RECIPES[task]
+    path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
+    model, curve = _new_model(task, recipe, seed), []
+    if path.exists():
+        curve = _restore(model, torch.load(path, weights_only=True))
+    while model.num_timesteps < recipe.steps:
+        chunk_seed = np.random.SeedSequence([seed, model.num_timesteps]).generate_state(1)[0]
+        model.set_random_seed(int(chunk_seed))
+        model._last_obs = None  # begin a fresh episode
+        model.action_noise.reset()
+        model.learn(min(CHUNK, recipe.steps - model.num_timesteps), reset_num_timesteps=False, log_interval=None)
+        curve.append(_score(model, task))
+        report(f"{task} seed {seed}: {curve[-1]}")
+        with store.atomic_path(path) as temporary:
+            torch.save(_snapshot(model, curve), temporary)
+    return path
+
+
+def _new_model(task: str, recipe: Recipe, seed: int):
+    import gymnasium
+    from stable_baselines3 import TD3
+    from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
+
+    arguments = asdict(recipe)
+    arguments.pop("steps")
+    kind = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}[arguments.pop("noise")]
+    m = len(get_task(task).action_low)
+    noise = kind(np.zeros(m), arguments.pop("noise_std") * np.ones(m))
+    return TD3("MlpPolicy", gymnasium.make(task), action_noise=noise, seed=seed, device="cpu", **arguments)
+
+
+_BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def _snapshot(model, curve: list[dict]) -> dict:
+    """Everything training depends on at the border of two chunks, in types that `weights_only` loading admits."""
+    import torch
+
+    buffer = model.replay_buffer
+    n = buffer.buffer_size if buffer.full else buffer.pos
+    return {
+        "policy": model.policy.state_dict(),
+        "actor_optimizer": model.actor.optimizer.state_dict(),
+        "critic_optimizer": model.critic.optimizer.state_dict(),
+        "buffer": {name: torch.from_numpy(getattr(buffer, name)[:n].copy()) for name in _BUFFER},
+        "buffer_at": [buffer.pos, buffer.full],
+        "counters": [model.num_timesteps, model._n_updates, model._episode_num],
+        "curve": curve,
+    }
+
+
+def _restore(model, snapshot: dict) -> list[dict]:
+    """Put a snapshot back into a fresh model; returns the learning curve so far."""
+    model.policy.load_state_dict(snapshot["policy"])
+    model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
+    model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
+    for name, rows in snapshot["buffer"].items():
+        getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
+    model.replay_buffer.pos, model.replay_buffer.full = snapshot["buffer_at"]
+    model.num_timesteps, model._n_updates, model._episode_num = snapshot["counters"]
+    return snapshot["curve"]
+
+
+def _score(model, task: str) -> dict:
+    """One point of the learning curve, over 500 episodes from starts that stay the same."""
+    weights = {name: tensor.numpy() for name, tensor in model.actor.state_dict().items()}
+    return {"steps": model.num_timesteps, **score(Teacher(weights, task), task, 500, seed=SELECTION_SEED)}
+
+
+def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed: int = SCORE_SEED) -> dict:
+    """Mean and standard deviation of the return, and the shares of episodes that end in the goal and in the pit."""
+    result = outcomes(teacher, task, n_episodes, seed=seed)
+    return {
+        "mean": round(float(result.returns.mean()), 4),
+        "std": round(float(result.returns.std(ddof=1)), 4),
+        "goal": float(np.mean(result.codes == GOAL)),
+        "pit": float(np.mean(result.codes == PIT)),
+    }
+
+
+# Export
+
+
+def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = SHIPPED) -> bool:
+    """Write the teacher of the last seed in `checkpoints` as safetensors with its card, if it reaches the bar.
+
+    Returns whether it does. All seeds in `checkpoints` go on the card; actor and critics are written, in float32.
+    """
+    import torch
+    from safetensors.numpy import save
+
+    tried = {seed: torch.load(path, weights_only=True) for seed, path in checkpoints.items()}
+    seed, snapshot = list(tried.items())[-1]
+    tensors = {
+        name: tensor.numpy() for name, tensor in snapshot["policy"].items() if name.startswith(("actor.", "critic."))
+    }
+    teacher = Teacher(actor_tensors(tensors), task)
+    if not reaches_bar(score(teacher, task, seed=SELECTION_SEED), task):
+        return False
+    card = {
+        "task": task,
+        "algorithm": "TD3 of Stable-Baselines3, MlpPolicy, layers [400, 300], ReLU, tanh output",
+        "recipe": asdict(RECIPES[task]),
+        "seed": seed,
+        "seeds_tried": [{"seed": s, **snap["curve"][-1]} for s, snap in tried.items()],
+        "earlier_trials": EARLIER_TRIALS.get(task, []),
+        "versions": {name: version(name) for name in ("torch", "stable-baselines3", "gymnasium", "numpy")},
+        "score": {"episodes": SCORE_EPISODES, "start_seed": SCORE_SEED, **score(teacher, task)},
+        "learning_curve": snapshot["curve"],
+    }
+    store.write_carded(Path(folder) / f"{task}.safetensors", save(tensors), card)
+    return True
+
+
+def reaches_bar(found: dict, task: str) -> bool:
+    """Whether a score reaches the bar of the task."""
+    mean, failures = BARS[task]
+    return found["mean"] >= mean and 1.0 - found["goal"] <= failures
+
+
+def main() -> None:
+    """Train each task's teacher with seed 0, 1, ... until one reaches the bar, and export that one."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--cache", required=True, help="folder for checkpoints; training resumes from there")
+    parser.add_argument("--out", default=SHIPPED, help="folder for the exported teachers")
+    parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
+    arguments = parser.parse_args()
+    for task in arguments.task or RECIPES:
+        checkpoints = {}
+        for seed in range(MOST_SEEDS):
+            checkpoints[seed] = train(task, seed=seed, cache=arguments.cache)
+            if export(task, checkpoints, arguments.out):
+                break
+        else:
+            sys.exit(f"{task}: none of the seeds 0 to {MOST_SEEDS - 1} reached the bar {BARS[task]}")
+
+
+if __name__ == "__main__":
+    main()
