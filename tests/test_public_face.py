@@ -79,15 +79,16 @@ print({"torch", "stable_baselines3", "matplotlib", "sklearn"} & set(sys.modules)
     assert done.stdout.strip() == "set()"
 
 
-def test_a_good_student_is_close_to_its_teacher(made):
-    teacher, _, policy, _ = made
-    student, random = vsp.evaluate(policy, "SimpleGoal-v0", 200, seed=1)["return"].mean(), -2
-    assert student > random and vsp.evaluate(teacher, "SimpleGoal-v0", 200, seed=1)["return"].mean() > student - 1
+def test_a_student_earns_most_of_what_its_teacher_does():
+    teacher = vsp.load_teacher("SimpleGoal-v0")
+    policy, _ = vsp.distill(teacher, "SimpleGoal-v0", seed=0)
+    own, student = (vsp.evaluate(actor, "SimpleGoal-v0", 1000, seed=1)["return"].mean() for actor in (teacher, policy))
+    assert own - 5 < student < own + 1  # standing still earns 0
 
 
 MODULES = (
     "buffers", "checks", "config", "distill", "envs", "evaluate", "experiments", "figures",
-    "geometry", "history", "policy", "rollouts", "store", "subpolicies", "tables", "teachers",
+    "geometry", "history", "partition", "policy", "rollouts", "store", "subpolicies", "tables", "teachers", "training",
 )  # fmt: skip
 
 
