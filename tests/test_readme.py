@@ -45,4 +45,4 @@ def test_results_are_those_of_the_tables():
     assert len(rows) == 8
     for task, metric, cells in rows:
         expected = tables[task].rename(index={"Median/Q2": "Median"}).loc[metric.capitalize()]
-        assert cells.split(" | ") == [f"{value:.2f}" for value in expected]
+        assert cells.split(" | ") == [f"{value:.3f}" for value in expected]
