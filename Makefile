@@ -61,14 +61,14 @@ help: ## this list
 	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
-paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: 3 to 5 minutes
+paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 70 s
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi
 
-quick: ## the same path with tiny runs, figures watermarked, into build/quick/: under 60 s
+quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 30 s
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
 
-runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: 2 to 4 minutes, resumable
+runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: about 45 s, resumable
 	@mkdir -p "$(STATE)" "$(OUT)/data/runs"; inputs=$$(cksum $(INPUTS)) || exit 1; \
 	state() { echo "$$inputs quick=$(QUICK)"; \
 	  (cd "$(OUT)/data/runs" && find . -type f | LC_ALL=C sort | xargs cksum 2>/dev/null); }; \
@@ -81,10 +81,10 @@ teachers: venv ## trains both TD3 teachers from scratch: 3 to 4 HOURS; resumes f
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
-test: venv ## runs the tests: about 3 minutes
+test: venv ## runs the tests: about 70 s
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests
 
-bench: venv ## measures speed: about a minute
+bench: venv ## measures speed: about 5 s
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py
 
 clean: ## removes build/ and data/runs/, nothing that is committed: at once

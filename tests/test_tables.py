@@ -116,7 +116,7 @@ def test_hyperparameters_stand_beside_the_papers(tmp_path):
     for task in TASKS:
         assert frame[f"{tables.SHORT[task]}, paper"].tolist() == frame[f"{tables.SHORT[task]}, here"].tolist()
     row = frame.set_index("hyperparameter").loc["n_epochs"]
-    assert row[f"{SIMPLEGOAL}, here"] == 5000 and row[f"{MOUNTAINCAR}, here"] == 2000
+    assert row["SimpleGoal, here"] == 5000 and row["MountainCar, here"] == 2000
     save_table(frame, "some_table", caption="c", out=tmp_path)
     tex, _ = written(tmp_path)
     assert r"n\_epochs" in tex and not unescaped(tex) and balanced(tex) and "0.0001" in tex
