@@ -30,7 +30,7 @@ import nbformat
 from .store import ROOT
 
 KERNEL = "python3"
-_ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}")
+_VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -174,8 +174,11 @@ def _check_outputs(notebook: Path, cells: list[nbformat.NotebookNode], out: Path
     """Outputs show nothing that differs between two runs or two machines."""
     for number, cell in enumerate(cells, 1):
         shown = [output.get("text") or json.dumps(output.get("data", {})) for output in cell.outputs]
-        if any(_ADDRESS.search(text) for text in shown):
-            raise NotebookError(f"{_where(notebook, number, cell)} shows a memory address: end its last line with `;`")
+        if found := _VARIES.search("\n".join(shown)):
+            where = _where(notebook, number, cell)
+            raise NotebookError(
+                f"{where} shows {found[0]!r}, which differs between runs: heed the warning, or end with `;`"
+            )
         for folder in {str(out), str(ROOT), sys.prefix}:
             if any(folder in text for text in shown):
                 raise NotebookError(f"{_where(notebook, number, cell)} shows a folder of this machine: {folder}")
