@@ -121,6 +121,8 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
     os.environ["JUPYTER_PREFER_ENV_PATH"] = "1"
     os.environ["IPYTHONDIR"] = str(copy_path.parent / "ipython")  # nobody's start-up files
     os.environ["SDL_VIDEODRIVER"] = "dummy"  # no search for a screen, nor words about it on standard error
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        os.environ[name] = "1"  # the same sums in the same order, also without make
     os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # no note of the debugger's on standard error
     import papermill
 
