@@ -4,15 +4,18 @@
 # for every notebook, the checksums of all that it read and made. An altered, deleted or never made file is made again.
 
 # What each notebook makes: figures/ (PDF and PNG), figures/tables/ (TEX and CSV) and data/results/.
-NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables
+NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
 FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
 RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv made_on.txt
 TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_policies mountaincar_linear_policies \
   simplegoal_spread mountaincar_spread text_numbers
-# The notebooks that read data/runs.
-NEED_RUNS := 03_evaluation 04_appendix_tables
+FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
+TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
+# The notebooks that read data/runs, and what else they read: results of studies, which `make study` makes.
+NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
+READS_05_ledger := data/results/readings.csv data/results/teachers.csv
 
 OUT ?= .
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN || echo 1)
@@ -26,7 +29,7 @@ endif
 PY := .venv/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check
 STATE = $(OUT)/build/state
-INPUTS := $(sort $(wildcard vsp/*.py data/paper/* data/teachers/*)) environment.lock
+INPUTS := $(sort $(wildcard vsp/*.py data/paper/* data/teachers/*.* data/teachers/short/*)) environment.lock
 outputs = figures/executed/$(1).ipynb $(foreach f,$(FIGURES_$(1)),figures/$(f).pdf figures/$(f).png) \
   $(foreach t,$(TABLES_$(1)),figures/tables/$(t).tex figures/tables/$(t).csv) \
   $(addprefix data/results/,$(RESULTS_$(1)))
@@ -45,7 +48,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study teachers short-teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
 .NOTPARALLEL: # `runs` uses every core by itself
 
 help: ## this list
@@ -63,7 +66,8 @@ help: ## this list
 
 paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 70 s
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
-	else echo "everything is up to date: see $(OUT)/figures"; fi
+	  $(PY) -m vsp.study --check > "$(STATE)/stale"; \
+	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
 
 quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 30 s
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
@@ -75,8 +79,14 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 	if ! state | cmp -s - "$(STATE)/runs"; then \
 	  $(PY) -m vsp.experiments --out "$(OUT)" --jobs $(JOBS) $(if $(QUICK),--quick) && state > "$(STATE)/runs"; fi
 
+study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
+	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
+
 teachers: venv ## trains both TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
 	$(PY) -m vsp.training --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
+
+short-teachers: venv ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes likewise
+	$(PY) -m vsp.training --short --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
 
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
@@ -102,7 +112,7 @@ define notebook-rules
 $(call outputs,$(1)): $(1) ;
 $(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@mkdir -p "$$(STATE)"; \
-	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
+	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$(QUICK)"; (cd "$$(OUT)" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$(STATE)/$(1)"; then \
 	  $$(PY) -m vsp.runner notebooks/$(1).ipynb --out "$$(OUT)" $$(if $$(QUICK),-p quick true) \

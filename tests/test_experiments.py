@@ -152,12 +152,15 @@ def test_equal_settings_use_the_same_folder():
     "name", ["distill", "envs", "geometry", "policy", "subpolicies", "buffers", "rollouts", "teachers"]
 )
 def test_changed_code_uses_another_folder(name, monkeypatch):
-    before, read = code_id(), type(store.ROOT).read_bytes
-    assert code_id() == before
-    monkeypatch.setattr(
-        type(store.ROOT), "read_bytes", lambda path: read(path) + (b"\n# changed" if path.stem == name else b"")
-    )
-    assert code_id() != before
+    compute, kind, before = code_id.__wrapped__, type(store.ROOT), code_id()
+    read = kind.read_text
+
+    def add(text):
+        monkeypatch.setattr(kind, "read_text", lambda path, **how: read(path, **how) + text * (path.stem == name))
+        return compute()
+
+    assert compute() == before and add("\nx = 1\n") != before
+    assert add("\n# a comment\n") == before == add('\n"""A string that explains."""\n')
 
 
 def test_a_run_with_other_settings_is_refused_with_both_values(made, tmp_path):
@@ -272,9 +275,7 @@ def test_summary_tells_each_run(made):
     for row, run in zip(frame.to_dict("records"), made[1]):
         assert row["cells"] == len(run.policy) == 1 + row["splits"] - row["merges"]
         assert {name: row[name] for name in spread(run.outcomes.returns)} == spread(run.outcomes.returns)
-        assert row["pit"] == np.mean(run.outcomes.codes == PIT) and row["goal"] == np.mean(
-            run.outcomes.codes == GOAL
-        )
+        assert row["pit"] == np.mean(run.outcomes.codes == PIT) and row["goal"] == np.mean(run.outcomes.codes == GOAL)
         assert row["truncated"] == np.mean(run.outcomes.codes == TRUNCATED)
 
 

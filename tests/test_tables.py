@@ -167,7 +167,7 @@ def test_the_spread_table_stands_beside_the_papers(task):
 def test_the_text_numbers_stand_beside_the_papers(task):
     teacher, runs = returns()
     frame = text_numbers(task, teacher, runs, cells=17).set_index("id")
-    prefix = tables.PREFIX[task]
+    prefix = paper.PREFIX[task]
     known = [name for name in frame.index if not pd.isna(frame.at[name, "paper"])]
     printed = paper.text_numbers(task)["value"]
     assert len(known) > 8 and all(frame.at[name, "paper"] == printed[name] for name in known)

@@ -60,8 +60,6 @@ def test_the_critics_are_shipped_too(task):
     assert tensors["actor.mu.0.weight"].shape == (400, d) and all(np.isfinite(t).all() for t in tensors.values())
 
 
-
-
 SHORT = Recipe(steps=90, batch_size=8, learning_starts=20, buffer_size=200)
 EPISODIC = Recipe(
     steps=60, batch_size=8, train_freq=(1, "episode"), gradient_steps=-1, learning_starts=10, buffer_size=70,

@@ -94,7 +94,7 @@ def _moments(values: np.ndarray) -> dict[str, float]:
 
 
 def interval(
-    returns: np.ndarray, statistic, *, level: float = 0.95, n_resamples: int = 2000, seed: int = 0
+    returns: np.ndarray, statistic, *, level: float = 0.95, n_resamples: int = 10_000, seed: int = 0
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of `statistic(returns)` that resamples policies, the rows of `returns` (p, n).
 
@@ -106,3 +106,56 @@ def interval(
     tail = 50 * (1 - level)
     low, high = np.percentile(values, [tail, 100 - tail])
     return float(low), float(high)
+
+
+def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -> pd.DataFrame:
+    """Bootstrap of everything that `spread` and `outlier_numbers` give: one row per resample, one column per statistic.
+
+    Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
+    that a resample leaves empty is NaN.
+    """
+    rng, (p, n) = np.random.default_rng(seed), returns.shape
+    order = returns.ravel().argsort(kind="stable")
+    values, owner = returns.ravel()[order], order // n
+    rows = []
+    for _ in range(n_resamples):
+        times_drawn = np.bincount(rng.integers(p, size=p), minlength=p).astype(float)
+        rows.append(_weighted_statistics(values, times_drawn[owner]))
+    return pd.DataFrame(rows)
+
+
+def _weighted_statistics(values: np.ndarray, weights: np.ndarray) -> dict[str, float]:
+    """The statistics of sorted `values` (n,) of which each is there `weights` (n,) times."""
+    until = weights.cumsum()
+    q1, median, q3 = (_weighted_quantile(values, until, q) for q in (0.25, 0.5, 0.75))
+    lower, upper = q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)
+    low, high = values.searchsorted(lower, "left"), values.searchsorted(upper, "right")
+    parts = {"": slice(None), "outliers_below_": slice(0, low), "outliers_above_": slice(high, None)}
+    facts = {name: _weighted_moments(values[part], weights[part]) for name, part in parts.items()}
+    outside = np.r_[0:low, high : len(values)]
+    facts["outliers_"] = _weighted_moments(values[outside], weights[outside])
+    numbers = {prefix + name: value for prefix, moments in facts.items() for name, value in moments.items()}
+    outliers = numbers.pop("outliers_n")
+    for side in ("below", "above"):
+        found = numbers.pop(f"outliers_{side}_n")
+        numbers[f"outliers_{side}_share"] = 100 * found / outliers if outliers else np.nan
+    numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
+    return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / numbers.pop("n"))}
+
+
+def _weighted_quantile(values: np.ndarray, until: np.ndarray, q: float) -> float:
+    """Linear interpolation between order statistics, as `np.percentile` has it; `until` are cumulated counts."""
+    place = q * (until[-1] - 1)
+    below, above = values[until.searchsorted([np.floor(place), np.ceil(place)], "right")]
+    return below + (place - np.floor(place)) * (above - below)
+
+
+def _weighted_moments(values: np.ndarray, weights: np.ndarray) -> dict[str, float]:
+    n = weights.sum()
+    if not n:
+        return {"n": 0.0} | dict.fromkeys(("mean", "std", "min", "max"), np.nan)
+    mean = values @ weights / n
+    deviation = np.sqrt(max(0.0, (values - mean) ** 2 @ weights / (n - 1))) if n > 1 else 0.0
+    present = weights > 0
+    first, last = present.argmax(), len(present) - 1 - present[::-1].argmax()
+    return {"n": n, "mean": mean, "std": deviation, "min": values[first], "max": values[last]}

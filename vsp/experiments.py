@@ -7,12 +7,15 @@ into the name of its folder, so a changed configuration never picks up old runs.
 from __future__ import annotations
 
 import argparse
+import ast
 import hashlib
 import json
 import os
 import platform
 import sys
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -94,10 +97,21 @@ class Experiment:
         return Path(runs) / self.task / f"{self.id}-{code_id()}"
 
 
+@cache
 def code_id() -> str:
-    """Ten hexadecimal digits that stand for the modules that decide a run's result."""
-    content = b"".join((Path(__file__).parent / f"{name}.py").read_bytes() for name in _CODE)
-    return hashlib.sha256(content).hexdigest()[:10]
+    """Ten hexadecimal digits that stand for the modules that decide a run's result.
+
+    Comments, docstrings and layout have no say: runs outlive a better explanation.
+    """
+    folder = Path(__file__).parent
+    trees = (ast.parse((folder / f"{name}.py").read_text(encoding="utf-8")) for name in _CODE)
+    content = "".join(ast.dump(_WithoutDocstrings().visit(tree)) for tree in trees)
+    return hashlib.sha256(content.encode()).hexdigest()[:10]
+
+
+class _WithoutDocstrings(ast.NodeTransformer):
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        return None if isinstance(node.value, ast.Constant) else node
 
 
 def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
@@ -116,22 +130,26 @@ def paper_runs(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs:
 
 def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int = 1) -> list[Run]:
     """Distil once per seed with `jobs` workers, skip what is there, and return the runs in the order of `seeds`."""
-    folder, seeds = experiment.folder(runs), list(seeds)
-    missing = [seed for seed in seeds if not _run_path(folder, seed).exists()]
-    if missing:
-        from joblib import Parallel, delayed, parallel_config
-        from tqdm import tqdm
+    seeds = list(seeds)
+    make_all([(experiment, seed) for seed in seeds], runs=runs, jobs=jobs, label=experiment.task)
+    return [load_run(run_path(experiment.folder(runs), seed), experiment) for seed in seeds]
 
-        with parallel_config("loky", inner_max_num_threads=1):
-            work = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-                delayed(make_run)(experiment, seed, folder) for seed in missing
-            )
-            done = len(seeds) - len(missing)
-            calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
-            bar = tqdm(work, experiment.task, initial=done, total=done + len(missing), unit="run", mininterval=calm)
-            for _ in bar:
-                pass
-    return [load_run(_run_path(folder, seed), experiment) for seed in seeds]
+
+def make_all(work: Iterable[tuple[Experiment, int]], *, runs: str | os.PathLike, jobs: int = 1, label: str) -> None:
+    """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`, with `jobs` workers."""
+    asked = [(experiment, seed, experiment.folder(runs)) for experiment, seed in work]
+    missing = [one for one in asked if not run_path(one[2], one[1]).exists()]
+    if not missing:
+        return
+    from joblib import Parallel, delayed, parallel_config
+    from tqdm import tqdm
+
+    with parallel_config("loky", inner_max_num_threads=1):
+        finished = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(make_run)(*one) for one in missing)
+        done = len(asked) - len(missing)
+        calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
+        for _ in tqdm(finished, label, initial=done, total=len(asked), unit="run", mininterval=calm):
+            pass
 
 
 def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> None:
@@ -157,7 +175,7 @@ def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> No
         "splits": sum(event.kind == "split" for event in history.events),
         "merges": sum(event.kind == "merge" for event in history.events),
     }
-    store.save(_run_path(folder, seed), arrays, about)
+    store.save(run_path(folder, seed), arrays, about)
 
 
 def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
@@ -169,7 +187,7 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
                 f"{path}: made with {name} = {about['settings'].get(name)}, expected {expected}: "
                 "delete it, and `make runs` makes it again"
             )
-    if Path(path).name != _run_path("", about["seed"]).name:
+    if Path(path).name != run_path("", about["seed"]).name:
         raise ValueError(f"{path}: holds the run of seed {about['seed']}, expected that of its name: delete it")
     return Run(
         seed=about["seed"],
@@ -248,7 +266,7 @@ def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
             "merges": run.merges,
             "validation_mean": run.validation_mean,
             **spread(run.outcomes.returns),
-            **{name: np.mean(run.outcomes.codes == code) for name, code in _SHARES.items()},
+            **{name: np.mean(run.outcomes.codes == code) for name, code in SHARES.items()},
         }
         for run in runs
     )
@@ -257,7 +275,7 @@ def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
 def overview(results: Results) -> pd.DataFrame:
     """Mean, lowest and highest value over the runs, one row per property of a run."""
     frame = summary(results.runs, results.experiment)
-    return frame[["cells", "splits", "merges", "mean", *_SHARES]].agg(["mean", "min", "max"]).T
+    return frame[["cells", "splits", "merges", "mean", *SHARES]].agg(["mean", "min", "max"]).T
 
 
 def comparison(results: Results) -> dict[str, float]:
@@ -304,10 +322,10 @@ def cpu_type() -> str:
     return " · ".join([platform.system(), platform.machine(), *blas, *simd])
 
 
-_SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
+SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
 
 
-def _run_path(folder: str | os.PathLike, seed: int) -> Path:
+def run_path(folder: str | os.PathLike, seed: int) -> Path:
     return Path(folder) / f"{seed:04d}.run"
 
 

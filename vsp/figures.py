@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -28,6 +29,7 @@ _COLOURS = sns.color_palette("colorblind").as_hex()
 TEACHER, DISTILLED, GOAL, PIT = _COLOURS[0], _COLOURS[1], _COLOURS[2], "0.35"
 BORDER, CODEWORD = "0.25", "black"
 FORCE_MAP = "PuOr_r"
+_VERDICTS = {"reproduced": (GOAL, "o"), "differs": (_COLOURS[3], "D"), "contradicts itself": (_COLOURS[4], "X")}
 
 _STYLE = {
     "font.size": 8,
@@ -224,6 +226,75 @@ def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: st
     """Mean return of the teacher over its training steps."""
     ax.plot(steps / 1000, means, color=TEACHER)
     ax.set(xlabel="training steps (thousands)", ylabel=ylabel)
+    return ax
+
+
+def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED, label: str | None = None) -> Axes:
+    """One row per entry of `frame` (index: names; columns here, low, high): a dot on its interval, the first on top."""
+    rows = np.arange(len(frame))
+    ax.hlines(rows, frame["low"], frame["high"], color=color, lw=1.2)
+    ax.scatter(frame["here"], rows, color=color, s=10, zorder=3, label=label)
+    ax.set_yticks(rows, frame.index)
+    ax.set_ylim(len(frame) - 0.5, -0.5)
+    ax.grid(axis="x", color="0.9", lw=0.5)
+    ax.set_axisbelow(True)
+    return ax
+
+
+def margin(ax: Axes, texts: list[str], title: str) -> Axes:
+    """A text beside each row of `intervals`, right of the axes, and what it is above."""
+    for row, text in enumerate([title, *texts], start=-1):
+        ax.text(1.03, row, text, transform=ax.get_yaxis_transform(), va="center", fontsize=7, color="0.3")
+    return ax
+
+
+def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: str = "-") -> Axes:
+    """A vertical line at a value that others are read against."""
+    ax.axvline(value, color=color, lw=0.8, ls=ls, zorder=1, label=name)
+    return ax
+
+
+def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
+    """How far the paper's values lie from ours, in half-widths of our intervals: one row per value, by verdict.
+
+    `frame` (index: names) has gap and verdict; inside the shaded `band` a value counts as reproduced. The scale is linear inside
+    the band and logarithmic outside.
+    """
+    ax.axvspan(-band, band, color="0.9", lw=0)
+    ax.axvline(0, color="0.6", lw=0.6)
+    for verdict, (color, marker) in _VERDICTS.items():
+        rows = np.flatnonzero(frame["verdict"] == verdict)
+        ax.scatter(frame["gap"].iloc[rows], rows, color=color, marker=marker, s=14, zorder=3, label=verdict)
+    ax.set_xscale("symlog", linthresh=band)
+    ax.set(xlim=(-10_000, 10_000), xticks=[-1000, -10, 0, 10, 1000])
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.set_yticks(np.arange(len(frame)), frame.index)
+    ax.set_ylim(len(frame) - 0.5, -0.5)
+    return ax
+
+
+def boxes(ax: Axes, summaries: dict[str, dict[str, float]], *, colours: list[str]) -> Axes:
+    """Lying boxes from their numbers alone: q1, median, q3, and the whiskers' ends, lower_fence and upper_fence."""
+    stats = [
+        {"label": name, "q1": s["q1"], "med": s["median"], "q3": s["q3"]}
+        | {"whislo": s["lower_fence"], "whishi": s["upper_fence"], "fliers": []}
+        for name, s in summaries.items()
+    ]
+    places = np.arange(len(stats))
+    drawn = ax.bxp(stats, positions=places, orientation="horizontal", showfliers=False, patch_artist=True, widths=0.5)
+    for box, colour in zip(drawn["boxes"], colours):
+        box.set(facecolor=colour, alpha=0.6)
+    for line in drawn["medians"]:
+        line.set(color="black")
+    ax.set_ylim(len(stats) - 0.4, -0.6)
+    return ax
+
+
+def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DISTILLED) -> Axes:
+    """One dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
+    sns.stripplot(frame, x=x, y=y, ax=ax, color=color, size=3, jitter=0.15)
+    for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
+        ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4)
     return ax
 
 

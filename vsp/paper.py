@@ -7,6 +7,7 @@ if it is byte for byte the one that was checked against the paper.
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "paper"
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
+PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids of printed values
+SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
 _POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
 _CHECKSUMS = {
@@ -69,6 +72,35 @@ def value(id: str) -> float:
     return number
 
 
+def spread_id(task: str, subject: str, metric: str) -> str:
+    """The id of a value of T5 or T6: spread_id("SimpleGoal-v0", "ours", "Median/Q2") is "sg_spread_ours_median"."""
+    return f"{PREFIX[_check_task(task)]}_spread_{subject}_{metric.lower().partition('/')[0]}"
+
+
+def printed_values() -> pd.DataFrame:
+    """Every number that the paper prints, in tables T2 to T6, text and captions: one row per value.
+
+    Columns: id, task, where, quantity, subject, paper (the paper's spelling), value (NaN for a version or a name).
+    """
+    text = _read("text_numbers.csv", numbers=["value"]).rename(columns={"printed": "paper"})
+    rows = []
+    for _, row in _read("spread.csv").iterrows():
+        for subject, who in (("drl", "DRL"), ("ours", "Ours")):
+            name = spread_id(row["task"], subject, row["metric"])
+            rows.append((name, row["task"], row["where"], row["metric"], who, row[subject]))
+    for task in TASKS:
+        for _, row in _read("hyperparameters.csv").iterrows():
+            name = row["hyperparameter"]
+            rows.append((f"{PREFIX[task]}_hyper_{name}", task, row["where"], name, "protocol", row[task]))
+        for k, row in _read(_POLICIES[task]).iterrows():
+            for name in _numbers(row.index):
+                if row[name] != "0":  # else the paper prints no such term
+                    rows.append((f"{PREFIX[task]}_cell_{k + 1}_{name}", task, row["where"], name, "Ours", row[name]))
+    tables = pd.DataFrame(rows, columns=["id", "task", "where", "quantity", "subject", "paper"])
+    tables["value"] = [float(ast.literal_eval(printed)) for printed in tables["paper"]]
+    return pd.concat([text[tables.columns], tables], ignore_index=True)
+
+
 def tdavq_comparison() -> pd.DataFrame:
     """TD-AVQ beside the paper's method, in words: one row per aspect (the index), columns TD-AVQ, Ours, where."""
     return _read("tdavq_comparison.csv").set_index("aspect")
@@ -82,7 +114,7 @@ def linear_policies(task: str) -> pd.DataFrame:
     """
     file = _POLICIES[_check_task(task)]
     frame = _read(file)
-    numbers = [name for name in frame.columns if not name.endswith(("_printed", "colour", "where"))]
+    numbers = _numbers(frame.columns)
     frame[numbers] = frame[numbers].astype(np.float64)
     return frame
 
@@ -98,6 +130,11 @@ def published_policy(task: str) -> VoronoiPolicy:
     terms = [*inputs, "bias"]
     coefficients = np.stack([frame[[f"{output}_{term}" for term in terms]] for output in outputs], axis=-1)
     return VoronoiPolicy(codewords=codewords, coefficients=coefficients, task=task)  # (k, d + 1, m)
+
+
+def _numbers(columns: Iterable[str]) -> list[str]:
+    """Those columns of a table of linear policies that hold a number each."""
+    return [name for name in columns if not name.endswith(("_printed", "colour", "where"))]
 
 
 def _check_task(task: str) -> str:

@@ -14,10 +14,9 @@ from . import paper, store
 from .config import preset
 from .evaluate import outlier_numbers, spread
 from .figures import FORCE_MAP
+from .paper import SHORT
 from .policy import VoronoiPolicy, expression
 
-PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids of text numbers
-SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 MISSING = "–"  # in print, where the paper gives no number
 
 
@@ -26,19 +25,24 @@ def save_table(
 ) -> pd.DataFrame:
     """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
 
-    `latex` is the same table as LaTeX code, for equations; without it numbers get three decimals. The LaTeX needs the
-    packages booktabs and xcolor.
+    `latex` is the table as LaTeX code, for equations, or a part of it where the whole is too long for a page; without
+    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor.
     """
     path = Path(out) / "figures" / "tables" / name
     rounded = frame.map(lambda value: float(f"{value:.6g}") if isinstance(value, float) else value)
     store.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
     shown = as_text(frame) if latex is None else latex
-    code = shown.map(_escape).rename(columns=_escape) if latex is None else latex
+    code = as_latex(frame) if latex is None else latex
     body = code.style.hide(axis="index").to_latex(
         hrules=True, caption=caption, label=f"tab:{name}", position="t", position_float="centering"
     )
     store.write_text(path.with_suffix(".tex"), body)
     return shown
+
+
+def as_latex(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame as text that LaTeX prints as it stands: floats with three decimals."""
+    return as_text(frame).map(_escape).rename(columns=_escape)
 
 
 def hyperparameters(tasks: list[str]) -> pd.DataFrame:
@@ -86,6 +90,14 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
     return pd.DataFrame({"metric": printed.index, **columns})
 
 
+def printed_spread(task: str, who: str) -> dict[str, float]:
+    """A column of T5 or T6 ("drl" or "ours") under the names of `evaluate.spread`, with the fences of its quartiles."""
+    column = paper.spread(task)[who]
+    values = {metric.lower().partition("/")[0]: value for metric, value in column.items()}
+    reach = 1.5 * (values["q3"] - values["q1"])
+    return values | {"lower_fence": values["q1"] - reach, "upper_fence": values["q3"] + reach}
+
+
 def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
     """N: the numbers of the running text beside ours; NaN where the paper gives none.
 
@@ -99,8 +111,8 @@ def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int
             means = runs.mean(axis=1)
             numbers |= {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
             numbers["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
-        rows += [(task, f"{PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
-    rows.append((task, f"{PREFIX[task]}_cells", cells))
+        rows += [(task, f"{paper.PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
+    rows.append((task, f"{paper.PREFIX[task]}_cells", cells))
     rows = [(task, name, _like(printed.get(name, np.nan), value), value) for task, name, value in rows]
     frame = pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
     for place, column in ((2, "subject"), (3, "quantity")):

@@ -1,0 +1,207 @@
+"""The ledger: every value that the paper prints, beside ours, with an interval and a verdict by rules stated here.
+
+Rules, fixed before the values were compared:
+
+1. A value that cannot stand beside the paper's other values is "contradicts itself" (`vsp.audit` has the arithmetic).
+2. A setting (a limit of a task, a hyperparameter, a count of the protocol) is "reproduced" if the code uses the same
+   number, else "differs".
+3. A result is "reproduced" if the printed value, give or take half a unit of its last digit, lies in the 95 % interval
+   of ours, widened by the square root of 2 because the paper's value comes from a sample of the same size; else it
+   "differs". Intervals come from 10,000 resamples: of runs for distilled policies, of start states for the one teacher.
+4. What no rerun can show (the parameters of one run, the machine) "cannot be checked".
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import gymnasium
+import numpy as np
+import pandas as pd
+from scipy.stats import trim_mean
+
+from . import audit, envs, paper
+from .config import preset
+from .evaluate import interval, outlier_numbers, resample, spread
+from .experiments import SHARES, Results
+
+VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
+    "reproduced", "differs", "cannot be checked", "contradicts itself"
+)  # fmt: skip
+N_RESAMPLES = 10_000
+COLUMNS = ["id", "task", "where", "quantity", "subject", "paper", "here", "low", "high", "verdict", "cell"]
+
+
+def ledger(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """One row per printed value, `COLUMNS`; `results` by task. The same results give the same rows.
+
+    `here` is NaN where nothing here compares; `low` and `high` are NaN for settings. Column `cell` names the notebook
+    and the cell that makes ours.
+    """
+    found = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"]).assign(low=np.nan, high=np.nan)
+    parts = [found, *(measured(task, result, n_resamples=n_resamples) for task, result in results.items())]
+    frame = paper.printed_values().join(pd.concat(parts), on="id")
+    doubted = audit.in_doubt()
+    frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
+    frame["cell"] = frame["id"].map(cell)
+    return frame[COLUMNS]
+
+
+def verdict(row, *, in_doubt: bool = False) -> str:
+    """The rules of this module's docstring; `row` has paper (as printed), value, here, low and high."""
+    if in_doubt:
+        return CONTRADICTED
+    if np.isnan(row.here):
+        return UNCHECKED
+    if np.isnan(row.low):
+        return REPRODUCED if np.isclose(row.here, row.value, rtol=1e-9) else DIFFERS
+    half = 0.5 * last_digit(row.paper)
+    low, high = row.here - np.sqrt(2) * (row.here - row.low), row.here + np.sqrt(2) * (row.high - row.here)
+    return REPRODUCED if low - half <= row.value <= high + half else DIFFERS
+
+
+def last_digit(printed: str) -> float:
+    """One unit of the last digit of a number as printed: 0.01 for "12.30" and "86.17%"."""
+    return 10.0 ** -len(printed.rstrip("%").partition(".")[2])
+
+
+def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """Our results under the ids of the paper's values: columns here, low, high (95 %)."""
+    rows = {}
+    for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
+        here = outlier_numbers(returns) | {name: value for name, value in spread(returns).items()}
+        here["coverage"] *= 100
+        bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
+        for name in bounds.columns.intersection(list(here)):
+            row = here[name], *bounds[name]
+            rows[f"{paper.PREFIX[task]}_{subject}_{name}"] = rows[paper.spread_id(task, subject, name)] = row
+    rows |= dict.fromkeys([f"{paper.PREFIX[task]}_{name}" for name in ("cells", "caption_cells")], _best_cells(result))
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
+
+
+def _best_cells(result: Results) -> tuple[float, float, float]:
+    """Cells of the best run, with the interval that other runs to choose among would give."""
+    runs = np.array([(run.validation_mean, len(run.policy)) for run in result.runs])
+    low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])
+    return len(result.best.policy), low, high
+
+
+def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
+    """The results in the ledger `book` for one task, the teacher's first; what tables and text both print, once."""
+    rows = book[(book["task"] == task) & book["id"].str.contains("_(?:spread|drl|ours)_|_cells")]
+    statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
+    twice = ~rows["id"].str.contains("_spread_|caption") & statistic.isin(["min", "max", "mean", "std"])
+    rows = rows[~twice & ~rows["id"].str.contains("caption")].assign(text=~rows["id"].str.contains("_spread_"))
+    return rows.sort_values(["subject", "text"], kind="stable").drop(columns="text")
+
+
+def gaps(rows: pd.DataFrame) -> pd.DataFrame:
+    """How far the printed values lie from ours, in half-widths of our intervals: gap and verdict by statistic.
+
+    An interval without width (the smallest of all returns may be the same in every resample) counts as half a unit of
+    the last printed digit.
+    """
+    rows = rows[rows["low"].notna()]
+    value = rows["paper"].str.rstrip("%").replace("no", "0").astype(float)
+    half = np.where(value > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
+    half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
+    statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
+    name = rows["subject"].replace({"DRL": "TD3", "Ours": "distilled"}) + ": " + statistic
+    frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"]})
+    return frame.set_index(pd.Index(name, name="statistic"))
+
+
+# Settings, read from the code that acts on them
+
+
+def _settings(results: dict[str, Results]) -> dict[str, float]:
+    """What is set here, under the ids of the paper's settings: limits, rewards, hyperparameters, counts."""
+    found = _environments() | {"initial_subpolicies": float(results[paper.TASKS[0]].runs[0].cells[0])}
+    for task, result in results.items():
+        prefix, (runs, episodes) = paper.PREFIX[task], result.returns.shape
+        counts = {"policies": runs, "episodes_per_policy": episodes, "total_episodes": runs * episodes}
+        counts["drl_episodes"] = len(result.teacher_returns)
+        found |= {f"{prefix}_{place}{name}": n for place in ("", "caption_", "text_") for name, n in counts.items()}
+        found |= {name: counts[name] for name in ("episodes_per_policy", "drl_episodes")}
+        found[f"{prefix}_algorithm_runs"] = runs
+        found[f"{prefix}_training_steps"] = result.experiment.teacher.card["recipe"]["steps"]
+        for name in paper.hyperparameters(task):
+            found[f"{prefix}_hyper_{name}"] = float(getattr(preset(task), name))
+    return found
+
+
+def _environments() -> dict[str, float]:
+    """Limits and rewards of both tasks; rewards are found by taking steps."""
+    goal, car = (envs.get_task(task) for task in paper.TASKS)
+    found = {"state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps}
+    for axis, name in enumerate("xy"):
+        found[f"sg_size_{name}"] = goal.high[axis] - goal.low[axis]
+        found |= {f"sg_goal_{name}_high": envs.GOAL_EDGE, f"sg_stride_{name}": envs.STRIDE}
+        found |= {f"sg_pit_{name}_low": envs.PIT_LOW, f"sg_pit_{name}_high": envs.PIT_HIGH}
+    for axis, name in enumerate(("position", "velocity")):
+        found |= {f"mc_{name}_low": car.low[axis], f"mc_{name}_high": car.high[axis]}
+    for name, task in (("sg_action", goal), ("mc_force", car)):
+        found |= {f"{name}_low": task.action_low[0], f"{name}_high": task.action_high[0]}
+    found["sg_reward_factor"] = _reward(goal, [0.5, 0.0], [-1.0, 0.0]) / envs.STRIDE
+    found["sg_goal_reward"] = _reward(goal, [0.15, 0.0], [-1.0, 0.0])
+    found["sg_pit_reward"] = _reward(goal, [0.35, 0.5], [1.0, 0.0])
+    full, half = (_reward(car, [-0.5, 0.0], [force]) for force in (1.0, 0.5))
+    found |= {"mc_force_reward_factor": full, "mc_force_reward_exponent": np.log2(full / half)}
+    found["mc_goal_reward"] = _reward(car, [0.449, 0.07], [0.0])
+    found["mc_goal_position"] = gymnasium.make(car.name).unwrapped.goal_position
+    return found
+
+
+def _reward(task: envs.Task, state: list[float], action: list[float]) -> float:
+    return float(task.step(np.array([state]), np.array([action]))[1][0])
+
+
+_CELLS = {
+    "hyper": "04, hyperparameters", "cells": "03, best", "caption": "03, runs", "text": "03, runs",
+    "policies": "03, runs", "training": "01, scores",
+}  # fmt: skip
+
+
+def cell(id: str) -> str:
+    """The notebook and the cell that make our number for the printed value `id`."""
+    prefix, kind = id.split("_")[:2]
+    task = {"sg": "simplegoal", "mc": "mountaincar"}.get(prefix)
+    if id.endswith("caption_cells"):
+        return _CELLS["cells"]
+    places = _CELLS | {"spread": f"04, {task}-spread", "drl": "04, text-numbers", "ours": "04, text-numbers"}
+    return places.get(kind, f"05, {'replay' if kind == 'cell' else 'ledger'}")
+
+
+# What the paper leaves out
+
+
+def left_out(result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """What describes many runs better than mean and quartiles of all episodes: columns here, low, high, teacher.
+
+    One row per statistic, with 95 % intervals from resampled runs. The interquartile mean is the mean of the middle
+    half of the runs' means (Agarwal et al. 2021). "beats": a higher mean return, or return, from the same starts.
+    """
+    own, means, middle = result.teacher_returns, result.returns.mean(axis=1), partial(trim_mean, proportiontocut=0.25)
+    cells = np.array([len(run.policy) for run in result.runs])
+    rows = {
+        "interquartile mean of the runs": (means, middle, own.mean()),
+        "probability that a run beats its teacher": (means > own.mean(), np.mean, np.nan),
+        "probability that an episode does": ((result.returns > own).mean(axis=1), np.mean, np.nan),
+    }
+    for name, code in SHARES.items():
+        ours, teacher = (result.codes == code).mean(axis=1), np.mean(result.teacher_outcomes.codes == code)
+        rows[f"share of episodes: {name}"] = ours, np.mean, teacher
+    for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
+        rows[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
+    found = {
+        name: (statistic(values, axis=0), *_interval(values, statistic, n_resamples), teacher)
+        for name, (values, statistic, teacher) in rows.items()
+    }
+    frame = pd.DataFrame.from_dict(found, orient="index", columns=["here", "low", "high", "teacher"])
+    return frame.astype(float).rename_axis("statistic")
+
+
+def _interval(values: np.ndarray, statistic, n_resamples: int) -> tuple[float, float]:
+    """Percentile bootstrap of `statistic(values, axis)` of one value per run (p,), all resamples at once."""
+    draws = np.random.default_rng(0).integers(len(values), size=(n_resamples, len(values)))
+    return tuple(np.percentile(statistic(values[draws], axis=1), [2.5, 97.5]))

@@ -1,0 +1,239 @@
+"""The study of the readings: what each choice that the paper leaves open does to the result.
+
+Every reading is tried on its own, those that move the result most in all combinations too. One set of seeds ranks them,
+another checks the first few against the default.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+
+import numpy as np
+import pandas as pd
+
+from . import paper
+from .config import preset
+from .evaluate import outcomes, resample, spread
+from .experiments import (
+    EVALUATION_SEED,
+    SHARES,
+    Experiment,
+    Run,
+    code_id,
+    load_run,
+    make_all,
+    paper_experiment,
+    run_path,
+)
+from .moments import quartiles_from_fences
+from .rollouts import Outcomes
+
+CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first
+N_CONFIRMED = 5  # variants that are checked, beside the default
+
+# Every reading on its own: fields of `Config` and the values that are not their defaults
+READINGS = {
+    "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
+    "R2": [{"split_lookup": "kept"}],
+    "R3": [{"split_metric": "euclidean"}],
+    "R4": [{"one_split": True}],
+    "R5": [{"periodic_reset": "off"}],
+    "R6": [{"merge_reset": "neighbours"}, {"merge_visits_removed": True}],
+    "R7": [
+        {"batch_size": 16},
+        {"batch_size": 256},
+        {"n_minibatches": 2},
+        {"n_minibatches": 5},
+        {"learning_rate": 3e-4},
+        {"learning_rate": 3e-3},
+        {"learning_rate": 1e-2},
+        {"initial": "zeros"},
+        {"adam_on_reset": "restart"},
+    ],
+    "R8": [{"scale": "box"}],
+    "R9": [{"neighbours": "lookup"}],
+    "R10": [{"split_loss": "clipped"}],
+    "R12": [{"merge_parameters": "weights"}],
+    "R13": [{"split_reset": "neighbours"}, {"split_neighbours": "new"}],
+    "R14": [{"loss_after_split": "kept"}],
+    "R15": [{"inclusive": True}],
+}
+# The readings that moved the result most, in all combinations
+FACTORS = {
+    "R2": {"split_lookup": "kept"},
+    "R3": {"split_metric": "euclidean"},
+    "R4": {"one_split": True},
+    "R7 rate": {"learning_rate": 3e-3},
+    "R7 zeros": {"initial": "zeros"},
+}
+# What Algorithms 1 to 3 print where the prose around them says something else
+AS_PRINTED = {
+    "freeze": "first_n_freeze",
+    "merge_reset": "neighbours",
+    "merge_visits_removed": True,
+    "split_reset": "neighbours",
+    "split_neighbours": "new",
+    "loss_after_split": "kept",
+    "inclusive": True,
+}
+
+
+def variants() -> dict[str, dict]:
+    """What is tried, by name: the default, each reading on its own, the algorithms as printed, all combinations."""
+    tried = {"default": {}}
+    tried |= {f"{number} {name_of(change)}": change for number, changes in READINGS.items() for change in changes}
+    tried["algorithms as printed"] = AS_PRINTED
+    for size in range(2, len(FACTORS) + 1):
+        for chosen in itertools.combinations(FACTORS, size):
+            if not {"R2", "R4"} <= set(chosen):  # after one split a pass needs no second look-up
+                tried[" + ".join(chosen)] = {name: v for part in chosen for name, v in FACTORS[part].items()}
+    return tried
+
+
+def name_of(change: dict) -> str:
+    """How a change of one field is written: "one_split", "learning_rate 0.01"."""
+    ((name, value),) = change.items()
+    return name if value is True else f"{name} {value}"
+
+
+def experiment(task: str, change: dict) -> Experiment:
+    """The paper's experiment on `task` with some readings changed."""
+    return dataclasses.replace(paper_experiment(task), config=dataclasses.replace(preset(task), **change))
+
+
+# How far from the paper
+
+
+def landmarks(task: str) -> dict[str, float]:
+    """Where the paper's distilled policies stand from its own teacher: see `standing`.
+
+    MountainCar's quartiles come from the whisker bounds of the text, since T6 repeats the teacher's (`vsp.audit`).
+    """
+    printed = paper.spread(task)
+    teacher, ours = ({name.lower(): value for name, value in printed[who].items()} for who in ("drl", "ours"))
+    if task == "MountainCarContinuous-v0":
+        bounds = paper.value("mc_ours_whisker_low"), paper.value("mc_ours_whisker_high")
+        ours["q1"], ours["q3"] = quartiles_from_fences(*bounds)
+    return standing(ours, teacher)
+
+
+def standing(policies: dict[str, float], teacher: dict[str, float]) -> dict[str, float]:
+    """Mean and quartiles of the return as differences to the teacher's mean, in units of its standard deviation, and
+    the logarithm of the ratio of the standard deviations."""
+    scaled = {name: (policies[name] - teacher["mean"]) / teacher["std"] for name in ("mean", "q1", "q3")}
+    return {**scaled, "std": float(np.log(policies["std"] / teacher["std"]))}
+
+
+def distance(here: dict[str, float], there: dict[str, float]) -> float:
+    """Root mean square difference of two standings."""
+    return float(np.sqrt(np.mean([(here[name] - there[name]) ** 2 for name in there])))
+
+
+# The study
+
+
+def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS, tried: dict | None = None):
+    """Every variant with the seeds CHOOSING, and the nearest to the paper with the seeds CONFIRMING: a data frame.
+
+    One row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
+    """
+    tried = variants() if tried is None else tried
+    chosen = _phase("choosing", tried, CHOOSING, runs, jobs, tasks)
+    first = ["default", *(name for name in ranking(chosen) if name != "default")][: N_CONFIRMED + 1]
+    confirmed = _phase("confirming", {name: tried[name] for name in first}, CONFIRMING, runs, jobs, tasks)
+    return pd.concat([chosen, confirmed], ignore_index=True)
+
+
+def ranking(frame: pd.DataFrame, task: str = "both") -> list[str]:
+    """The variants from the nearest to the paper to the farthest."""
+    rows = frame[frame["task"] == task]
+    return rows.sort_values("distance", kind="stable")["variant"].tolist()
+
+
+def _phase(phase: str, tried: dict, seeds, runs, jobs: int, tasks) -> pd.DataFrame:
+    experiments = {(name, task): experiment(task, change) for name, change in tried.items() for task in tasks}
+    make_all(list(itertools.product(experiments.values(), seeds)), runs=runs, jobs=jobs, label=f"readings, {phase}")
+    teachers = {task: outcomes(paper_experiment(task).teacher, task, seed=EVALUATION_SEED) for task in tasks}
+    rows, away = [], {}
+    for (name, task), one in experiments.items():
+        made = [load_run(run_path(one.folder(runs), seed), one) for seed in seeds]
+        row, away[name, task] = _row(made, teachers[task], landmarks(task))
+        about = {"phase": phase, "variant": name, "task": task, "settings": one.id, "code": code_id()}
+        rows.append(about | row)
+    return pd.concat([pd.DataFrame(rows), _joint(phase, away, tasks)], ignore_index=True)
+
+
+def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """What the runs of one variant come to, with 95 % intervals over runs; and their distances to the paper, the
+    measured one first, then one per resample."""
+    returns = np.stack([run.outcomes.returns for run in made])
+    codes = np.stack([run.outcomes.codes for run in made])
+    cells = np.array([len(run.policy) for run in made])
+    facts, own, draws = spread(returns), spread(teacher.returns), resample(returns, n_resamples=1000)
+    away = [distance(standing(drawn, own), there) for drawn in (facts, *draws.to_dict("records"))]
+    row = {"runs": len(made), "cells": cells.mean(), "cells_min": cells.min(), "cells_max": cells.max()}
+    row |= {name: facts[name] for name in ("mean", "std", "q1", "median", "q3")}
+    row["mean_low"], row["mean_high"] = draws["mean"].quantile([0.025, 0.975])
+    row |= {name: np.mean(codes == code) for name, code in SHARES.items()}
+    row["runs_above_teacher"] = np.mean(returns.mean(axis=1) > own["mean"])
+    return row | _with_interval("distance", np.array(away)), np.array(away)
+
+
+def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.DataFrame:
+    """The distance averaged over the tasks, and how much larger it is than the default's ("gap"), for each variant.
+
+    Variants share seeds, and every variant's resamples draw the same of them, so gaps are taken resample by resample.
+    """
+    names = list(dict.fromkeys(name for name, _ in away))
+    joint = {name: np.mean([away[name, task] for task in tasks], axis=0) for name in names}
+    rows = [
+        {"phase": phase, "variant": name, "task": "both"}
+        | _with_interval("distance", joint[name])
+        | _with_interval("gap", joint[name] - joint["default"])
+        for name in names
+    ]
+    return pd.DataFrame(rows)
+
+
+def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
+    """A measured value and the 95 % interval of its resamples; `values` holds the one, then the others."""
+    low, high = np.percentile(values[1:], [2.5, 97.5])
+    return {name: values[0], f"{name}_low": low, f"{name}_high": high}
+
+
+# What the notebook shows of it
+
+PANELS = [  # task, what is shown of it, and its axis
+    ("SimpleGoal-v0", "mean", "mean return"),
+    ("MountainCarContinuous-v0", "mean", "mean return"),
+    ("both", "distance", "distance"),
+]
+
+
+def as_intervals(frame: pd.DataFrame, task: str, column: str) -> pd.DataFrame:
+    """One column of the choosing phase with its interval, by variant: columns here, low, high."""
+    rows = frame[(frame["phase"] == "choosing") & (frame["task"] == task)].set_index("variant")
+    return rows[[column, f"{column}_low", f"{column}_high"]].set_axis(["here", "low", "high"], axis=1)
+
+
+def shown_variants(frame: pd.DataFrame, n_combinations: int = 4) -> list[str]:
+    """The default, every reading on its own, the algorithms as printed, and the nearest of the combinations."""
+    every = variants()
+    alone = [name for name, change in every.items() if len(change) < 2 or change is AS_PRINTED]
+    ranked = ranking(frame[frame["phase"] == "choosing"])
+    return [*alone, *[name for name in ranked if name not in alone][:n_combinations]]
+
+
+def brief(frame: pd.DataFrame) -> pd.DataFrame:
+    """The choosing phase, one row per variant, the tasks side by side, the nearest to the paper first."""
+    rows = frame[frame["phase"] == "choosing"]
+    wide = rows.pivot(index="variant", columns="task", values=["cells", "mean", "std", "pit", "truncated", "distance"])
+    columns = [
+        (name, task) for task in paper.TASKS for name in ("cells", "mean", "std", "pit", "truncated", "distance")
+    ]
+    columns = [c for c in columns if c != ("pit", "MountainCarContinuous-v0")]  # there is none
+    wide = wide.loc[ranking(rows), [*columns, ("distance", "both")]]
+    wide.columns = [f"{paper.PREFIX.get(task, task)} {name}" for name, task in wide.columns]
+    return wide.reset_index()

@@ -1,0 +1,65 @@
+"""The two studies that take minutes, on disk: `make study` makes them, notebooks draw what is committed.
+
+data/results/readings.csv and teachers.csv name the settings and the code they were made with, so that `stale` can tell.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+from . import paper, readings_study, store, teachers_study
+from .experiments import code_id
+
+RESULTS = store.ROOT / "data" / "results"
+STUDIES = {"readings": readings_study.study, "teachers": teachers_study.study}
+
+
+def read(name: str) -> pd.DataFrame:
+    """The committed results called `name`: "readings" or "teachers"."""
+    return pd.read_csv(RESULTS / f"{name}.csv", dtype={"settings": str, "code": str})
+
+
+def stale() -> list[str]:
+    """Which committed results were made with other settings or code than today's, in words; empty if none."""
+    tried = readings_study.variants().values()
+    today = {
+        "readings": {readings_study.experiment(task, change).id for task in paper.TASKS for change in tried},
+        "teachers": {experiment.id for experiment in teachers_study.experiments().values()},
+    }
+    found = []
+    for name, settings in today.items():
+        path = RESULTS / f"{name}.csv"
+        if not path.exists():
+            found.append(f"data/results/{name}.csv is missing: `make study` makes it")
+            continue
+        frame = read(name)
+        parts = {
+            "settings": set(frame["settings"].dropna()) != settings,
+            "code": set(frame["code"].dropna()) != {code_id()},
+        }
+        if old := [part for part, differs in parts.items() if differs]:
+            found.append(f"data/results/{name}.csv was made with other {' and '.join(old)}: `make study` makes it anew")
+    return found
+
+
+def main() -> None:
+    """Make the runs of both studies, or those that are missing, and write their results."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="results go to OUT/data/results, runs to OUT/build/study")
+    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    parser.add_argument("--check", action="store_true", help="only say which results are stale")
+    arguments = parser.parse_args()
+    if arguments.check:
+        print(*stale(), sep="\n", end="\n" if stale() else "")
+        return
+    runs, results = Path(arguments.out) / "build" / "study", Path(arguments.out) / "data" / "results"
+    for name, study in STUDIES.items():
+        frame = study(runs, jobs=arguments.jobs)
+        store.write_text(results / f"{name}.csv", frame.to_csv(index=False, float_format="%.6f", lineterminator="\n"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""The study of the teachers: how much of the result belongs to the one teacher that all runs of a task share."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import f
+
+from . import paper
+from .evaluate import outcomes
+from .experiments import EVALUATION_SEED, SHARES, Experiment, code_id, load_run, make_all, paper_experiment, run_path
+from .teachers import SHIPPED, load_teacher
+
+SEEDS = range(1000, 1010)  # of the distillations of each teacher
+
+
+def teachers(task: str) -> dict[str, Path]:
+    """The teachers of `task` by name: the shipped one, and those of shorter training."""
+    others = sorted((SHIPPED / "short").glob(f"{task}-*.safetensors"))
+    return {"shipped": SHIPPED / f"{task}.safetensors"} | {f"seed {path.stem.split('-')[-1]}": path for path in others}
+
+
+def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS) -> pd.DataFrame:
+    """Distil every teacher with the seeds SEEDS: one row per run."""
+    work = experiments(tasks)
+    make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
+    rows = []
+    for (task, name), experiment in work.items():
+        own = outcomes(experiment.teacher, task, seed=EVALUATION_SEED).returns
+        about = {"task": task, "teacher": name, "settings": experiment.id, "code": code_id()}
+        for seed in SEEDS:
+            run = load_run(run_path(experiment.folder(runs), seed), experiment)
+            shares = {share: np.mean(run.outcomes.codes == code) for share, code in SHARES.items()}
+            returns = run.outcomes.returns
+            scores = {"mean": returns.mean(), "std": returns.std(ddof=1), "teacher_mean": own.mean()}
+            scores["teacher_std"] = own.std(ddof=1)
+            rows.append({**about, "seed": seed, "cells": len(run.policy), **scores, **shares})
+    return pd.DataFrame(rows)
+
+
+def experiments(tasks=paper.TASKS) -> dict[tuple[str, str], Experiment]:
+    """The paper's experiment with each teacher, by task and name of the teacher."""
+    return {
+        (task, name): dataclasses.replace(paper_experiment(task), teacher=load_teacher(path))
+        for task in tasks
+        for name, path in teachers(task).items()
+    }
+
+
+def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
+    """Variance of `values` between and within groups of equal size: one-way random effects.
+
+    Keys: between, within (variances, by moments; between is cut at zero), share (of between in the sum), share_low and
+    share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6). Raises ValueError for unequal groups.
+    """
+    table = values.groupby(groups)
+    size, means = table.size(), table.mean()
+    k, n = len(size), size.iloc[0]
+    if size.nunique() != 1 or k < 2 or n < 2:
+        raise ValueError(f"sizes of the groups are {size.to_dict()}, expected two or more groups of one size, above 1")
+    within = table.var().mean()
+    ratio = n * means.var() / within
+    low, high = (ratio / f.ppf(q, k - 1, k * (n - 1)) for q in (0.975, 0.025))
+    shares = {name: max(0.0, (x - 1) / (x + n - 1)) for name, x in (("", ratio), ("_low", low), ("_high", high))}
+    between = max(0.0, means.var() - within / n)
+    return {"between": between, "within": within} | {f"share{name}": share for name, share in shares.items()}
+
+
+def summary(frame: pd.DataFrame) -> pd.DataFrame:
+    """One row per teacher: its own return, and over its runs the mean, its deviation, cells and failed episodes."""
+    groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)
+    means = groups[["teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
+    means.insert(3, "deviation between runs", groups["mean"].std())
+    return means.reset_index()
