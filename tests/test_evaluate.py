@@ -8,7 +8,16 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, Pum
 
 from vsp import paper
 from vsp.envs import OUTCOMES, get_task
-from vsp.evaluate import evaluate, interval, outcomes, outlier_numbers, spread, start_states
+from vsp.evaluate import (
+    _weighted_statistics,
+    evaluate,
+    interval,
+    outcomes,
+    outlier_numbers,
+    resample,
+    spread,
+    start_states,
+)
 from vsp.rollouts import play
 
 HAND = np.array([-100.0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 100])  # quartiles 2.5, 5, 7.5: whiskers at -5 and 15
@@ -154,3 +163,108 @@ def test_a_spread_of_nothing_or_nan_is_refused(returns, message):
 def test_a_number_of_episodes_is_an_integer(n):
     with pytest.raises(ValueError, match="expected an integer from 1 on"):
         start_states(get_task(SIMPLEGOAL), n, 1)
+
+
+# Everything resampled at once
+
+# Quarters of whole numbers: many are equal, some lie on a fence, and quartiles and fences come out exact
+QUARTERS = st.integers(-80, 80).map(lambda number: number / 4)
+
+
+def both_routes(returns):
+    """What `resample` gives, from `spread` and `outlier_numbers`, which know it by these names or others."""
+    facts = spread(returns)
+    expected = {name: facts[name] for name in ("min", "max", "mean", "std", "q1", "median", "q3", "iqr")}
+    expected |= outlier_numbers(returns) | {"coverage": 100 * facts["coverage"]}
+    sides = {"below": returns[returns < facts["lower_fence"]], "above": returns[returns > facts["upper_fence"]]}
+    for side, values in sides.items():
+        expected[f"outliers_{side}_min"] = values.min() if len(values) else np.nan
+        expected[f"outliers_{side}_max"] = values.max() if len(values) else np.nan
+    return expected
+
+
+def agree(found, expected):
+    assert found.keys() == expected.keys()
+    for name in expected:
+        assert found[name] == pytest.approx(expected[name], rel=1e-9, abs=1e-9, nan_ok=True), name
+
+
+@given(arrays(np.float64, st.integers(1, 60), elements=QUARTERS))
+def test_statistics_that_count_each_value_once_are_those_of_the_spread(returns):
+    agree(_weighted_statistics(np.sort(returns), np.ones(len(returns))), both_routes(returns))
+
+
+@given(st.lists(st.tuples(QUARTERS, st.integers(0, 3)), min_size=1, max_size=40).filter(lambda p: any(n for _, n in p)))
+def test_a_weight_stands_for_so_many_copies(pairs):
+    values, weights = (np.array(part, dtype=float) for part in zip(*sorted(pairs)))
+    agree(_weighted_statistics(values, weights), both_routes(np.repeat(values, weights.astype(int))))
+
+
+def test_a_value_on_the_fence_is_no_outlier_however_often_it_is_drawn():
+    values = np.array([-5.0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 15])  # quartiles 2.5 and 7.5, fences -5 and 15
+    found = _weighted_statistics(values, np.ones(11))
+    assert (found["whisker_low"], found["whisker_high"], found["outliers"], found["coverage"]) == (-5, 15, 0, 100)
+    found = _weighted_statistics(values, np.array([1.0] * 10 + [0.0]))
+    assert (found["max"], found["q1"], found["q3"], found["whisker_low"]) == (9, 2.25, 6.75, -4.5)
+    assert (found["outliers"], found["outliers_min"], found["coverage"]) == (1, -5, 90)
+
+
+def drawn(seed, p, n_resamples):
+    rng = np.random.default_rng(seed)
+    return [rng.integers(p, size=p) for _ in range(n_resamples)]
+
+
+@pytest.mark.parametrize("shape", [(1, 7), (7, 1), (12, 30)])
+def test_a_resample_is_the_drawn_rows_stacked(shape):
+    rng = np.random.default_rng(3)
+    returns = rng.normal(15, 2, shape) - 25 * (rng.random(shape) < 0.06)
+    frame = resample(returns, n_resamples=25, seed=4)
+    assert len(frame) == 25
+    for found, rows in zip(frame.to_dict("records"), drawn(4, len(returns), 25), strict=True):
+        agree(found, both_routes(np.vstack([returns[i] for i in rows])))
+
+
+def test_resamples_repeat_with_their_seed():
+    returns = np.random.default_rng(0).normal(size=(6, 10))
+    one, same, other = (resample(returns, n_resamples=20, seed=seed) for seed in (1, 1, 2))
+    assert one.equals(same) and not one.equals(other)
+    assert resample(returns, n_resamples=5, seed=1).equals(one[:5]) and len(resample(returns)) == 10_000
+    assert resample(np.asfortranarray(returns), n_resamples=20, seed=1).equals(one)
+
+
+def test_policies_are_resampled_and_not_episodes():
+    """Policies with the same return in all episodes: a resample can hold no other mean than one of whole policies."""
+    returns = np.repeat(np.array([[0.0], [1.0]]), 9, axis=1)
+    assert set(resample(returns, n_resamples=60)["mean"]) == {0.0, 0.5, 1.0}
+
+
+def test_resamples_of_two_sets_draw_the_same_rows():
+    returns = np.random.default_rng(5).normal(size=(8, 20))
+    one, other = (resample(values, n_resamples=30) for values in (returns, returns + 4))
+    for name in ("mean", "median", "min", "max"):
+        assert np.allclose(other[name], one[name] + 4)
+
+
+def test_the_mean_has_the_interval_that_stacking_gives():
+    returns = np.random.default_rng(6).normal(size=(15, 20))
+    low, high = resample(returns, n_resamples=400)["mean"].quantile([0.025, 0.975])
+    assert (low, high) == pytest.approx(interval(returns, np.mean, n_resamples=400))
+
+
+def test_resamples_without_outliers_are_nan_where_outliers_are_described():
+    returns = np.arange(40.0).reshape(4, 10) % 7
+    frame = resample(returns, n_resamples=10)
+    described = [name for name in frame if name.startswith("outliers_")]
+    assert len(described) == 4 + 2 * 5 and frame[described].isna().all(axis=None)
+    assert (frame["outliers"] == 0).all() and (frame["coverage"] == 100).all()
+    assert frame.drop(columns=described).notna().all(axis=None)
+
+
+def test_a_resample_without_the_only_outlier_is_nan_and_the_others_are_not():
+    returns = np.tile(np.arange(10.0), (6, 1))
+    returns[2, 0] = 1000
+    frame, absent = resample(returns, n_resamples=40), np.array([2 not in rows for rows in drawn(0, 6, 40)])
+    assert 0 < absent.sum() < 40
+    assert np.array_equal(frame["outliers_above_mean"].isna(), absent) and (frame["outliers"][absent] == 0).all()
+    assert set(frame["outliers_above_mean"].dropna()) == {1000.0} == set(frame["max"][~absent])
+    assert frame["outliers_below_mean"].isna().all() and set(frame["outliers_above_share"].dropna()) == {100.0}

@@ -18,6 +18,7 @@ from vsp.experiments import (
     code_id,
     load_run,
     load_runs,
+    make_all,
     make_run,
     make_runs,
     paper_experiment,
@@ -91,6 +92,34 @@ def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monke
     assert all(path.stat().st_mtime_ns == time for path, time in times.items())
     make_runs(SMALL, range(3), runs=tmp_path / "runs")
     assert seeds == [1]
+
+
+OTHER = dataclasses.replace(SMALL, config=dataclasses.replace(CONFIG, n_split=5))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_runs_of_several_experiments_are_those_made_one_by_one(made, tmp_path, jobs):
+    work = [(OTHER, 0), (SMALL, 2), (SMALL, 0), (OTHER, 3)]
+    assert make_all(iter(work), runs=tmp_path / "all", jobs=jobs, label="both") is None
+    make_runs(OTHER, [3, 0], runs=tmp_path / "one")
+    assert files(tmp_path / "all", OTHER) == files(tmp_path / "one", OTHER)
+    before = files(made[0])
+    assert files(tmp_path / "all") == {name: before[name] for name in ("0000.run", "0002.run")}
+
+
+def test_all_that_is_there_is_made_no_more(made, tmp_path, monkeypatch, capsys):
+    shutil.copytree(made[0], tmp_path, dirs_exist_ok=True)
+    asked, original = [], experiments.make_run
+    monkeypatch.setattr(
+        experiments, "make_run", lambda e, seed, folder: (asked.append((e, seed)), original(e, seed, folder))
+    )
+    make_all([(SMALL, 1), (SMALL, 2)], runs=tmp_path, label="a study")
+    assert not asked and capsys.readouterr().err == ""
+    make_all([(SMALL, 1), (OTHER, 1), (SMALL, 4)], runs=tmp_path, label="a study")
+    shown = capsys.readouterr().err
+    assert asked == [(OTHER, 1), (SMALL, 4)] and "a study" in shown and "3/3" in shown
+    make_all([], runs=tmp_path, label="a study")
+    assert len(asked) == 2 and files(tmp_path).keys() == {f"000{seed}.run" for seed in (0, 1, 2, 4)}
 
 
 def test_progress_says_how_many_are_done(tmp_path, capsys):

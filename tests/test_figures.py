@@ -5,10 +5,12 @@ import zlib
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 
-from vsp import figures, geometry
+from vsp import figures, geometry, ledger
 from vsp.envs import get_task
+from vsp.evaluate import spread
 from vsp.figures import TEXT_WIDTH, letter, panels, save_figure
 from vsp.rollouts import Episode
 
@@ -230,3 +232,149 @@ def test_things_have_colours_of_their_own():
     rgb = np.array([mpl.colors.to_rgb(c) for c in (figures.TEACHER, figures.DISTILLED, figures.GOAL, figures.PIT)])
     gaps = np.abs(rgb[:, None] - rgb).max(axis=2)[~np.eye(4, dtype=bool)]
     assert gaps.min() > 0.1
+
+
+# Intervals, the ledger, the studies
+
+ROWS = pd.DataFrame(
+    {"here": [2.0, 5.0, 3.0], "low": [1.0, 4.5, 3.0], "high": [4.0, 6.0, 3.0]}, index=["one", "two", "three"]
+)
+
+
+def hexes(colours):
+    return [mpl.colors.to_hex(colour) for colour in colours]
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_yticklabels()]
+
+
+def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
+    figures.intervals(ax, ROWS, label="runs")
+    lines, dots = ax.collections
+    assert [s.tolist() for s in lines.get_segments()] == [[[1, 0], [4, 0]], [[4.5, 1], [6, 1]], [[3, 2], [3, 2]]]
+    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]] and dots.get_label() == "runs"
+    assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
+    assert ax.get_ylim() == (2.5, -0.5)
+    assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [figures.DISTILLED]
+
+
+def test_intervals_have_colours_of_their_own(ax):
+    colours = [figures.TEACHER, figures.DISTILLED, figures.GOAL]
+    figures.intervals(ax, ROWS, color=colours)
+    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
+
+
+def test_texts_in_the_margin_stand_beside_their_rows(ax):
+    figures.intervals(ax, ROWS)
+    figures.margin(ax, ["1 %", "2 %", "3 %"], "fail")
+    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("fail", -1), ("1 %", 0), ("2 %", 1), ("3 %", 2)]
+    assert all(t.get_position()[0] > 1 and t.get_va() == "center" for t in ax.texts)
+    ax.set_xlim(-1000, 1000)  # the place beside the axes does not depend on what they show
+    right, middle = ax.transData.transform((1000, 1)), ax.texts[2].get_transform().transform(ax.texts[2].get_position())
+    assert middle[0] > right[0] and middle[1] == pytest.approx(right[1])
+
+
+def test_a_reference_is_a_line_from_bottom_to_top(ax):
+    figures.reference(ax, 2.5, "default", color="black", ls="--")
+    (line,) = ax.lines
+    assert line.get_xdata() == [2.5, 2.5] and line.get_ydata() == [0, 1] and line.get_transform() == (
+        ax.get_xaxis_transform(which="grid")
+    )
+    assert (line.get_label(), line.get_color(), line.get_linestyle()) == ("default", "black", "--")
+    figures.reference(ax, 1.0, "teacher")
+    assert (ax.lines[1].get_color(), ax.lines[1].get_linestyle()) == (figures.TEACHER, "-")
+
+
+GAPS = pd.DataFrame(
+    {
+        "gap": [0.5, -300.0, 12.0, np.nan, -1.2],
+        "verdict": ["reproduced", "differs", "contradicts itself", np.nan, "reproduced"],
+    },
+    index=["mean", "std", "q1", "absent", "max"],
+)
+
+
+def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
+    figures.ledger_gaps(ax, GAPS, band=2**0.5)
+    drawn = {dots.get_label(): dots for dots in ax.collections}
+    assert {name: dots.get_offsets().tolist() for name, dots in drawn.items()} == {
+        "reproduced": [[0.5, 0], [-1.2, 4]], "differs": [[-300, 1]], "contradicts itself": [[12, 2]],
+    }  # fmt: skip
+    assert len({tuple(hexes(dots.get_facecolors())) for dots in drawn.values()}) == 3
+    assert len({dots.get_paths()[0].vertices.tobytes() for dots in drawn.values()}) == 3  # and markers
+    assert labels(ax) == ["mean", "std", "q1", "absent", "max"] and ax.get_ylim() == (4.5, -0.5)
+
+
+def test_the_band_of_the_ledger_is_linear_and_the_rest_logarithmic(ax):
+    figures.ledger_gaps(ax, GAPS, band=2**0.5)
+    (band,) = ax.patches
+    assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((-(2**0.5), 2**0.5))
+    assert (ax.get_xscale(), ax.xaxis.get_transform().linthresh) == ("symlog", 2**0.5)
+    place = ax.transData.transform([(x, 0) for x in (-(2**0.5), 0, 2**0.5, 20, 200, 2000)])[:, 0]
+    assert place[1] - place[0] == pytest.approx(place[2] - place[1])
+    assert place[4] - place[3] == pytest.approx(place[5] - place[4])
+    assert ax.lines[0].get_xdata() == [0, 0]
+    ax.figure.canvas.draw()
+    assert [t.get_text().replace("\u2212", "-") for t in ax.get_xticklabels()] == ["-1000", "-10", "0", "10", "1000"]
+
+
+def test_no_gap_of_the_ledger_is_cut_off(ax):
+    figures.ledger_gaps(ax, GAPS.assign(gap=[0.5, -5e5, 12.0, np.nan, 2e4]), band=2**0.5)
+    left, right = ax.get_xlim()
+    assert left < -5e5 and 2e4 < right
+
+
+def test_every_verdict_with_a_gap_has_a_colour():
+    assert set(figures._VERDICTS) == set(ledger.VERDICTS) - {ledger.UNCHECKED}
+
+
+def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
+    summaries = {
+        "paper": {"q1": 1.0, "median": 2.0, "q3": 4.0, "lower_fence": -3.5, "upper_fence": 8.5, "mean": 99.0},
+        "here": {"q1": 3.0, "median": np.nan, "q3": 5.0, "lower_fence": 0.0, "upper_fence": 8.0},
+    }
+    figures.boxes(ax, summaries, colours=[figures.TEACHER, figures.DISTILLED])
+    extents = [(box.get_path().vertices[:, 0].min(), box.get_path().vertices[:, 0].max()) for box in ax.patches]
+    middles = [np.ptp(box.get_path().vertices[:, 1]) / 2 + box.get_path().vertices[:, 1].min() for box in ax.patches]
+    assert extents == [(1, 4), (3, 5)] and middles == pytest.approx([0, 1])
+    assert hexes(box.get_facecolor() for box in ax.patches) == [figures.TEACHER, figures.DISTILLED]
+    x = [np.asarray(line.get_xdata(), dtype=float) for line in ax.lines]
+    assert {(a, b) for a, b in (sorted(line) for line in x if len(line) == 2) if a < b} == {
+        (-3.5, 1), (4, 8.5), (0, 3), (5, 8),
+    }  # fmt: skip
+    assert any((line == 2).all() for line in x) and any(np.isnan(line).all() for line in x)
+    assert labels(ax) == ["paper", "here"] and ax.get_ylim()[0] > 1 > 0 > ax.get_ylim()[1]
+
+
+def test_boxes_of_returns_are_those_of_the_box_plot(ax):
+    """Two routes: from the numbers alone, and from the returns."""
+    returns = np.random.default_rng(0).normal(10, 2, 99)
+    figures.boxes(ax, {"runs": spread(returns)}, colours=["C0"])
+    fig, (other,) = panels()
+    figures.box_plot(other, {"runs": returns})
+    lying, standing = (a.patches[0].get_path().vertices for a in (ax, other))
+    assert (lying[:, 0].min(), lying[:, 0].max()) == pytest.approx((standing[:, 1].min(), standing[:, 1].max()))
+    plt.close(fig)
+
+
+TEACHERS = pd.DataFrame({"teacher": ["shipped"] * 3 + ["seed 2"] * 2, "loss": [-1.0, -2.0, -6.0, 0.5, 1.5]})
+
+
+def test_groups_are_columns_of_dots_with_a_bar_at_their_mean(ax):
+    figures.by_group(ax, TEACHERS, x="teacher", y="loss")
+    dots, bars = ax.collections[:2], ax.collections[2:]
+    assert [sorted(column.get_offsets()[:, 1]) for column in dots] == [[-6, -2, -1], [0.5, 1.5]]
+    assert all(np.abs(column.get_offsets()[:, 0] - k).max() < 0.3 for k, column in enumerate(dots))
+    (first,), (second,) = (bar.get_segments() for bar in bars)
+    assert first.tolist() == [[-0.3, -3], [0.3, -3]] and second.tolist() == [[0.7, 1], [1.3, 1]]
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["shipped", "seed 2"]
+
+
+def test_groups_are_drawn_the_same_twice(ax):
+    figures.by_group(ax, TEACHERS, x="teacher", y="loss")
+    fig, (other,) = panels()
+    figures.by_group(other, TEACHERS, x="teacher", y="loss")
+    for one, same in zip(ax.collections[:2], other.collections[:2], strict=True):
+        assert np.array_equal(one.get_offsets(), same.get_offsets())
+    plt.close(fig)

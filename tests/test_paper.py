@@ -1,3 +1,4 @@
+import ast
 import csv
 import math
 import re
@@ -207,3 +208,82 @@ def test_missing_and_altered_files_are_named(tmp_path, monkeypatch):
     copy.write_text(copy.read_text(encoding="utf-8").replace("16.599", "16.598"), encoding="utf-8")
     with pytest.raises(ValueError, match="spread.csv was altered"):
         paper.spread(SIMPLEGOAL)
+
+
+# Every printed value
+
+
+@pytest.fixture(scope="module")
+def printed():
+    return paper.printed_values().set_index("id")
+
+
+def test_every_printed_value_is_there_once(printed):
+    assert printed.columns.tolist() == ["task", "where", "quantity", "subject", "paper", "value"]
+    assert printed.index.is_unique and not (printed.drop(columns="value") == "").any(axis=None)
+    kinds = printed.index.str.extract("^.._(spread|hyper|cell)_", expand=False).fillna("text")
+    coefficients = sum(
+        (frame[[name for name in frame if name.startswith("codeword_")]].size)
+        + sum(len(re.findall(r"[0-9]*\.[0-9]+", text)) for name in frame if "printed" in name for text in frame[name])
+        for frame in map(paper.linear_policies, (SIMPLEGOAL, MOUNTAINCAR))
+    )
+    assert kinds.value_counts().to_dict() == {"text": 99, "spread": 2 * 2 * 9, "hyper": 2 * 9, "cell": coefficients}
+
+
+def test_values_of_text_and_captions_are_among_the_printed(printed):
+    text = paper.text_numbers()
+    rows = printed.loc[text.index]
+    assert rows["paper"].tolist() == text["printed"].tolist() and rows["where"].tolist() == text["where"].tolist()
+    assert np.array_equal(rows["value"], text["value"], equal_nan=True)
+    assert rows[["task", "quantity", "subject"]].equals(text[["task", "quantity", "subject"]])
+
+
+@pytest.mark.parametrize(("task", "prefix"), [(SIMPLEGOAL, "sg"), (MOUNTAINCAR, "mc")])
+def test_values_of_the_tables_are_among_the_printed(printed, task, prefix):
+    for subject, who in (("drl", "DRL"), ("ours", "Ours")):
+        for metric, row in paper.spread(task).iterrows():
+            found = printed.loc[paper.spread_id(task, subject, metric)]
+            assert (found["task"], found["quantity"], found["subject"]) == (task, metric, who)
+            assert found["value"] == float(found["paper"]) == row[subject] and found["where"] == row["where"]
+    for name, value in paper.hyperparameters(task).items():
+        found = printed.loc[f"{prefix}_hyper_{name}"]
+        assert (found["task"], found["value"], ast.literal_eval(found["paper"])) == (task, float(value), value)
+    cells = printed[printed.index.str.startswith(f"{prefix}_cell_")]
+    frame = paper.linear_policies(task)
+    for id, found in cells.iterrows():
+        k, name = re.fullmatch(r".._cell_(\d+)_(\w+)", id).groups()
+        row = frame.loc[int(k) - 1]
+        assert found["value"] == float(found["paper"]) == row[name] and found["where"] == row["where"]
+        assert (found["task"], found["quantity"], found["subject"]) == (task, name, "Ours")
+
+
+def test_terms_that_the_paper_does_not_print_are_no_printed_values(printed):
+    frame = paper.linear_policies(SIMPLEGOAL)
+    assert frame.at[2, "dx_printed"] == "3.175y-1.000"  # no x
+    assert "sg_cell_3_dx_x" not in printed.index and printed.at["sg_cell_3_dx_y", "paper"] == "3.175"
+    assert printed.at["sg_cell_3_dx_bias", "paper"] == "-1.000"
+    assert printed.at["mc_cell_1_codeword_v", "paper"] == "0.000"  # printed, though zero
+
+
+def test_printed_values_keep_the_papers_digits(printed):
+    spelled = {
+        "sg_ours_min": "-11.790", "mc_ours_outliers_below_share": "73.19%", "mc_drl_outliers": "no",
+        "initial_subpolicies": "one", "sg_training_steps": "500.000", "mc_spread_ours_min": "71.050",
+        "mc_hyper_max_pol_loss": "0.00001", "pytorch_version": "2.3.1",
+    }  # fmt: skip
+    assert {id: printed.at[id, "paper"] for id in spelled} == spelled
+    assert printed.index[printed["value"].isna()].tolist() == ["machine_chip", "pytorch_version", "python_version"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "id"),
+    [
+        ((SIMPLEGOAL, "ours", "Median/Q2"), "sg_spread_ours_median"),
+        ((MOUNTAINCAR, "drl", "Coverage"), "mc_spread_drl_coverage"),
+        ((MOUNTAINCAR, "ours", "q1"), "mc_spread_ours_q1"),
+    ],
+)
+def test_ids_of_the_spread_tables(asked, id):
+    assert paper.spread_id(*asked) == id
+    with pytest.raises(ValueError, match="unknown task 'CartPole-v1'"):
+        paper.spread_id("CartPole-v1", *asked[1:])

@@ -24,7 +24,7 @@ def test_artefacts_and_cells_exist():
         for path in (ROOT / "notebooks").glob("*.ipynb")
     }
     rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", README, flags=re.M)
-    assert len(rows) == 12
+    assert len(rows) == 18
     for artefacts, notebook, names in rows:
         assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
         for artefact in re.findall(r"`([a-z_/]+)`", artefacts):
@@ -46,3 +46,25 @@ def test_results_are_those_of_the_tables():
     for task, metric, cells in rows:
         expected = tables[task].rename(index={"Median/Q2": "Median"}).loc[metric.capitalize()]
         assert cells.split(" | ") == [f"{value:.3f}" for value in expected]
+
+
+def test_ledger_counts_are_those_of_the_ledger():
+    book = pd.read_csv(ROOT / "figures" / "tables" / "ledger.csv")
+    verdicts = ["reproduced", "differs", "cannot be checked", "contradicts itself"]
+    for part, name in (
+        ("settings", "settings and counts"),
+        ("results", "results"),
+        ("coefficients", "coefficients[^|]*"),
+    ):
+        (cells,) = re.findall(rf"^\| {name} \| (.*) \|$", README, flags=re.M)
+        found = book.loc[book["part"] == part, "verdict"].value_counts()
+        assert [int(n) for n in cells.split(" | ")] == [found.get(verdict, 0) for verdict in verdicts]
+
+
+def test_what_cells_buy_is_that_of_the_table():
+    table = pd.read_csv(ROOT / "figures" / "tables" / "what_cells_buy.csv")
+    block = README.partition("### What do the cells buy?")[2]
+    rows = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", block, flags=re.M)
+    shown = {tuple(row[1:3]) for row in rows}, {tuple(row[3:]) for row in rows}
+    for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
+        assert found == {(f"{row.here:.2f}", f"{100 * row.failing:.1f}") for row in kinds.itertuples()}

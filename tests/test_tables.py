@@ -10,7 +10,16 @@ from vsp import paper, tables
 from vsp.config import Config, preset
 from vsp.evaluate import spread
 from vsp.policy import VoronoiPolicy
-from vsp.tables import as_text, equation_table, hyperparameters, save_table, spread_table, text_numbers
+from vsp.tables import (
+    as_latex,
+    as_text,
+    equation_table,
+    hyperparameters,
+    printed_spread,
+    save_table,
+    spread_table,
+    text_numbers,
+)
 
 FRAME = pd.DataFrame(
     {"name_of": ["a_b", "c & d"], "value": [1 / 3, 1e-4], "count": [10, 2_000_000], "gap": [np.nan, -2.0]}
@@ -191,3 +200,38 @@ def test_readings_are_the_fields_that_the_papers_table_does_not_print():
     frame = tables.readings(SIMPLEGOAL).set_index("reading")["default"]
     assert frame["split_lookup"] == preset(SIMPLEGOAL).split_lookup and "n_epochs" not in frame
     assert len(frame) + len(paper.hyperparameters(SIMPLEGOAL)) == len(dataclasses.fields(Config))
+
+
+def test_a_printed_column_has_the_names_of_our_spread():
+    found = printed_spread(SIMPLEGOAL, "drl")
+    assert found == pytest.approx({
+        "min": -10.0, "max": 22.667, "mean": 16.599, "std": 3.117, "q1": 14.542, "median": 16.956, "q3": 18.687,
+        "iqr": 4.145, "coverage": 97.6, "lower_fence": 14.542 - 6.2175, "upper_fence": 18.687 + 6.2175,
+    })  # fmt: skip
+    assert printed_spread(MOUNTAINCAR, "ours")["median"] == 93.476 and printed_spread(SIMPLEGOAL, "ours")["q1"] == 12.298
+    assert set(found) == set(spread(np.arange(5.0))) - {"outliers_below", "outliers_above"}
+    with pytest.raises(KeyError, match="theirs"):
+        printed_spread(SIMPLEGOAL, "theirs")
+
+
+def test_a_frame_as_latex_is_what_the_table_holds(tmp_path):
+    shown = as_latex(FRAME)
+    assert shown.columns.tolist() == [r"name\_of", "value", "count", "gap"]
+    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "-2.000"]
+    assert shown["value"].tolist() == ["0.333", "0.0001"] and shown["count"].tolist() == ["10", "2000000"]
+    for name, latex in (("plain", None), ("given", shown)):
+        save_table(FRAME, name, caption="c", out=tmp_path, latex=latex)
+    (plain, _), (given, csv) = written(tmp_path, "plain"), written(tmp_path, "given")
+    assert plain.replace("plain", "given") == given and len(pd.read_csv(csv)) == 2
+
+
+def test_a_long_table_is_whole_in_the_csv_and_in_part_in_the_latex(tmp_path):
+    shown = save_table(FRAME, "some_table", caption="c", out=tmp_path, latex=as_latex(FRAME[["value"]][:1]))
+    tex, csv = written(tmp_path)
+    assert shown.shape == (1, 1) and "0.333" in tex and "a\\_b" not in tex and len(pd.read_csv(csv).columns) == 4
+
+
+def test_every_printed_value_can_stand_in_latex(tmp_path):
+    save_table(paper.printed_values().drop(columns="value"), "some_table", caption="c", out=tmp_path)
+    tex, _ = written(tmp_path)
+    assert balanced(tex) and not unescaped(tex) and r"73.19\%" in tex

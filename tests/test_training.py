@@ -9,7 +9,17 @@ from vsp import store, training
 from vsp.envs import GOAL, PIT, get_task
 from vsp.evaluate import outcomes
 from vsp.teachers import SHIPPED, load_teacher
-from vsp.training import BARS, RECIPES, Recipe
+from vsp.training import BARS, RECIPES, SHORT_SEEDS, Recipe, short_recipe
+
+
+@pytest.fixture(autouse=True)
+def denormal_numbers():
+    """Training flushes them to zero, in the whole process; the tests that come next may need them."""
+    yield
+    import torch
+
+    torch.set_flush_denormal(False)
+
 
 # Shipped
 
@@ -164,3 +174,90 @@ def test_the_recipes_are_those_of_the_paper():
     assert (car.steps, car.noise, car.noise_std, car.batch_size) == (300_000, "ornstein-uhlenbeck", 0.5, 100)
     assert (car.train_freq, car.gradient_steps, car.learning_rate) == ((1, "episode"), -1, 1e-3)
     assert vsp.load_teacher is load_teacher
+
+
+# The shorter trainings of a study
+
+SHIPPED_SHORT = [(task, seed) for task in TASKS for seed in SHORT_SEEDS[task]]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_short_recipe_is_that_of_the_shipped_teacher_with_fewer_steps(task):
+    recipe = short_recipe(task)
+    assert recipe.steps < RECIPES[task].steps and recipe.id != RECIPES[task].id
+    assert dataclasses.replace(recipe, steps=RECIPES[task].steps) == RECIPES[task]
+
+
+def test_the_short_teachers_are_shipped_and_no_others():
+    names = [f"{task}-{seed}" for task, seed in SHIPPED_SHORT]
+    files = [path.name for path in (SHIPPED / "short").iterdir()]
+    assert sorted(files) == sorted(f"{name}.{kind}" for name in names for kind in ("json", "safetensors"))
+    digests = {load_teacher(SHIPPED / "short" / f"{name}.safetensors").digest for name in names}
+    assert len(digests | {load_teacher(task).digest for task in TASKS}) == len(names) + len(TASKS)
+
+
+@pytest.mark.parametrize(("task", "seed"), SHIPPED_SHORT)
+def test_a_short_teacher_scores_what_its_card_says(task, seed):
+    teacher = load_teacher(SHIPPED / "short" / f"{task}-{seed}.safetensors")
+    card, written = teacher.card, teacher.card["score"]
+    recipe = {key: list(v) if isinstance(v, tuple) else v for key, v in dataclasses.asdict(short_recipe(task)).items()}
+    assert (card["task"], card["seed"], card["recipe"], teacher.task.name) == (task, seed, recipe, task)
+    assert card["learning_curve"][-1]["steps"] >= recipe["steps"] > card["learning_curve"][-2]["steps"]
+    assert {"torch", "stable-baselines3", "gymnasium", "numpy"} <= set(card["versions"])
+    found = outcomes(teacher, task, 200, seed=20_241)  # starts that no one has seen
+    assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / np.sqrt(200)
+    missed = np.mean(found.codes != GOAL)
+    assert missed <= (1 - written["goal"]) + 4 * np.sqrt((1 - written["goal"]) / 200)
+
+
+def test_a_recipe_may_be_given(short, tmp_path):
+    fewer = dataclasses.replace(SHORT, steps=40)
+    paths = [training.train(SIMPLEGOAL, seed=0, cache=tmp_path, recipe=r, report=lambda _: None) for r in (fewer, None)]
+    assert [path.name for path in paths] == [f"{SIMPLEGOAL}-{recipe.id}-0.pt" for recipe in (fewer, SHORT)]
+    import torch
+
+    curves = [torch.load(path, weights_only=True)["curve"] for path in paths]
+    assert [[point["steps"] for point in curve] for curve in curves] == [[31, 40], [31, 62, 90]]
+
+
+@pytest.fixture
+def fewer_episodes(monkeypatch):
+    score = training.score
+    monkeypatch.setattr(training, "score", lambda teacher, task, n=40, *, seed=102: score(teacher, task, 40, seed=seed))
+    monkeypatch.setattr(training, "SHORT_STEPS", {SIMPLEGOAL: 40, MOUNTAINCAR: 40})
+    monkeypatch.setattr(training, "BARS", {task: (1000.0, 0.0) for task in TASKS})  # which nobody reaches
+
+
+def test_the_export_of_a_short_training_is_an_actor_and_its_card(short, fewer_episodes, tmp_path):
+    from safetensors.numpy import load_file
+
+    checkpoint = training.train(
+        SIMPLEGOAL, seed=6, cache=tmp_path, recipe=short_recipe(SIMPLEGOAL), report=lambda line: None
+    )
+    assert training.export_short(SIMPLEGOAL, 6, checkpoint, tmp_path / "out") is None
+    path = tmp_path / "out" / "short" / f"{SIMPLEGOAL}-6.safetensors"
+    assert sorted(tmp_path.glob("out/**/*.*")) == [path.with_suffix(".json"), path]
+    actor = {name: tensor for name, tensor in weights(checkpoint).items() if name.startswith("actor.")}
+    assert same(load_file(path), actor) and len(actor) == 6
+    teacher = load_teacher(path)
+    assert same({"0": teacher.layers[0][0].T}, {"0": actor["actor.mu.0.weight"]})
+    assert teacher.card["recipe"] == dataclasses.asdict(SHORT) | {"steps": 40, "train_freq": [1, "step"]}
+    assert (teacher.card["task"], teacher.card["seed"]) == (SIMPLEGOAL, 6)
+    assert [point["steps"] for point in teacher.card["learning_curve"]] == [31, 40]
+    assert teacher.card["sha256"] == store.sha256(path) and "seeds_tried" not in teacher.card
+    found = training.score(teacher, SIMPLEGOAL)
+    assert {name: teacher.card["score"][name] for name in found} == found
+
+
+def test_make_short_teachers_trains_and_exports_every_seed(short, fewer_episodes, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "SHORT_SEEDS", {SIMPLEGOAL: (4, 5), MOUNTAINCAR: (7,)})
+    arguments = ["x", "--short", "--cache", str(tmp_path / "cache"), "--out", str(tmp_path / "out")]
+    for more, expected in ((["--task", SIMPLEGOAL], 2), ([], 3)):
+        monkeypatch.setattr("sys.argv", [*arguments, *more])
+        training.main()
+        assert len(list((tmp_path / "cache").iterdir())) == expected
+    cards = sorted((tmp_path / "out").rglob("*.json"))
+    assert [path.name for path in cards] == [f"{MOUNTAINCAR}-7.json", f"{SIMPLEGOAL}-4.json", f"{SIMPLEGOAL}-5.json"]
+    assert {path.parent.name for path in cards} == {"short"}  # nobody takes the shipped teacher's place
+    teachers = [load_teacher(path.with_suffix(".safetensors")) for path in cards]
+    assert [teacher.card["seed"] for teacher in teachers] == [7, 4, 5] and len({t.digest for t in teachers}) == 3

@@ -255,10 +255,10 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
 
 
 def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
-    """How far the paper's values lie from ours, in half-widths of our intervals: one row per value, by verdict.
+    """How far the paper's values lie from ours, in half-widths of our intervals: a row per value.
 
-    `frame` (index: names) has gap and verdict; inside the shaded `band` a value counts as reproduced. The scale is linear inside
-    the band and logarithmic outside.
+    `frame` (index: names) has gap and verdict; inside the shaded `band` a value counts as reproduced. Scale: linear in
+    the band, logarithmic outside.
     """
     ax.axvspan(-band, band, color="0.9", lw=0)
     ax.axvline(0, color="0.6", lw=0.6)
@@ -292,7 +292,7 @@ def boxes(ax: Axes, summaries: dict[str, dict[str, float]], *, colours: list[str
 
 def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DISTILLED) -> Axes:
     """One dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
-    sns.stripplot(frame, x=x, y=y, ax=ax, color=color, size=3, jitter=0.15)
+    sns.swarmplot(frame, x=x, y=y, ax=ax, color=color, size=3)
     for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
         ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4)
     return ax

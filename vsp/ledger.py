@@ -29,7 +29,8 @@ VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "differs", "cannot be checked", "contradicts itself"
 )  # fmt: skip
 N_RESAMPLES = 10_000
-COLUMNS = ["id", "task", "where", "quantity", "subject", "paper", "here", "low", "high", "verdict", "cell"]
+PARTS = {"coefficients": "_cell_", "results": "_(?:spread|drl|ours)_|_cells$", "settings": ""}  # patterns of ids
+COLUMNS = ["id", "part", "task", "where", "quantity", "subject", "paper", "here", "low", "high", "verdict", "cell"]
 
 
 def ledger(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
@@ -44,7 +45,14 @@ def ledger(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd
     doubted = audit.in_doubt()
     frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
     frame["cell"] = frame["id"].map(cell)
+    frame["part"] = np.select([frame["id"].str.contains(pattern) for pattern in PARTS.values()], list(PARTS), "")
     return frame[COLUMNS]
+
+
+def counts(book: pd.DataFrame) -> pd.DataFrame:
+    """How many values of each part of the paper got which verdict."""
+    table = pd.crosstab(book["part"], book["verdict"])
+    return table.reindex(index=[*reversed(PARTS)], columns=list(VERDICTS), fill_value=0).rename_axis(columns=None)
 
 
 def verdict(row, *, in_doubt: bool = False) -> str:
@@ -88,10 +96,10 @@ def _best_cells(result: Results) -> tuple[float, float, float]:
 
 def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
     """The results in the ledger `book` for one task, the teacher's first; what tables and text both print, once."""
-    rows = book[(book["task"] == task) & book["id"].str.contains("_(?:spread|drl|ours)_|_cells")]
+    rows = book[(book["task"] == task) & (book["part"] == "results") & ~book["id"].str.contains("caption|text")]
     statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
-    twice = ~rows["id"].str.contains("_spread_|caption") & statistic.isin(["min", "max", "mean", "std"])
-    rows = rows[~twice & ~rows["id"].str.contains("caption")].assign(text=~rows["id"].str.contains("_spread_"))
+    twice = ~rows["id"].str.contains("_spread_") & statistic.isin(["min", "max", "mean", "std"])
+    rows = rows[~twice].assign(text=~rows["id"].str.contains("_spread_"))
     return rows.sort_values(["subject", "text"], kind="stable").drop(columns="text")
 
 

@@ -135,7 +135,11 @@ def _text(value: object, digits: int) -> str:
         return str(value)
     if np.isnan(value):
         return MISSING
-    return f"{value:.{digits}f}" if abs(value) >= 0.001 or not value else np.format_float_positional(value)
+    return (
+        f"{value:.{digits}f}"
+        if abs(value) >= 0.001 or not value
+        else np.format_float_positional(value, 2, fractional=False)
+    )
 
 
 def _escape(text: str) -> str:
