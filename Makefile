@@ -66,7 +66,7 @@ help: ## this list
 
 paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 70 s
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
-	  $(PY) -m vsp.study --check > "$(STATE)/stale"; \
+	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
 
 quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 30 s
@@ -111,7 +111,8 @@ define notebook-rules
 .PHONY: $(call outputs,$(1))
 $(call outputs,$(1)): $(1) ;
 $(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
-	@mkdir -p "$$(STATE)"; \
+	@mkdir -p "$$(STATE)"; for file in $$(READS_$(1)); do test -f "$$$$file" || { \
+	  echo "error: $$$$file is missing: \`git checkout $$$$file\` brings it back, \`make study\` makes it" >&2; exit 1; }; done; \
 	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$(QUICK)"; (cd "$$(OUT)" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$(STATE)/$(1)"; then \

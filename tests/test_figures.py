@@ -265,6 +265,20 @@ def test_intervals_have_colours_of_their_own(ax):
     assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
 
 
+def test_a_second_measurement_is_drawn_over_the_first_and_may_be_missing(ax):
+    figures.intervals(ax, ROWS)
+    figures.again(ax, (ROWS + 1).drop("two").reindex(ROWS.index))
+    lines, dots = ax.collections[2:]
+    assert [s.tolist() for s in lines.get_segments() if s.size and not np.isnan(s).any()] == [
+        [[2, 0], [5, 0]],
+        [[4, 2], [4, 2]],
+    ]
+    assert dots.get_offsets()[[0, 2]].tolist() == [[3, 0], [4, 2]] and np.isnan(dots.get_offsets()[1, 0].filled(np.nan))
+    assert hexes(dots.get_facecolors()) == ["#ffffff"] and hexes(dots.get_edgecolors()) == ["#000000"]
+    assert min(lines.get_zorder(), dots.get_zorder()) > max(drawn.get_zorder() for drawn in ax.collections[:2])
+    assert labels(ax) == ["one", "two", "three"] and ax.get_ylim() == (2.5, -0.5)
+
+
 def test_texts_in_the_margin_stand_beside_their_rows(ax):
     figures.intervals(ax, ROWS)
     figures.margin(ax, ["1 %", "2 %", "3 %"], "fail")
@@ -278,9 +292,8 @@ def test_texts_in_the_margin_stand_beside_their_rows(ax):
 def test_a_reference_is_a_line_from_bottom_to_top(ax):
     figures.reference(ax, 2.5, "default", color="black", ls="--")
     (line,) = ax.lines
-    assert line.get_xdata() == [2.5, 2.5] and line.get_ydata() == [0, 1] and line.get_transform() == (
-        ax.get_xaxis_transform(which="grid")
-    )
+    assert (line.get_xdata(), line.get_ydata()) == ([2.5, 2.5], [0, 1])
+    assert line.get_transform() == ax.get_xaxis_transform(which="grid")  # 0 and 1 are the edges of the axes
     assert (line.get_label(), line.get_color(), line.get_linestyle()) == ("default", "black", "--")
     figures.reference(ax, 1.0, "teacher")
     assert (ax.lines[1].get_color(), ax.lines[1].get_linestyle()) == (figures.TEACHER, "-")
@@ -290,6 +303,7 @@ GAPS = pd.DataFrame(
     {
         "gap": [0.5, -300.0, 12.0, np.nan, -1.2],
         "verdict": ["reproduced", "differs", "contradicts itself", np.nan, "reproduced"],
+        "wide": [False, False, False, np.nan, True],
     },
     index=["mean", "std", "q1", "absent", "max"],
 )
@@ -297,13 +311,24 @@ GAPS = pd.DataFrame(
 
 def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
     figures.ledger_gaps(ax, GAPS, band=2**0.5)
-    drawn = {dots.get_label(): dots for dots in ax.collections}
-    assert {name: dots.get_offsets().tolist() for name, dots in drawn.items()} == {
-        "reproduced": [[0.5, 0], [-1.2, 4]], "differs": [[-300, 1]], "contradicts itself": [[12, 2]],
-    }  # fmt: skip
-    assert len({tuple(hexes(dots.get_facecolors())) for dots in drawn.values()}) == 3
-    assert len({dots.get_paths()[0].vertices.tobytes() for dots in drawn.values()}) == 3  # and markers
+    shown = [dots for dots in ax.collections if len(dots.get_offsets())]
+    assert [dots.get_offsets().tolist() for dots in shown] == [[[0.5, 0], [-1.2, 4]], [[-300, 1]], [[12, 2]]]
+    named = {dots.get_label(): dots for dots in ax.collections if not len(dots.get_offsets())}  # for the legend
+    assert list(named) == ["reproduced", "differs", "contradicts itself"]
+    for dots, same in zip(shown, named.values(), strict=True):
+        assert set(hexes(dots.get_edgecolors())) == set(hexes(same.get_facecolors()))
+        assert dots.get_paths()[0].vertices.tolist() == same.get_paths()[0].vertices.tolist()
+    assert len({hexes(dots.get_facecolors())[0] for dots in named.values()}) == 3
+    assert len({dots.get_paths()[0].vertices.tobytes() for dots in named.values()}) == 3  # markers, for grey printers
     assert labels(ax) == ["mean", "std", "q1", "absent", "max"] and ax.get_ylim() == (4.5, -0.5)
+
+
+def test_values_with_a_wide_interval_are_hollow(ax):
+    figures.ledger_gaps(ax, GAPS, band=2**0.5)
+    reproduced, differs = (dots for dots in ax.collections if len(dots.get_offsets()) and dots.get_offsets()[0, 1] < 2)
+    colour = hexes(reproduced.get_edgecolors())[0]
+    assert hexes(reproduced.get_facecolors()) == [colour, "#ffffff"] and colour != "#ffffff"
+    assert set(hexes(differs.get_facecolors())) == set(hexes(differs.get_edgecolors()))
 
 
 def test_the_band_of_the_ledger_is_linear_and_the_rest_logarithmic(ax):
@@ -330,31 +355,30 @@ def test_every_verdict_with_a_gap_has_a_colour():
 
 
 def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
-    summaries = {
-        "paper": {"q1": 1.0, "median": 2.0, "q3": 4.0, "lower_fence": -3.5, "upper_fence": 8.5, "mean": 99.0},
-        "here": {"q1": 3.0, "median": np.nan, "q3": 5.0, "lower_fence": 0.0, "upper_fence": 8.0},
-    }
-    figures.boxes(ax, summaries, colours=[figures.TEACHER, figures.DISTILLED])
-    extents = [(box.get_path().vertices[:, 0].min(), box.get_path().vertices[:, 0].max()) for box in ax.patches]
-    middles = [np.ptp(box.get_path().vertices[:, 1]) / 2 + box.get_path().vertices[:, 1].min() for box in ax.patches]
-    assert extents == [(1, 4), (3, 5)] and middles == pytest.approx([0, 1])
+    quartiles = {"paper": (1.0, 2.0, 4.0), "here": (3.0, np.nan, 5.0)}
+    figures.boxes(ax, quartiles, colours=[figures.TEACHER, figures.DISTILLED])
+    corners = [box.get_path().vertices for box in ax.patches]
+    assert [(c[:, 0].min(), c[:, 0].max()) for c in corners] == [(1, 4), (3, 5)]
+    assert [(c[:, 1].min() + c[:, 1].max()) / 2 for c in corners] == pytest.approx([0, 1])
     assert hexes(box.get_facecolor() for box in ax.patches) == [figures.TEACHER, figures.DISTILLED]
     x = [np.asarray(line.get_xdata(), dtype=float) for line in ax.lines]
-    assert {(a, b) for a, b in (sorted(line) for line in x if len(line) == 2) if a < b} == {
-        (-3.5, 1), (4, 8.5), (0, 3), (5, 8),
-    }  # fmt: skip
+    whiskers = {(a, b) for a, b in (sorted(line) for line in x if len(line) == 2) if a < b}
+    assert whiskers == {(-3.5, 1), (4, 8.5), (0, 3), (5, 8)}  # 1.5 lengths of the box
     assert any((line == 2).all() for line in x) and any(np.isnan(line).all() for line in x)
     assert labels(ax) == ["paper", "here"] and ax.get_ylim()[0] > 1 > 0 > ax.get_ylim()[1]
 
 
 def test_boxes_of_returns_are_those_of_the_box_plot(ax):
-    """Two routes: from the numbers alone, and from the returns."""
+    """Two routes: from three numbers, and from the returns."""
     returns = np.random.default_rng(0).normal(10, 2, 99)
-    figures.boxes(ax, {"runs": spread(returns)}, colours=["C0"])
+    facts = spread(returns)
+    figures.boxes(ax, {"runs": (facts["q1"], facts["median"], facts["q3"])}, colours=["C0"])
     fig, (other,) = panels()
     figures.box_plot(other, {"runs": returns})
     lying, standing = (a.patches[0].get_path().vertices for a in (ax, other))
     assert (lying[:, 0].min(), lying[:, 0].max()) == pytest.approx((standing[:, 1].min(), standing[:, 1].max()))
+    ends = [value for line in ax.lines for value in np.asarray(line.get_xdata(), dtype=float)]
+    assert (min(ends), max(ends)) == pytest.approx((facts["lower_fence"], facts["upper_fence"]))
     plt.close(fig)
 
 
@@ -367,6 +391,7 @@ def test_groups_are_columns_of_dots_with_a_bar_at_their_mean(ax):
     assert [sorted(column.get_offsets()[:, 1]) for column in dots] == [[-6, -2, -1], [0.5, 1.5]]
     assert all(np.abs(column.get_offsets()[:, 0] - k).max() < 0.3 for k, column in enumerate(dots))
     (first,), (second,) = (bar.get_segments() for bar in bars)
+    assert [bar.get_label() for bar in bars if not bar.get_label().startswith("_")] == ["mean"]  # once in a legend
     assert first.tolist() == [[-0.3, -3], [0.3, -3]] and second.tolist() == [[0.7, 1], [1.3, 1]]
     assert [t.get_text() for t in ax.get_xticklabels()] == ["shipped", "seed 2"]
 
@@ -375,6 +400,8 @@ def test_groups_are_drawn_the_same_twice(ax):
     figures.by_group(ax, TEACHERS, x="teacher", y="loss")
     fig, (other,) = panels()
     figures.by_group(other, TEACHERS, x="teacher", y="loss")
+    for drawn_on in (ax, other):
+        drawn_on.figure.canvas.draw()  # which moves dots apart
     for one, same in zip(ax.collections[:2], other.collections[:2], strict=True):
         assert np.array_equal(one.get_offsets(), same.get_offsets())
     plt.close(fig)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vsp import paper
+from vsp.evaluate import spread
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
 FILES = sorted(paper._CHECKSUMS)
@@ -287,3 +288,14 @@ def test_ids_of_the_spread_tables(asked, id):
     assert paper.spread_id(*asked) == id
     with pytest.raises(ValueError, match="unknown task 'CartPole-v1'"):
         paper.spread_id("CartPole-v1", *asked[1:])
+
+
+def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():
+    assert paper.spread_values(SIMPLEGOAL, "drl") == {
+        "min": -10.0, "max": 22.667, "mean": 16.599, "std": 3.117, "q1": 14.542, "median": 16.956, "q3": 18.687,
+        "iqr": 4.145, "coverage": 97.6,
+    }  # fmt: skip
+    assert paper.spread_values(MOUNTAINCAR, "ours")["median"] == 93.476
+    assert paper.spread_values(SIMPLEGOAL, "ours").keys() <= spread(np.arange(5.0)).keys()
+    with pytest.raises(KeyError, match="theirs"):
+        paper.spread_values(SIMPLEGOAL, "theirs")

@@ -67,4 +67,5 @@ def test_what_cells_buy_is_that_of_the_table():
     rows = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", block, flags=re.M)
     shown = {tuple(row[1:3]) for row in rows}, {tuple(row[3:]) for row in rows}
     for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
-        assert found == {(f"{row.here:.2f}", f"{100 * row.failing:.1f}") for row in kinds.itertuples()}
+        kinds = kinds.to_dict("records")
+        assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}

@@ -261,3 +261,4 @@ def test_make_short_teachers_trains_and_exports_every_seed(short, fewer_episodes
     assert {path.parent.name for path in cards} == {"short"}  # nobody takes the shipped teacher's place
     teachers = [load_teacher(path.with_suffix(".safetensors")) for path in cards]
     assert [teacher.card["seed"] for teacher in teachers] == [7, 4, 5] and len({t.digest for t in teachers}) == 3
+    assert {(t.card["recipe"]["steps"], t.card["learning_curve"][-1]["steps"]) for t in teachers} == {(40, 40)}

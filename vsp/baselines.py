@@ -12,13 +12,13 @@ import pandas as pd
 from . import paper
 from .distill import teacher_episodes
 from .envs import GOAL, get_task
-from .evaluate import interval, outcomes
-from .experiments import EVALUATION_SEED, Experiment, Results
+from .evaluate import outcomes
+from .experiments import EVALUATION_SEED, Experiment, Results, Run
 from .policy import VoronoiPolicy
 from .rollouts import Outcomes, Policy
 
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
-SEEDS = range(20)  # each brings teacher episodes of its own
+N_RUNS = 20  # whose teacher episodes the baselines are fitted to
 
 
 class Tree:
@@ -48,6 +48,16 @@ def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPol
     return VoronoiPolicy(states.mean(axis=0)[None], coefficients[None], task=task)
 
 
+def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> VoronoiPolicy:
+    """The cells of `policy` with new maps, by least squares on the states and actions in each cell: what training to
+    the end would give. `constant`: a constant action per cell instead. A cell without states keeps its map."""
+    cells, coefficients = policy.cells(states), policy.coefficients.copy()
+    inputs = np.column_stack([np.zeros_like(states) if constant else states, np.ones(len(states))])
+    for i in np.unique(cells):
+        coefficients[i] = np.linalg.lstsq(inputs[cells == i], actions[cells == i], rcond=None)[0]
+    return VoronoiPolicy(policy.codewords, coefficients, task=policy.task, scale=policy.scale)
+
+
 def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:
     """A policy that a person would write down without any teacher, with its name.
 
@@ -67,38 +77,55 @@ def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndar
     return np.concatenate([e.states for e in episodes]), np.concatenate([e.actions for e in episodes])
 
 
-def fit(experiment: Experiment, seed: int) -> dict[str, Policy]:
-    """The baselines that need a teacher, by name, fitted on the data of `seed`."""
-    states, actions = teacher_data(experiment, seed)
+def fit(experiment: Experiment, run: Run) -> dict[str, Policy]:
+    """The baselines that need a teacher, by name, fitted on the data that `run` was distilled from."""
+    states, actions = teacher_data(experiment, run.seed)
     trees = {f"tree, {leaves} leaves": Tree(states, actions, leaves=leaves) for leaves in LEAVES}
-    return {"one linear map": linear_map(states, actions, experiment.task), **trees}
+    return {
+        "one linear map": linear_map(states, actions, experiment.task),
+        **trees,
+        "same cells, least squares": refit(run.policy, states, actions),
+        "same cells, constants": refit(run.policy, states, actions, constant=True),
+    }
 
 
-def compare(result: Results, seeds=SEEDS) -> pd.DataFrame:
+def compare(result: Results, n_runs: int = N_RUNS) -> pd.DataFrame:
     """What stands beside the distilled policies: one row per kind of policy (the index), best mean return first.
 
-    Columns: policies (how many), cells (or leaves, their mean), here (mean return), low and high (95 %), std of all
-    returns, failing (share of episodes that do not reach the goal). Intervals resample policies where there are
-    several, start states where there is one. Baselines are fitted once per seed and played from the shared starts.
+    Columns: policies (how many), cells (or leaves, their mean), mean return, gap (to the teacher's, from the same
+    starts), low and high (95 %, of the gap), std of all returns, failing (share of episodes without the goal).
+    Intervals resample policies and start states together. Baselines are fitted to the data of the first `n_runs` runs.
     """
     experiment, task = result.experiment, result.experiment.task
     name, rule = rule_of_thumb(task)
     kinds = {name: [rule], "published policy": [paper.published_policy(task)]}
-    for seed in seeds:
-        for kind, policy in fit(experiment, seed).items():
+    for run in result.runs[:n_runs]:
+        for kind, policy in fit(experiment, run).items():
             kinds.setdefault(kind, []).append(policy)
-    rows = {"teacher (TD3)": _row(np.nan, [result.teacher_outcomes])}
+    own = result.teacher_returns
+    rows = {"teacher (TD3)": _row(np.nan, [result.teacher_outcomes], own)}
     for kind, policies in kinds.items():
         played = [outcomes(policy, task, experiment.n_episodes, seed=EVALUATION_SEED) for policy in policies]
-        rows[kind] = _row(np.mean([len(policy) for policy in policies]), played)
+        rows[kind] = _row(np.mean([len(policy) for policy in policies]), played, own)
     cells = [len(run.policy) for run in result.runs]
-    rows["distilled, all runs"] = _row(np.mean(cells), [run.outcomes for run in result.runs])
-    rows["distilled, best run"] = _row(len(result.best.policy), [result.best.outcomes])
-    return pd.DataFrame.from_dict(rows, orient="index").sort_values("here", ascending=False, kind="stable")
+    rows["distilled, all runs"] = _row(np.mean(cells), [run.outcomes for run in result.runs], own)
+    rows["distilled, best run"] = _row(len(result.best.policy), [result.best.outcomes], own)
+    return pd.DataFrame.from_dict(rows, orient="index").sort_values("mean", ascending=False, kind="stable")
 
 
-def _row(cells: float, played: list[Outcomes]) -> dict[str, float]:
+def _row(cells: float, played: list[Outcomes], own: np.ndarray) -> dict[str, float]:
     returns, codes = np.stack([o.returns for o in played]), np.stack([o.codes for o in played])
-    low, high = interval(returns if len(played) > 1 else returns.T, np.mean)
-    row = {"policies": len(played), "cells": cells, "here": returns.mean(), "low": low, "high": high}
-    return row | {"std": returns.std(ddof=1), "failing": np.mean(codes != GOAL)}
+    low, high = _crossed_interval(returns - own)
+    row = {"policies": len(played), "cells": cells, "mean": returns.mean(), "gap": np.mean(returns - own)}
+    return row | {"low": low, "high": high, "std": returns.std(ddof=1), "failing": np.mean(codes != GOAL)}
+
+
+def _crossed_interval(values: np.ndarray, n_resamples: int = 2000) -> tuple[float, float]:
+    """95 % interval of the mean of `values` (p, n) for other policies *and* other start states: both are resampled.
+
+    Policies may be so alike (twenty fits to much the same data) that the starts are all that matters.
+    """
+    rng = np.random.default_rng(0)
+    policies, starts = (rng.multinomial(k, np.full(k, 1 / k), size=n_resamples) for k in values.shape)
+    means = np.einsum("rn,rn->r", policies @ values, starts) / values.size
+    return tuple(np.percentile(means, [2.5, 97.5]))

@@ -7,6 +7,7 @@ import pandas as pd
 
 from .checks import check_finite, check_seed
 from .envs import OUTCOMES, Task, get_task
+from .moments import fences
 from .rollouts import Outcomes, Policy, play
 
 
@@ -43,7 +44,7 @@ def spread(returns: np.ndarray) -> dict[str, float]:
     if not len(returns):
         raise ValueError("no returns, expected at least one")
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
-    lower, upper = q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)
+    lower, upper = fences(q1, q3)
     below, above = returns < lower, returns > upper
     return {
         "min": returns.min(),
@@ -128,7 +129,7 @@ def _weighted_statistics(values: np.ndarray, weights: np.ndarray) -> dict[str, f
     """The statistics of sorted `values` (n,) of which each is there `weights` (n,) times."""
     until = weights.cumsum()
     q1, median, q3 = (_weighted_quantile(values, until, q) for q in (0.25, 0.5, 0.75))
-    lower, upper = q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)
+    lower, upper = fences(q1, q3)
     low, high = values.searchsorted(lower, "left"), values.searchsorted(upper, "right")
     parts = {"": slice(None), "outliers_below_": slice(0, low), "outliers_above_": slice(high, None)}
     facts = {name: _weighted_moments(values[part], weights[part]) for name, part in parts.items()}

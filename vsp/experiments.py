@@ -44,6 +44,7 @@ _CODE = (
     "evaluate",
     "geometry",
     "history",
+    "moments",
     "partition",
     "policy",
     "readings",
@@ -98,13 +99,13 @@ class Experiment:
 
 
 @cache
-def code_id() -> str:
-    """Ten hexadecimal digits that stand for the modules that decide a run's result.
+def code_id(*more: str) -> str:
+    """Ten hexadecimal digits that stand for the modules that decide a run's result, and for those called `more`.
 
     Comments, docstrings and layout have no say: runs outlive a better explanation.
     """
     folder = Path(__file__).parent
-    trees = (ast.parse((folder / f"{name}.py").read_text(encoding="utf-8")) for name in _CODE)
+    trees = (ast.parse((folder / f"{name}.py").read_text(encoding="utf-8")) for name in (*_CODE, *more))
     content = "".join(ast.dump(_WithoutDocstrings().visit(tree)) for tree in trees)
     return hashlib.sha256(content.encode()).hexdigest()[:10]
 
@@ -326,6 +327,7 @@ SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
 
 
 def run_path(folder: str | os.PathLike, seed: int) -> Path:
+    """Where the run with this seed lies in the folder of its experiment."""
     return Path(folder) / f"{seed:04d}.run"
 
 

@@ -22,12 +22,13 @@ from matplotlib.ticker import MaxNLocator
 
 from . import envs, store
 from .envs import Task
+from .moments import fences
 from .rollouts import Episode
 
 TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
 _COLOURS = sns.color_palette("colorblind").as_hex()
 TEACHER, DISTILLED, GOAL, PIT = _COLOURS[0], _COLOURS[1], _COLOURS[2], "0.35"
-BORDER, CODEWORD = "0.25", "black"
+BORDER, CODEWORD, OTHER = "0.25", "black", "0.4"
 FORCE_MAP = "PuOr_r"
 _VERDICTS = {"reproduced": (GOAL, "o"), "differs": (_COLOURS[3], "D"), "contradicts itself": (_COLOURS[4], "X")}
 
@@ -50,14 +51,17 @@ _STYLE = {
 }
 
 
-def panels(n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, **subplots) -> tuple[Figure, np.ndarray]:
-    """A figure of LNCS text width with n panels in a row; height in inches. Returns figure and axes (n,).
+def panels(
+    n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, stacked: bool = False, **subplots
+) -> tuple[Figure, np.ndarray]:
+    """A figure of LNCS text width with n panels in a row, or in a column; height in inches. Returns it and axes (n,).
 
     Sets the style for everything drawn from here on.
     """
     mpl.rcParams.update(_STYLE)
-    fig, axes = plt.subplots(1, n, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
-    return fig, axes[0]
+    shape = (n, 1) if stacked else (1, n)
+    fig, axes = plt.subplots(*shape, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
+    return fig, axes.ravel()
 
 
 class Picture:
@@ -241,6 +245,14 @@ def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILL
     return ax
 
 
+def again(ax: Axes, frame: pd.DataFrame) -> Axes:
+    """A second measurement over `intervals`, as hollow dots; rows without one are NaN."""
+    rows = np.arange(len(frame))
+    ax.hlines(rows, frame["low"], frame["high"], color="black", lw=0.6, zorder=4)
+    ax.scatter(frame["here"], rows, facecolor="white", edgecolor="black", s=10, lw=0.6, zorder=5)
+    return ax
+
+
 def margin(ax: Axes, texts: list[str], title: str) -> Axes:
     """A text beside each row of `intervals`, right of the axes, and what it is above."""
     for row, text in enumerate([title, *texts], start=-1):
@@ -257,28 +269,31 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
 def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
     """How far the paper's values lie from ours, in half-widths of our intervals: a row per value.
 
-    `frame` (index: names) has gap and verdict; inside the shaded `band` a value counts as reproduced. Scale: linear in
-    the band, logarithmic outside.
+    `frame` (index: names) has gap, verdict, wide (drawn hollow). Inside the shaded `band` a value counts as reproduced;
+    the scale is linear in the band and logarithmic outside.
     """
-    ax.axvspan(-band, band, color="0.9", lw=0)
+    ax.axvspan(-band, band, color="0.9", lw=0, label="reproduced if here")
     ax.axvline(0, color="0.6", lw=0.6)
     for verdict, (color, marker) in _VERDICTS.items():
         rows = np.flatnonzero(frame["verdict"] == verdict)
-        ax.scatter(frame["gap"].iloc[rows], rows, color=color, marker=marker, s=14, zorder=3, label=verdict)
+        faces = ["white" if wide is True else color for wide in frame["wide"].iloc[rows]]
+        ax.scatter(frame["gap"].iloc[rows], rows, color=faces, edgecolor=color, marker=marker, s=14, lw=0.8, zorder=3)
+        ax.scatter([], [], color=color, marker=marker, s=14, label=verdict)
+    limit = max(10_000, 2 * frame["gap"].abs().max())
     ax.set_xscale("symlog", linthresh=band)
-    ax.set(xlim=(-10_000, 10_000), xticks=[-1000, -10, 0, 10, 1000])
+    ax.set(xlim=(-limit, limit), xticks=[-1000, -10, 0, 10, 1000])
     ax.xaxis.set_major_formatter("{x:g}")
     ax.set_yticks(np.arange(len(frame)), frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
     return ax
 
 
-def boxes(ax: Axes, summaries: dict[str, dict[str, float]], *, colours: list[str]) -> Axes:
-    """Lying boxes from their numbers alone: q1, median, q3, and the whiskers' ends, lower_fence and upper_fence."""
+def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours: list[str]) -> Axes:
+    """Lying boxes from Q1, median and Q3 alone; the whiskers end at the bounds beyond which a return is an outlier."""
     stats = [
-        {"label": name, "q1": s["q1"], "med": s["median"], "q3": s["q3"]}
-        | {"whislo": s["lower_fence"], "whishi": s["upper_fence"], "fliers": []}
-        for name, s in summaries.items()
+        {"label": name, "q1": q1, "med": median, "q3": q3, "fliers": []}
+        | dict(zip(("whislo", "whishi"), fences(q1, q3), strict=True))
+        for name, (q1, median, q3) in quartiles.items()
     ]
     places = np.arange(len(stats))
     drawn = ax.bxp(stats, positions=places, orientation="horizontal", showfliers=False, patch_artist=True, widths=0.5)
@@ -294,7 +309,7 @@ def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DIST
     """One dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
     sns.swarmplot(frame, x=x, y=y, ax=ax, color=color, size=3)
     for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
-        ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4)
+        ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4, label="mean" if not place else None)
     return ax
 
 

@@ -1,6 +1,6 @@
 """The ledger: every value that the paper prints, beside ours, with an interval and a verdict by rules stated here.
 
-Rules, fixed before the values were compared:
+Rules:
 
 1. A value that cannot stand beside the paper's other values is "contradicts itself" (`vsp.audit` has the arithmetic).
 2. A setting (a limit of a task, a hyperparameter, a count of the protocol) is "reproduced" if the code uses the same
@@ -8,7 +8,10 @@ Rules, fixed before the values were compared:
 3. A result is "reproduced" if the printed value, give or take half a unit of its last digit, lies in the 95 % interval
    of ours, widened by the square root of 2 because the paper's value comes from a sample of the same size; else it
    "differs". Intervals come from 10,000 resamples: of runs for distilled policies, of start states for the one teacher.
-4. What no rerun can show (the parameters of one run, the machine) "cannot be checked".
+4. What no rerun can show or nothing here measures (the parameters of one run, the machine) "cannot be checked".
+
+A verdict on a return is marked "wide" where the widened interval is longer than the standard deviation that the paper
+prints for these returns: there "reproduced" says little.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from functools import partial
 import gymnasium
 import numpy as np
 import pandas as pd
-from scipy.stats import trim_mean
+from scipy.stats import binomtest, trim_mean
 
 from . import audit, envs, paper
 from .config import preset
@@ -29,8 +32,16 @@ VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "differs", "cannot be checked", "contradicts itself"
 )  # fmt: skip
 N_RESAMPLES = 10_000
-PARTS = {"coefficients": "_cell_", "results": "_(?:spread|drl|ours)_|_cells$", "settings": ""}  # patterns of ids
-COLUMNS = ["id", "part", "task", "where", "quantity", "subject", "paper", "here", "low", "high", "verdict", "cell"]
+# Parts of the paper, by patterns of ids, of which the first that fits counts
+PARTS = {
+    "coefficients": "_cell_",
+    "results": "_(?:spread|drl|ours)_(?!episodes)|^.._(?:caption_)?cells$",
+    "settings": "",
+}
+COLUMNS = [
+    "id", "part", "task", "where", "quantity", "subject", "paper", "value", "here", "low", "high", "verdict", "wide",
+    "cell",
+]  # fmt: skip
 
 
 def ledger(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
@@ -44,9 +55,19 @@ def ledger(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd
     frame = paper.printed_values().join(pd.concat(parts), on="id")
     doubted = audit.in_doubt()
     frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
+    frame["wide"] = _wide(frame)
     frame["cell"] = frame["id"].map(cell)
     frame["part"] = np.select([frame["id"].str.contains(pattern) for pattern in PARTS.values()], list(PARTS), "")
     return frame[COLUMNS]
+
+
+def _wide(frame: pd.DataFrame) -> list[bool]:
+    """Whether an interval of a return, widened, is longer than the printed standard deviation of these returns."""
+    stds = {(task, who): paper.spread_values(task, who)["std"] for task in paper.TASKS for who in ("drl", "ours")}
+    length = np.sqrt(2) * (frame["high"] - frame["low"])
+    keys = zip(frame["task"], frame["subject"].str.lower())
+    of_returns = ~frame["id"].str.contains("share|coverage|cells|outliers$")
+    return [bool(known and x > stds.get(key, np.inf)) for key, x, known in zip(keys, length, of_returns)]
 
 
 def counts(book: pd.DataFrame) -> pd.DataFrame:
@@ -77,11 +98,12 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
     """Our results under the ids of the paper's values: columns here, low, high (95 %)."""
     rows = {}
     for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
-        here = outlier_numbers(returns) | {name: value for name, value in spread(returns).items()}
+        here = outlier_numbers(returns) | spread(returns)
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
         for name in bounds.columns.intersection(list(here)):
-            row = here[name], *bounds[name]
+            known = not np.isnan(here[name])  # without outliers there is no mean of them
+            row = (here[name], *bounds[name]) if known else (np.nan, np.nan, np.nan)
             rows[f"{paper.PREFIX[task]}_{subject}_{name}"] = rows[paper.spread_id(task, subject, name)] = row
     rows |= dict.fromkeys([f"{paper.PREFIX[task]}_{name}" for name in ("cells", "caption_cells")], _best_cells(result))
     return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
@@ -96,26 +118,28 @@ def _best_cells(result: Results) -> tuple[float, float, float]:
 
 def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
     """The results in the ledger `book` for one task, the teacher's first; what tables and text both print, once."""
-    rows = book[(book["task"] == task) & (book["part"] == "results") & ~book["id"].str.contains("caption|text")]
+    rows = book[(book["task"] == task) & (book["part"] == "results")]
     statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
     twice = ~rows["id"].str.contains("_spread_") & statistic.isin(["min", "max", "mean", "std"])
+    twice |= rows["id"].str.contains("caption")
     rows = rows[~twice].assign(text=~rows["id"].str.contains("_spread_"))
     return rows.sort_values(["subject", "text"], kind="stable").drop(columns="text")
 
 
 def gaps(rows: pd.DataFrame) -> pd.DataFrame:
-    """How far the printed values lie from ours, in half-widths of our intervals: gap and verdict by statistic.
+    """How far the printed values lie from ours, in half-widths of our intervals: gap, verdict, wide.
 
     An interval without width (the smallest of all returns may be the same in every resample) counts as half a unit of
     the last printed digit.
     """
     rows = rows[rows["low"].notna()]
-    value = rows["paper"].str.rstrip("%").replace("no", "0").astype(float)
+    value = rows["value"]
     half = np.where(value > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
     half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
     statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
+    statistic = statistic.str.replace("whisker low", "lower bound").str.replace("whisker high", "upper bound")
     name = rows["subject"].replace({"DRL": "TD3", "Ours": "distilled"}) + ": " + statistic
-    frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"]})
+    frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"], "wide": rows["wide"]})
     return frame.set_index(pd.Index(name, name="statistic"))
 
 
@@ -187,24 +211,27 @@ def left_out(result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame
     """What describes many runs better than mean and quartiles of all episodes: columns here, low, high, teacher.
 
     One row per statistic, with 95 % intervals from resampled runs. The interquartile mean is the mean of the middle
-    half of the runs' means (Agarwal et al. 2021). "beats": a higher mean return, or return, from the same starts.
+    half of the runs' means (Agarwal et al. 2021). "beats": a higher mean return, or return, from the same starts; the
+    interval for runs is the exact one of Clopper and Pearson, which none or all of them do not shrink to a point.
     """
     own, means, middle = result.teacher_returns, result.returns.mean(axis=1), partial(trim_mean, proportiontocut=0.25)
-    cells = np.array([len(run.policy) for run in result.runs])
+    cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
     rows = {
         "interquartile mean of the runs": (means, middle, own.mean()),
-        "probability that a run beats its teacher": (means > own.mean(), np.mean, np.nan),
         "probability that an episode does": ((result.returns > own).mean(axis=1), np.mean, np.nan),
     }
     for name, code in SHARES.items():
         ours, teacher = (result.codes == code).mean(axis=1), np.mean(result.teacher_outcomes.codes == code)
-        rows[f"share of episodes: {name}"] = ours, np.mean, teacher
+        if name != "pit" or task.name == "SimpleGoal-v0":  # the other task has none
+            rows[f"share of episodes: {name}"] = ours, np.mean, teacher
     for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
         rows[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
     found = {
         name: (statistic(values, axis=0), *_interval(values, statistic, n_resamples), teacher)
         for name, (values, statistic, teacher) in rows.items()
     }
+    beats = binomtest(int(np.sum(means > own.mean())), len(means))
+    found["probability that a run beats its teacher"] = (beats.statistic, *beats.proportion_ci(0.95), np.nan)
     frame = pd.DataFrame.from_dict(found, orient="index", columns=["here", "low", "high", "teacher"])
     return frame.astype(float).rename_axis("statistic")
 

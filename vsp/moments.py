@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from collections.abc import Sequence
+from decimal import Decimal
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): so many values lie in [low, high]
 Part = namedtuple("Part", "size mean std low high")  # some of the returns, and the range that they lie in
@@ -63,4 +64,5 @@ def greatest_std(mean: float, low: float, high: float) -> float:
 
 def rounds_to(number: float, printed: float) -> bool:
     """Whether `number` may be printed as `printed`, to the last decimal of this."""
-    return bool(abs(number - printed) <= 0.5 / 10 ** len(f"{printed:g}".partition(".")[2]) + 1e-9)
+    decimals = max(0, -Decimal(repr(float(printed))).normalize().as_tuple().exponent)
+    return bool(abs(number - printed) <= 0.5 / 10**decimals + 1e-9)

@@ -51,6 +51,11 @@ def spread(task: str) -> pd.DataFrame:
     return frame[frame["task"] == _check_task(task)].drop(columns="task").set_index("metric")
 
 
+def spread_values(task: str, subject: str) -> dict[str, float]:
+    """A column of T5 or T6, "drl" or "ours", under the names of `evaluate.spread`; coverage in percent."""
+    return {metric.lower().partition("/")[0]: value for metric, value in spread(task)[subject].items()}
+
+
 def text_numbers(task: str | None = None) -> pd.DataFrame:
     """The numbers in running text and captions: one row per number, its id as index.
 

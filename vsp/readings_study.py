@@ -31,7 +31,7 @@ from .moments import quartiles_from_fences
 from .rollouts import Outcomes
 
 CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first
-N_CONFIRMED = 5  # variants that are checked, beside the default
+N_CONFIRMED = 5  # variants that are checked, beside the default and the nearest one of each task
 
 # Every reading on its own: fields of `Config` and the values that are not their defaults
 READINGS = {
@@ -60,7 +60,7 @@ READINGS = {
     "R14": [{"loss_after_split": "kept"}],
     "R15": [{"inclusive": True}],
 }
-# The readings that moved the result most, in all combinations
+# Readings that change the number of cells or how fast the maps learn, in all combinations
 FACTORS = {
     "R2": {"split_lookup": "kept"},
     "R3": {"split_metric": "euclidean"},
@@ -111,8 +111,7 @@ def landmarks(task: str) -> dict[str, float]:
 
     MountainCar's quartiles come from the whisker bounds of the text, since T6 repeats the teacher's (`vsp.audit`).
     """
-    printed = paper.spread(task)
-    teacher, ours = ({name.lower(): value for name, value in printed[who].items()} for who in ("drl", "ours"))
+    teacher, ours = (paper.spread_values(task, who) for who in ("drl", "ours"))
     if task == "MountainCarContinuous-v0":
         bounds = paper.value("mc_ours_whisker_low"), paper.value("mc_ours_whisker_high")
         ours["q1"], ours["q3"] = quartiles_from_fences(*bounds)
@@ -131,10 +130,15 @@ def distance(here: dict[str, float], there: dict[str, float]) -> float:
     return float(np.sqrt(np.mean([(here[name] - there[name]) ** 2 for name in there])))
 
 
+def code() -> str:
+    """What stands for the code of this study."""
+    return code_id("readings_study")
+
+
 # The study
 
 
-def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS, tried: dict | None = None):
+def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS, tried: dict | None = None) -> pd.DataFrame:
     """Every variant with the seeds CHOOSING, and the nearest to the paper with the seeds CONFIRMING: a data frame.
 
     One row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
@@ -142,6 +146,7 @@ def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS, tried: d
     tried = variants() if tried is None else tried
     chosen = _phase("choosing", tried, CHOOSING, runs, jobs, tasks)
     first = ["default", *(name for name in ranking(chosen) if name != "default")][: N_CONFIRMED + 1]
+    first = list(dict.fromkeys([*first, *(ranking(chosen, task)[0] for task in tasks)]))
     confirmed = _phase("confirming", {name: tried[name] for name in first}, CONFIRMING, runs, jobs, tasks)
     return pd.concat([chosen, confirmed], ignore_index=True)
 
@@ -160,7 +165,7 @@ def _phase(phase: str, tried: dict, seeds, runs, jobs: int, tasks) -> pd.DataFra
     for (name, task), one in experiments.items():
         made = [load_run(run_path(one.folder(runs), seed), one) for seed in seeds]
         row, away[name, task] = _row(made, teachers[task], landmarks(task))
-        about = {"phase": phase, "variant": name, "task": task, "settings": one.id, "code": code_id()}
+        about = {"phase": phase, "variant": name, "task": task, "settings": one.id, "code": code()}
         rows.append(about | row)
     return pd.concat([pd.DataFrame(rows), _joint(phase, away, tasks)], ignore_index=True)
 
@@ -205,16 +210,17 @@ def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
 
 # What the notebook shows of it
 
-PANELS = [  # task, what is shown of it, and its axis
-    ("SimpleGoal-v0", "mean", "mean return"),
-    ("MountainCarContinuous-v0", "mean", "mean return"),
-    ("both", "distance", "distance"),
+PANELS = [  # a panel of the figure: task, what is shown of it, label of the axis, its limits
+    ("SimpleGoal-v0", "mean", "mean return", (12.3, 16)),
+    ("MountainCarContinuous-v0", "mean", "mean return", (81, 96)),
+    ("SimpleGoal-v0", "distance", "distance", (0.04, 1.5)),
+    ("MountainCarContinuous-v0", "distance", "distance", (0.6, 40)),
 ]
 
 
-def as_intervals(frame: pd.DataFrame, task: str, column: str) -> pd.DataFrame:
-    """One column of the choosing phase with its interval, by variant: columns here, low, high."""
-    rows = frame[(frame["phase"] == "choosing") & (frame["task"] == task)].set_index("variant")
+def as_intervals(frame: pd.DataFrame, task: str, column: str, phase: str = "choosing") -> pd.DataFrame:
+    """One column of a phase with its interval, by variant: columns here, low, high."""
+    rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant")
     return rows[[column, f"{column}_low", f"{column}_high"]].set_axis(["here", "low", "high"], axis=1)
 
 
@@ -227,13 +233,10 @@ def shown_variants(frame: pd.DataFrame, n_combinations: int = 4) -> list[str]:
 
 
 def brief(frame: pd.DataFrame) -> pd.DataFrame:
-    """The choosing phase, one row per variant, the tasks side by side, the nearest to the paper first."""
-    rows = frame[frame["phase"] == "choosing"]
-    wide = rows.pivot(index="variant", columns="task", values=["cells", "mean", "std", "pit", "truncated", "distance"])
-    columns = [
-        (name, task) for task in paper.TASKS for name in ("cells", "mean", "std", "pit", "truncated", "distance")
-    ]
-    columns = [c for c in columns if c != ("pit", "MountainCarContinuous-v0")]  # there is none
-    wide = wide.loc[ranking(rows), [*columns, ("distance", "both")]]
-    wide.columns = [f"{paper.PREFIX.get(task, task)} {name}" for name, task in wide.columns]
-    return wide.reset_index()
+    """The choosing phase, one row per variant, the tasks (SG, MC) side by side, the nearest to the paper first."""
+    shown = ["cells", "mean", "std", "failing", "distance"]
+    rows = frame[frame["phase"] == "choosing"].assign(failing=lambda rows: 100 * (1 - rows["goal"]))
+    wide = rows.pivot(index="variant", columns="task", values=shown)
+    wide = wide.loc[ranking(rows), [*itertools.product(shown, paper.TASKS), ("distance", "both")]]
+    wide.columns = [f"{paper.PREFIX.get(task, task).upper()} {name}" for name, task in wide.columns]
+    return wide.rename(columns=lambda name: name.replace("failing", "failing (%)")).round(3).reset_index()

@@ -11,10 +11,9 @@ from pathlib import Path
 import pandas as pd
 
 from . import paper, readings_study, store, teachers_study
-from .experiments import code_id
 
 RESULTS = store.ROOT / "data" / "results"
-STUDIES = {"readings": readings_study.study, "teachers": teachers_study.study}
+STUDIES = {"readings": readings_study, "teachers": teachers_study}
 
 
 def read(name: str) -> pd.DataFrame:
@@ -38,7 +37,7 @@ def stale() -> list[str]:
         frame = read(name)
         parts = {
             "settings": set(frame["settings"].dropna()) != settings,
-            "code": set(frame["code"].dropna()) != {code_id()},
+            "code": set(frame["code"].dropna()) != {STUDIES[name].code()},
         }
         if old := [part for part, differs in parts.items() if differs]:
             found.append(f"data/results/{name}.csv was made with other {' and '.join(old)}: `make study` makes it anew")
@@ -57,7 +56,7 @@ def main() -> None:
         return
     runs, results = Path(arguments.out) / "build" / "study", Path(arguments.out) / "data" / "results"
     for name, study in STUDIES.items():
-        frame = study(runs, jobs=arguments.jobs)
+        frame = study.study(runs, jobs=arguments.jobs)
         store.write_text(results / f"{name}.csv", frame.to_csv(index=False, float_format="%.6f", lineterminator="\n"))
 
 

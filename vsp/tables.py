@@ -18,6 +18,7 @@ from .paper import SHORT
 from .policy import VoronoiPolicy, expression
 
 MISSING = "–"  # in print, where the paper gives no number
+PAGE = 40  # rows that fit on one
 
 
 def save_table(
@@ -26,16 +27,16 @@ def save_table(
     """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
 
     `latex` is the table as LaTeX code, for equations, or a part of it where the whole is too long for a page; without
-    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor.
+    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor; a table of
+    more than `PAGE` rows is a longtable.
     """
     path = Path(out) / "figures" / "tables" / name
-    rounded = frame.map(lambda value: float(f"{value:.6g}") if isinstance(value, float) else value)
+    rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
     store.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
     shown = as_text(frame) if latex is None else latex
     code = as_latex(frame) if latex is None else latex
-    body = code.style.hide(axis="index").to_latex(
-        hrules=True, caption=caption, label=f"tab:{name}", position="t", position_float="centering"
-    )
+    place = {"environment": "longtable"} if len(code) > PAGE else {"position": "t", "position_float": "centering"}
+    body = code.style.hide(axis="index").to_latex(hrules=True, caption=caption, label=f"tab:{name}", **place)
     store.write_text(path.with_suffix(".tex"), body)
     return shown
 
@@ -88,14 +89,6 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
         label = {"drl": "TD3", "ours": "distilled"}[name]
         columns |= {f"{label}, paper": printed[name].to_numpy(), f"{label}, here": found}
     return pd.DataFrame({"metric": printed.index, **columns})
-
-
-def printed_spread(task: str, who: str) -> dict[str, float]:
-    """A column of T5 or T6 ("drl" or "ours") under the names of `evaluate.spread`, with the fences of its quartiles."""
-    column = paper.spread(task)[who]
-    values = {metric.lower().partition("/")[0]: value for metric, value in column.items()}
-    reach = 1.5 * (values["q3"] - values["q1"])
-    return values | {"lower_fence": values["q1"] - reach, "upper_fence": values["q3"] + reach}
 
 
 def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:

@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.stats import f
 
 from . import paper
+from .baselines import linear_map, teacher_data
 from .evaluate import outcomes
 from .experiments import EVALUATION_SEED, SHARES, Experiment, code_id, load_run, make_all, paper_experiment, run_path
 from .teachers import SHIPPED, load_teacher
@@ -32,7 +33,8 @@ def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS) -> pd.Da
     rows = []
     for (task, name), experiment in work.items():
         own = outcomes(experiment.teacher, task, seed=EVALUATION_SEED).returns
-        about = {"task": task, "teacher": name, "settings": experiment.id, "code": code_id()}
+        about = {"task": task, "teacher": name, "settings": experiment.id, "code": code()}
+        about |= {"steps": experiment.teacher.card["recipe"]["steps"], "linear_error": linear_error(experiment)}
         for seed in SEEDS:
             run = load_run(run_path(experiment.folder(runs), seed), experiment)
             shares = {share: np.mean(run.outcomes.codes == code) for share, code in SHARES.items()}
@@ -41,6 +43,18 @@ def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS) -> pd.Da
             scores["teacher_std"] = own.std(ddof=1)
             rows.append({**about, "seed": seed, "cells": len(run.policy), **scores, **shares})
     return pd.DataFrame(rows)
+
+
+def code() -> str:
+    """What stands for the code of this study."""
+    return code_id("teachers_study")
+
+
+def linear_error(experiment: Experiment) -> float:
+    """Root mean square error, in units of the action, of one linear map for all that the teacher does on its way."""
+    states, actions = teacher_data(experiment, SEEDS[0])
+    error = linear_map(states, actions, experiment.task).linear(states) - actions
+    return float(np.sqrt(np.square(error).mean()))
 
 
 def experiments(tasks=paper.TASKS) -> dict[tuple[str, str], Experiment]:
@@ -64,6 +78,8 @@ def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
     if size.nunique() != 1 or k < 2 or n < 2:
         raise ValueError(f"sizes of the groups are {size.to_dict()}, expected two or more groups of one size, above 1")
     within = table.var().mean()
+    if not within:
+        raise ValueError("no variance within the groups, expected values that differ")
     ratio = n * means.var() / within
     low, high = (ratio / f.ppf(q, k - 1, k * (n - 1)) for q in (0.975, 0.025))
     shares = {name: max(0.0, (x - 1) / (x + n - 1)) for name, x in (("", ratio), ("_low", low), ("_high", high))}
@@ -74,6 +90,6 @@ def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
 def summary(frame: pd.DataFrame) -> pd.DataFrame:
     """One row per teacher: its own return, and over its runs the mean, its deviation, cells and failed episodes."""
     groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)
-    means = groups[["teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
-    means.insert(3, "deviation between runs", groups["mean"].std())
+    means = groups[["steps", "linear_error", "teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
+    means.insert(5, "deviation between runs", groups["mean"].std())
     return means.reset_index()

@@ -1,0 +1,303 @@
+import dataclasses
+import importlib
+
+import numpy as np
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.tree import DecisionTreeRegressor
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
+
+from vsp import baselines, paper
+from vsp.baselines import LEAVES, Tree, compare, fit, linear_map, refit, rule_of_thumb, teacher_data
+from vsp.distill import distill
+from vsp.envs import GOAL, get_task
+from vsp.evaluate import evaluate, interval, outcomes
+from vsp.experiments import EVALUATION_SEED, Experiment, Results, make_runs
+from vsp.partition import Partition
+from vsp.policy import VoronoiPolicy
+
+module = importlib.import_module("vsp.distill")  # `vsp.distill` is the function
+CONFIG = tiny(n_epochs=30, n_freeze=5)
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+
+
+def experiment(task=SIMPLEGOAL, **changes):
+    return Experiment(task, dataclasses.replace(CONFIG, **changes), TEACHERS[task], n_episodes=50)
+
+
+def examples(task, n=300, seed=0):
+    """States of the whole box and actions that are linear but for some noise, (n, d) and (n, m)."""
+    rng, task = np.random.default_rng(seed), get_task(task)
+    states = rng.uniform(task.low, task.high, (n, 2))
+    maps = rng.normal(size=(2, len(task.action_low)))
+    return states, states @ maps + 0.3 + 0.1 * rng.normal(size=(n, len(task.action_low)))
+
+
+# One linear map
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_linear_teacher_is_found_exactly(task):
+    states, _ = examples(task)
+    m = len(get_task(task).action_low)
+    coefficients = np.arange(1.0, 1 + 3 * m).reshape(3, m) / 10
+    policy = linear_map(states, states @ coefficients[:-1] + coefficients[-1], task)
+    assert len(policy) == 1 and policy.codewords[0] == pytest.approx(states.mean(axis=0))
+    assert np.allclose(policy.coefficients[0], coefficients, atol=1e-10)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_linear_map_is_that_of_least_squares(task):
+    states, actions = examples(task)
+    policy, model = linear_map(states, actions, task), LinearRegression().fit(states, actions)
+    assert np.allclose(policy.coefficients[0, :-1], model.coef_.T) and np.allclose(
+        policy.coefficients[0, -1], model.intercept_
+    )
+    error = np.sum((policy.linear(states) - actions) ** 2)
+    for change in np.eye(3 * actions.shape[1]) * 1e-3:  # no step in any direction does better
+        moved = policy.coefficients[0] + change.reshape(policy.coefficients[0].shape)
+        assert np.sum((states @ moved[:-1] + moved[-1] - actions) ** 2) > error
+
+
+def test_the_linear_map_acts_within_the_limits():
+    states, _ = examples(SIMPLEGOAL)
+    policy = linear_map(states, np.column_stack([6 * states[:, 0] - 3, np.full(300, -2.0)]), SIMPLEGOAL)
+    actions, _ = policy.predict(np.array([[0.0, 0.5], [0.6, 0.5], [1.0, 0.1]]))
+    assert np.allclose(actions, [[-1, -1], [0.6, -1], [1, -1]])
+
+
+# Trees
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("leaves", [2, 13, 32])
+def test_a_tree_is_that_of_scikit_learn(task, leaves):
+    states, actions = examples(task)
+    tree, other = Tree(states, actions, leaves=leaves), examples(task, seed=1)[0]
+    model = DecisionTreeRegressor(max_leaf_nodes=leaves, criterion="squared_error", random_state=0)
+    found, state = tree.predict(other)
+    assert found.shape == actions.shape and state is None
+    assert np.array_equal(found, model.fit(states, actions).predict(other).reshape(actions.shape))
+    assert len(tree) == leaves == len(np.unique(tree.predict(states)[0], axis=0))
+
+
+def test_a_leaf_holds_the_mean_action_of_its_states():
+    states = np.array([[0.1, 0.5], [0.2, 0.5], [0.8, 0.5], [0.9, 0.5]])
+    actions = np.array([[0.0, 1.0], [0.2, 1.0], [-1.0, -1.0], [-0.6, -1.0]])
+    tree = Tree(states, actions, leaves=2)
+    assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
+    assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
+    assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
+
+
+# Rules of thumb
+
+
+def test_the_rule_of_thumb_of_simplegoal_by_hand():
+    name, policy = rule_of_thumb(SIMPLEGOAL)
+    actions, _ = policy.predict(np.array([[0.0, 0.0], [0.9, 0.2], [0.5, 1.0]]))
+    assert name == "always (−1, −1)" and (actions == -1).all() and len(policy) == 1
+
+
+def test_the_rule_of_thumb_of_mountaincar_by_hand():
+    name, policy = rule_of_thumb(MOUNTAINCAR)
+    actions, _ = policy.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
+    assert name == "12 · velocity" and np.allclose(actions, [[0], [0.6], [-0.84], [0.84]])
+
+
+def test_rules_of_thumb_do_what_is_said_of_them():
+    frame = evaluate(rule_of_thumb(MOUNTAINCAR)[1], MOUNTAINCAR, 200, seed=30)
+    assert frame["return"].mean() > 97 and (frame["outcome"] == "goal").all()
+    frame = evaluate(rule_of_thumb(SIMPLEGOAL)[1], SIMPLEGOAL, 200, seed=30)
+    assert set(frame["outcome"]) == {"goal", "pit"} and 0.05 < (frame["outcome"] == "pit").mean() < 0.3
+
+
+# Their data
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("inclusive", [False, True])
+def test_baselines_see_what_a_distillation_sees(task, inclusive, monkeypatch):
+    monkeypatch.setattr(module, "EPISODES_AHEAD", 8)  # several batches, the last one cut
+    one, seen, observe = experiment(task, inclusive=inclusive), [], Partition.observe
+    monkeypatch.setattr(Partition, "observe", lambda self, episode: (seen.append(episode), observe(self, episode))[1])
+    distill(one.teacher, task, one.config, seed=5)
+    states, actions = teacher_data(one, 5)
+    assert len(seen) == 30 + inclusive
+    assert np.array_equal(states, np.concatenate([e.states for e in seen]))
+    assert np.array_equal(actions, np.concatenate([e.actions for e in seen]))
+    assert len(states) == len(actions) > 3 * len(seen)
+
+
+def test_other_seeds_bring_other_data():
+    (one, _), (same, _), (other, _) = (teacher_data(experiment(), seed) for seed in (1, 1, 2))
+    assert np.array_equal(one, same) and not np.array_equal(one[:5], other[:5])
+
+
+FITTED = [
+    "one linear map", "tree, 13 leaves", "tree, 32 leaves", "same cells, least squares", "same cells, constants"
+]  # fmt: skip
+
+
+def test_the_baselines_of_a_run_are_fitted_on_its_data(tmp_path):
+    (run,) = make_runs(experiment(), [3], runs=tmp_path)
+    states, actions = teacher_data(experiment(), 3)
+    found, asked = fit(experiment(), run), np.random.default_rng(0).random((50, 2))
+    assert list(found) == FITTED and LEAVES == (13, 32)
+    expected = [linear_map(states, actions, SIMPLEGOAL), *(Tree(states, actions, leaves=n) for n in LEAVES)]
+    expected += [refit(run.policy, states, actions), refit(run.policy, states, actions, constant=True)]
+    for policy, same in zip(found.values(), expected, strict=True):
+        assert np.array_equal(policy.predict(asked)[0], same.predict(asked)[0])
+
+
+def test_leaves_are_the_cells_of_the_printed_partitions():
+    assert LEAVES == tuple(int(paper.value(f"{paper.PREFIX[task]}_cells")) for task in TASKS)
+
+
+# The same cells with other maps
+
+
+def three_cells(task=SIMPLEGOAL):
+    m = len(get_task(task).action_low)
+    codewords = np.array([[0.1, 0.1], [0.5, 0.5], [9.0, 9.0]])  # no state is near the last
+    return VoronoiPolicy(codewords, np.random.default_rng(1).normal(size=(3, 3, m)), task=task)
+
+
+def test_refitted_maps_are_those_of_least_squares_in_each_cell():
+    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
+    found, cells = refit(policy, states, actions), policy.cells(states)
+    assert set(cells) == {0, 1} and np.array_equal(found.cells(states), cells)
+    for i in (0, 1):
+        model = LinearRegression().fit(states[cells == i], actions[cells == i])
+        assert np.allclose(found.coefficients[i, :-1], model.coef_.T)
+        assert np.allclose(found.coefficients[i, -1], model.intercept_)
+    assert np.array_equal(found.coefficients[2], policy.coefficients[2])  # an empty cell keeps its map
+    assert np.array_equal(policy.coefficients, three_cells().coefficients)  # and the policy is not touched
+
+
+def test_constants_are_the_mean_action_of_each_cell():
+    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
+    found, cells = refit(policy, states, actions, constant=True), policy.cells(states)
+    for i in (0, 1):
+        assert np.allclose(found.coefficients[i, :-1], 0)
+        assert np.allclose(found.coefficients[i, -1], actions[cells == i].mean(axis=0))
+
+
+def test_one_cell_refitted_is_the_linear_map():
+    states, actions = examples(MOUNTAINCAR)
+    one = VoronoiPolicy(np.zeros((1, 2)), np.ones((1, 3, 1)), task=MOUNTAINCAR)
+    same = linear_map(states, actions, MOUNTAINCAR)
+    assert np.allclose(refit(one, states, actions).coefficients, same.coefficients)
+
+
+# Intervals over policies and starts
+
+
+def test_alike_policies_leave_the_interval_to_the_starts():
+    gaps = np.tile(np.random.default_rng(0).normal(1, 2, 400), (20, 1))
+    low, high = baselines._crossed_interval(gaps)
+    expected = interval(gaps[0][:, None], np.mean, n_resamples=2000)  # the starts alone
+    assert (low, high) == pytest.approx(expected, abs=0.03) and high - low > 0.3
+
+
+def test_alike_starts_leave_the_interval_to_the_policies():
+    gaps = np.tile(np.random.default_rng(0).normal(1, 2, (40, 1)), (1, 300))
+    assert baselines._crossed_interval(gaps) == pytest.approx(interval(gaps, np.mean, n_resamples=2000), abs=0.1)
+
+
+def test_the_crossed_interval_is_that_of_drawing_rows_and_columns():
+    """The same by hand: an average over drawn policies of an average over drawn starts."""
+    gaps, rng = np.random.default_rng(5).normal(size=(4, 30)), np.random.default_rng(1)
+    means = [gaps[rng.integers(4, size=4)][:, rng.integers(30, size=30)].mean() for _ in range(4000)]
+    assert baselines._crossed_interval(gaps) == pytest.approx(np.percentile(means, [2.5, 97.5]), abs=0.04)
+    assert baselines._crossed_interval(gaps) == baselines._crossed_interval(gaps)
+
+
+# All of them side by side
+
+
+@pytest.fixture(scope="module", params=TASKS)
+def compared(request, tmp_path_factory):
+    one = experiment(request.param)
+    runs = make_runs(one, range(3), runs=tmp_path_factory.mktemp("runs"))
+    result = Results(one, runs, outcomes(one.teacher, one.task, 50, seed=EVALUATION_SEED))
+    return result, compare(result, n_runs=2)
+
+
+def test_kinds_and_how_many_there_are_of_each(compared):
+    result, frame = compared
+    assert frame["policies"].to_dict() == {
+        "teacher (TD3)": 1, rule_of_thumb(result.experiment.task)[0]: 1, "published policy": 1,
+        **dict.fromkeys(FITTED, 2), "distilled, all runs": 3, "distilled, best run": 1,
+    }  # fmt: skip
+    assert frame.columns.tolist() == ["policies", "cells", "mean", "gap", "low", "high", "std", "failing"]
+
+
+def test_the_best_kind_comes_first_and_lies_in_its_interval(compared):
+    _, frame = compared
+    assert frame["mean"].is_monotonic_decreasing and frame["mean"].nunique() > 4
+    assert (frame["low"] <= frame["gap"]).all() and (frame["gap"] <= frame["high"]).all()
+
+
+def test_cells_of_all_kinds(compared):
+    result, frame = compared
+    cells = frame["cells"].to_dict()
+    published = {SIMPLEGOAL: 13, MOUNTAINCAR: 32}[result.experiment.task]
+    assert np.isnan(cells["teacher (TD3)"]) and cells["one linear map"] == 1 and cells["published policy"] == published
+    assert cells["tree, 13 leaves"] <= 13 and cells["tree, 13 leaves"] < cells["tree, 32 leaves"] <= 32
+    assert cells["distilled, all runs"] == np.mean([len(run.policy) for run in result.runs])
+    assert cells["distilled, best run"] == len(result.best.policy)
+
+
+def by_hand(policies, task, n=50):
+    """Returns and outcomes of several policies from the shared starts, one row each."""
+    played = [evaluate(policy, task, n, seed=EVALUATION_SEED) for policy in policies]
+    return np.stack([frame["return"] for frame in played]), np.stack([frame["outcome"] for frame in played])
+
+
+def test_numbers_of_the_fitted_kinds_by_hand(compared):
+    result, frame = compared
+    one = result.experiment
+    fitted = [fit(one, run) for run in result.runs[:2]]
+    for kind in FITTED:
+        policies = [found[kind] for found in fitted]
+        assert_row(frame.loc[kind], *by_hand(policies, one.task), result)
+        assert frame.at[kind, "cells"] == np.mean([len(policy) for policy in policies])
+
+
+def assert_row(row, returns, ends, result):
+    gaps = returns - result.teacher_returns
+    found = row["mean"], row["gap"], row["std"]
+    assert found == pytest.approx((returns.mean(), gaps.mean(), np.std(returns, ddof=1)))
+    assert row["failing"] == pytest.approx(1 - np.mean(ends == "goal"))
+    assert (row["low"], row["high"]) == pytest.approx(baselines._crossed_interval(gaps))
+
+
+def test_numbers_of_single_policies_by_hand(compared):
+    result, frame = compared
+    task = result.experiment.task
+    name, rule = rule_of_thumb(task)
+    policies = {name: rule, "published policy": paper.published_policy(task), "teacher (TD3)": TEACHERS[task]}
+    for kind, policy in {**policies, "distilled, best run": result.best.policy}.items():
+        assert_row(frame.loc[kind], *by_hand([policy], task), result)
+    assert (frame.loc["teacher (TD3)", ["gap", "low", "high"]] == 0).all()
+
+
+def test_numbers_of_the_distilled_policies_by_hand(compared):
+    result, frame = compared
+    row = frame.loc["distilled, all runs"]
+    assert row["mean"] == pytest.approx(result.returns.mean())
+    assert row["failing"] == pytest.approx(np.mean(result.codes != GOAL))
+    gaps = result.returns - result.teacher_returns
+    assert (row["low"], row["high"]) == pytest.approx(baselines._crossed_interval(gaps))
+
+
+def test_every_run_brings_one_policy_of_each_fitted_kind(compared, monkeypatch):
+    result, _ = compared
+    asked, rule = [], rule_of_thumb(result.experiment.task)[1]
+    monkeypatch.setattr(baselines, "fit", lambda experiment, run: asked.append(run.seed) or {"one linear map": rule})
+    frame = compare(result, n_runs=2)
+    assert asked == [0, 1] and frame.at["one linear map", "policies"] == 2 and "tree, 13 leaves" not in frame.index
+    many = dataclasses.replace(result, runs=[dataclasses.replace(result.runs[0], seed=seed) for seed in range(25)])
+    asked.clear()
+    assert compare(many).at["one linear map", "policies"] == 20 and asked == list(range(20))

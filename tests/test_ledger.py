@@ -1,0 +1,580 @@
+import dataclasses
+import io
+import re
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import nbformat
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.stats import trim_mean
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
+from test_transcription import GOLDEN, METRICS, NAMES, lines, text_id
+
+from vsp import audit, envs, ledger, paper, tables
+from vsp.envs import GOAL, PIT, TRUNCATED
+from vsp.evaluate import interval, outcomes
+from vsp.experiments import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
+from vsp.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, VERDICTS, last_digit, left_out, results_of, verdict
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Outcomes
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULT = "_spread_|_drl_|_ours_"  # what the ids of the results in text and tables hold
+SEEDS, N_RESAMPLES = range(4), 40
+
+
+def experiment(task):
+    """The shipped teacher, 60 iterations, 40 episodes."""
+    quick = paper_experiment(task, quick=True)
+    config = dataclasses.replace(quick.config, n_epochs=60, n_freeze=10, n_split=10)
+    return dataclasses.replace(quick, config=config, n_episodes=40)
+
+
+def make_results(runs, jobs):
+    """Tiny runs of both tasks, in the folder `runs`."""
+    found = {}
+    for task in TASKS:
+        one = experiment(task)
+        teacher = outcomes(one.teacher, task, one.n_episodes, seed=EVALUATION_SEED)
+        found[task] = Results(one, make_runs(one, SEEDS, runs=runs, jobs=jobs), teacher)
+    return found
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return make_results(tmp_path_factory.mktemp("runs"), jobs=1)
+
+
+@pytest.fixture(scope="module")
+def book(results):
+    return ledger.ledger(results, n_resamples=N_RESAMPLES)
+
+
+@pytest.fixture(scope="module")
+def by_id(book):
+    return book.set_index("id")
+
+
+def as_bytes(frame):
+    return frame.to_csv().encode()
+
+
+# Every printed value has its row
+
+
+def lacking(book):
+    """The printed values that have no row, or one without a verdict or without a cell."""
+    whole = book[book["verdict"].isin(VERDICTS) & book["cell"].fillna("").str.strip().ne("")]
+    return sorted(set(paper.printed_values()["id"]) - set(whole["id"]))
+
+
+def test_every_printed_value_has_one_row_a_verdict_and_a_cell(book):
+    assert lacking(book) == []
+    assert book["id"].tolist() == paper.printed_values()["id"].tolist() and book["id"].is_unique
+    assert book.columns.tolist() == ledger.COLUMNS
+
+
+@pytest.mark.parametrize("id", ["sg_ours_outliers_mean", "mc_spread_ours_q3", "mc_cell_32_F_bias", "machine_chip"])
+def test_a_value_that_lacks_something_is_found(book, id):
+    """The check above bites: no row, no verdict, an unknown one, no cell."""
+    here = book["id"] == id
+    assert lacking(book[~here]) == [id]
+    for column, value in (("verdict", np.nan), ("verdict", "as expected"), ("cell", ""), ("cell", " "), ("cell", None)):
+        assert lacking(book.assign(**{column: book[column].mask(here, value)})) == [id]
+
+
+def test_a_value_that_the_paper_prints_and_nobody_thought_of_is_listed(results, monkeypatch):
+    printed = paper.printed_values()
+    new = printed[printed["id"] == "sg_drl_mean"].assign(id="sg_drl_kurtosis")
+    monkeypatch.setattr(paper, "printed_values", lambda: pd.concat([printed, new], ignore_index=True))
+    book = ledger.ledger(results, n_resamples=2)
+    assert lacking(book) == [] and unmeasured(book, results) == ["sg_drl_kurtosis"]
+
+
+def unmeasured(book, results):
+    """The results that text and tables print, for which nothing is computed here."""
+    ids = book["id"][book["id"].str.contains(RESULT)]
+    computed = [ledger.measured(task, results[task], n_resamples=2).index for task in TASKS]
+    return sorted(set(ids).difference(*computed, ledger._settings(results)))
+
+
+def test_every_result_of_text_and_tables_is_computed_here(book, results, monkeypatch):
+    assert unmeasured(book, results) == []
+    original = ledger.outlier_numbers
+    monkeypatch.setattr(
+        ledger, "outlier_numbers", lambda r: {k: v for k, v in original(r).items() if k != "whisker_high"}
+    )
+    assert unmeasured(book, results) == ["mc_ours_whisker_high"]  # the check bites
+
+
+def test_results_have_a_verdict_wherever_they_were_read(book):
+    """By the place in the paper, not by the id: the two Performance subsections and T5 and T6."""
+    here = book["where"].str.contains("Performance|T5|T6")
+    assert here.sum() == 2 * 21 + 2 * 18 and book[here]["verdict"].isin(VERDICTS).all()
+    assert book["id"][here].str.contains(RESULT + "|_text_").all()
+    open_ones = book[here & (book["verdict"] == UNCHECKED)]
+    assert open_ones["here"].isna().all() and open_ones["id"].str.contains("_outliers_").all()  # there were none
+
+
+def test_the_values_that_nothing_here_compares_with_are_these(book):
+    rows = book[book["here"].isna() & ~book["id"].str.contains("_cell_|_outliers_")]
+    assert rows["id"].tolist() == [
+        "voronoi_example_codewords", "trajectory_buffer_iterations", "action_dimensions", "machine_chip",
+        "machine_memory", "pytorch_version", "python_version", "sg_table_digits", "mc_table_digits",
+    ]  # fmt: skip
+    assert set(rows["verdict"]) == {UNCHECKED, CONTRADICTED}
+    assert set(book[book["id"].str.contains("_cell_")]["verdict"]) == {UNCHECKED}
+
+
+def golden_numbers():
+    """The second transcription: (id, text as printed) for each line of printed_numbers.txt."""
+    for task, name in NAMES.items():
+        short = tables.SHORT[task]
+        for place, first in (("caption", f"fig:{name}_boxplots caption"), ("Performance", f"{short} Performance")):
+            yield from ((text_id(task, place, label), text) for text, label in lines("printed_numbers.txt", first))
+        for text, label in lines("printed_numbers.txt", f"appendix:{name}_spread"):
+            who, metric = label.split(" in row ")
+            assert metric in METRICS
+            yield paper.spread_id(task, who.lower(), metric), text
+
+
+def test_every_number_of_the_second_transcription_has_a_row(book, by_id):
+    numbers = list(golden_numbers())
+    text = (GOLDEN / "printed_numbers.txt").read_text(encoding="utf-8")
+    assert len(numbers) == sum(not line.startswith("#") for line in text.splitlines()) == len(dict(numbers))
+    for id, printed in numbers:
+        row = by_id.loc[id]
+        assert row["paper"].removesuffix("%") == printed.removesuffix("%").replace("No", "no"), id
+        assert row["verdict"] in VERDICTS and row["cell"]
+    shown = pd.concat([results_of(book, task) for task in TASKS])
+    for id, _ in numbers:
+        if re.search("caption|text", id):
+            continue  # a setting, in the ledger alone
+        subject, statistic = re.fullmatch(".._(?:spread_)?(drl|ours)_(.+)", id).groups()
+        twin = f"{id[:2]}_spread_{subject}_{statistic}"
+        assert (id in set(shown["id"])) != (id != twin and twin in set(shown["id"])), id
+        if twin in by_id.index:  # printed in text and table: one result, one verdict
+            one, other = by_id.loc[id], by_id.loc[twin]
+            assert float(one["paper"].rstrip("%")) == float(other["paper"].rstrip("%"))
+            assert one[["here", "low", "high"]].equals(other[["here", "low", "high"]])
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_results_of_a_task_are_there_once_the_teachers_first(book, task):
+    rows = results_of(book, task)
+    assert rows["subject"].tolist() == sorted(rows["subject"]) and set(rows["subject"]) == {"DRL", "Ours"}
+    assert rows["id"].str.startswith(paper.PREFIX[task]).all() and rows["id"].is_unique
+    for _, part in rows.groupby("subject"):
+        table = part["id"].str.contains("_spread_").tolist()
+        assert table == sorted(table, reverse=True)  # what the table prints comes before what the text adds
+    assert not rows["id"].str.contains("caption|_text_|_hyper_|_cell_").any()
+    text = rows["id"][~rows["id"].str.contains("_spread_")]
+    assert len(rows) == 2 * 9 + len(text) and f"{paper.PREFIX[task]}_cells" in set(text)
+    assert len(text) == {SIMPLEGOAL: 5 + 5, MOUNTAINCAR: 1 + 9}[task] + 1  # what the text says of outliers
+
+
+def test_there_is_no_interval_without_a_value(book):
+    assert book["id"][book["here"].isna() & (book["low"].notna() | book["high"].notna())].tolist() == []
+
+
+def test_parts_are_settings_results_and_coefficients(book):
+    """A result is something with an interval, or something of which nothing was there to be measured."""
+    results = book[book["part"] == "results"]
+    assert results["id"][results["low"].isna() & results["here"].notna()].tolist() == []
+    assert book[book["part"] != "results"]["low"].isna().all()
+    assert (book["part"].eq("coefficients") == book["id"].str.contains("_cell_")).all()
+    assert set(book["part"]) == {"settings", "results", "coefficients"}
+
+
+def test_counts_by_hand():
+    part = ["settings", "results", "results", "coefficients"]
+    table = ledger.counts(pd.DataFrame({"part": part, "verdict": [REPRODUCED, DIFFERS, DIFFERS, UNCHECKED]}))
+    assert table.index.tolist() == ["settings", "results", "coefficients"] and table.columns.tolist() == list(VERDICTS)
+    assert table.to_numpy().tolist() == [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]]
+
+
+def test_counts_add_up_to_all_values(book):
+    assert ledger.counts(book).to_numpy().sum() == len(book) == len(paper.printed_values())
+
+
+def notebook_cells():
+    found = {}
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        cells = nbformat.read(path, as_version=4).cells
+        found[path.stem[:2]] = {cell.id for cell in cells if cell.cell_type == "code"}
+    return found
+
+
+def test_cells_are_cells_of_the_notebooks_that_hold_code(book):
+    cells = notebook_cells()
+    for place in book["cell"].unique():
+        number, id = re.fullmatch(r"(\d\d), ([\w-]+)", place).groups()
+        assert id in cells[number], place
+
+
+@pytest.mark.parametrize(
+    ("id", "cell"),
+    [
+        ("sg_ours_mean", "04, text-numbers"),
+        ("mc_drl_outliers", "04, text-numbers"),
+        ("sg_spread_drl_q1", "04, simplegoal-spread"),
+        ("mc_spread_ours_coverage", "04, mountaincar-spread"),
+        ("mc_hyper_n_split", "04, hyperparameters"),
+        ("sg_caption_policies", "03, runs"),
+        ("mc_text_drl_episodes", "03, runs"),
+        ("sg_caption_cells", "03, best"),
+        ("mc_cells", "03, best"),
+        ("mc_cell_1_F_x", "05, replay"),
+        ("sg_goal_reward", "05, ledger"),
+        ("state_dimensions", "05, ledger"),
+        ("sg_training_steps", "01, scores"),
+    ],
+)
+def test_cells_by_hand(id, cell):
+    assert ledger.cell(id) == cell
+
+
+# The rules
+
+
+def row(paper, here, low=np.nan, high=np.nan, value=None):
+    value = float(paper.rstrip("%")) if value is None else value
+    return SimpleNamespace(paper=paper, value=value, here=here, low=low, high=high)
+
+
+ROOT2 = np.sqrt(2)
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        (row("M2", np.nan, value=np.nan), UNCHECKED),
+        (row("13", np.nan), UNCHECKED),
+        (row("1000", 1000.0), REPRODUCED),
+        (row("1000", 999.0), DIFFERS),
+        (row("0.1", 0.1 + 1e-12), REPRODUCED),  # a setting found by taking a step
+        (row("0.1", 0.1001), DIFFERS),
+        (row("0", 0.0), REPRODUCED),
+        (row("-0.1", 0.1), DIFFERS),
+        (row("no", 0.0, 0.0, 0.0, value=0.0), REPRODUCED),
+        (row("no", 1.0, 0.0, 1.0, value=0.0), REPRODUCED),
+        # the interval [9, 12] of 10.00 reaches from 10 - √2 to 10 + 2 √2, and half a unit of 0.001 further
+        (row("8.586", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("8.585", 10.0, 9.0, 12.0), DIFFERS),
+        (row("12.828", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("12.829", 10.0, 9.0, 12.0), DIFFERS),
+        (row("8.6", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("8.5", 10.0, 9.0, 12.0), DIFFERS),  # up to 8.536 with one decimal
+        (row("9", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("8", 10.0, 9.0, 12.0), DIFFERS),  # up to 8.086 without decimals
+        (row("13", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("14", 10.0, 9.0, 12.0), DIFFERS),
+        (row("12.9%", 10.0, 9.0, 12.0), DIFFERS),  # 12.85 and more, against 12.828
+        (row("12.8%", 10.0, 9.0, 12.0), REPRODUCED),
+        # no width: half a unit alone
+        (row("10.00", 10.004, 10.004, 10.004), REPRODUCED),
+        (row("10.00", 10.006, 10.006, 10.006), DIFFERS),
+        (row("10.0", 10.006, 10.006, 10.006), REPRODUCED),
+        (row("-11.790", -10.0, -10.5, -9.0), DIFFERS),
+    ],
+)
+def test_verdicts_by_hand(row, expected):
+    assert verdict(row) == expected
+    assert verdict(row, in_doubt=True) == CONTRADICTED
+
+
+def test_the_edge_of_the_widened_interval():
+    for edge, outwards in ((10 - ROOT2 - 0.005, -1), (10 + 2 * ROOT2 + 0.005, 1)):
+        inside, outside = edge - outwards * 1e-9, edge + outwards * 1e-9
+        assert verdict(row("10.00", 10.0, 9.0, 12.0, value=inside)) == REPRODUCED
+        assert verdict(row("10.00", 10.0, 9.0, 12.0, value=outside)) == DIFFERS
+
+
+@pytest.mark.parametrize(
+    ("printed", "unit"), [("12.30", 0.01), ("86.17%", 0.01), ("100", 1), ("100%", 1), ("-10.0", 0.1), ("no", 1)]
+)
+def test_the_last_digit_by_hand(printed, unit):
+    assert last_digit(printed) == pytest.approx(unit)
+
+
+def test_verdicts_of_the_book_are_those_of_the_rules(book):
+    doubted = audit.in_doubt()
+    assert book["id"][book["verdict"] == CONTRADICTED].tolist() == [id for id in book["id"] if id in doubted]
+    values = paper.printed_values().set_index("id")["value"]
+    for found in book.itertuples():
+        as_row = row(found.paper, found.here, found.low, found.high, value=values[found.id])
+        assert found.verdict == verdict(as_row, in_doubt=found.id in doubted), found.id
+
+
+# Settings
+
+
+def test_settings_are_those_of_the_code(by_id):
+    """All that the tasks and T2 fix, and the counts of the tiny runs."""
+    counts = {f"{prefix}_{place}policies": 4 for prefix in ("sg", "mc") for place in ("", "caption_", "text_")}
+    assert {id: by_id.at[id, "here"] for id in counts} == counts
+    assert by_id.loc[["sg_total_episodes", "episodes_per_policy", "mc_caption_drl_episodes"], "here"].tolist() == [
+        160, 40, 40,
+    ]  # fmt: skip
+    tiny = "_policies|episodes|algorithm_runs|" + RESULT + "|_cells|_cell_"
+    fixed = by_id[~by_id.index.str.contains(tiny) & by_id["here"].notna()]
+    assert fixed.index[fixed["verdict"] != REPRODUCED].tolist() == ["mc_max_steps"]  # Gymnasium's 999 for 1000
+    assert len(fixed) == 3 + 16 + 11 + 2 * 9 and fixed["low"].isna().all()
+    assert fixed.at["mc_goal_position", "here"] == 0.45 and fixed.at["mc_force_reward_exponent", "here"] == 2
+    assert fixed.at["sg_training_steps", "here"] == 500_000 and fixed.at["mc_hyper_max_pol_loss", "here"] == 1e-5
+
+
+def differing(results):
+    found = pd.Series(ledger._settings(results))
+    printed = paper.printed_values().set_index("id").loc[lambda frame: frame.index.isin(found.index)]
+    same = np.isclose(found[printed.index], printed["value"], rtol=1e-9)
+    counts = printed.index.str.contains("_policies|episodes|algorithm_runs")
+    return printed.index[~same & ~counts].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda patch: patch(envs, "GOAL_EDGE", 0.12), ["sg_goal_x_high", "sg_goal_y_high"]),
+        (lambda patch: patch(envs, "PIT_LOW", 0.3), ["sg_pit_x_low", "sg_pit_y_low"]),
+        (lambda patch: alter(patch, SIMPLEGOAL, max_steps=51), ["sg_max_steps"]),
+        (lambda patch: alter(patch, MOUNTAINCAR, high=np.array([0.6, 0.08])), ["mc_velocity_high"]),
+        (
+            lambda patch: alter(patch, SIMPLEGOAL, step=partial(envs.simplegoal_step, goal_reward="add")),
+            ["sg_goal_reward", "sg_pit_reward"],
+        ),
+        (
+            lambda patch: alter(patch, MOUNTAINCAR, step=lambda s, a: cost_of_the_cube(s, a)),
+            ["mc_force_reward_exponent"],
+        ),
+    ],
+    ids=["goal", "pit", "steps", "box", "reward", "cost"],
+)
+def test_another_setting_differs(results, monkeypatch, change, expected):
+    """What is compared is what the code does: rewards are found by taking a step."""
+    assert differing(results) == ["mc_max_steps"]
+    change(monkeypatch.setattr)
+    assert sorted(differing(results)) == sorted([*expected, "mc_max_steps"])
+
+
+def alter(patch, task, **changes):
+    patch(envs, "_TASKS", envs._TASKS | {task: dataclasses.replace(envs.get_task(task), **changes)})
+
+
+def cost_of_the_cube(states, actions):
+    moved, rewards, codes = envs.mountaincar_step(states, actions)
+    return moved, np.where(codes == GOAL, 100.0, 0.0) - 0.1 * np.abs(actions[:, 0]) ** 3, codes
+
+
+# Results
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_our_results_are_those_of_the_tables(book, by_id, results, task):
+    """Two routes: notebook 4 prints the same numbers."""
+    prefix, result = paper.PREFIX[task], results[task]
+    frame = tables.spread_table(task, result.teacher_returns, result.returns).set_index("metric")
+    for metric in frame.index:
+        for who, column in (("drl", "TD3, here"), ("ours", "distilled, here")):
+            here = by_id.at[paper.spread_id(task, who, metric), "here"]
+            assert here == pytest.approx(frame.at[metric, column], rel=1e-12)
+    text = tables.text_numbers(task, result.teacher_returns, result.returns, cells=len(result.best.policy))
+    text = text.set_index("id")["here"].astype(float)
+    ids = [id for id in text.index if id in by_id.index]
+    assert len(ids) > 15 and np.allclose(by_id.loc[ids, "here"].astype(float), text[ids], rtol=1e-12, equal_nan=True)
+    cells = by_id["here"][by_id.index.str.startswith(prefix) & by_id.index.str.endswith("_cells")]
+    assert len(cells) == {SIMPLEGOAL: 2, MOUNTAINCAR: 1}[task] and set(cells) == {text[f"{prefix}_cells"]}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_intervals_resample_runs_and_for_the_teacher_starts(results, task):
+    frame = ledger.measured(task, results[task], n_resamples=300)
+    result, prefix = results[task], paper.PREFIX[task]
+    for subject, values in (("ours", result.returns), ("drl", result.teacher_returns[:, None])):
+        for name, statistic in (("mean", np.mean), ("median", np.median), ("min", np.min)):
+            row = frame.loc[paper.spread_id(task, subject, name)]
+            assert (row["low"], row["high"]) == pytest.approx(interval(values, statistic, n_resamples=300))
+            assert row["low"] <= row["here"] <= row["high"]
+        covered = frame.loc[paper.spread_id(task, subject, "coverage")]
+        assert 50 <= covered["low"] <= covered["high"] <= 100
+    assert frame.loc[f"{prefix}_ours_mean"].tolist() == frame.loc[f"{prefix}_spread_ours_mean"].tolist()
+
+
+def test_more_resamples_change_the_intervals_alone(book, results):
+    more = ledger.ledger(results, n_resamples=90)
+    same = ["id", "task", "where", "quantity", "subject", "paper", "here", "cell"]
+    assert as_bytes(more[same]) == as_bytes(book[same]) and not more["low"].equals(book["low"])
+
+
+def test_the_same_results_give_the_same_rows(book, results):
+    again = ledger.ledger(dict(reversed(results.items())), n_resamples=N_RESAMPLES)
+    assert as_bytes(again) == as_bytes(book)
+
+
+def test_workers_have_no_say_in_the_intervals(book, results, tmp_path):
+    found = make_results(tmp_path, jobs=2)
+    assert as_bytes(ledger.ledger(found, n_resamples=N_RESAMPLES)) == as_bytes(book)
+    for task in TASKS:
+        one, other = (as_bytes(left_out(r[task], n_resamples=N_RESAMPLES)) for r in (results, found))
+        assert one == other
+
+
+# Made by hand
+
+
+def run(seed, returns, *, codes=None, cells=1, validation=0.0):
+    returns = np.array(returns, dtype=float)
+    codes = np.full(len(returns), GOAL) if codes is None else np.array(codes)
+    codewords = np.linspace(0.0, 0.9, cells)[:, None] * np.ones(2)
+    policy = VoronoiPolicy(codewords, np.zeros((cells, 3, 2)), task=SIMPLEGOAL)
+    played = Outcomes(returns, np.ones(len(returns), dtype=int), codes)
+    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0)
+
+
+TEACHER = Outcomes(np.array([5.0, 5.0, 5.0, 1.0]), np.ones(4, dtype=int), np.array([GOAL, GOAL, GOAL, TRUNCATED]))
+BY_HAND = Results(
+    SimpleNamespace(task=SIMPLEGOAL),
+    [
+        run(0, [6, 6, 6, 6], cells=3, validation=1.0),  # mean 6
+        run(1, [5, 5, 5, 2], cells=5, validation=3.0),  # mean 4.25: 1 of 4 beats the teacher
+        run(2, [4, 4, 4, 0], codes=[GOAL, PIT, PIT, TRUNCATED], cells=4, validation=2.0),  # mean 3: no episode
+        run(3, [9, 0, 9, 0], codes=[GOAL, PIT, GOAL, PIT], cells=9, validation=0.0),  # mean 4.5: 2 of 4
+    ],
+    TEACHER,
+)  # teacher: mean 4
+
+
+def test_what_the_paper_leaves_out_by_hand():
+    frame = left_out(BY_HAND, n_resamples=200)
+    here = frame["here"].to_dict()
+    assert here == pytest.approx({
+        "interquartile mean of the runs": (4.25 + 4.5) / 2,
+        "probability that a run beats its teacher": 3 / 4,
+        "probability that an episode does": (4 + 1 + 0 + 2) / 16,
+        "share of episodes: goal": (4 + 4 + 1 + 2) / 16,
+        "share of episodes: pit": (2 + 2) / 16,
+        "share of episodes: truncated": 1 / 16,
+        "cells per run: lowest": 3, "cells per run: first quartile": 3.75, "cells per run: median": 4.5,
+        "cells per run: third quartile": 6, "cells per run: highest": 9,
+    })  # fmt: skip
+    teacher = frame["teacher"].dropna().to_dict()
+    assert teacher == {
+        "interquartile mean of the runs": 4, "share of episodes: goal": 0.75, "share of episodes: pit": 0,
+        "share of episodes: truncated": 0.25,
+    }  # fmt: skip
+
+
+def test_a_tie_beats_nobody():
+    same = dataclasses.replace(BY_HAND, runs=[run(0, TEACHER.returns), run(1, TEACHER.returns)])
+    here = left_out(same, n_resamples=5)["here"]
+    assert here["probability that a run beats its teacher"] == here["probability that an episode does"] == 0
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_the_paper_leaves_out_has_its_intervals(results, task):
+    frame, result = left_out(results[task], n_resamples=500), results[task]
+    assert (frame["low"] <= frame["here"] + 1e-12).all() and (frame["here"] <= frame["high"] + 1e-12).all()
+    shares = frame[frame.index.str.startswith("share of episodes")]
+    assert len(shares) == {SIMPLEGOAL: 3, MOUNTAINCAR: 2}[task]  # MountainCar has no pit
+    assert shares[["here", "teacher"]].sum().tolist() == pytest.approx([1, 1])
+    means = result.returns.mean(axis=1)
+    found = frame.loc["interquartile mean of the runs"]
+    assert found["here"] == pytest.approx(trim_mean(means, 0.25))
+    assert found["here"] == pytest.approx(np.sort(means)[1:3].mean())  # of four
+    expected = interval(means, lambda drawn: trim_mean(drawn, 0.25), n_resamples=500)
+    assert (found["low"], found["high"]) == pytest.approx(expected)
+    assert as_bytes(left_out(result, n_resamples=500)) == as_bytes(frame)
+    fewer = left_out(result, n_resamples=60)
+    assert fewer["here"].equals(frame["here"]) and not fewer[["low", "high"]].equals(frame[["low", "high"]])
+
+
+def test_the_middle_half_of_ten_runs():
+    """A quarter of ten is two and a half: scipy cuts two off each end."""
+    returns = [[mean] * 4 for mean in (0, 100, 1, 2, 3, 4, 5, 6, 90, -50)]
+    many = dataclasses.replace(BY_HAND, runs=[run(seed, values) for seed, values in enumerate(returns)])
+    here = left_out(many, n_resamples=5).at["interquartile mean of the runs", "here"]
+    assert here == pytest.approx(np.mean([1, 2, 3, 4, 5, 6]))
+    assert here == pytest.approx(trim_mean(np.mean(returns, axis=1), 0.25))
+
+
+def test_the_cells_of_the_best_run_are_those_of_the_best_on_the_validation_starts():
+    here, low, high = ledger._best_cells(BY_HAND)
+    assert here == 5 and low < 5 and high == 5  # runs 1, 2, 0, 3 in this order, of 5, 4, 3, 9 cells
+    draws = np.random.default_rng(0).integers(4, size=(10_000, 4))
+    best = [{1: 5, 2: 4, 0: 3, 3: 9}[min(drawn, key=[1, 2, 0, 3].index)] for drawn in draws]
+    assert (low, high) == tuple(np.percentile(best, [2.5, 97.5]))
+
+
+# Gaps
+
+
+def rows(*values):
+    frame = pd.DataFrame(values, columns=["id", "subject", "paper", "here", "low", "high", "verdict"])
+    numbers = frame["paper"].replace("no", "0").str.rstrip("%").astype(float)
+    return frame.assign(value=numbers, wide=frame["verdict"] == REPRODUCED)
+
+
+def test_gaps_by_hand():
+    found = ledger.gaps(
+        rows(
+            ("sg_spread_drl_mean", "DRL", "12.0", 10.0, 9.0, 14.0, REPRODUCED),  # 2 of 4 upwards
+            ("sg_ours_whisker_low", "Ours", "7.0", 10.0, 9.0, 14.0, DIFFERS),  # 3 of 1 downwards
+            ("mc_spread_ours_min", "Ours", "-11.790", -10.0, -10.0, -10.0, DIFFERS),  # no width: half of 0.001
+            ("mc_drl_outliers", "DRL", "no", 3.0, 1.0, 4.0, REPRODUCED),
+            ("mc_ours_outliers_below_share", "Ours", "73.19%", 83.19, 73.19, 84.0, REPRODUCED),
+            ("sg_cells", "Ours", "13", 13.0, 12.0, 16.0, REPRODUCED),
+            ("sg_text_policies", "Ours", "40", 85.0, np.nan, np.nan, CONTRADICTED),  # a setting
+            ("sg_drl_outliers_max", "DRL", "10.364", np.nan, np.nan, np.nan, UNCHECKED),
+        )
+    )
+    assert found["gap"].to_dict() == pytest.approx({
+        "TD3: mean": 0.5, "distilled: lower bound": -3, "distilled: min": -1.79 / 0.0005, "TD3: outliers": -1.5,
+        "distilled: outliers below share": -1, "distilled: cells": 0,
+    })  # fmt: skip
+    assert found["verdict"].tolist() == [REPRODUCED, DIFFERS, DIFFERS, REPRODUCED, REPRODUCED, REPRODUCED]
+    assert found.index.name == "statistic" and found["wide"].tolist() == [True, False, False, True, True, True]
+
+
+def test_half_a_unit_is_the_least_width():
+    narrow = ledger.gaps(rows(("sg_ours_min", "Ours", "10", 9.0, 8.9, 9.1, DIFFERS)))
+    assert narrow["gap"].item() == pytest.approx(1 / 0.5)
+
+
+NUMBERS = st.floats(-100, 100)
+
+
+@given(NUMBERS, st.floats(0, 20), st.floats(0, 20), st.integers(-100_000, 100_000), st.integers(0, 3))
+def test_what_lies_inside_the_band_is_reproduced(here, below, above, number, digits):
+    """The figure's band and the verdict agree, up to the half unit that the verdict adds."""
+    printed = f"{number / 10**digits:.{digits}f}"
+    assume(abs(float(printed)) < 200)
+    low, high = here - below, here + above
+    found = verdict(row(printed, here, low, high))
+    gap = ledger.gaps(rows(("sg_ours_mean", "Ours", printed, here, low, high, found)))["gap"].item()
+    wide = (above if gap > 0 else below) > 0.5 * last_digit(printed)
+    if abs(gap) < (0.999 * ROOT2 if wide else 0.999):
+        assert found == REPRODUCED
+    if abs(gap) > 1.001 * ROOT2 + 1:
+        assert found == DIFFERS
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_gaps_of_the_book(book, task):
+    found, shown = ledger.gaps(results_of(book, task)), results_of(book, task)
+    compared = shown[shown["low"].notna()]
+    assert len(found) == len(compared) > 18 and found.index.is_unique
+    assert found["verdict"].tolist() == compared["verdict"].tolist()
+    values = compared["id"].map(paper.printed_values().set_index("id")["value"])
+    signs = np.sign(values - compared["here"]).to_numpy()
+    assert np.array_equal(np.sign(found["gap"]), signs, equal_nan=True)
+
+
+def test_the_book_can_be_written_and_read_again(book):
+    back = pd.read_csv(io.BytesIO(book.to_csv(index=False).encode()), dtype={"paper": str})
+    assert back["paper"].tolist() == book["paper"].tolist() and back["verdict"].tolist() == book["verdict"].tolist()
+    assert np.allclose(back["here"], book["here"], equal_nan=True)
