@@ -1,10 +1,12 @@
 import dataclasses
 import os
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, same_arrays, tiny
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, same_arrays, tiny
 
 from vsp import experiments, store
 from vsp.envs import GOAL, PIT, TRUNCATED
@@ -316,3 +318,11 @@ def test_the_papers_experiment(task):
     assert N_RUNS == {SIMPLEGOAL: 85, MOUNTAINCAR: 40}
     with pytest.raises(ValueError, match="unknown task"):
         paper_runs("Pendulum-v1", runs="unused")
+
+
+def test_the_command_makes_runs_in_several_processes(tmp_path):
+    """As `make` calls it: a module run as a script has another name than the one workers know it by."""
+    command = [sys.executable, "-m", "vsp.experiments", "--quick", "--jobs", "2", "--out", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stderr
+    assert len(list(tmp_path.rglob("*.run"))) == len(TASKS) * experiments.QUICK_RUNS

@@ -344,4 +344,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    from vsp.experiments import main  # of the module by its name, under which workers find what it holds
+
     main()
