@@ -82,7 +82,7 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
 	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
 
-teachers: venv ## trains both TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
+teachers: venv ## trains the TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
 	$(PY) -m vsp.training --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
 
 short-teachers: venv ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes likewise
@@ -165,8 +165,7 @@ new-venv:
 
 # SHA-256 of a CPU build of torch (2.13.0+cpu, Python 3.11, Linux x86_64), accepted beside the registry's builds.
 TORCH_CPU := 6746dbcbeb526eb61330b76b41ff1b4eb848951103a892eeb080dfa2b264667b
-ANYWHERE := ; (python_full_version < '3.12' and sys_platform == 'darwin') or \
-  (python_full_version < '3.12' and sys_platform == 'linux')
+ANYWHERE := ; python_full_version < '3.12' and (sys_platform == 'darwin' or sys_platform == 'linux')
 
 lock: venv ## resolves pyproject.toml anew, to the newest versions, and writes environment.lock: under a minute
 	@mkdir -p build; test -x build/uv/bin/uv || { $(PY) -m venv build/uv && build/uv/bin/python -m pip install -qq uv; }

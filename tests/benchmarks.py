@@ -30,7 +30,7 @@ def report(capsys, what: str, value: float, unit: str) -> None:
         print(f"\n{what:60s} {value:10.4g} {unit}", end="")
 
 
-@pytest.mark.parametrize("task", vsp.tasks())
+@pytest.mark.parametrize("task", vsp.paper.TASKS)
 def test_one_distillation(task, capsys):
     teacher = vsp.load_teacher(task)
     taken = seconds(lambda: vsp.distill(teacher, task, seed=0), repeats=3)
@@ -38,7 +38,7 @@ def test_one_distillation(task, capsys):
     assert taken < DISTILLATION[task]
 
 
-@pytest.mark.parametrize("task", vsp.tasks())
+@pytest.mark.parametrize("task", vsp.paper.TASKS)
 def test_one_evaluation(task, capsys):
     policy = vsp.paper.published_policy(task)
     taken = seconds(lambda: outcomes(policy, task, 1000, seed=0))
@@ -46,7 +46,7 @@ def test_one_evaluation(task, capsys):
     assert taken < 2
 
 
-@pytest.mark.parametrize("task", vsp.tasks())
+@pytest.mark.parametrize("task", vsp.paper.TASKS)
 def test_teacher_states_per_second(task, capsys):
     teacher, space = vsp.load_teacher(task), vsp.get_task(task)
     states = np.random.default_rng(0).uniform(space.low, space.high, size=(500, len(space.low))).astype(np.float32)

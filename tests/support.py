@@ -12,7 +12,8 @@ from vsp.rollouts import Episode
 from vsp.teachers import Teacher
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
-TASKS = (SIMPLEGOAL, MOUNTAINCAR)
+PENDULUM, LUNARLANDER = "Pendulum-v1", "LunarLanderContinuous-v3"
+TASKS = (SIMPLEGOAL, MOUNTAINCAR)  # of the paper
 
 TINY = Config(
     n_epochs=120,

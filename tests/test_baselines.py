@@ -8,13 +8,27 @@ from sklearn.tree import DecisionTreeRegressor
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
 
 from vsp import baselines, paper
-from vsp.baselines import LEAVES, Tree, compare, fit, linear_map, refit, rule_of_thumb, teacher_data
+from vsp.baselines import (
+    LEAVES,
+    LinearTree,
+    Tree,
+    compare,
+    dagger,
+    fit,
+    kmeans_cells,
+    linear_map,
+    refit,
+    rule_of_thumb,
+    teacher_data,
+)
+from vsp.config import Refinement
 from vsp.distill import distill
 from vsp.envs import GOAL, get_task
 from vsp.evaluate import evaluate, interval, outcomes
 from vsp.experiments import EVALUATION_SEED, Experiment, Results, make_runs
 from vsp.partition import Partition
 from vsp.policy import VoronoiPolicy
+from vsp.rollouts import record
 
 module = importlib.import_module("vsp.distill")  # `vsp.distill` is the function
 CONFIG = tiny(n_epochs=30, n_freeze=5)
@@ -88,6 +102,87 @@ def test_a_leaf_holds_the_mean_action_of_its_states():
     assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
     assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
     assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
+
+
+@pytest.mark.parametrize("kind", ["constants", "maps"])
+def test_one_leaf_is_the_root(kind):
+    states, actions = examples(SIMPLEGOAL)
+    if kind == "constants":
+        tree, expected = Tree(states, actions, leaves=1), np.tile(actions.mean(axis=0), (300, 1))
+    else:
+        tree = LinearTree(states, actions, leaves=1, task=SIMPLEGOAL)
+        expected = linear_map(states, actions, SIMPLEGOAL).predict(states)[0]
+    assert len(tree) == 1 and np.allclose(tree.predict(states)[0], expected)
+
+
+def test_the_linear_leaves_are_fitted_to_their_states():
+    states, actions = examples(SIMPLEGOAL)
+    tree, other = LinearTree(states, actions, leaves=4, task=SIMPLEGOAL), examples(SIMPLEGOAL, seed=1)[0]
+    model = DecisionTreeRegressor(max_leaf_nodes=4, min_samples_leaf=6, random_state=0).fit(states, actions)
+    leaf, asked = model.apply(states), model.apply(other)
+    assert len(tree) == 4 and np.bincount(leaf).max() < 300
+    for node in np.unique(leaf):
+        own = LinearRegression().fit(states[leaf == node], actions[leaf == node])
+        expected = np.clip(own.predict(other[asked == node]), -1, 1)
+        assert np.allclose(tree.predict(other[asked == node])[0], expected)
+
+
+def test_a_linear_tree_finds_two_pieces():
+    states = np.random.default_rng(0).random((500, 2))
+    actions = np.where(states[:, :1] < 0.4, 0.2 * states - 0.8, 0.9 - 0.2 * states)
+    tree = LinearTree(states, actions, leaves=2, task=SIMPLEGOAL)
+    assert np.abs(tree.predict(states)[0] - actions).max() < 0.02
+    assert np.abs(Tree(states, actions, leaves=2).predict(states)[0] - actions).max() > 0.09
+
+
+# Cells of k-means, and DAgger
+
+
+def test_cells_of_kmeans_stand_where_the_states_are():
+    rng = np.random.default_rng(0)
+    groups = np.array([[0.2, 0.2], [0.8, 0.2], [0.5, 0.9]])
+    states = np.concatenate([group + 0.02 * rng.normal(size=(100, 2)) for group in groups])
+    actions = np.repeat([[0.1, -0.5], [0.7, 0.2], [-0.3, 0.9]], 100, axis=0)
+    policy = kmeans_cells(states, actions, cells=3, task=SIMPLEGOAL, seed=0)
+    near = policy.codewords[np.square(groups[:, None] - policy.codewords).sum(axis=2).argmin(axis=1)]
+    assert np.abs(near - groups).max() < 0.01 and np.allclose(policy.predict(states)[0], actions)
+    again, other = (kmeans_cells(*examples(SIMPLEGOAL), cells=9, task=SIMPLEGOAL, seed=seed) for seed in (1, 2))
+    assert not np.array_equal(again.codewords, other.codewords)
+
+
+BUDGET = Refinement(n_cells=1, n_episodes=20, n_corrections=2, n_correction_episodes=10, n_validation=50)
+
+
+def test_dagger_labels_the_states_that_the_policy_visits():
+    seen = []
+
+    def fit(states, actions):
+        seen.append((states, actions))
+        return Tree(states, actions, leaves=3)
+
+    teacher = TEACHERS[SIMPLEGOAL]
+    dagger(fit, teacher, SIMPLEGOAL, config=BUDGET, seed=0)
+    assert len(seen) == 3 and all(np.array_equal(a, teacher.predict(s)[0]) for s, a in seen)
+    for (fewer, _), (more, _) in zip(seen, seen[1:]):
+        assert np.array_equal(more[: len(fewer)], fewer) and len(more) > len(fewer) + 10
+    own = Tree(*seen[0], leaves=3)
+    rng = np.random.default_rng(np.random.SeedSequence(0).spawn(2)[0])
+    task = get_task(SIMPLEGOAL)
+    task.start(rng, 20)
+    visited = [episode.states for episode in record(own, task, task.start(rng, 10))]
+    assert np.array_equal(seen[1][0][len(seen[0][0]) :], np.concatenate(visited))
+
+
+def test_dagger_keeps_the_best_on_the_validation_starts():
+    gains = iter([5.0, -40.0, 40.0])  # pumping, braking, pumping hard
+
+    def fit(states, actions):
+        return VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [next(gains)], [0.0]]], task=MOUNTAINCAR)
+
+    kept = dagger(fit, TEACHERS[MOUNTAINCAR], MOUNTAINCAR, config=BUDGET, seed=0)
+    assert kept.coefficients[0, 1, 0] == 40.0
+    gains = iter([12.0, -40.0, 40.0])
+    assert dagger(fit, TEACHERS[MOUNTAINCAR], MOUNTAINCAR, config=BUDGET, seed=0).coefficients[0, 1, 0] == 12.0
 
 
 # Rules of thumb

@@ -4,7 +4,8 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TINY, tiny
 
 from vsp import paper
-from vsp.config import Config, preset
+from vsp.config import Config, Refinement, preset
+from vsp.envs import tasks
 
 INTEGERS = ("n_epochs", "n_split", "n_merge", "n_freeze", "n_reset", "batch_size", "n_minibatches")
 NUMBERS = ("min_param_distance", "min_pol_distance", "max_pol_loss", "learning_rate")
@@ -66,7 +67,11 @@ def test_a_freeze_longer_than_the_run_is_refused():
 
 
 def test_an_unknown_task_and_an_unknown_field():
-    with pytest.raises(ValueError, match="unknown task 'Pendulum-v1', expected one of"):
+    with pytest.raises(ValueError, match="unknown task 'Pendulum', expected one of .*; did you mean 'Pendulum-v1'"):
+        preset("Pendulum")
+    with pytest.raises(
+        ValueError, match="no preset for task 'Pendulum-v1', expected one of .*: write a Config of your"
+    ):
         preset("Pendulum-v1")
     with pytest.raises(TypeError, match="n_spilt"):
         tiny(n_spilt=3)
@@ -91,17 +96,49 @@ def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
     assert 0 < quick.n_freeze <= quick.n_epochs <= n_epochs
 
 
-def test_every_field_says_what_it_is():
+# Refinement
+
+
+def test_every_task_has_a_best_preset():
+    for task in tasks():
+        assert isinstance(preset(task, "best"), Refinement) and preset(task, "best").n_cells <= 5
+    with pytest.raises(ValueError, match="kind is 'finest', expected one of \\['paper', 'best'\\]"):
+        preset(TASKS[0], "finest")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"n_cells": 0}, {"n_cells": 2.0}, {"n_restarts": 0}, {"n_corrections": -1}, {"n_generations": True}, {"leak": 0},
+     {"coldest": 2.0}, {"learning_rate": float("nan")}, {"n_corrections": 0.0}],
+)  # fmt: skip
+def test_a_refinement_out_of_range_is_refused(change):
+    ((name, value),) = change.items()
+    with pytest.raises(ValueError, match=f"{name} is {value}, expected"):
+        Refinement(**{"n_cells": 3, **change})
+
+
+def test_parts_of_a_refinement_can_be_switched_off():
+    assert Refinement(n_cells=1, n_corrections=0, n_generations=0, failure_price=0.0).n_corrections == 0
+
+
+def test_a_quick_refinement_keeps_its_cells_and_what_is_off():
+    quick = Refinement(n_cells=3, n_generations=0).quick()
+    assert (quick.n_cells, quick.n_steps, quick.n_generations) == (3, 300, 0)
+    assert Refinement(n_cells=3, n_episodes=4).quick().n_episodes == 1
+
+
+@pytest.mark.parametrize("kind", [Config, Refinement])
+def test_every_field_says_what_it_is(kind):
     import ast
     import inspect
 
-    body = ast.parse(inspect.getsource(Config)).body[0].body
+    body = ast.parse(inspect.getsource(kind)).body[0].body
     documented = {
         field.target.id
         for field, text in zip(body, body[1:])
         if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
     }
-    assert documented == {f.name for f in dataclasses.fields(Config)}
+    assert documented == {f.name for f in dataclasses.fields(kind)}
 
 
 @pytest.mark.parametrize("reading", [n for n in range(1, 16) if n != 11])

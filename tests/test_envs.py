@@ -1,10 +1,11 @@
+import dataclasses
 import warnings
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, RandomPolicy
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, RandomPolicy
 
 import vsp
 from vsp.envs import (
@@ -16,6 +17,7 @@ from vsp.envs import (
     SimpleGoalEnv,
     Task,
     get_task,
+    gymnasium_task,
     mountaincar_step,
     simplegoal_start,
     simplegoal_step,
@@ -228,10 +230,91 @@ def test_mountaincar_starts_at_rest_in_the_valley():
     assert starts.dtype == np.float64
 
 
+def test_pendulum_batched_equals_gymnasium_from_anywhere():
+    task, env, rng = get_task(PENDULUM), gymnasium.make(PENDULUM).unwrapped, np.random.default_rng(8)
+    states, actions = rng.uniform([-9, -8], [9, 8], size=(2000, 2)), rng.uniform(-3, 3, size=(2000, 1))
+    moved, rewards, outcomes = task.step(states, actions)
+    env.reset(seed=0)
+    for i in range(2000):
+        env.state = states[i].copy()
+        seen, reward, terminated, _, _ = env.step(actions[i])
+        assert np.abs(env.state - moved[i]).max() < 1e-12 and reward == pytest.approx(rewards[i], abs=1e-12)
+        assert np.array_equal(seen, task.observe(moved[i : i + 1])[0]) and not terminated
+    assert (outcomes == RUNNING).all() and np.abs(moved[:, 1]).max() == 8
+
+
+def test_pendulum_starts_as_in_gymnasium_and_always_plays_to_the_end():
+    task = get_task(PENDULUM)
+    starts = task.start(np.random.default_rng(0), 5000)
+    assert np.abs(starts).max(axis=0) == pytest.approx([np.pi, 1], abs=2e-3)
+    assert starts.mean(axis=0) == pytest.approx([0, 0], abs=0.1)
+    result = play(RandomPolicy(1), task, starts[:20])
+    assert (result.codes == TRUNCATED).all() and (result.lengths == 200).all() and (result.returns < -100).all()
+
+
+# Any environment of Gymnasium
+
+
+def test_lunarlander_is_gymnasium_step_by_step():
+    task = get_task(LUNARLANDER)
+    starts, policy = task.start(np.random.default_rng(0), 6), RandomPolicy(2, seed=3)
+    episodes, result = record(policy, task, starts), play(RandomPolicy(2, seed=3), task, starts)
+    env = gymnasium.make(LUNARLANDER)
+    for i, episode in enumerate(episodes):
+        seen, total = [env.reset(seed=int(starts[i, 0]))[0]], 0.0
+        for action in episode.actions.astype(np.float32):
+            observation, reward, terminated, _, _ = env.step(action)
+            seen.append(observation)
+            total += reward
+        assert terminated and len(episode.actions) == result.lengths[i] and total == pytest.approx(result.returns[i])
+        assert np.array_equal(episode.states, np.array(seen[:-1], dtype=np.float64))
+        assert result.codes[i] == (GOAL if reward > 0 else PIT)
+    assert len({episode.states[0].tobytes() for episode in episodes}) == 6
+
+
+def test_the_same_seeds_play_the_same_episodes():
+    task = get_task(LUNARLANDER)
+    starts = task.start(np.random.default_rng(1), 5)
+    one, other = (play(RandomPolicy(2, seed=3), task, starts) for _ in range(2))
+    assert np.array_equal(one.returns, other.returns) and np.array_equal(one.codes, other.codes)
+
+
+def test_a_task_of_gymnasiums_own_pendulum():
+    """The two ways to the same environment; the generic one starts from seeds."""
+    task, own = gymnasium_task(PENDULUM), get_task(PENDULUM)
+    assert (task.max_steps, task.low.tolist(), task.action_high.tolist()) == (200, own.low.tolist(), [2.0])
+    live = task.begin(task.start(np.random.default_rng(0), 4))
+    states, actions = np.array([one.env.state for one in live]), np.array([[0.5], [-1], [2], [0]])
+    assert np.allclose(task.see(live), own.see(states), atol=1e-7)
+    _, rewards, outcomes = task.step(live, actions)
+    moved, expected, _ = own.step(states, actions)
+    assert np.allclose(rewards, expected) and (outcomes == RUNNING).all()
+    assert np.array_equal(task.observe(live), own.observe(moved))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("CartPole-v1", r"actions of CartPole-v1 are Discrete\(2\), expected a Box of one dimension"),
+        ("Blackjack-v1", "observations of Blackjack-v1 are Tuple"),
+    ],
+)
+def test_environments_without_boxes_are_refused(name, message):
+    with pytest.raises(ValueError, match=message):
+        gymnasium_task(name)
+
+
+def test_an_environment_without_a_limit_of_steps_is_refused(monkeypatch):
+    monkeypatch.setitem(gymnasium.registry, "Endless-v0", dataclasses.replace(gymnasium.spec(PENDULUM)))
+    gymnasium.registry["Endless-v0"].max_episode_steps = None
+    with pytest.raises(ValueError, match="None steps at most, expected limits for both"):
+        gymnasium_task("Endless-v0")
+
+
 # Registry
 
 
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("name", [*TASKS, PENDULUM, LUNARLANDER])
 def test_the_task_agrees_with_gymnasium(name):
     task, env = get_task(name), gymnasium.make(name)
     assert np.allclose(env.observation_space.low, task.low) and np.allclose(env.observation_space.high, task.high)
@@ -239,7 +322,9 @@ def test_the_task_agrees_with_gymnasium(name):
     assert env.spec.max_episode_steps == task.max_steps
     assert len(task.inputs) == len(task.input_labels) == len(task.low) and len(task.outputs) == len(task.action_low)
     starts = task.start(np.random.default_rng(0), 100)
-    assert (starts >= task.low).all() and (starts <= task.high).all()
+    assert starts.shape == (100, task.start_size or len(task.low)) and starts.dtype == np.float64
+    seen = task.see(task.begin(starts))
+    assert (seen >= task.low).all() and (seen <= task.high).all() and seen.shape == (100, len(task.low))
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -256,16 +341,27 @@ def test_states_stay_in_the_box_and_rows_do_not_mix(name):
 
 
 def test_tasks_by_name():
-    assert tasks() == list(TASKS) == vsp.tasks() and all(isinstance(get_task(name), Task) for name in TASKS)
+    assert tasks() == [*TASKS, PENDULUM, LUNARLANDER] == vsp.tasks()
+    assert all(isinstance(get_task(name), Task) and get_task(name).name == name for name in tasks())
     task = get_task(SIMPLEGOAL)
     assert get_task(task) is task and task.name == SIMPLEGOAL
 
 
 @pytest.mark.parametrize(
-    ("typo", "near"), [("simplegoal", SIMPLEGOAL), ("MountainCar-v0", MOUNTAINCAR), ("SimpleGoal-v1", SIMPLEGOAL)]
+    ("typo", "near"), [("simplegoal", SIMPLEGOAL), ("MountainCar", MOUNTAINCAR), ("SimpleGoal-v1", SIMPLEGOAL)]
 )
 def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
     with pytest.raises(ValueError, match=f"unknown task '{typo}', expected one of .*did you mean '{near}'"):
         get_task(typo)
     with pytest.raises(ValueError, match="unknown task None"):
         get_task(None)
+
+
+def test_a_task_of_gymnasium_that_does_not_fit_is_answered_with_the_nearest():
+    with pytest.raises(ValueError, match=f"actions of MountainCar-v0 are Discrete.*; did you mean '{MOUNTAINCAR}'"):
+        get_task("MountainCar-v0")
+
+
+def test_any_environment_of_boxes_is_a_task():
+    assert get_task("BipedalWalker-v3") is get_task("BipedalWalker-v3") is gymnasium_task("BipedalWalker-v3")
+    assert len(get_task("BipedalWalker-v3").low) == 24 and get_task("BipedalWalker-v3").max_steps == 1600

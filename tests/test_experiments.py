@@ -316,7 +316,7 @@ def test_the_papers_experiment(task):
     assert paper.config == experiments.preset(task) and paper.n_episodes == 1000
     assert quick.config == paper.config.quick() and quick.n_episodes == 100 and quick.id != paper.id
     assert N_RUNS == {SIMPLEGOAL: 85, MOUNTAINCAR: 40}
-    with pytest.raises(ValueError, match="unknown task"):
+    with pytest.raises(ValueError, match="no preset for task 'Pendulum-v1', expected one of"):
         paper_runs("Pendulum-v1", runs="unused")
 
 

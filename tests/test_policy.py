@@ -233,3 +233,41 @@ def test_a_policy_of_any_task_object():
     )
     policy = VoronoiPolicy([[0, 0]], [[[0, 0], [0, 0], [3, 1.5]]], task=task)
     assert policy.predict([0.5, 0.5])[0].tolist() == [0.5, 1.5]
+
+
+# How far the borders are
+
+
+def test_borders_by_hand():
+    """Codewords at x = 0.2 and x = 0.8 (y alike), and far above; in Manhattan distance the border is at x = 0.5."""
+    policy = VoronoiPolicy(np.array([[0.2, 0.2], [0.8, 0.2], [0.2, 0.9]]), np.zeros((3, 3, 2)), task=SIMPLEGOAL)
+    told = policy.explain(np.array([0.3, 0.1])).borders
+    assert told.index.tolist() == ["x", "y"] and told["cell"].tolist() == [1, 2]
+    assert told["change"].tolist() == pytest.approx([0.2, 0.45], abs=1e-9)
+    back = policy.explain(np.array([0.9, 0.2])).borders
+    assert back.at["x", "change"] == pytest.approx(-0.4, abs=1e-9) and back.at["x", "cell"] == 0
+
+
+def test_without_another_cell_there_is_no_border():
+    alone = VoronoiPolicy(np.array([[0.2, 0.2]]), np.zeros((1, 3, 2)), task=SIMPLEGOAL)
+    told = alone.explain(np.array([0.3, 0.1])).borders
+    assert told["change"].isna().all() and (told["cell"] == -1).all()
+
+
+@pytest.mark.parametrize("metric", ["manhattan", "euclidean", "chebyshev"])
+def test_a_step_beyond_the_border_is_in_the_other_cell(metric):
+    rng = np.random.default_rng(0)
+    policy = VoronoiPolicy(rng.random((6, 2)), np.zeros((6, 3, 2)), task=SIMPLEGOAL, metric=metric, scale=[1.0, 0.5])
+    found = 0
+    for state in rng.random((50, 2)):
+        told = policy.explain(state)
+        for axis, (change, cell) in enumerate(told.borders.itertuples(index=False)):
+            way = np.eye(2)[axis]
+            if cell < 0:
+                line = np.where(way, np.linspace(0, 1, 101)[:, None], state)
+                assert (policy.cells(line) == told.cell).all()
+                continue
+            found += 1
+            assert policy.cells(state + change * way) == cell != told.cell
+            assert policy.cells(state + (change - np.sign(change) * 1e-8) * way) == told.cell
+    assert found > 60

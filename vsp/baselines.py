@@ -6,16 +6,20 @@ nothing with its cells. All act through the same `predict` as `VoronoiPolicy`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
 from . import paper
+from .config import Refinement
 from .distill import teacher_episodes
 from .envs import GOAL, get_task
 from .evaluate import outcomes
 from .experiments import EVALUATION_SEED, Experiment, Results, Run
 from .policy import VoronoiPolicy
-from .rollouts import Outcomes, Policy
+from .refine import worth
+from .rollouts import Outcomes, Policy, play, record
 
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
 N_RUNS = 20  # whose teacher episodes the baselines are fitted to
@@ -28,9 +32,7 @@ class Tree:
     """
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int):
-        from sklearn.tree import DecisionTreeRegressor
-
-        self.model = DecisionTreeRegressor(max_leaf_nodes=leaves, random_state=0).fit(states, actions)
+        self.model = _grow(states, actions, leaves, smallest=1)
         self._m = actions.shape[1]
 
     def __len__(self) -> int:
@@ -39,6 +41,71 @@ class Tree:
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d): means of the teacher's, so they stay inside the action box."""
         return self.model.predict(obs).reshape(len(obs), self._m), None
+
+
+class LinearTree:
+    """A regression tree with a linear map in each leaf: CART's borders, then least squares on the states of each leaf.
+
+    A leaf holds at least twice as many states as its map has rows.
+    """
+
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str):
+        self.model = _grow(states, actions, leaves, smallest=2 * (states.shape[1] + 1))
+        self.task, leaf = get_task(task), self.model.apply(states)
+        inputs = np.column_stack([states, np.ones(len(states))])
+        self.maps = np.zeros((self.model.tree_.node_count, inputs.shape[1], actions.shape[1]))
+        for node in np.unique(leaf):
+            self.maps[node] = np.linalg.lstsq(inputs[leaf == node], actions[leaf == node], rcond=None)[0]
+
+    def __len__(self) -> int:
+        return self.model.get_n_leaves()
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        maps = self.maps[self.model.apply(obs)]
+        raw = np.einsum("nd,ndm->nm", obs.astype(np.float64), maps[:, :-1]) + maps[:, -1]
+        return np.clip(raw, self.task.action_low, self.task.action_high), None
+
+
+def _grow(states: np.ndarray, actions: np.ndarray, leaves: int, *, smallest: int):
+    """scikit-learn's tree of at most so many leaves, one included, with at least `smallest` states in each."""
+    from sklearn.tree import DecisionTreeRegressor
+
+    enough = 2 if leaves > 1 else len(states) + 1  # states that a node needs to be split: the root stays whole for one
+    options = {"max_leaf_nodes": max(2, leaves), "min_samples_split": enough, "min_samples_leaf": smallest}
+    return DecisionTreeRegressor(**options, random_state=0).fit(states, actions)
+
+
+def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:
+    """Cells around the centres of k-means (scikit-learn) of the standardised states, and least squares in each."""
+    from sklearn.cluster import KMeans
+
+    scale = np.where((std := states.std(axis=0)) > 0, std, 1.0)
+    centres = KMeans(cells, n_init=1, random_state=seed).fit(states / scale).cluster_centers_ * scale
+    maps = np.zeros((cells, states.shape[1] + 1, actions.shape[1]))
+    return refit(VoronoiPolicy(centres, maps, task=task, metric="euclidean", scale=scale), states, actions)
+
+
+def dagger(
+    fit: Callable[[np.ndarray, np.ndarray], Policy], teacher: Policy, task: str, *, config: Refinement, seed: int
+) -> Policy:
+    """Fit to the teacher's states, then again with those that the fitted policy visits (DAgger, Ross et al. 2011).
+
+    Episodes, rounds, validation and the choice of the best are those of `config`, as `refine` has them: the same
+    budget. `fit` makes a policy from states (n, d) and actions (n, m).
+    """
+    task, streams = get_task(task), np.random.SeedSequence(seed).spawn(2)
+    starts, checks = (np.random.default_rng(stream) for stream in streams)
+    validation = task.start(checks, config.n_validation)
+    policy, states, best = teacher, np.zeros((0, len(task.low))), (-np.inf, None)
+    for i in range(1 + config.n_corrections):
+        n = config.n_correction_episodes if i else config.n_episodes
+        visited = [episode.states for episode in record(policy, task, task.start(starts, n))]
+        states = np.concatenate([states, *visited])
+        policy = fit(states, np.asarray(teacher.predict(states)[0], dtype=np.float64))
+        value = worth(play(policy, task, validation), config.failure_price)
+        best = max(best, (value, policy), key=lambda pair: pair[0])
+    return best[1]
 
 
 def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPolicy:

@@ -1,8 +1,8 @@
-"""The hyperparameters of the paper (table T2) and the readings of what it leaves open, in one frozen dataclass.
+"""What a distillation depends on, in two frozen dataclasses: `Config` for the paper's method, `Refinement` for ours.
 
-The paper's open questions are numbered R1-R15 as in the comments below. Each reading is a field that names
-an entry of `readings.py`, or a number. R11 (which states a splitting pass reads) has one reading in the prose,
-"this iteration's episode", and so it is no field.
+`Config` has the hyperparameters of the paper (table T2) and the readings of what it leaves open, numbered R1-R15 as in
+the comments below. Each reading is a field that names an entry of `readings.py`, or a number. R11 (which states a
+splitting pass reads) has one reading in the prose, "this iteration's episode", and so it is no field.
 """
 
 from __future__ import annotations
@@ -113,6 +113,59 @@ class Config:
         return dataclasses.replace(self, **tenth)
 
 
+@dataclass(frozen=True)
+class Refinement:
+    """How `refine` finds a few cells and their maps together. Raises ValueError for a value out of range."""
+
+    n_cells: int
+    """Cells of the policy."""
+    n_episodes: int = 500
+    """Episodes of the teacher that the first fit sees."""
+    n_restarts: int = 4
+    """Fits from other beginnings; the one with the best return from validation starts goes on."""
+    n_steps: int = 3000
+    """Steps of Adam of a first fit; later fits, from where the last one ended, take half as many."""
+    batch_size: int = 512
+    """States per step."""
+    learning_rate: float = 0.02
+    """Step size of Adam at the beginning, for inputs scaled to unit deviation and actions to [-1, 1]; falls to 0."""
+    hottest: float = 1.0
+    """Temperature at the beginning, in units of the variance of the states: how far beyond its cell a map still counts
+    (deterministic annealing, Rose 1998)."""
+    coldest: float = 0.003
+    """Temperature at the end, where cells have all but plain borders."""
+    leak: float = 0.01
+    """Slope of the limited action beyond the limits, as the loss sees it: a little, so that maps find back."""
+    n_corrections: int = 3
+    """Rounds of labelling the states that the policy itself visits by the teacher (DAgger, Ross et al. 2011)."""
+    n_correction_episodes: int = 200
+    """Episodes of the policy per round."""
+    n_generations: int = 300
+    """Generations of CMA-ES (Hansen 2016) on the return itself, at the end."""
+    n_tuning_episodes: int = 500
+    """Episodes, from fresh starts, that each candidate of a generation plays."""
+    tuning_step: float = 0.05
+    """First standard deviation of CMA-ES, in scaled units."""
+    failure_price: float = 100.0
+    """Return that a failed episode costs on top, wherever candidates are compared, for a mean hides what is rare."""
+    n_validation: int = 5000
+    """Episodes that decide between restarts, rounds and before and after tuning."""
+
+    def __post_init__(self) -> None:
+        for name, kind in get_type_hints(type(self)).items():
+            optional = name in ("n_corrections", "n_generations", "failure_price")
+            if not (optional and type(value := getattr(self, name)) is kind and value == 0):  # without this part
+                _check(name, getattr(self, name), kind)
+        if self.coldest > self.hottest:
+            raise ValueError(f"coldest is {self.coldest}, expected at most hottest = {self.hottest}")
+
+    def quick(self) -> Refinement:
+        """The same method in a tenth of the steps: for a first look, not for results."""
+        shrunk = ("n_episodes", "n_steps", "n_correction_episodes", "n_generations", "n_validation")
+        values = {name: getattr(self, name) for name in shrunk}
+        return dataclasses.replace(self, **{name: value and max(1, value // 10) for name, value in values.items()})
+
+
 def _check(name: str, value: object, kind: object) -> None:
     if get_origin(kind) is Literal:
         good, expected = value in get_args(kind), f"one of {list(get_args(kind))}"
@@ -151,9 +204,33 @@ _PRESETS = {
 }
 
 
-def preset(task: str) -> Config:
-    """The paper's hyperparameters for `task` (table T2) with the default readings. Raises ValueError if unknown."""
+_BEST = {
+    "SimpleGoal-v0": Refinement(n_cells=5),
+    "MountainCarContinuous-v0": Refinement(n_cells=2, n_generations=100, failure_price=10_000.0),
+    "Pendulum-v1": Refinement(n_cells=3, n_generations=100, n_validation=1000),
+    "LunarLanderContinuous-v3": Refinement(
+        n_cells=4,
+        n_episodes=200,
+        n_correction_episodes=100,
+        n_generations=100,
+        n_tuning_episodes=30,
+        n_validation=300,
+        failure_price=0.0,
+    ),
+}
+
+
+def preset(task: str, kind: Literal["paper", "best"] = "paper") -> Config | Refinement:
+    """The settings for `task`: the paper's (table T2, with the default readings) or the best we know.
+
+    Raises ValueError for an unknown task or kind, and for one that the paper does not treat.
+    """
+    presets = {"paper": _PRESETS, "best": _BEST}
+    if kind not in presets:
+        raise ValueError(f"kind is {kind!r}, expected one of {list(presets)}")
     name = get_task(task).name
-    if name not in _PRESETS:
-        raise ValueError(f"no preset for task {name!r}, expected one of {list(_PRESETS)}: write a Config of your own")
-    return _PRESETS[name]
+    if name not in presets[kind]:
+        own = "Config" if kind == "paper" else "Refinement"
+        known = list(presets[kind])
+        raise ValueError(f"no preset for task {name!r}, expected one of {known}: write a {own} of your own")
+    return presets[kind][name]

@@ -10,32 +10,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from . import readings
 from .checks import check_seed
-from .config import Config, preset
+from .config import Config, Refinement, preset
 from .envs import Task, get_task
 from .history import History
 from .partition import Partition
 from .policy import VoronoiPolicy
+from .refine import refine
 from .rollouts import Episode, Policy, record
 
 EPISODES_AHEAD = 500  # teacher episodes rolled out together
 
 
 def distill(
-    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int
-) -> tuple[VoronoiPolicy, History]:
+    teacher: Policy, task: str | Task, config: Config | Refinement | None = None, *, seed: int
+) -> tuple[VoronoiPolicy, History | pd.DataFrame]:
     """Distil `teacher` to a `VoronoiPolicy` (Algorithm 1). Same arguments, same policy.
 
     `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
-    of the task. The history lets a notebook replay the run. Raises ValueError when the teacher does not fit the task,
-    its states or actions are not finite, or `seed` is no integer from 0 on.
+    of the task, and a `Refinement` hands over to `refine`. The history lets a notebook replay the run.
+    Raises ValueError when the teacher does not fit the task, its states or actions are not finite, or `seed` is no
+    integer from 0 on.
     """
     check_seed(seed)
     task = get_task(task)
     config = preset(task.name) if config is None else config
+    if isinstance(config, Refinement):
+        return refine(teacher, task, config, seed=seed)
     with threadpool_limits(1):  # the same sums in the same order on any machine, and no threads to wait for
         return _distill(teacher, task, config, seed)
 

@@ -1,7 +1,8 @@
 """The tasks: dynamics written once, on arrays of states; Gymnasium classes are thin adapters over them.
 
-Every function that moves states takes a batch `(n, d)` and returns a batch, so that a thousand episodes advance in one
-call. To add a task, write its `start` and `step`, and add a `Task` to `_TASKS`.
+Every function that moves states takes a batch of n and returns a batch, so that a thousand episodes advance in one
+call. To add a task, write its `start` and `step`, and add a `Task` to `_TASKS`; where the dynamics are out of reach (a
+physics engine), `gymnasium_task` plays Gymnasium's own environment, one copy per episode.
 """
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import gymnasium
 import numpy as np
@@ -23,29 +24,39 @@ OUTCOMES = ("running", "goal", "pit", "truncated")
 Step = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
+def _as_it_is(states: np.ndarray) -> np.ndarray:
+    """The same array: of most tasks starts, states and observations are one thing."""
+    return states
+
+
 @dataclass(frozen=True)
 class Task:
-    """A continuous-control task whose states and actions are boxes.
+    """A continuous-control task whose observations and actions are boxes.
 
-    `start(rng, n)` draws start states (n, d) in float64. `step(states, actions)` maps (n, d), (n, m) to the next states
-    (n, d), the rewards (n,) and the outcomes (n,), codes of `OUTCOMES`; truncation is counted by the caller.
+    `start(rng, n)` draws start states (n, s) in float64, plain numbers that name a beginning; `begin` makes the states
+    of them that `step(states, actions)` moves: with actions (n, m) to the next states, the rewards (n,) and the
+    outcomes (n,), codes of `OUTCOMES`; truncation is counted by the caller. `see` turns states into the d numbers that
+    a policy works with. In most tasks start, state and what is seen of it are the same array (n, d).
     """
 
     name: str
-    inputs: tuple[str, ...]  # symbols of the d state variables, as the paper prints them
+    inputs: tuple[str, ...]  # symbols of the d observed variables, as the paper prints them
     outputs: tuple[str, ...]  # symbols of the m actions
     input_labels: tuple[str, ...]  # axis labels, with units
-    low: np.ndarray  # (d,) box that the states stay in
+    low: np.ndarray  # (d,) box that the observations stay in
     high: np.ndarray  # (d,)
     action_low: np.ndarray  # (m,) box that actions are limited to
     action_high: np.ndarray  # (m,)
     max_steps: int  # an episode is truncated after this many steps
     start: Callable[[np.random.Generator, int], np.ndarray]
     step: Step
+    see: Callable[[np.ndarray], np.ndarray] = _as_it_is
+    begin: Callable[[np.ndarray], np.ndarray] = _as_it_is
+    start_size: int | None = None  # s, where it is not d
 
     def observe(self, states: np.ndarray) -> np.ndarray:
-        """What a policy sees of `states`: the same numbers in float32, as Gymnasium hands them out. (n, d)"""
-        return states.astype(np.float32)
+        """What a policy sees of `states`, in float32, as Gymnasium hands it out. (n, d)"""
+        return self.see(states).astype(np.float32)
 
 
 # SimpleGoal (paper, section "Navigation task")
@@ -139,6 +150,119 @@ def mountaincar_step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarra
     return moved, rewards, np.where(at_goal, GOAL, RUNNING)
 
 
+# Pendulum-v1: Gymnasium's own environment, its dynamics on arrays
+
+
+def pendulum_start(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Angle (rad, 0 is upright) uniform over the circle, angular velocity (rad/s) uniform in [-1, 1]. (n, 2)"""
+    return rng.uniform([-np.pi, -1.0], [np.pi, 1.0], size=(n, 2))
+
+
+def pendulum_see(states: np.ndarray) -> np.ndarray:
+    """Cosine and sine of the angle, and the angular velocity. (n, 3)"""
+    angle, velocity = states.T
+    return np.column_stack([np.cos(angle), np.sin(angle), velocity])
+
+
+def pendulum_step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gymnasium's `PendulumEnv.step`, for a batch: a rod of 1 kg and 1 m, 10 m/s2, 0.05 s a step; it never ends."""
+    angle, velocity = states.T
+    torque = np.clip(actions[:, 0], -2.0, 2.0)
+    upright = (angle + np.pi) % (2 * np.pi) - np.pi
+    rewards = -(upright**2 + 0.1 * velocity**2 + 0.001 * torque**2)
+    velocity = np.clip(velocity + (15.0 * np.sin(angle) + 3.0 * torque) * 0.05, -8.0, 8.0)
+    return np.column_stack([angle + velocity * 0.05, velocity]), rewards, np.full(len(states), RUNNING)
+
+
+# Any environment of Gymnasium, one copy per episode
+
+
+@dataclass
+class _Live:
+    """An episode under way: an environment and the last that it let see."""
+
+    env: gymnasium.Env
+    observation: np.ndarray
+
+
+def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Seeds for `reset` as start states: whole numbers in float64. (n, 1)"""
+    return rng.integers(2**32, size=(n, 1)).astype(np.float64)
+
+
+def _begin_live(name: str, starts: np.ndarray) -> np.ndarray:
+    """A freshly reset environment per start. (n,) objects"""
+    live = np.empty(len(starts), dtype=object)
+    for i, (seed,) in enumerate(starts):
+        env = gymnasium.make(name).unwrapped  # without the limit of steps, which the caller counts
+        live[i] = _Live(env, env.reset(seed=int(seed))[0])
+    return live
+
+
+def _see_live(states: np.ndarray) -> np.ndarray:
+    return np.array([live.observation for live in states], dtype=np.float64)
+
+
+def _step_live(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A step of every environment. An end that pays is a goal, one that costs is a pit."""
+    rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
+    for i, (live, action) in enumerate(zip(states, actions)):
+        live.observation, rewards[i], ended, _, _ = live.env.step(action.astype(live.env.action_space.dtype))
+        if ended:
+            outcomes[i] = GOAL if rewards[i] > 0 else PIT
+    return states, rewards, outcomes
+
+
+@cache
+def gymnasium_task(name: str) -> Task:
+    """The `Task` of any environment of Gymnasium whose observations and actions are boxes of one dimension.
+
+    Raises ValueError for other spaces, an action box without limits, or an environment without a limit of steps.
+    """
+    env = gymnasium.make(name)
+    seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
+    env.close()
+    for what, space in (("observations", seen), ("actions", acts)):
+        if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
+            raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension")
+    if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()) or most is None:
+        raise ValueError(f"{name} has actions {acts} and {most} steps at most, expected limits for both")
+    return Task(
+        name=name,
+        inputs=(inputs := tuple(f"s{i}" for i in range(seen.shape[0]))),
+        outputs=tuple(f"a{j}" for j in range(acts.shape[0])),
+        input_labels=inputs,
+        low=seen.low.astype(np.float64),
+        high=seen.high.astype(np.float64),
+        action_low=acts.low.astype(np.float64),
+        action_high=acts.high.astype(np.float64),
+        max_steps=most,
+        start=_draw_seeds,
+        step=_step_live,
+        see=_see_live,
+        begin=partial(_begin_live, name),
+        start_size=1,
+    )
+
+
+def _lunarlander() -> Task:
+    return replace(
+        gymnasium_task("LunarLanderContinuous-v3"),
+        inputs=("x", "y", "vx", "vy", "θ", "ω", "l", "r"),
+        outputs=("main", "side"),
+        input_labels=(
+            "x (half widths)",
+            "height above the pad",
+            "vx",
+            "vy",
+            "angle (rad)",
+            "ω",
+            "left leg down",
+            "right leg down",
+        ),  # fmt: skip
+    )
+
+
 # Registry
 
 _UNIT = np.ones(1)
@@ -169,24 +293,48 @@ _TASKS = {
         start=mountaincar_start,
         step=mountaincar_step,
     ),
+    "Pendulum-v1": Task(
+        name="Pendulum-v1",
+        inputs=("cos θ", "sin θ", "ω"),
+        outputs=("τ",),
+        input_labels=("cos θ", "sin θ", "angular velocity (rad/s)"),
+        low=np.array([-1.0, -1.0, -8.0]),
+        high=np.array([1.0, 1.0, 8.0]),
+        action_low=-2 * _UNIT,
+        action_high=2 * _UNIT,
+        max_steps=200,
+        start=pendulum_start,
+        step=pendulum_step,
+        see=pendulum_see,
+        start_size=2,
+    ),
 }
+_LATER = {"LunarLanderContinuous-v3": cache(_lunarlander)}  # made when asked for: it opens an environment
 
 gymnasium.register("SimpleGoal-v0", entry_point="vsp.envs:SimpleGoalEnv", max_episode_steps=50)
 
 
 def tasks() -> list[str]:
     """Names of the tasks that vsp knows."""
-    return list(_TASKS)
+    return [*_TASKS, *_LATER]
 
 
 def get_task(name: str | Task) -> Task:
-    """The `Task` called `name`; a `Task` passes through. Raises ValueError with the nearest name for a typo."""
+    """The `Task` called `name`, one of ours or an environment that Gymnasium knows; a `Task` passes through.
+
+    Raises ValueError with the nearest name for a typo, and as `gymnasium_task` does.
+    """
     if isinstance(name, Task):
         return name
-    if name not in _TASKS:
-        near = difflib.get_close_matches(str(name), _TASKS, n=1, cutoff=0.0)
-        raise ValueError(f"unknown task {name!r}, expected one of {tasks()}; did you mean {near[0]!r}?")
-    return _TASKS[name]
+    if name in _TASKS:
+        return _TASKS[name]
+    (near,) = difflib.get_close_matches(str(name), tasks(), n=1, cutoff=0.0)
+    if name not in gymnasium.registry:
+        raise ValueError(f"unknown task {name!r}, expected one of {tasks()}; did you mean {near!r}?")
+    try:
+        return _LATER.get(name, partial(gymnasium_task, name))()
+    except ValueError as error:
+        raise ValueError(f"{error}; did you mean {near!r}?") from error
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from . import geometry, store
+from . import export, geometry, store
 from .checks import check_array, check_observations
 from .envs import Task, get_task
+
+_STEPS = 200  # places along an axis in which a border is looked for, at once
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Explanation:
     action: np.ndarray  # (m,) `raw` limited to the action box
     next_cell: int | None  # the cell with the second nearest codeword; None if there is one cell
     margin: float  # how much nearer the own codeword is than that one, in units of the look-up distance
+    borders: pd.DataFrame  # one row per input: the least change of it alone that leads to another cell, and which one
 
 
 class VoronoiPolicy:
@@ -82,8 +85,10 @@ class VoronoiPolicy:
         return np.clip(self.linear(obs), self.task.action_low, self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
-        """Cell, equation, contribution of each input, and how much nearer this codeword is than the next, for one
-        observation (d,). Raises ValueError for a batch, as `predict` does for bad numbers."""
+        """Cell, equation, contribution of each input, and how far the borders are, for one observation (d,).
+
+        Raises ValueError for a batch, as `predict` does for bad numbers.
+        """
         state = self._states(obs)
         if state.ndim != 1:
             raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
@@ -100,7 +105,32 @@ class VoronoiPolicy:
             action=self.predict(state)[0],
             next_cell=int(order[1]) if len(self) > 1 else None,
             margin=float(gaps[order[1]] - gaps[order[0]]) if len(self) > 1 else float("inf"),
+            borders=self._borders(state, cell),
         )
+
+    def _borders(self, state: np.ndarray, cell: int) -> pd.DataFrame:
+        """Columns change (in units of the input, NaN where no change of it within the box helps) and cell (-1 there).
+
+        Looks in `_STEPS` places along each axis and then between two of them, so a sliver of a cell may be missed.
+        """
+        rows = []
+        for axis in range(len(state)):
+            low, high = min(self.task.low[axis], state[axis]), max(self.task.high[axis], state[axis])
+            ways = [self._border(state, cell, axis, end) for end in (low, high) if np.isfinite(end)]
+            rows.append(min(ways, key=lambda way: np.nan_to_num(abs(way[0]), nan=np.inf), default=(np.nan, -1)))
+        return pd.DataFrame(rows, index=list(self.task.inputs), columns=["change", "cell"])
+
+    def _border(self, state: np.ndarray, cell: int, axis: int, end: float) -> tuple[float, int]:
+        """The change along one axis towards `end` at which another cell begins, and that cell."""
+        inside, outside = state[axis], end
+        for _ in range(5):  # each time in a finer grid
+            line = np.tile(state, (_STEPS, 1))
+            line[:, axis] = np.linspace(inside, outside, _STEPS)
+            left = np.flatnonzero(self.cells(line) != cell)
+            if not len(left) or left[0] == 0:
+                return np.nan, -1
+            inside, outside, found = line[left[0] - 1, axis], line[left[0], axis], int(self.cells(line[left[0]]))
+        return float(outside - state[axis]), found
 
     def equations(self, cell: int, digits: int = 3) -> tuple[str, ...]:
         """The linear maps of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300"."""
@@ -116,6 +146,22 @@ class VoronoiPolicy:
             for i, name in enumerate([*self.task.inputs, "bias"]):
                 columns[f"{output.replace('Δ', 'd')}_{name}"] = self.coefficients[:, i, j]
         return pd.DataFrame(columns).rename_axis("cell")
+
+    def to_json(self) -> str:
+        """All numbers of the policy by name, as JSON."""
+        return export.to_json(self)
+
+    def to_python(self) -> str:
+        """Source of a Python module with a function `act(state)` that needs no package."""
+        return export.to_python(self)
+
+    def to_c(self) -> str:
+        """Source in C99 without dependencies: `void vsp_act(const double *state, double *action)`."""
+        return export.to_c(self)
+
+    def to_latex(self, digits: int = 3) -> str:
+        """A LaTeX table of codewords and equations."""
+        return export.to_latex(self, digits)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""

@@ -35,7 +35,7 @@ class Outcomes:
 
 
 def play(policy: Policy, task: Task, starts: np.ndarray) -> Outcomes:
-    """Play one episode of `policy` from each start state (n, d)."""
+    """Play one episode of `policy` from each start state (n, s)."""
     result, _ = _advance(policy, task, starts, record=False)
     return result
 
@@ -53,12 +53,14 @@ def record(policy: Policy, task: Task, starts: np.ndarray) -> list[Episode]:
 
 def _advance(policy: Policy, task: Task, starts: np.ndarray, *, record: bool):
     """The loop behind `play` and `record`; finished episodes leave the batch."""
-    states = check_array("start states", starts, (-1, len(task.low)))
-    outside = (states < task.low) | (states > task.high)
+    starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
+    states = task.begin(starts)
+    seen = task.see(states)
+    outside = (seen < task.low) | (seen > task.high)
     if outside.any():
         row = np.flatnonzero(outside.any(axis=1))[0]
         low, high = task.low.tolist(), task.high.tolist()
-        raise ValueError(f"start state {states[row].tolist()} lies outside the box of {task.name}, {low} to {high}")
+        raise ValueError(f"start state {starts[row].tolist()} lies outside the box of {task.name}, {low} to {high}")
     n = len(states)
     returns, lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
     outcomes = np.full(n, TRUNCATED)

@@ -13,9 +13,10 @@ import pandas as pd
 from . import paper, store
 from .config import preset
 from .evaluate import outlier_numbers, spread
+from .export import codeword_latex, equations_latex, symbol
 from .figures import FORCE_MAP
 from .paper import SHORT
-from .policy import VoronoiPolicy, expression
+from .policy import VoronoiPolicy
 
 MISSING = "–"  # in print, where the paper gives no number
 PAGE = 40  # rows that fit on one
@@ -69,13 +70,12 @@ def equation_table(policy: VoronoiPolicy, *, digits: int = 3, swatch: bool = Fal
 
     `swatch` puts a patch in the force map's colour of the action at the codeword before the equation, for one action.
     """
-    symbols, rows = policy.task.inputs, []
-    outputs = ["$" + output.replace("Δ", r"\Delta ") + "$" for output in policy.task.outputs]
-    for codeword, maps in zip(policy.codewords, policy.coefficients):
-        row = {"codeword": "$[" + ",\\ ".join(f"{c:.{digits}f}" for c in codeword) + "]$"}
-        for j, output in enumerate(outputs):
-            patch = _patch(policy.predict(codeword)[0][j]) if swatch else ""
-            row[output] = f"{patch}${expression(maps[:, j], symbols, digits)}$"
+    rows = []
+    for i, codeword in enumerate(policy.codewords):
+        row = {"codeword": codeword_latex(policy, i, digits)}
+        patches = [_patch(action) if swatch else "" for action in policy.predict(codeword)[0]]
+        for output, patch, equation in zip(policy.task.outputs, patches, equations_latex(policy, i, digits)):
+            row[f"${symbol(output)}$"] = patch + equation
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -1,0 +1,111 @@
+import ctypes
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+
+from vsp import paper
+from vsp.envs import get_task
+from vsp.export import symbol
+from vsp.policy import VoronoiPolicy
+
+TASKS = (SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER)
+
+
+def some(task, metric="euclidean", k=7, seed=0):
+    rng, task = np.random.default_rng(seed), get_task(task)
+    d, m = len(task.low), len(task.action_low)
+    scale = rng.uniform(0.5, 2, size=d)
+    coefficients = rng.normal(size=(k, d + 1, m))
+    return VoronoiPolicy(rng.uniform(task.low, task.high, (k, d)), coefficients, task=task, metric=metric, scale=scale)
+
+
+def states_of(policy, n, seed=1):
+    return np.random.default_rng(seed).uniform(policy.task.low, policy.task.high, size=(n, len(policy.task.low)))
+
+
+CASES = [(task, metric) for task in TASKS for metric in ("manhattan", "euclidean", "chebyshev")]
+
+
+def compiled(policy, folder):
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler: `cc` is not there")
+    (folder / "policy.c").write_text(policy.to_c(), encoding="utf-8")
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+    library = folder / "policy.so"
+    subprocess.run(["cc", *flags, "-o", library, folder / "policy.c", "-lm"], check=True, capture_output=True)
+    return ctypes.CDLL(str(library))
+
+
+@pytest.mark.parametrize(("task", "metric"), CASES)
+def test_the_c_code_acts_as_the_policy_does(task, metric, tmp_path):
+    policy = some(task, metric)
+    check_c(policy, compiled(policy, tmp_path), 100_000)
+
+
+@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
+def test_the_c_code_of_the_published_policies(task, tmp_path):
+    policy = paper.published_policy(task)
+    check_c(policy, compiled(policy, tmp_path), 100_000)
+
+
+def check_c(policy, library, n):
+    states = states_of(policy, n)
+    doubles = ctypes.POINTER(ctypes.c_double)
+    library.vsp_act.argtypes, library.vsp_act.restype = [doubles, doubles], None
+    library.vsp_cell.argtypes = [doubles]
+    expected, cells, action = policy.predict(states)[0], policy.cells(states), np.zeros(len(policy.task.action_low))
+    found = np.empty_like(expected)
+    for i, state in enumerate(states):
+        at = state.ctypes.data_as(doubles)
+        library.vsp_act(at, action.ctypes.data_as(doubles))
+        found[i] = action
+        if i % 97 == 0:
+            assert library.vsp_cell(at) == cells[i]
+    assert np.abs(found - expected).max() <= 1e-12 and len(np.unique(cells)) > 1
+
+
+@pytest.mark.parametrize(("task", "metric"), CASES)
+def test_the_python_code_acts_as_the_policy_does(task, metric):
+    policy, module = some(task, metric), {}
+    exec(compile(policy.to_python(), "policy.py", "exec"), module)
+    states = states_of(policy, 2000)
+    assert np.abs([module["act"](s.tolist()) for s in states] - policy.predict(states)[0]).max() <= 1e-12
+    assert [module["cell"](s.tolist()) for s in states] == policy.cells(states).tolist()
+    assert module["__doc__"].startswith(f"{task}: 7 linear policies")
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_json_holds_the_same_numbers(task):
+    policy = some(task, "chebyshev")
+    told = json.loads(policy.to_json())
+    arrays = {name: np.array(told[name]) for name in ("codewords", "coefficients", "scale")}
+    back = VoronoiPolicy(**arrays, task=told["task"], metric=told["metric"])
+    states = states_of(policy, 100)
+    assert np.array_equal(back.predict(states)[0], policy.predict(states)[0])
+    assert told["inputs"] == list(policy.task.inputs) and told["outputs"] == list(policy.task.outputs)
+    assert (
+        told["action_low"] == policy.task.action_low.tolist()
+        and told["action_high"] == (-np.array(told["action_low"])).tolist()
+    )
+
+
+def test_latex_by_hand():
+    policy = VoronoiPolicy(np.array([[1.0, 0.0, 0.5]]), np.array([[[1.0], [-2.5], [0.0], [0.125]]]), task=PENDULUM)
+    assert policy.to_latex(2) == (
+        "\\begin{tabular}{ll}\n\\toprule\ncodeword & $\\tau$ \\\\\n\\midrule\n"
+        "$[1.00,\\ 0.00,\\ 0.50]$ & $1.00 \\cos \\theta - 2.50 \\sin \\theta + 0.00 \\omega + 0.12$ \\\\\n"
+        "\\bottomrule\n\\end{tabular}\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "code"),
+    [("x", "x"), ("Δx", r"\Delta x"), ("vx", "v_x"), ("main", r"\mathrm{main}"), ("ω", r"\omega"), ("F", "F"),
+     ("cos θ", r"\cos \theta"), ("s0", "s0")],
+)  # fmt: skip
+def test_symbols_by_hand(name, code):
+    assert symbol(name) == code

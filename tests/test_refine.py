@@ -1,0 +1,305 @@
+import dataclasses
+import importlib
+
+import numpy as np
+import pytest
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, RandomPolicy
+
+import vsp
+from vsp import paper
+from vsp.config import Refinement
+from vsp.envs import GOAL, PIT, TRUNCATED, get_task
+from vsp.evaluate import outcomes
+from vsp.policy import VoronoiPolicy
+from vsp.refine import (
+    Cells,
+    Crowd,
+    Frame,
+    Labelled,
+    Trials,
+    anneal,
+    beginning,
+    expected_loss,
+    play_all,
+    refine,
+    tune,
+    worth,
+)
+from vsp.rollouts import Outcomes, play
+
+module = importlib.import_module("vsp.refine")
+SMALL = Refinement(
+    n_cells=3, n_episodes=60, n_restarts=2, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
+    n_generations=3, n_tuning_episodes=50, n_validation=100,
+)  # fmt: skip
+
+
+def some(k=3, d=2, m=2, n=40, seed=0):
+    rng = np.random.default_rng(seed)
+    inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
+    return Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, m))), inputs, rng.uniform(-1, 1, size=(n, m))
+
+
+def hard_actions(cells, inputs):
+    nearest = np.square(inputs[:, None, :-1] - cells.codewords).sum(axis=2).argmin(axis=1)
+    return np.einsum("nd,ndm->nm", inputs, cells.maps[nearest])
+
+
+# Units
+
+
+@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER])
+def test_a_policy_acts_as_its_cells_do_in_scaled_units(task):
+    task, rng = get_task(task), np.random.default_rng(1)
+    d, m = len(task.low), len(task.action_low)
+    states = rng.normal(2.0, 3.0, size=(500, d)) * np.arange(1, d + 1)
+    frame, (cells, _, _) = Frame.of(task, states), some(4, d, m)
+    inputs, policy = frame.inputs(states), frame.policy(cells)
+    assert inputs[:, :-1].mean(axis=0) == pytest.approx(0) and inputs[:, :-1].std(axis=0) == pytest.approx(1)
+    assert np.allclose(frame.outputs(policy.linear(states)), hard_actions(cells, inputs))
+    assert (frame.outputs(task.action_low) == -1).all() and (frame.outputs(task.action_high) == 1).all()
+
+
+def test_the_way_to_a_policy_and_back_leads_home():
+    frame, (cells, _, _) = Frame.of(get_task(PENDULUM), some(d=3, n=99)[1][:, :3]), some(k=3, d=3, m=1)
+    back = frame.cells(frame.policy(cells))
+    assert np.allclose(back.vector, cells.vector) and cells.like(cells.vector).maps.tolist() == cells.maps.tolist()
+
+
+def test_a_variable_that_never_varies_keeps_its_unit():
+    frame = Frame.of(get_task(SIMPLEGOAL), np.array([[0.5, 0.1], [0.5, 0.3]]))
+    assert frame.scale.tolist() == [1.0, 0.1] or frame.scale == pytest.approx([1.0, 0.1])
+
+
+# The loss
+
+
+@pytest.mark.parametrize("temperature", [0.05, 1.0, 20.0])
+@pytest.mark.parametrize("leak", [0.01, 0.3])
+def test_the_gradient_is_that_of_finite_differences(temperature, leak):
+    cells, inputs, actions = some()
+    _, gradient = expected_loss(cells, inputs, actions, temperature=temperature, leak=leak)
+    steps = 1e-6 * np.eye(cells.vector.size)
+    values = [
+        [expected_loss(cells.like(cells.vector + sign * step), inputs, actions, temperature=temperature, leak=leak)[0]
+         for sign in (1, -1)] for step in steps
+    ]  # fmt: skip
+    assert gradient == pytest.approx(-np.diff(values)[:, 0] / 2e-6, abs=1e-7) and np.abs(gradient).min() > 0
+
+
+def test_one_cell_has_the_mean_squared_error():
+    cells, inputs, actions = some(k=1)
+    raw = inputs @ cells.maps[0]
+    limited = np.clip(raw, -1, 1) + 0.01 * (raw - np.clip(raw, -1, 1))
+    loss, _ = expected_loss(cells, inputs, actions, temperature=1.0, leak=0.01)
+    assert loss == pytest.approx(np.mean((limited - actions) ** 2)) and (np.abs(raw) > 1).any()
+
+
+def test_in_the_cold_each_state_belongs_to_its_nearest_codeword():
+    cells, inputs, actions = some()
+    loss, gradient = expected_loss(cells, inputs, actions, temperature=1e-9, leak=1e-9)
+    assert loss == pytest.approx(np.mean((np.clip(hard_actions(cells, inputs), -1, 1) - actions) ** 2))
+    assert np.abs(gradient[: cells.codewords.size]).max() == 0  # borders do not feel anything any more
+
+
+def test_in_the_heat_all_cells_count_the_same():
+    cells, inputs, actions = some()
+    each = [
+        expected_loss(
+            Cells(cells.codewords[i : i + 1], cells.maps[i : i + 1]), inputs, actions, temperature=1, leak=0.1
+        )
+        for i in range(3)
+    ]
+    loss, _ = expected_loss(cells, inputs, actions, temperature=1e9, leak=0.1)
+    assert loss == pytest.approx(np.mean([one[0] for one in each]))
+
+
+# Its parts
+
+
+def kinked(n=2000):
+    """A teacher of two linear pieces, one on either side of x = 0.3."""
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, size=(n, 2))
+    left = states[:, :1] < 0.3
+    actions = np.where(left, 0.5 * states[:, :1] + 0.2, -0.7 * states[:, 1:] - 0.1)
+    return Labelled(np.column_stack([states, np.ones(n)]), actions)
+
+
+def test_annealing_finds_two_pieces_and_their_border():
+    """The worst of five beginnings leaves less than a twentieth of the error of one linear map."""
+    seen, config = kinked(), dataclasses.replace(SMALL, n_cells=2, n_steps=2000)
+    common = np.linalg.lstsq(seen.inputs, seen.actions, rcond=None)[0]
+    one = np.mean((seen.inputs @ common - seen.actions) ** 2)
+    errors = []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        cells = anneal(seen, beginning(seen, 2, rng), config, rng, hottest=1.0, n_steps=2000)
+        errors.append(np.mean((hard_actions(cells, seen.inputs) - seen.actions) ** 2))
+    assert max(errors) < one / 20
+    middle, way = cells.codewords.mean(axis=0), np.diff(cells.codewords, axis=0)[0]
+    assert abs(middle @ way / way[0] - 0.3) < 0.05 and abs(way[1] / way[0]) < 0.2  # where x = 0.3, upright
+
+
+def test_a_beginning_stands_among_the_states_with_nearly_the_common_map():
+    seen = kinked()
+    cells = beginning(seen, 5, np.random.default_rng(0))
+    gaps = np.abs(cells.codewords[:, None] - seen.inputs[:, :2]).max(axis=2).min(axis=1)
+    common = np.linalg.lstsq(seen.inputs, seen.actions, rcond=None)[0]
+    assert gaps.max() < 0.05 and np.abs(cells.maps - common).max() < 0.5 and len(np.unique(cells.codewords)) == 10
+
+
+def ended(returns, codes):
+    return Outcomes(np.array(returns, dtype=float), np.ones(len(returns)), np.array(codes))
+
+
+def test_a_failure_costs_its_price():
+    assert worth(ended([10, 20], [GOAL, GOAL]), 1000.0) == 15
+    assert worth(ended([10, 20], [GOAL, PIT]), 4.0) == worth(ended([10, 20], [TRUNCATED, GOAL]), 4.0) == 13
+
+
+def test_the_first_of_the_best_trials_is_kept():
+    task = get_task(SIMPLEGOAL)
+    frame = Frame(task, np.zeros(2), np.ones(2))
+    trials = Trials(frame, np.array([[0.9, 0.05], [0.05, 0.9]]), 1000.0)
+    still, home = (Cells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
+    again = Cells(home.codewords + 1, home.maps)
+    for restart, cells in enumerate((still, home, again)):
+        trials.add("fit", restart, cells)
+    assert trials.best is home and trials.winner == 1
+    assert [row["failing"] for row in trials.rows] == [1, 0, 0] and trials.rows[1]["mean"] > trials.rows[0]["mean"]
+
+
+def test_tuning_finds_a_better_policy():
+    """From a policy that walks to the goal at half its speed along both axes, on SimpleGoal."""
+    frame = Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
+    slow = Cells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))
+    config = dataclasses.replace(SMALL, n_cells=1, n_generations=30, tuning_step=0.2)
+    tuned = tune(frame, slow, config, np.random.default_rng(0))
+    before, after = (outcomes(frame.policy(cells), SIMPLEGOAL, 500, seed=9).returns.mean() for cells in (slow, tuned))
+    assert after > before + 1
+
+
+# All of it
+
+
+@pytest.fixture(scope="module")
+def refined():
+    return refine(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=3)
+
+
+def same(one, other):
+    return np.array_equal(one.codewords, other.codewords) and np.array_equal(one.coefficients, other.coefficients)
+
+
+def test_the_same_arguments_give_the_same_policy(refined):
+    policy, trials = refined
+    again, rows = refine(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=3)
+    assert same(policy, again) and trials.equals(rows)
+    assert not same(policy, refine(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=4)[0])
+
+
+def test_distill_hands_over_to_refine(refined):
+    policy, rows = vsp.distill(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=3)
+    assert same(policy, refined[0]) and rows.equals(refined[1])
+
+
+def test_the_trials_tell_how_it_came_about(refined):
+    policy, trials = refined
+    assert trials["stage"].tolist() == ["fit", "fit", "correct", "tune"] and len(policy) == 3
+    assert trials["restart"].tolist()[:2] == [0, 1] and trials["failing"].between(0, 1).all()
+    best = trials.assign(worth=trials["mean"] - SMALL.failure_price * trials["failing"])
+    assert best["restart"][2] == best["worth"][:2].idxmax() == best["restart"][3]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"n_cells": 2}, {"n_episodes": 30}, {"n_steps": 200}, {"batch_size": 64}, {"learning_rate": 0.01},
+     {"hottest": 0.5}, {"coldest": 0.01}, {"leak": 0.2}, {"n_corrections": 2}, {"n_correction_episodes": 20},
+     {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.1}],
+)  # fmt: skip
+def test_every_setting_acts(change):
+    base = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
+    one, rows = refine(PumpingTeacher(), MOUNTAINCAR, base, seed=0)
+    other, changed = refine(PumpingTeacher(), MOUNTAINCAR, dataclasses.replace(base, **change), seed=0)
+    assert not rows.equals(changed)
+
+
+@pytest.mark.parametrize(("change", "stages"), [({"n_restarts": 1}, "fct"), ({"n_corrections": 0}, "fft"),
+                                                ({"n_generations": 0}, "ffc")])  # fmt: skip
+def test_parts_can_be_switched_off(change, stages):
+    rows = refine(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(SMALL, **change), seed=0)[1]
+    assert "".join(stage[0] for stage in rows["stage"]) == stages
+
+
+def test_other_validation_episodes_give_other_means(refined):
+    fewer = refine(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(SMALL, n_validation=10), seed=3)[1]
+    assert fewer["mean"][0] != refined[1]["mean"][0]
+
+
+@pytest.mark.parametrize(("price", "kept"), [(0.0, 0), (10.0, 1)])
+def test_the_price_of_a_failure_decides_between_a_mean_and_a_safe_one(monkeypatch, price, kept):
+    results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
+    monkeypatch.setattr(module, "play", lambda *_: next(results))
+    trials = Trials(Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2)), None, price)
+    for restart in range(2):
+        trials.add("fit", restart, some(k=1)[0])
+    assert trials.winner == kept
+
+
+def test_it_works_from_a_policy_that_is_there():
+    start = paper.published_policy(SIMPLEGOAL)
+    config = dataclasses.replace(SMALL, n_cells=13, n_restarts=1)
+    policy, rows = refine(CurvedTeacher(), SIMPLEGOAL, config, seed=0, start=start)
+    scratch, _ = refine(CurvedTeacher(), SIMPLEGOAL, config, seed=0)
+    assert len(policy) == 13 and not same(policy, scratch)
+    near = np.abs(policy.codewords[:, None] - start.codewords).max(axis=2).min(axis=1)
+    assert np.median(near) < 0.15  # codewords move, but not far
+    with pytest.raises(ValueError, match="start has 13 cells, expected n_cells = 3"):
+        refine(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=0, start=start)
+
+
+@pytest.mark.parametrize("task", [PENDULUM, LUNARLANDER])
+def test_tasks_of_more_dimensions(task):
+    tiny = dataclasses.replace(SMALL, n_episodes=4, n_correction_episodes=2, n_tuning_episodes=2, n_validation=3,
+                               n_generations=1)  # fmt: skip
+    policy, _ = refine(RandomPolicy(len(get_task(task).action_low)), task, tiny, seed=0)
+    assert isinstance(policy, VoronoiPolicy) and policy.codewords.shape == (3, len(get_task(task).low))
+
+
+def test_bad_seeds_are_refused():
+    with pytest.raises(ValueError, match="seed"):
+        refine(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=-1)
+
+
+# Many policies at once
+
+
+def crowd_of(task, metric, p=4, k=3, seed=0):
+    task, rng = get_task(task), np.random.default_rng(seed)
+    d, m = len(task.low), len(task.action_low)
+    scale = rng.uniform(0.5, 1.5, size=d)
+    return [
+        VoronoiPolicy(rng.uniform(task.low, task.high, (k, d)), rng.normal(0, 3, size=(k, d + 1, m)), task=task,
+                      metric=metric, scale=scale)
+        for _ in range(p)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("metric", ["manhattan", "euclidean"])
+@pytest.mark.parametrize(("task", "n"), [(SIMPLEGOAL, 50), (MOUNTAINCAR, 10), (PENDULUM, 10), (LUNARLANDER, 3)])
+def test_many_policies_at_once_play_as_each_alone(task, n, metric):
+    policies, task = crowd_of(task, metric), get_task(task)
+    starts = task.start(np.random.default_rng(0), n)
+    for policy, together in zip(policies, play_all(policies, task, starts), strict=True):
+        alone = play(policy, task, starts)
+        assert np.allclose(together.returns, alone.returns) and len(together.returns) == n
+        assert np.array_equal(together.codes, alone.codes) and np.array_equal(together.lengths, alone.lengths)
+
+
+def test_a_crowd_acts_for_the_policy_of_the_number():
+    policies = crowd_of(SIMPLEGOAL, "euclidean")
+    states = np.random.default_rng(1).random((40, 2))
+    numbers = np.random.default_rng(2).integers(4, size=40)
+    actions, _ = Crowd(policies).predict(np.column_stack([states, numbers]))
+    assert np.allclose(actions, [policies[i].predict(state)[0] for i, state in zip(numbers, states)])

@@ -1,0 +1,169 @@
+"""A policy as text that runs or reads without vsp, in JSON, Python, C and LaTeX: `VoronoiPolicy.to_json` and the like.
+
+Numbers are written so that they read back as the same float64. Codewords are written already divided by the scale of
+the distance, states are divided where distances are taken, as `VoronoiPolicy` does.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .policy import VoronoiPolicy
+
+_SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "cos ": r"\cos ", "sin ": r"\sin "}
+
+
+def to_json(policy: VoronoiPolicy) -> str:
+    """All numbers of the policy by name, and what they are for."""
+    task = policy.task
+    about = {
+        "task": task.name,
+        "inputs": list(task.inputs),
+        "outputs": list(task.outputs),
+        "metric": policy.metric,
+        "action_low": task.action_low.tolist(),
+        "action_high": task.action_high.tolist(),
+        "scale": policy.scale.tolist(),
+        "codewords": policy.codewords.tolist(),
+        "coefficients": policy.coefficients.tolist(),
+    }
+    return json.dumps(about, ensure_ascii=False, indent=1) + "\n"
+
+
+def to_python(policy: VoronoiPolicy) -> str:
+    """A module without imports beyond the standard library: `act(state)` returns a list of actions."""
+    task = policy.task
+    distance = {
+        "manhattan": "sum(abs(a - b) for a, b in zip(point, codeword))",
+        "euclidean": "math.sqrt(sum((a - b) ** 2 for a, b in zip(point, codeword)))",
+        "chebyshev": "max(abs(a - b) for a, b in zip(point, codeword))",
+    }[policy.metric]
+    numbers = {
+        "SCALE": policy.scale,
+        "CODEWORDS": policy.codewords / policy.scale,
+        "WEIGHTS": policy.coefficients[:, :-1].transpose(0, 2, 1),
+        "BIASES": policy.coefficients[:, -1],
+        "LOW": task.action_low,
+        "HIGH": task.action_high,
+    }
+    return "\n".join([
+        f'"""{_headline(policy)}"""',
+        "",
+        "import math  # noqa: F401",
+        "",
+        *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
+        "",
+        "",
+        "def cell(state):",
+        '    """Index of the nearest codeword."""',
+        "    point = [s / unit for s, unit in zip(state, SCALE)]",
+        f"    distances = [{distance} for codeword in CODEWORDS]",
+        "    return distances.index(min(distances))",
+        "",
+        "",
+        "def act(state):",
+        f'    """From [{", ".join(task.inputs)}] to [{", ".join(task.outputs)}]."""',
+        "    i = cell(state)",
+        "    raw = [sum(w * s for w, s in zip(row, state)) + b for row, b in zip(WEIGHTS[i], BIASES[i])]",
+        "    return [min(max(a, low), high) for a, low, high in zip(raw, LOW, HIGH)]",
+        "",
+    ])  # fmt: skip
+
+
+def to_c(policy: VoronoiPolicy) -> str:
+    """C99 with nothing but the standard library: `int vsp_cell(const double *state)` and
+    `void vsp_act(const double *state, double *action)`."""
+    k, rows, m = policy.coefficients.shape
+    d = rows - 1
+    add = {
+        "manhattan": "distance += fabs(gap);",
+        "euclidean": "distance += gap * gap;",
+        "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
+    }[policy.metric]
+    root = "        distance = sqrt(distance);\n" if policy.metric == "euclidean" else ""
+    return f"""/* {_headline(policy)}
+   state: {", ".join(policy.task.inputs)}; action: {", ".join(policy.task.outputs)}. */
+#include <math.h>
+
+static const double scale[{d}] = {_braces(policy.scale)};
+static const double codewords[{k}][{d}] = {_braces(policy.codewords / policy.scale)};
+static const double weights[{k}][{m}][{d}] = {_braces(policy.coefficients[:, :-1].transpose(0, 2, 1))};
+static const double biases[{k}][{m}] = {_braces(policy.coefficients[:, -1])};
+static const double low[{m}] = {_braces(policy.task.action_low)};
+static const double high[{m}] = {_braces(policy.task.action_high)};
+
+/* The index of the nearest codeword. */
+int vsp_cell(const double *state) {{
+    int nearest = 0;
+    double least = INFINITY;
+    for (int i = 0; i < {k}; i++) {{
+        double distance = 0.0;
+        for (int j = 0; j < {d}; j++) {{
+            double gap = state[j] / scale[j] - codewords[i][j];
+            {add}
+        }}
+{root}        if (distance < least) {{
+            least = distance;
+            nearest = i;
+        }}
+    }}
+    return nearest;
+}}
+
+void vsp_act(const double *state, double *action) {{
+    int i = vsp_cell(state);
+    for (int j = 0; j < {m}; j++) {{
+        double sum = 0.0;
+        for (int l = 0; l < {d}; l++) sum += weights[i][j][l] * state[l];
+        action[j] = fmin(fmax(sum + biases[i][j], low[j]), high[j]);
+    }}
+}}
+"""
+
+
+def to_latex(policy: VoronoiPolicy, digits: int = 3) -> str:
+    """A table of the codewords and their equations, one row per cell; needs the package booktabs."""
+    outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
+    rows = [
+        " & ".join([codeword_latex(policy, i, digits), *equations_latex(policy, i, digits)]) for i in range(len(policy))
+    ]
+    head = " & ".join(["codeword", *outputs])
+    body = "".join(rf"{row} \\" + "\n" for row in rows)
+    columns = "l" * (1 + len(outputs))
+    return f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
+
+
+def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int = 3) -> str:
+    """The codeword of a cell between dollars."""
+    return "$[" + ",\\ ".join(f"{c:.{digits}f}" for c in policy.codewords[cell]) + "]$"
+
+
+def equations_latex(policy: VoronoiPolicy, cell: int, digits: int = 3) -> list[str]:
+    """The right sides of the equations of a cell between dollars, one per action."""
+    from .policy import expression
+
+    names = tuple(symbol(name) for name in policy.task.inputs)
+    return [f"${expression(maps, names, digits)}$" for maps in policy.coefficients[cell].T]
+
+
+def symbol(name: str) -> str:
+    """A variable's name as LaTeX prints it in mathematics."""
+    for plain, code in _SYMBOLS.items():
+        name = name.replace(plain, code)
+    if name.isascii() and name.isalpha() and len(name) == 2 and name.startswith("v"):
+        return f"v_{name[1]}"
+    return rf"\mathrm{{{name}}}" if name.isalpha() and len(name) > 1 else name
+
+
+def _headline(policy: VoronoiPolicy) -> str:
+    return f"{policy.task.name}: {len(policy)} linear policies, each valid where its codeword is the nearest."
+
+
+def _braces(values: np.ndarray) -> str:
+    if not np.ndim(values):
+        return repr(float(values))
+    return "{" + ", ".join(_braces(value) for value in values) + "}"

@@ -1,0 +1,291 @@
+"""`refine`: a few codewords and their maps, optimised together. What the paper's method leaves on the table.
+
+Three parts, each of which a `Refinement` can switch off: deterministic annealing on the teacher's actions, correction
+on the states that the policy itself visits, tuning on the return. Inside, inputs have mean 0 and deviation 1, actions
+the limits -1 and 1, so that one step size fits all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from .checks import check_seed
+from .config import Refinement
+from .envs import GOAL, Task, get_task
+from .policy import VoronoiPolicy
+from .rollouts import Outcomes, Policy, play, record
+from .subpolicies import BETA1, BETA2, EPSILON
+
+METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The units that the optimisation works in, and the way to a policy and back."""
+
+    task: Task
+    centre: np.ndarray  # (d,) mean of the observations
+    scale: np.ndarray  # (d,) their standard deviation
+
+    @classmethod
+    def of(cls, task: Task, states: np.ndarray) -> Frame:
+        """That in which `states` (n, d) have mean 0 and deviation 1; a variable that never varies keeps its unit."""
+        scale = states.std(axis=0)
+        return cls(task, states.mean(axis=0), np.where(scale > 0, scale, 1.0))
+
+    @property
+    def _middle(self) -> np.ndarray:
+        return 0.5 * (self.task.action_high + self.task.action_low)
+
+    @property
+    def _half(self) -> np.ndarray:
+        return 0.5 * (self.task.action_high - self.task.action_low)
+
+    def inputs(self, states: np.ndarray) -> np.ndarray:
+        """Scaled states and a column of ones, (n, d + 1), of states (n, d)."""
+        return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+
+    def outputs(self, actions: np.ndarray) -> np.ndarray:
+        """Actions (n, m) in units in which the limits are -1 and 1."""
+        return (actions - self._middle) / self._half
+
+    def policy(self, cells: Cells) -> VoronoiPolicy:
+        """`cells` as a policy in the units of the task."""
+        weights = cells.maps[:, :-1] * self._half / self.scale[:, None]
+        biases = cells.maps[:, -1] * self._half + self._middle - self.centre @ weights
+        coefficients = np.concatenate([weights, biases[:, None]], axis=1)
+        codewords = cells.codewords * self.scale + self.centre
+        return VoronoiPolicy(codewords, coefficients, task=self.task, metric=METRIC, scale=self.scale)
+
+    def cells(self, policy: VoronoiPolicy) -> Cells:
+        """The codewords and maps of `policy` in these units."""
+        weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
+        biases = (biases + self.centre @ weights - self._middle) / self._half
+        maps = np.concatenate([weights * self.scale[:, None] / self._half, biases[:, None]], axis=1)
+        return Cells((policy.codewords - self.centre) / self.scale, maps)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What is optimised, in scaled units."""
+
+    codewords: np.ndarray  # (k, d)
+    maps: np.ndarray  # (k, d + 1, m): weights, then bias
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All numbers in a row."""
+        return np.concatenate([self.codewords.ravel(), self.maps.ravel()])
+
+    def like(self, vector: np.ndarray) -> Cells:
+        """The cells of this shape that have `vector`."""
+        cut = self.codewords.size
+        return Cells(vector[:cut].reshape(self.codewords.shape), vector[cut:].reshape(self.maps.shape))
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """States in scaled units, with what the teacher does there."""
+
+    inputs: np.ndarray  # (n, d + 1), the last column ones
+    actions: np.ndarray  # (n, m)
+
+    def with_more(self, other: Labelled) -> Labelled:
+        """These and the others."""
+        return Labelled(np.concatenate([self.inputs, other.inputs]), np.concatenate([self.actions, other.actions]))
+
+
+def refine(
+    teacher: Policy, task: str | Task, config: Refinement, *, seed: int, start: VoronoiPolicy | None = None
+) -> tuple[VoronoiPolicy, pd.DataFrame]:
+    """Distil `teacher` to `config.n_cells` cells, from scratch or from those of `start`. Same arguments, same policy.
+
+    Returns the policy and how it came about: one row per trial, with its stage ("fit", "correct", "tune"), restart,
+    mean return and share of failed episodes from the validation starts. Raises ValueError as `distill` does, and for a
+    `start` with another number of cells.
+    """
+    check_seed(seed)
+    if start is not None and len(start) != config.n_cells:
+        raise ValueError(f"start has {len(start)} cells, expected n_cells = {config.n_cells}")
+    with threadpool_limits(1):
+        return _refine(teacher, get_task(task), config, seed, start)
+
+
+def _refine(teacher, task, config, seed, start) -> tuple[VoronoiPolicy, pd.DataFrame]:
+    starts, init, batches, checks, search = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
+    states = _states(teacher, task, task.start(starts, config.n_episodes))
+    frame = Frame.of(task, states)
+    seen = _labelled(frame, teacher, states)
+    trials = Trials(frame, task.start(checks, config.n_validation), config.failure_price)
+
+    for restart in range(config.n_restarts):
+        cells = frame.cells(start) if start is not None else beginning(seen, config.n_cells, init)
+        hottest = config.hottest if start is None else 10 * config.coldest
+        trials.add("fit", restart, anneal(seen, cells, config, batches, hottest=hottest, n_steps=config.n_steps))
+    cells = trials.best
+    for _ in range(config.n_corrections):
+        visited = _states(frame.policy(cells), task, task.start(starts, config.n_correction_episodes))
+        seen = seen.with_more(_labelled(frame, teacher, visited))
+        cells = anneal(seen, cells, config, batches, hottest=10 * config.coldest, n_steps=config.n_steps // 2)
+        trials.add("correct", trials.winner, cells)
+    if config.n_generations:
+        trials.add("tune", trials.winner, tune(frame, trials.best, config, search))
+    return frame.policy(trials.best), pd.DataFrame(trials.rows)
+
+
+class Trials:
+    """Candidates, compared by their `worth` from the same starts; the first of the best is kept."""
+
+    def __init__(self, frame: Frame, starts: np.ndarray, price: float):
+        self.rows, self.best, self.winner = [], None, 0
+        self._frame, self._starts, self._price, self._most = frame, starts, price, -np.inf
+
+    def add(self, stage: str, restart: int, cells: Cells) -> None:
+        """Play `cells` from the validation starts."""
+        result = play(self._frame.policy(cells), self._frame.task, self._starts)
+        mean, failing = result.returns.mean(), np.mean(result.codes != GOAL)
+        self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
+        if worth(result, self._price) > self._most:
+            self._most, self.best, self.winner = worth(result, self._price), cells, restart
+
+
+def worth(result: Outcomes, price: float) -> float:
+    """Mean return, less `price` for every failed episode; where none can succeed this changes no comparison."""
+    return float(result.returns.mean() - price * np.mean(result.codes != GOAL))
+
+
+def beginning(seen: Labelled, k: int, rng: np.random.Generator) -> Cells:
+    """k codewords at states drawn from `seen`, and the least-squares map of all states with a little noise."""
+    states = seen.inputs[:, :-1]
+    codewords = states[rng.integers(len(states), size=k)] + 0.01 * rng.normal(size=(k, states.shape[1]))
+    common = np.linalg.lstsq(seen.inputs, seen.actions, rcond=None)[0]
+    return Cells(codewords, common + 0.1 * rng.normal(size=(k, *common.shape)))
+
+
+def anneal(
+    seen: Labelled, cells: Cells, config: Refinement, rng: np.random.Generator, *, hottest: float, n_steps: int
+) -> Cells:
+    """Codewords and maps together by Adam while the temperature falls from `hottest` to `config.coldest`.
+
+    Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with their distance, and
+    the temperature says how fast. The last tenth of the steps stays at the coldest.
+    """
+    unit = seen.inputs[:, :-1].var(axis=0).sum()
+    theta, mean, square = cells.vector, 0.0, 0.0
+    for i in range(n_steps):
+        done = i / n_steps
+        temperature = unit * hottest * (config.coldest / hottest) ** min(1.0, done / 0.9)
+        rows = rng.integers(len(seen.inputs), size=config.batch_size)
+        _, gradient = expected_loss(
+            cells.like(theta), seen.inputs[rows], seen.actions[rows], temperature=temperature, leak=config.leak
+        )
+        mean = BETA1 * mean + (1 - BETA1) * gradient
+        square = BETA2 * square + (1 - BETA2) * gradient**2
+        step = mean / (1 - BETA1 ** (i + 1)) / (np.sqrt(square / (1 - BETA2 ** (i + 1))) + EPSILON)
+        theta = theta - config.learning_rate * (1 - done) * step
+    return cells.like(theta)
+
+
+def expected_loss(
+    cells: Cells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, leak: float
+) -> tuple[float, np.ndarray]:
+    """Mean squared error of the cells' limited actions, weighted by the cells' shares of a state; and its gradient.
+
+    `inputs` (n, d + 1) and `actions` (n, m); the gradient is that by `cells.vector`.
+    """
+    n, (k, _, m) = len(inputs), cells.maps.shape
+    states, flat = inputs[:, :-1], cells.maps.transpose(1, 0, 2).reshape(inputs.shape[1], k * m)
+    raw = (inputs @ flat).reshape(n, k, m)
+    limited = np.clip(raw, -1.0, 1.0)
+    error = limited + leak * (raw - limited) - actions[:, None]
+    losses = np.square(error).mean(axis=2)
+
+    closeness = (2 * states @ cells.codewords.T - np.square(cells.codewords).sum(axis=1)) / temperature
+    shares = np.exp(closeness - closeness.max(axis=1, keepdims=True))
+    shares /= shares.sum(axis=1, keepdims=True)
+    loss = (shares * losses).sum(axis=1, keepdims=True)
+
+    by_raw = (2 / (n * m)) * shares[:, :, None] * error * np.where(raw == limited, 1.0, leak)
+    by_maps = (inputs.T @ by_raw.reshape(n, k * m)).reshape(-1, k, m).transpose(1, 0, 2)
+    by_closeness = shares * (losses - loss) * (2 / (n * temperature))
+    by_codewords = by_closeness.T @ states - by_closeness.sum(axis=0)[:, None] * cells.codewords
+    return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_maps.ravel()])
+
+
+def tune(frame: Frame, cells: Cells, config: Refinement, rng: np.random.Generator) -> Cells:
+    """CMA-ES (Hansen 2016) on `worth`: a generation plays all its candidates from the same fresh starts."""
+    import cma
+
+    options = {"seed": int(rng.integers(1, 2**31)), "verbose": -9}
+    search = cma.CMAEvolutionStrategy(cells.vector, config.tuning_step, options)
+    for _ in range(config.n_generations):
+        starts = frame.task.start(rng, config.n_tuning_episodes)
+        asked = search.ask()
+        played = play_all([frame.policy(cells.like(one)) for one in asked], frame.task, starts)
+        search.tell(asked, [-worth(result, config.failure_price) for result in played])
+    return cells.like(search.result.xfavorite)
+
+
+def play_all(policies: list[VoronoiPolicy], task: Task, starts: np.ndarray) -> list[Outcomes]:
+    """`play` for policies of one shape, metric and scale: all of them in one batch where states are arrays."""
+    if task.begin(one := starts[:1]) is not one:
+        return [play(policy, task, starts) for policy in policies]
+    number = np.repeat(np.arange(float(len(policies))), len(starts))
+    together = np.column_stack([np.tile(starts, (len(policies), 1)), number])
+    result = play(Crowd(policies), numbered(task, len(policies)), together)
+    parts = (np.split(part, len(policies)) for part in (result.returns, result.lengths, result.codes))
+    return [Outcomes(*of_one) for of_one in zip(*parts)]
+
+
+def numbered(task: Task, n: int) -> Task:
+    """`task`, with a number below n at the end of every state, which stays and which policies see."""
+
+    def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        moved, rewards, outcomes = task.step(states[:, :-1], actions)
+        return np.column_stack([moved, states[:, -1]]), rewards, outcomes
+
+    return replace(
+        task,
+        low=np.append(task.low, 0.0),
+        high=np.append(task.high, n),
+        start_size=1 + (task.start_size or len(task.low)),
+        see=lambda states: np.column_stack([task.see(states[:, :-1]), states[:, -1]]),
+        step=step,
+    )
+
+
+class Crowd:
+    """Several policies of one shape, metric and scale in one; the last number of an observation says whose it is."""
+
+    def __init__(self, policies: list[VoronoiPolicy]):
+        self._one = policies[0]
+        self._codewords = np.stack([policy.codewords / policy.scale for policy in policies], axis=1)  # (k, p, d)
+        self._coefficients = np.stack([policy.coefficients for policy in policies])  # (p, k, d + 1, m)
+        self._length = {"manhattan": lambda gaps: np.abs(gaps).sum(axis=1), "euclidean": _squares}[self._one.metric]
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations and numbers (n, d + 1)."""
+        states, whose = obs[:, :-1].astype(np.float64), obs[:, -1].astype(np.intp)
+        points = states / self._one.scale
+        cells = np.stack([self._length(points - own[whose]) for own in self._codewords]).argmin(axis=0)
+        maps = self._coefficients[whose, cells]
+        raw = np.einsum("nd,ndm->nm", states, maps[:, :-1]) + maps[:, -1]
+        return np.clip(raw, self._one.task.action_low, self._one.task.action_high), None
+
+
+def _squares(gaps: np.ndarray) -> np.ndarray:
+    return np.einsum("nd,nd->n", gaps, gaps)
+
+
+def _states(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
+    """All states (n, d) on the way of `policy` from `starts`."""
+    return np.concatenate([episode.states for episode in record(policy, task, starts)])
+
+
+def _labelled(frame: Frame, teacher: Policy, states: np.ndarray) -> Labelled:
+    actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
+    return Labelled(frame.inputs(states), frame.outputs(actions))

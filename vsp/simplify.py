@@ -1,0 +1,102 @@
+"""`simplify`: the fewest cells, then the fewest and shortest coefficients, that keep the return within a tolerance."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+
+from .checks import check_seed
+from .config import Refinement
+from .envs import GOAL, Task, get_task
+from .evaluate import start_states
+from .policy import VoronoiPolicy
+from .refine import refine, worth
+from .rollouts import Outcomes, Policy, play
+
+DIGITS = range(1, 17)  # significant digits that are tried, the fewest first
+
+
+def simplify(
+    teacher: Policy, task: str | Task, config: Refinement, *, tolerance: float, seed: int
+) -> tuple[VoronoiPolicy, pd.DataFrame]:
+    """The simplest policy that returns at most `tolerance` less than `teacher`; up to `config.n_cells` cells are tried.
+
+    Everything is compared by `worth` from the same `config.n_validation` starts, so report the result from others.
+    Returns the policy and what was tried, one row each: stage ("cells", "prune", "round"), cells, nonzero
+    coefficients, digits (0: as they are), mean return, failing, kept. The rows of stage "cells" are the curve of
+    return over cells. Where no number of cells will do, the best one goes on and nothing may cost it more than
+    `tolerance`. Raises ValueError as `refine` does, and for a tolerance below 0.
+    """
+    check_seed(seed)
+    if not tolerance >= 0:
+        raise ValueError(f"tolerance is {tolerance}, expected a return of at least 0")
+    task = get_task(task)
+    starts = start_states(task, config.n_validation, seed)
+    bar = worth(play(teacher, task, starts), config.failure_price) - tolerance
+    tried = _Tried(task, starts, config.failure_price)
+    policies = []
+    for k in range(1, config.n_cells + 1):
+        policies.append(refine(teacher, task, dataclasses.replace(config, n_cells=k), seed=seed)[0])
+        if tried.reaches(bar, "cells", policies[-1]):
+            break
+    best = int(np.argmax(tried.worths))
+    bar = min(bar, tried.worths[best] - tolerance)
+    policy = prune(policies[best], lambda one: tried.reaches(bar, "prune", one))
+    for digits in DIGITS:
+        short = rounded(policy, digits)
+        if short is not None and tried.reaches(bar, "round", short, digits=digits):
+            policy = short
+            break
+    return policy, pd.DataFrame(tried.rows)
+
+
+def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
+    """Set to zero, one by one, the coefficients without which the policy is still `good`, a function of a policy.
+
+    Those go first that move the action least when their input moves by one unit of `policy.scale`.
+    """
+    sizes = np.abs(policy.coefficients) * np.append(policy.scale, 1.0)[:, None]
+    for place in np.argsort(sizes, axis=None, kind="stable"):
+        coefficients = policy.coefficients.copy()
+        if not coefficients.flat[place]:
+            continue
+        coefficients.flat[place] = 0.0
+        without = _like(policy, policy.codewords, coefficients, policy.scale)
+        policy = without if good(without) else policy
+    return policy
+
+
+def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
+    """The policy with all its numbers rounded to so many significant digits; None if two codewords become equal."""
+    codewords, coefficients, scale = (
+        _significant(values, digits) for values in (policy.codewords, policy.coefficients, policy.scale)
+    )
+    different = len(np.unique(codewords, axis=0)) == len(codewords)
+    return _like(policy, codewords, coefficients, scale) if different else None
+
+
+def _significant(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([float(f"{value:.{digits}g}") for value in values.flat]).reshape(values.shape)
+
+
+def _like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
+    return VoronoiPolicy(codewords, coefficients, task=policy.task, metric=policy.metric, scale=scale)
+
+
+class _Tried:
+    """What was tried, and how it did from the same starts."""
+
+    def __init__(self, task: Task, starts: np.ndarray, price: float):
+        self.rows, self.worths = [], []
+        self._task, self._starts, self._price = task, starts, price
+
+    def reaches(self, bar: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:
+        """Play `policy`, note it, and say whether it is worth at least `bar`."""
+        result: Outcomes = play(policy, self._task, self._starts)
+        self.worths.append(worth(result, self._price))
+        about = {"stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients)}
+        scores = {"mean": result.returns.mean(), "failing": np.mean(result.codes != GOAL)}
+        self.rows.append({**about, "digits": digits, **scores, "kept": self.worths[-1] >= bar})
+        return self.rows[-1]["kept"]
