@@ -48,7 +48,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study teachers short-teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond teachers short-teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
 .NOTPARALLEL: # `runs` uses every core by itself
 
 help: ## this list
@@ -81,6 +81,9 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 
 study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
 	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
+
+beyond: venv ## our own method and others beside it, into data/results/: over an HOUR, resumable
+	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(JOBS)
 
 teachers: venv ## trains the TD3 teachers from scratch: 3 to 4 HOURS; resumes from $VSP_CACHE (~/.cache/vsp) if stopped
 	$(PY) -m vsp.training --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"

@@ -197,22 +197,22 @@ def expected_loss(
 
     `inputs` (n, d + 1) and `actions` (n, m); the gradient is that by `cells.vector`.
     """
-    n, (k, _, m) = len(inputs), cells.maps.shape
-    states, flat = inputs[:, :-1], cells.maps.transpose(1, 0, 2).reshape(inputs.shape[1], k * m)
-    raw = (inputs @ flat).reshape(n, k, m)
+    n, (k, rows, m) = len(inputs), cells.maps.shape
+    states, flat = inputs[:, :-1], cells.maps.transpose(0, 2, 1).reshape(k * m, rows)
+    raw = (flat @ inputs.T).reshape(k, m, n)  # sums over cells and actions then run along whole rows
     limited = np.clip(raw, -1.0, 1.0)
-    error = limited + leak * (raw - limited) - actions[:, None]
-    losses = np.square(error).mean(axis=2)
+    error = limited + leak * (raw - limited) - actions.T
+    losses = np.square(error).mean(axis=1)
 
-    closeness = (2 * states @ cells.codewords.T - np.square(cells.codewords).sum(axis=1)) / temperature
-    shares = np.exp(closeness - closeness.max(axis=1, keepdims=True))
-    shares /= shares.sum(axis=1, keepdims=True)
-    loss = (shares * losses).sum(axis=1, keepdims=True)
+    closeness = (2 * cells.codewords @ states.T - np.square(cells.codewords).sum(axis=1)[:, None]) / temperature
+    shares = np.exp(closeness - closeness.max(axis=0))
+    shares /= shares.sum(axis=0)
+    loss = (shares * losses).sum(axis=0)
 
-    by_raw = (2 / (n * m)) * shares[:, :, None] * error * np.where(raw == limited, 1.0, leak)
-    by_maps = (inputs.T @ by_raw.reshape(n, k * m)).reshape(-1, k, m).transpose(1, 0, 2)
+    by_raw = (2 / (n * m)) * shares[:, None] * error * np.where(raw == limited, 1.0, leak)
+    by_maps = (by_raw.reshape(k * m, n) @ inputs).reshape(k, m, rows).transpose(0, 2, 1)
     by_closeness = shares * (losses - loss) * (2 / (n * temperature))
-    by_codewords = by_closeness.T @ states - by_closeness.sum(axis=0)[:, None] * cells.codewords
+    by_codewords = by_closeness @ states - by_closeness.sum(axis=1)[:, None] * cells.codewords
     return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_maps.ravel()])
 
 

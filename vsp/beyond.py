@@ -1,0 +1,252 @@
+"""The comparison beyond the paper: every method at every size, from the same teachers, budgets and starts, on disk.
+
+`make beyond` makes the rows that are missing; data/results/beyond_<task>.csv holds what came out, one row per method,
+size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from . import paper, store
+from .baselines import LinearTree, Tree, dagger, kmeans_cells, linear_map, rule_of_thumb
+from .config import Refinement, preset
+from .distill import distill
+from .envs import GOAL, Task, get_task
+from .evaluate import start_states
+from .experiments import code_id
+from .policy import VoronoiPolicy
+from .refine import refine
+from .rollouts import Policy, play, record
+from .teachers import load_teacher
+
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
+SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
+SEEDS = range(20)
+REPORT_SEED, ERROR_SEED = 11, 12  # start states that nothing was chosen on: to report returns, and action errors
+N_REPORTED, N_ERROR = 10_000, 500
+_CODE = ("refine", "baselines", "beyond", "config")
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What every method may use: the teacher, its task, and the episodes and rounds of a `Refinement`."""
+
+    teacher: Policy
+    task: Task
+    config: Refinement
+
+
+def _refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
+    config = replace(budget.config, n_cells=size, **changes)
+    return refine(budget.teacher, budget.task, config, seed=seed)[0]
+
+
+def _with_dagger(fit: Callable[..., Policy], budget: Budget, size: int, seed: int, **changes) -> Policy:
+    def of_size(states: np.ndarray, actions: np.ndarray) -> Policy:
+        return fit(states, actions, size=size, task=budget.task.name, seed=seed)
+
+    config = replace(budget.config, **changes)
+    return dagger(of_size, budget.teacher, budget.task.name, config=config, seed=seed)
+
+
+def _tree(states, actions, *, size: int, task: str, seed: int) -> Policy:
+    return Tree(states, actions, leaves=size)
+
+
+def _linear_tree(states, actions, *, size: int, task: str, seed: int) -> Policy:
+    return LinearTree(states, actions, leaves=size, task=task)
+
+
+def _kmeans(states, actions, *, size: int, task: str, seed: int) -> Policy:
+    return kmeans_cells(states, actions, cells=size, task=task, seed=seed)
+
+
+def _line(states, actions, *, size: int, task: str, seed: int) -> Policy:
+    return linear_map(states, actions, task)
+
+
+def _alone(fit: Callable[..., Policy]) -> Callable[..., Policy]:
+    """A fit to the teacher's own episodes, as many as the others have in all rounds."""
+
+    def method(budget: Budget, size: int, seed: int) -> Policy:
+        config = budget.config
+        n = config.n_episodes + config.n_corrections * config.n_correction_episodes
+        return _with_dagger(fit, budget, size, seed, n_corrections=0, n_episodes=n)
+
+    return method
+
+
+# The methods at every size, by name: a function of budget, size and seed
+SIZED = {
+    "refined": _refined,
+    "refined, not tuned": partial(_refined, n_generations=0),
+    "k-means cells": _alone(_kmeans),
+    "k-means cells, DAgger": partial(_with_dagger, _kmeans),
+    "CART": _alone(_tree),
+    "CART, DAgger": partial(_with_dagger, _tree),
+    "CART, linear leaves": _alone(_linear_tree),
+    "CART, linear leaves, DAgger": partial(_with_dagger, _linear_tree),
+}
+# Those whose size is their own
+SINGLE = {
+    "teacher": lambda budget, size, seed: budget.teacher,
+    "one linear map": _alone(_line),
+    "rule of thumb": lambda budget, size, seed: rule_of_thumb(budget.task.name)[1],
+    "the paper's method": lambda budget, size, seed: distill(budget.teacher, budget.task, seed=seed)[0],
+}
+ABLATION = {  # `refined` at the size of the preset, with one more part taken away
+    "refined, cold from the start": {"hottest": 0.003},
+    "refined, one beginning": {"n_restarts": 1},
+    "refined, not corrected": {"n_corrections": 0},
+    "refined, no leak": {"leak": 1e-9},
+    "refined, failures at no price": {"failure_price": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One row to come: a method at a size, with a seed. Size 0: the method's own."""
+
+    task: str
+    method: str
+    size: int
+    seed: int
+
+    def path(self, folder: str | os.PathLike) -> Path:
+        """Its file: the name stands for all that decides the row, teacher and code included."""
+        name = hashlib.sha256(json.dumps([asdict(self), _circumstances(self.task)]).encode())
+        return Path(folder) / self.task / f"{name.hexdigest()[:16]}.row"
+
+
+@cache
+def _circumstances(task: str) -> list:
+    return [asdict(preset(task, "best")), load_teacher(task).digest, N_REPORTED, N_ERROR, code_id(*_CODE)]
+
+
+def jobs(task: str) -> list[Job]:
+    """All rows of a task."""
+    single = [name for name in SINGLE if task in paper.TASKS or name not in _OF_PAPER]
+    found = [Job(task, name, size, seed) for name in SIZED for size in SIZES for seed in SEEDS]
+    found += [Job(task, name, 0, seed) for name in single for seed in (SEEDS if name not in _FIXED else SEEDS[:1])]
+    size = preset(task, "best").n_cells
+    return found + [Job(task, name, size, seed) for name in ABLATION for seed in SEEDS]
+
+
+_FIXED = ("teacher", "rule of thumb")  # the same policy for every seed
+_OF_PAPER = ("rule of thumb", "the paper's method")  # only for its tasks
+
+
+def make_row(job: Job, folder: str | os.PathLike) -> None:
+    """Distil, play, and write the row."""
+    budget = Budget(load_teacher(job.task), get_task(job.task), preset(job.task, "best"))
+    began = time.perf_counter()
+    policy = _method(job)(budget, job.size, job.seed)
+    seconds = time.perf_counter() - began
+    result = play(policy, budget.task, start_states(budget.task, N_REPORTED, REPORT_SEED))
+    starts = start_states(budget.task, N_ERROR, ERROR_SEED)
+    parameters, operations = cost(policy)
+    row = {
+        "mean": float(result.returns.mean()),
+        "failing": float(np.mean(result.codes != GOAL)),
+        "error_teacher": action_error(policy, budget.teacher, budget.task, starts, by=budget.teacher),
+        "error_own": action_error(policy, budget.teacher, budget.task, starts, by=policy),
+        "cells": len(policy) if hasattr(policy, "__len__") else 0,
+        "parameters": parameters,
+        "operations": operations,
+    }
+    store.save(job.path(folder), {}, {"kind": "Row", "job": asdict(job), "row": row, "seconds": seconds})
+
+
+def _method(job: Job) -> Callable[[Budget, int, int], Policy]:
+    ablated = {name: partial(_refined, **changes) for name, changes in ABLATION.items()}
+    return {**SIZED, **SINGLE, **ablated}[job.method]
+
+
+def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
+    """Root mean square difference of the two policies' actions on the way of `by`, in units of half the action box."""
+    states = np.concatenate([episode.states for episode in record(by, task, starts)])
+    half = 0.5 * (task.action_high - task.action_low)
+    gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
+    return float(np.sqrt(np.square(gaps).mean()))
+
+
+def cost(policy: Policy) -> tuple[int, float]:
+    """Numbers that a policy consists of, and arithmetic operations and comparisons of a decision (of a mean one)."""
+    if isinstance(policy, VoronoiPolicy):
+        k, rows, m = policy.coefficients.shape
+        look_up = (k > 1) * (k * 3 * (rows - 1) + k - 1)
+        return policy.coefficients.size + (k > 1) * policy.codewords.size, look_up + 2 * (rows - 1) * m
+    if isinstance(policy, Tree | LinearTree):
+        tree, leaves = policy.model.tree_, len(policy)
+        ends = tree.children_left < 0
+        depth = float(np.average(policy.model.tree_.compute_node_depths()[ends] - 1, weights=tree.n_node_samples[ends]))
+        rows, m = policy.maps.shape[1:] if isinstance(policy, LinearTree) else (1, policy.model.n_outputs_)
+        return leaves * rows * m + 2 * (leaves - 1), depth + 2 * (rows - 1) * m
+    layers = policy.layers
+    return sum(w.size + b.size for w, b in layers), float(sum(2 * w.size for w, _ in layers))
+
+
+def make_all(folder: str | os.PathLike, *, workers: int = 1, tasks=TASKS) -> None:
+    """Make the rows that are missing in `folder`."""
+    from joblib import Parallel, delayed, parallel_config
+    from tqdm import tqdm
+
+    asked = [job for task in tasks for job in jobs(task)]
+    missing = [job for job in asked if not job.path(folder).exists()]
+    with parallel_config("loky", inner_max_num_threads=1):
+        finished = Parallel(n_jobs=workers, return_as="generator_unordered")(
+            delayed(make_row)(job, folder) for job in missing
+        )
+        calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
+        for _ in tqdm(
+            finished, "beyond", initial=len(asked) - len(missing), total=len(asked), unit="row", mininterval=calm
+        ):
+            pass
+
+
+def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What came out for `task`, one row per job, and how long each took."""
+    found = [(job, store.load(job.path(folder), kind="Row")[1]) for job in jobs(task)]
+    about = [{name: value for name, value in asdict(job).items() if name != "task"} for job, _ in found]
+    frame = pd.DataFrame([{**job, **one["row"], "code": code_id(*_CODE)} for job, (_, one) in zip(about, found)])
+    return frame, pd.DataFrame(
+        [{"task": task, **job, "seconds": one["seconds"]} for job, (_, one) in zip(about, found)]
+    )
+
+
+def main() -> None:
+    """Make the rows that are missing, and write data/results/beyond_<task>.csv and beyond_seconds.csv."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
+    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    parser.add_argument("--task", choices=TASKS, action="append", help="only this task")
+    arguments = parser.parse_args()
+    folder, results = Path(arguments.out) / "build" / "beyond", Path(arguments.out) / "data" / "results"
+    tasks = arguments.task or TASKS
+    make_all(folder, workers=arguments.jobs, tasks=tasks)
+    seconds = []
+    for task in tasks:
+        frame, took = rows(folder, task)
+        seconds.append(took)
+        text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
+        store.write_text(results / f"beyond_{task}.csv", text)
+    store.write_text(results / "beyond_seconds.csv", pd.concat(seconds).to_csv(index=False, float_format="%.3f"))
+
+
+if __name__ == "__main__":
+    from vsp.beyond import main  # of the module by its name, under which workers find what it holds
+
+    main()
