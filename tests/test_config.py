@@ -123,7 +123,7 @@ def test_parts_of_a_refinement_can_be_switched_off():
 
 def test_a_quick_refinement_keeps_its_cells_and_what_is_off():
     quick = Refinement(n_cells=3, n_generations=0).quick()
-    assert (quick.n_cells, quick.n_steps, quick.n_generations) == (3, 300, 0)
+    assert (quick.n_cells, quick.n_steps, quick.n_generations) == (3, 150, 0)
     assert Refinement(n_cells=3, n_episodes=4).quick().n_episodes == 1
 
 

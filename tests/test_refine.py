@@ -216,7 +216,7 @@ def test_the_trials_tell_how_it_came_about(refined):
     "change",
     [{"n_cells": 2}, {"n_episodes": 30}, {"n_steps": 200}, {"batch_size": 64}, {"learning_rate": 0.01},
      {"hottest": 0.5}, {"coldest": 0.01}, {"leak": 0.2}, {"n_corrections": 2}, {"n_correction_episodes": 20},
-     {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.1}],
+     {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.3}],
 )  # fmt: skip
 def test_every_setting_acts(change):
     base = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
