@@ -11,6 +11,7 @@ from vsp import baselines, paper
 from vsp.baselines import (
     LEAVES,
     LinearTree,
+    SoftTree,
     Tree,
     compare,
     dagger,
@@ -133,6 +134,45 @@ def test_a_linear_tree_finds_two_pieces():
     tree = LinearTree(states, actions, leaves=2, task=SIMPLEGOAL)
     assert np.abs(tree.predict(states)[0] - actions).max() < 0.02
     assert np.abs(Tree(states, actions, leaves=2).predict(states)[0] - actions).max() > 0.09
+
+
+# Soft trees
+
+
+def test_the_turns_of_a_tree_by_hand():
+    assert baselines._turns(2).tolist() == [
+        [0, 0, 0], [-1, 0, 0], [1, 0, 0], [-1, -1, 0], [-1, 1, 0], [1, 0, -1], [1, 0, 1]
+    ]  # fmt: skip
+    assert baselines._turns(0).shape == (1, 0)
+
+
+def test_a_soft_tree_finds_four_oblique_pieces():
+    states = np.random.default_rng(0).uniform(-1, 1, size=(2000, 2))
+    u, v = states @ [1, 1] > 0, states @ [1, -1] > 0
+    actions = np.column_stack([np.where(u, 0.8, -0.6), np.where(v, 0.5, -0.9)])
+    tree = SoftTree(states, actions, leaves=4, seed=0)
+    wrong = np.abs(tree.predict(states)[0] - actions).max(axis=1) > 0.1
+    straight = np.abs(Tree(states, actions, leaves=4).predict(states)[0] - actions).max(axis=1) > 0.1
+    assert wrong.mean() < 0.05 < straight.mean() and len(tree) == 4
+
+
+def test_a_soft_tree_acts_as_its_most_probable_leaf():
+    states, actions = examples(SIMPLEGOAL)
+    tree = SoftTree(states, actions, leaves=5, seed=1)  # rounded down to four
+    right = 1 / (1 + np.exp(-tree._inputs(states) @ tree.nodes.T))
+    probabilities = np.column_stack([
+        (1 - right[:, 0]) * (1 - right[:, 1]), (1 - right[:, 0]) * right[:, 1],
+        right[:, 0] * (1 - right[:, 2]), right[:, 0] * right[:, 2],
+    ])  # fmt: skip
+    assert np.array_equal(tree.predict(states)[0], tree.values[probabilities.argmax(axis=1)])
+    assert len(tree) == 4 and len(set(probabilities.argmax(axis=1))) > 1
+
+
+def test_a_soft_tree_of_one_leaf_is_the_mean_action_and_seeds_count():
+    states, actions = examples(SIMPLEGOAL)
+    assert SoftTree(states, actions, leaves=1, seed=0).values[0] == pytest.approx(actions.mean(axis=0), abs=0.05)
+    one, same, other = (SoftTree(states, actions, leaves=2, seed=seed) for seed in (3, 3, 4))
+    assert np.array_equal(one.nodes, same.nodes) and not np.array_equal(one.nodes, other.nodes)
 
 
 # Cells of k-means, and DAgger

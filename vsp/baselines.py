@@ -76,6 +76,72 @@ def _grow(states: np.ndarray, actions: np.ndarray, leaves: int, *, smallest: int
     return DecisionTreeRegressor(**options, random_state=0).fit(states, actions)
 
 
+class SoftTree:
+    """A soft decision tree (Coppens et al. 2019, after Frosst & Hinton 2017), with constant actions in its leaves.
+
+    An inner node sends a state to the right with a probability that is the sigmoid of a linear function. Training
+    weighs the squared error of every leaf by the probability of its path, and asks every node to use both branches.
+    The trained tree acts as its most probable leaf. `leaves` is rounded down to a power of two.
+    """
+
+    N_STEPS, BATCH, RATE = 2000, 256, 0.02
+    BALANCE = 0.1  # weight of what uneven nodes cost; halves with every level
+
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, seed: int):
+        self.depth, self.centre, scale = int(np.log2(leaves)), states.mean(axis=0), states.std(axis=0)
+        self.scale, self._signs = np.where(scale > 0, scale, 1.0), _turns(int(np.log2(leaves)))
+        rng = np.random.default_rng(seed)
+        self.nodes = rng.normal(0, 0.5, size=(len(self) - 1, states.shape[1] + 1))  # (2^depth - 1, d + 1)
+        self.values = actions[rng.integers(len(actions), size=len(self))].astype(np.float64)  # (2^depth, m)
+        self._train(self._inputs(states), actions, rng)
+
+    def __len__(self) -> int:
+        return 2**self.depth
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d)."""
+        turns = self._signs[-len(self) :]
+        against = np.logaddexp(0.0, -(self._inputs(obs) @ self.nodes.T)[:, None] * turns) * np.abs(turns)
+        return self.values[against.sum(axis=2).argmin(axis=1)], None
+
+    def _inputs(self, states: np.ndarray) -> np.ndarray:
+        return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+
+    def _train(self, inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> None:
+        import torch
+        from torch.nn.functional import softplus
+
+        signs, x, a = (torch.from_numpy(np.asarray(part, dtype=np.float64)) for part in (self._signs, inputs, actions))
+        nodes, values = (torch.tensor(part, requires_grad=True) for part in (self.nodes, self.values))
+        fades = 0.5 ** signs[: len(nodes)].abs().sum(dim=1)  # one power per level
+        optimizer = torch.optim.Adam([nodes, values], lr=self.RATE)
+        for _ in range(self.N_STEPS):
+            rows = torch.from_numpy(rng.integers(len(inputs), size=self.BATCH))
+            goes = x[rows] @ nodes.T
+            paths = torch.exp(-(softplus(-goes[:, None] * signs) * signs.abs()).sum(dim=2))  # to every node, and leaf
+            errors = (a[rows][:, None] - values).square().mean(dim=2)
+            loss = (paths[:, len(nodes) :] * errors).sum(dim=1).mean()
+            reach = paths[:, : len(nodes)]
+            share = ((reach * torch.sigmoid(goes)).sum(dim=0) / reach.sum(dim=0).clamp(min=1e-9)).clamp(1e-6, 1 - 1e-6)
+            loss = loss - self.BALANCE * (0.5 * fades * (share.log() + (1 - share).log())).sum()
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+        self.nodes = nodes.detach().numpy()
+        self.values = np.clip(values.detach().numpy(), actions.min(axis=0), actions.max(axis=0))
+
+
+def _turns(depth: int) -> np.ndarray:
+    """The way to every node of a full binary tree, breadth first, inner nodes before leaves: which inner nodes it
+    passes, to the left (-1) or to the right (1). (2^(depth + 1) - 1, 2^depth - 1)"""
+    signs = np.zeros((2 ** (depth + 1) - 1, 2**depth - 1))
+    for node in range(1, len(signs)):
+        parent = (node - 1) // 2
+        signs[node] = signs[parent]
+        signs[node, parent] = 1.0 if node == 2 * parent + 2 else -1.0
+    return signs
+
+
 def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:
     """Cells around the centres of k-means (scikit-learn) of the standardised states, and least squares in each."""
     from sklearn.cluster import KMeans

@@ -21,7 +21,7 @@ import numpy as np
 import pandas as pd
 
 from . import paper, store
-from .baselines import LinearTree, Tree, dagger, kmeans_cells, linear_map, rule_of_thumb
+from .baselines import LinearTree, SoftTree, Tree, dagger, kmeans_cells, linear_map, rule_of_thumb
 from .config import Refinement, preset
 from .distill import distill
 from .envs import GOAL, Task, get_task
@@ -70,6 +70,10 @@ def _linear_tree(states, actions, *, size: int, task: str, seed: int) -> Policy:
     return LinearTree(states, actions, leaves=size, task=task)
 
 
+def _soft_tree(states, actions, *, size: int, task: str, seed: int) -> Policy:
+    return SoftTree(states, actions, leaves=size, seed=seed)
+
+
 def _kmeans(states, actions, *, size: int, task: str, seed: int) -> Policy:
     return kmeans_cells(states, actions, cells=size, task=task, seed=seed)
 
@@ -99,6 +103,7 @@ SIZED = {
     "CART, DAgger": partial(_with_dagger, _tree),
     "CART, linear leaves": _alone(_linear_tree),
     "CART, linear leaves, DAgger": partial(_with_dagger, _linear_tree),
+    "soft tree": _alone(_soft_tree),
 }
 # Those whose size is their own
 SINGLE = {
@@ -195,6 +200,9 @@ def cost(policy: Policy) -> tuple[int, float]:
         depth = float(np.average(policy.model.tree_.compute_node_depths()[ends] - 1, weights=tree.n_node_samples[ends]))
         rows, m = policy.maps.shape[1:] if isinstance(policy, LinearTree) else (1, policy.model.n_outputs_)
         return leaves * rows * m + 2 * (leaves - 1), depth + 2 * (rows - 1) * m
+    if isinstance(policy, SoftTree):  # the probabilities of all leaves, then the most probable one
+        nodes, leaves = policy.nodes, len(policy)
+        return nodes.size + policy.values.size, float(2 * nodes.size + leaves * policy.depth + leaves - 1)
     layers = policy.layers
     return sum(w.size + b.size for w, b in layers), float(sum(2 * w.size for w, _ in layers))
 
