@@ -107,8 +107,8 @@ def test_dagger_labels_the_states_that_the_policy_visits():
     rng = np.random.default_rng(np.random.SeedSequence(0).spawn(2)[0])
     task = get_task(SIMPLEGOAL)
     task.start(rng, 20)
-    visited = [episode.states for episode in record(own, task, task.start(rng, 10))]
-    assert np.array_equal(seen[1][0][len(seen[0][0]) :], np.concatenate(visited))
+    on_its_way = [episode.states for episode in record(own, task, task.start(rng, 10))]
+    assert np.array_equal(seen[1][0][len(seen[0][0]) :], np.concatenate(on_its_way))
 
 
 def test_dagger_keeps_the_best_on_the_validation_starts():

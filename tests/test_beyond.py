@@ -8,7 +8,10 @@ from vsp import beyond, measure, paper, store
 from vsp.beyond import ABLATION, METHODS, Job, jobs
 from vsp.config import Refinement, preset
 from vsp.envs import get_task
+from vsp.evaluate import start_states
 from vsp.methods import Budget
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import play
 from vsp.teachers import load_teacher
 
 SMALL = Refinement(
@@ -130,6 +133,27 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
     assert "was made with other settings or code" in beyond.stale(results)[0]
 
 
+def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
+    small.setattr(beyond, "LONG", (SIMPLEGOAL,))
+    small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
+    beyond.main()
+    results = tmp_path / "data" / "results"
+    policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
+    assert 1 <= len(policy) <= SMALL.n_cells
+    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 2 * 5 + 1  # few seeds
+    assert not (results / "beyond_race.csv").exists()
+
+
+def test_the_simplified_policy_may_lose_its_share(small):
+    asked = []
+    small.setattr(beyond, "simplify", lambda *given, **settings: asked.append((given, settings)) or ("policy", None))
+    assert beyond.simplest(SIMPLEGOAL) == "policy"
+    ((teacher, task, config), settings) = asked[0]
+    starts = start_states(get_task(SIMPLEGOAL), SMALL.n_validation, 0)
+    own = play(teacher, get_task(SIMPLEGOAL), starts).returns.mean()
+    assert (task, config, settings) == (SIMPLEGOAL, SMALL, {"tolerance": pytest.approx(0.02 * own), "seed": 0})
+
+
 # What came out
 
 ROWS = pd.DataFrame(
@@ -175,6 +199,15 @@ def test_what_is_as_good_as_the_teacher(task, shares):
     assert table["gap"].tolist() == pytest.approx([-0.01, 0.99]) and table["failing"].tolist() == [0.1, 0.0]
 
 
+def test_the_headline_is_of_the_size_of_the_preset():
+    (row,) = beyond.headline({SIMPLEGOAL: ROWS}).to_dict("records")
+    low, high = (pytest.approx(end) for end in (9.0, 11.0))
+    assert row == {
+        "task": SIMPLEGOAL, "teacher": 9.01, "cells": 4, "mean": 10.0, "low": low, "high": high, "reached": 1.0,
+        "failing": 0.0, "rival": "CART", "rival mean": pytest.approx(10.1),
+    }  # fmt: skip
+
+
 def test_a_hundredth_of_a_negative_return_is_below_it():
     teacher, own = pd.Series({"mean": -100.0}), pd.DataFrame({"mean": [-101.0, -101.1, -99.0]})
     assert beyond.AS_GOOD["Pendulum-v1"](own, teacher).tolist() == [True, False, True]
@@ -184,3 +217,8 @@ def test_an_ablation_is_that_of_the_size_of_the_preset():
     table = beyond.ablation(ROWS)
     assert dict(zip(table["part"], table["mean"])) == {"all of it": 10.0, "no leak": 3.0, "not tuned": 20.0}
     assert set(table["size"]) == {4} and table["part"].iloc[0] == "not tuned"
+
+
+def test_a_task_without_an_ablation_has_none():
+    with pytest.raises(ValueError, match="is an ablation"):
+        beyond.ablation(ROWS[ROWS["method"].isin(["refined", "teacher"])])

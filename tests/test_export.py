@@ -1,5 +1,6 @@
 import ctypes
 import json
+import re
 import shutil
 import subprocess
 
@@ -99,8 +100,47 @@ def test_latex_by_hand():
     assert policy.to_latex(2) == (
         "\\begin{tabular}{ll}\n\\toprule\ncodeword & $\\tau$ \\\\\n\\midrule\n"
         "$[1.00,\\ 0.00,\\ 0.50]$ & $1.00 \\cos \\theta - 2.50 \\sin \\theta + 0.00 \\omega + 0.12$ \\\\\n"
-        "\\bottomrule\n\\end{tabular}\n"
+        "\\midrule\n\\multicolumn{2}{l}{Manhattan distances} \\\\\n\\bottomrule\n\\end{tabular}\n"
     )
+
+
+def rounded_policy():
+    """As `simplify` leaves them: few digits, some zeros, scaled states."""
+    coefficients = np.array([[[0.0], [20.0], [0.0]], [[0.014], [0.0], [-1.5]]])
+    codewords = np.array([[-0.5, 0.0], [0.25, 0.013]])
+    return VoronoiPolicy(codewords, coefficients, task=MOUNTAINCAR, metric="euclidean", scale=np.array([0.3, 0.02]))
+
+
+def test_a_policy_in_words_by_hand():
+    assert rounded_policy().to_text(None) == (
+        "MountainCarContinuous-v0: 2 linear policies, each valid where its codeword is the nearest.\n"
+        "Euclidean distances of states divided, x by 0.3, v by 0.02.\n"
+        "nearest to x -0.5, v 0:\n  F = 20 v\n"
+        "nearest to x 0.25, v 0.013:\n  F = 0.014 x - 1.5\n"
+        "limited to F from -1 to 1\n"
+    )
+    plain = VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 2)), task=SIMPLEGOAL)
+    assert plain.to_text(1).splitlines()[1:] == [
+        "Manhattan distances.",
+        "nearest to x 0.0, y 0.0:",
+        "  Δx = 0.0 x + 0.0 y + 0.0",
+        "  Δy = 0.0 x + 0.0 y + 0.0",
+        "limited to Δx from -1 to 1, Δy from -1 to 1",
+    ]
+
+
+def test_latex_of_exact_numbers_says_what_states_are_divided_by():
+    code = rounded_policy().to_latex(None)
+    assert "$[0.25,\\ 0.013]$ & $0.014 x - 1.5$ " in code and "$20 v$" in code
+    assert "{Euclidean distances of states divided by $[0.3,\\ 0.02]$}" in code
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_printed_exactly_reads_back_as_the_same_policy(seed):
+    rng = np.random.default_rng(seed)
+    policy = VoronoiPolicy(rng.normal(size=(3, 2)), rng.normal(size=(3, 3, 1)) * 1e-6, task=MOUNTAINCAR)
+    numbers = np.array(re.findall(r"-?\d+\.\d+", policy.to_text(None).replace("- ", "-")), dtype=float)
+    assert np.array_equal(numbers, np.concatenate([policy.codewords, policy.coefficients[..., 0]], axis=1).ravel())
 
 
 @pytest.mark.parametrize(

@@ -182,6 +182,19 @@ def test_expression(coefficients, text):
     assert expression(np.array(coefficients), ("x", "y"), 2) == text
 
 
+@pytest.mark.parametrize(
+    ("coefficients", "text"),
+    [
+        ([0.5, -1.25, 2], "0.5 x - 1.25 y + 2"),
+        ([0, -0.00014, 0], "-0.00014 y"),
+        ([0, 0, -12000.0], "-12000"),
+        ([0, 0, 0], "0"),
+    ],
+)
+def test_an_exact_expression_has_no_zeros_and_loses_no_digit(coefficients, text):
+    assert expression(np.array(coefficients), ("x", "y"), None) == text
+
+
 # frame, files
 
 

@@ -6,7 +6,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, Pum
 
 from vsp import paper
 from vsp.envs import GOAL, PIT, TRUNCATED, get_task
-from vsp.rollouts import play, record
+from vsp.rollouts import play, record, visited
 
 PLAYERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 
@@ -27,6 +27,12 @@ def test_recorded_episodes_by_hand():
     assert np.allclose(first.states, [[0.25, 0.05], [0.15, 0.0625]]) and np.allclose(second.states, [[0.65, 0.5]])
     assert first.actions.tolist() == [[-1, 0.125]] * 2 and second.actions.tolist() == [[-1, 0.125]]
     assert first.states.dtype == first.actions.dtype == np.float64
+
+
+def test_visited_states_by_hand():
+    """Down the diagonal, episode by episode, the goal itself not acted in."""
+    states = visited(Constant(-1.0, -1.0), get_task(SIMPLEGOAL), np.array([[0.25, 0.25], [0.15, 0.05]]))
+    assert np.allclose(states, [[0.25, 0.25], [0.15, 0.15], [0.15, 0.05]])
 
 
 @pytest.mark.parametrize("task", TASKS)

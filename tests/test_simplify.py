@@ -118,6 +118,7 @@ def test_it_returns_within_the_tolerance(simple):
     last = tried[tried["kept"]].iloc[-1]
     assert (last["cells"], last["nonzero"]) == (len(policy), np.count_nonzero(policy.coefficients))
     assert last["mean"] == pytest.approx(play(policy, policy.task, starts).returns.mean())
+    assert tried.attrs == {"teacher": pytest.approx(play(PumpingTeacher(), policy.task, starts).returns.mean())}
 
 
 def test_the_stages_come_in_order(simple):

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, TASKS
 
-from vsp import readings_study, study, teachers_study
+from vsp import beyond, readings_study, study, teachers_study
 from vsp.experiments import paper_experiment
 from vsp.readings_study import variants
 
@@ -207,6 +207,10 @@ def test_a_check_says_what_is_stale_and_makes_nothing(results, tmp_path, monkeyp
     for module in (readings_study, teachers_study):
         monkeypatch.delattr(module, "study")
     monkeypatch.setattr("sys.argv", ["x", "--check", "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(beyond, "stale", lambda folder: [f"all of {folder.name}"])
+    study.main()
+    assert capsys.readouterr().out == f"all of {results.name}\n"
+    monkeypatch.setattr(beyond, "stale", lambda folder: [])
     study.main()
     assert capsys.readouterr().out == ""
     (results / "readings.csv").unlink()

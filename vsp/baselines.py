@@ -19,7 +19,7 @@ from .evaluate import outcomes
 from .experiments import EVALUATION_SEED, Experiment, Results, Run
 from .policy import VoronoiPolicy
 from .refine import worth
-from .rollouts import Outcomes, Policy, play, record
+from .rollouts import Outcomes, Policy, play, visited
 from .trees import Tree, standard
 
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
@@ -51,8 +51,7 @@ def dagger(fits: Sequence[Fit], teacher: Policy, task: str, *, config: Refinemen
     policy, states, best = teacher, np.zeros((0, len(task.low))), (-np.inf, None)
     for i in range(1 + config.n_corrections):
         n = config.n_correction_episodes if i else config.n_episodes
-        visited = [episode.states for episode in record(policy, task, task.start(starts, n))]
-        states = np.concatenate([states, *visited])
+        states = np.concatenate([states, visited(policy, task, task.start(starts, n))])
         actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
         made = [(fit, fit(states, actions)) for fit in fits]
         values = [worth(play(policy, task, validation), config.failure_price) for _, policy in made]

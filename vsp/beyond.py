@@ -1,7 +1,8 @@
 """The comparison beyond the paper: every method at every size, from the same teachers, budgets and starts, on disk.
 
 `make beyond` makes the rows that are missing; data/results/beyond_<task>.csv holds what came out, one row per method,
-size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv.
+size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv. Of
+tasks whose rows take hours, one simplified policy is kept too, beyond_<task>.policy.
 """
 
 from __future__ import annotations
@@ -23,17 +24,20 @@ import pandas as pd
 from . import methods, paper, store, study, tdavq
 from .config import Config, Refinement, preset
 from .envs import get_task
-from .evaluate import interval
+from .evaluate import interval, start_states
 from .experiments import code_id
 from .measure import measure
 from .methods import Budget
+from .policy import VoronoiPolicy
 from .race import race
-from .rollouts import Policy
+from .rollouts import Policy, play
+from .simplify import simplify
 from .teachers import load_teacher
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
 SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
+LOSS = 0.02  # share of the teacher's mean return that the simplified policy of a long task may lose
 MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameters", "operations")
 INTERVAL = ("mean", "low", "high")
 
@@ -67,7 +71,7 @@ def _by_dagger(
 METHODS = {
     "refined": Method(methods.refined, ("refine",), ALL),
     "refined, not tuned": Method(methods.refined, ("refine",), ALL, {"n_generations": 0}),
-    "refined, closest": Method(methods.closest, ("refine",), ALL, sizes=(13,)),
+    "refined, closest": Method(methods.closest, ("refine", "moves"), ALL, sizes=(13,)),
     "k-means cells, DAgger": _by_dagger(methods.kmeans, "baselines", beginnings=3),
     "CART": Method(partial(methods.alone, fit=methods.tree), ("trees", "baselines", "refine"), EPISODES),
     "CART, DAgger": _by_dagger(methods.tree, "trees"),
@@ -185,6 +189,14 @@ def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFra
     )
 
 
+def simplest(task: str) -> VoronoiPolicy:
+    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about half an hour."""
+    teacher, config = load_teacher(task), preset(task, "best")
+    starts = start_states(get_task(task), config.n_validation, 0)
+    own = play(teacher, get_task(task), starts).returns.mean()
+    return simplify(teacher, task, config, tolerance=LOSS * abs(own), seed=0)[0]
+
+
 def stale(folder: str | os.PathLike) -> list[str]:
     """Which of the results in `folder` were made with other settings or code than today's, in words."""
     found = []
@@ -241,10 +253,13 @@ def rivals(frame: pd.DataFrame) -> pd.DataFrame:
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     """`refined` and what is left of it without one of its parts, at the size of the preset, as `summary` has it.
 
-    The column `part` names what was taken away, or is "all of it"; the best mean return comes first.
+    The column `part` names what was taken away, or is "all of it"; the best mean return comes first. Raises ValueError
+    for a task without such rows, one of `LONG`.
     """
     names = {f"refined, {part}": part for part in ABLATION} | {"refined": "all of it"}
     ablated = frame["method"].isin(names) & ~frame["method"].isin(METHODS)
+    if not ablated.any():
+        raise ValueError(f"no method of {sorted(set(frame['method']))} is an ablation, expected one of {sorted(names)}")
     rows = frame[(frame["size"] == frame.loc[ablated, "size"].iloc[0]) & frame["method"].isin(names)]
     return summary(rows).assign(part=lambda table: table["method"].map(names))
 
@@ -259,6 +274,22 @@ def reached(task: str, frame: pd.DataFrame) -> pd.DataFrame:
     parts = rows.groupby("size").agg(policies=("good", "size"), reached=("good", "mean"), gap=("mean", "median"),
                                      failing=("failing", "max"))  # fmt: skip
     return parts.assign(gap=parts["gap"] - teacher["mean"]).reset_index()
+
+
+def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """What came out in short: `refined` at the size of the preset, one row per task of `frames`, as `read` has them.
+
+    Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing, as in `reached`, rival (the
+    best of the other methods with as many cells or leaves) and rival mean.
+    """
+    columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
+    found = []
+    for task, frame in frames.items():
+        table = rivals(frame).merge(reached(task, frame), on="size").rename(columns={"size": "cells"})
+        (row,) = table.loc[table["cells"] == preset(task, "best").n_cells, columns].to_dict("records")
+        teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
+        found.append({"task": task, "teacher": teacher, **row})
+    return pd.DataFrame(found)
 
 
 # When a policy is as good as its teacher. SimpleGoal: the mean return within 0.03 and the failures within 0.1 points.
@@ -276,7 +307,7 @@ AS_GOOD = {
 
 def main() -> None:
     """Make the rows that are missing, and write data/results/beyond_<task>.csv and, with times, beyond_seconds.csv and
-    beyond_race.csv; or the rows that take hours, with their times in beyond_seconds_long.csv."""
+    beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
@@ -289,6 +320,8 @@ def main() -> None:
     for task, (frame, _) in found.items():
         text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
         store.write_text(results / f"beyond_{task}.csv", text)
+    for task in tasks if arguments.long else ():
+        simplest(task).save(results / f"beyond_{task}.policy")
     times = {f"seconds{end}": pd.concat([took for _, took in found.values()])}
     times |= {} if arguments.long else {"race": race()}
     for name, frame in times.items():

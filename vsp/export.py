@@ -1,4 +1,4 @@
-"""A policy as text that runs or reads without vsp, in JSON, Python, C and LaTeX: `VoronoiPolicy.to_json` and the like.
+"""A policy as text that runs or reads without vsp: `VoronoiPolicy.to_json`, `to_python`, `to_c`, `to_latex`, `to_text`.
 
 Numbers are written so that they read back as the same float64. Codewords are written already divided by the scale of
 the distance, states are divided where distances are taken, as `VoronoiPolicy` does.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .subpolicies import HIDDEN
+from .subpolicies import HIDDEN, number
 
 if TYPE_CHECKING:
     from .policy import VoronoiPolicy
@@ -159,8 +159,27 @@ void vsp_act(const double *state, double *action) {{
 """
 
 
-def to_latex(policy: VoronoiPolicy, digits: int = 3) -> str:
-    """A table of the codewords and their equations, one row per cell; needs the package booktabs."""
+def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+    """The whole policy in plain words: what distances are, and for every codeword its equations."""
+    lines = [_headline(policy), f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}."]
+    for i, codeword in enumerate(policy.codewords):
+        place = ", ".join(f"{name} {number(c, digits)}" for name, c in zip(policy.task.inputs, codeword))
+        lines += [f"nearest to {place}:", *(f"  {equation}" for equation in policy.equations(i, digits))]
+    lows, highs = ([number(limit, None) for limit in box] for box in (policy.task.action_low, policy.task.action_high))
+    limits = (f"{name} from {low} to {high}" for name, low, high in zip(policy.task.outputs, lows, highs))
+    return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
+
+
+def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
+    """What states are divided by before distances are taken, in words; nothing if they are taken as they are."""
+    if (policy.scale == 1).all():
+        return ""
+    units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
+    return f" of states divided, {', '.join(units)}"
+
+
+def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+    """A table of the codewords and their equations, one row per cell, and what distances are; needs booktabs."""
     outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
     rows = [
         " & ".join([codeword_latex(policy, i, digits), *equations_latex(policy, i, digits)]) for i in range(len(policy))
@@ -168,15 +187,27 @@ def to_latex(policy: VoronoiPolicy, digits: int = 3) -> str:
     head = " & ".join(["codeword", *outputs])
     body = "".join(rf"{row} \\" + "\n" for row in rows)
     columns = "l" * (1 + len(outputs))
-    return f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
+    note = rf"\multicolumn{{{len(columns)}}}{{l}}{{{distances_latex(policy, digits)}}} \\" + "\n"
+    return (
+        f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n"
+        f"{body}\\midrule\n{note}\\bottomrule\n\\end{{tabular}}\n"
+    )
 
 
-def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int = 3) -> str:
+def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+    """What distances to the codewords are: a caption for their table."""
+    if (policy.scale == 1).all():
+        return f"{policy.metric.capitalize()} distances"
+    units = ",\\ ".join(number(unit, digits) for unit in policy.scale)
+    return f"{policy.metric.capitalize()} distances of states divided by $[{units}]$"
+
+
+def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> str:
     """The codeword of a cell between dollars."""
-    return "$[" + ",\\ ".join(f"{c:.{digits}f}" for c in policy.codewords[cell]) + "]$"
+    return "$[" + ",\\ ".join(number(c, digits) for c in policy.codewords[cell]) + "]$"
 
 
-def equations_latex(policy: VoronoiPolicy, cell: int, digits: int = 3) -> list[str]:
+def equations_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> list[str]:
     """The right sides of the equations of a cell between dollars, one per action."""
     return [f"${policy.form.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
 

@@ -232,7 +232,7 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str) -> Axes:
             continue
         low, middle, high = (rows.groupby("size")[column].quantile(share) for share in (0.1, 0.5, 0.9))
         if "marker" not in style:
-            ax.plot(middle.index, middle, **{"lw": 0.9, **style}, label=method)
+            ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, **style}, label=method)
             if style["color"] == DISTILLED:
                 ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
             continue

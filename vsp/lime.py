@@ -23,7 +23,8 @@ def local_map(
 ) -> np.ndarray:
     """LIME's linear map around `state` (d,): weights, then bias, in the units of the task. (d + 1, m)
 
-    The recipe for tabular data without bins: `n` normal perturbations with the data's standard deviation `scale` (d,),
+    The recipe for tabular data without bins, around the state itself (their `sample_around_instance`; without it they
+    sample around the mean of all data): `n` normal perturbations with the data's standard deviation `scale` (d,),
     weights from an exponential kernel of the standardised distance, ridge regression of penalty 1. The authors' library
     takes the square root of the kernel, and so does this. Perturbed states may leave the box of the task, as theirs do.
     """

@@ -13,7 +13,7 @@ from .config import SLOW
 from .envs import GOAL, Task
 from .evaluate import start_states
 from .policy import VoronoiPolicy
-from .rollouts import Policy, play, record
+from .rollouts import Policy, play, visited
 from .trees import LinearTree, ObliqueLinearTree, SoftTree, Tree
 
 REPORT_SEED, ERROR_SEED = 21, 22  # of the start states: for returns, and for action errors
@@ -40,7 +40,7 @@ def measure(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
     """Root mean square difference of the two policies' actions on the way of `by`, in units of half the action box."""
-    states = np.concatenate([episode.states for episode in record(by, task, starts)])
+    states = visited(by, task, starts)
     half = 0.5 * (task.action_high - task.action_low)
     gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
     return float(np.sqrt(np.square(gaps).mean()))

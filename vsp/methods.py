@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-from . import tdavq
+from . import moves, tdavq
 from .baselines import Heuristic, dagger, kmeans_cells, linear_map, rule_of_thumb
 from .config import Refinement
 from .distill import distill
@@ -40,11 +40,12 @@ def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
 
 
 def closest(budget: Budget, size: int, seed: int) -> Policy:
-    """`refine` where to imitate is all that is asked: fitted long to the teacher's own episodes, then left alone."""
+    """Where to imitate is all that is asked, of the teacher's own episodes: cells that move, and neither correction nor
+    tuning."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    changes = {"n_generations": 0, "n_corrections": 0, "n_restarts": 2, "n_steps": 6000, "hottest": 2.5}
-    return refined(budget, size, seed, n_episodes=n, **changes)
+    config = replace(config, n_cells=size, n_episodes=n, n_restarts=3)
+    return moves.closest(budget.teacher, budget.task, config, seed=seed)
 
 
 # Fits to states (n, d) and actions (n, m)

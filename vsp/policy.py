@@ -138,8 +138,11 @@ class VoronoiPolicy:
             inside, outside, found = line[left[0] - 1, axis], line[left[0], axis], int(self.cells(line[left[0]]))
         return float(outside - state[axis]), found
 
-    def equations(self, cell: int, digits: int = 3) -> tuple[str, ...]:
-        """The sub-policy of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300"."""
+    def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
+        """The sub-policy of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
+
+        `digits` are decimals; None: each number exactly, and no term that is zero, as `simplify` leaves policies.
+        """
         return tuple(
             f"{output} = {self.form.expression(self.coefficients[cell, :, j], digits)}"
             for j, output in enumerate(self.task.outputs)
@@ -165,9 +168,13 @@ class VoronoiPolicy:
         """Source in C99 without dependencies: `void vsp_act(const double *state, double *action)`."""
         return export.to_c(self)
 
-    def to_latex(self, digits: int = 3) -> str:
-        """A LaTeX table of codewords and equations."""
+    def to_latex(self, digits: int | None = 3) -> str:
+        """A LaTeX table of codewords and equations, with `digits` as `equations` has them."""
         return export.to_latex(self, digits)
+
+    def to_text(self, digits: int | None = 3) -> str:
+        """The whole policy in plain words, with `digits` as `equations` has them."""
+        return export.to_text(self, digits)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""

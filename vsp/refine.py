@@ -18,7 +18,7 @@ from .checks import check_seed
 from .config import Refinement
 from .envs import GOAL, Task, get_task
 from .policy import VoronoiPolicy
-from .rollouts import Outcomes, Policy, play, record
+from .rollouts import Outcomes, Policy, play, visited
 from .subpolicies import BETA1, BETA2, EPSILON
 
 WARM = 10  # times the coldest temperature: where cells that are good already are annealed from
@@ -146,7 +146,7 @@ def _check_start(start: VoronoiPolicy, task: Task, config: Refinement) -> None:
 
 def _refine(teacher, task, config, seed, start) -> tuple[VoronoiPolicy, pd.DataFrame]:
     starts, init, batches, checks, search = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(5))
-    states = _states(teacher, task, task.start(starts, config.n_episodes))
+    states = visited(teacher, task, task.start(starts, config.n_episodes))
     frame = Frame.of(task, states)
     seen = frame.labelled(teacher, states, stakes=config.stakes)
     trials = Trials(frame, task.start(checks, config.n_validation), config.failure_price)
@@ -160,8 +160,8 @@ def _refine(teacher, task, config, seed, start) -> tuple[VoronoiPolicy, pd.DataF
         trials.add("fit", restart, anneal(seen, cells, config, batches, hottest=hottest, n_steps=config.n_steps))
     cells = trials.best
     for _ in range(config.n_corrections):
-        visited = _states(frame.policy(cells), task, task.start(starts, config.n_correction_episodes))
-        seen = seen.with_more(frame.labelled(teacher, visited, stakes=config.stakes))
+        states = visited(frame.policy(cells), task, task.start(starts, config.n_correction_episodes))
+        seen = seen.with_more(frame.labelled(teacher, states, stakes=config.stakes))
         cells = anneal(seen, cells, config, batches, hottest=warm, n_steps=config.n_steps // 2)
         trials.add("correct", trials.winner, cells)
     for cells in tune(frame, trials.best, config, search):
@@ -327,8 +327,3 @@ class Crowd:
         maps = self._coefficients[whose, cells]
         raw = np.einsum("nd,ndm->nm", states, maps[:, :-1]) + maps[:, -1]
         return np.clip(raw, self._one.task.action_low, self._one.task.action_high), None
-
-
-def _states(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
-    """All states (n, d) on the way of `policy` from `starts`."""
-    return np.concatenate([episode.states for episode in record(policy, task, starts)])

@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 
 from .checks import check_array
-from .evaluate import start_states
 from .export import symbol
 from .policy import VoronoiPolicy
-from .rollouts import record
+from .subpolicies import number
 
 MOST = 200  # leaves of the largest tree that is tried
 _DIGITS = range(1, 17)  # of the numbers in rules, the fewest first
@@ -44,12 +43,6 @@ class Rule:
             elif low or high:
                 conditions.append(f"{name} > {low}" if low else f"{name} <= {high}")
         return " and ".join(conditions) or "always"
-
-
-def visited(policy: VoronoiPolicy, n_episodes: int, *, seed: int) -> np.ndarray:
-    """The states of `n_episodes` episodes of `policy`, from the start states of `seed`. (n, d)"""
-    episodes = record(policy, policy.task, start_states(policy.task, n_episodes, seed))
-    return np.concatenate([episode.states for episode in episodes])
 
 
 def describe(
@@ -196,7 +189,7 @@ def _with(values: np.ndarray, place: int, value: float) -> np.ndarray:
 
 def _plain(bound: float) -> str:
     """A bound without needless zeros, nothing for an infinite one."""
-    return np.format_float_positional(bound + 0.0, trim="-") if np.isfinite(bound) else ""
+    return number(bound + 0.0, None) if np.isfinite(bound) else ""
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:

@@ -51,6 +51,11 @@ def record(policy: Policy, task: Task, starts: np.ndarray) -> list[Episode]:
     return [Episode(s, a) for s, a in zip(np.split(states, cuts), np.split(actions, cuts))]
 
 
+def visited(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
+    """All states (t, d) on the way from the start states (n, s), episode by episode."""
+    return np.concatenate([episode.states for episode in record(policy, task, starts)])
+
+
 def _advance(policy: Policy, task: Task, starts: np.ndarray, *, record: bool):
     """The loop behind `play` and `record`; finished episodes leave the batch."""
     starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))

@@ -13,7 +13,7 @@ from .envs import GOAL, Task, get_task
 from .evaluate import start_states
 from .policy import VoronoiPolicy
 from .refine import refine, worth
-from .rollouts import Outcomes, Policy, play, record
+from .rollouts import Outcomes, Policy, play, visited
 
 N_VISITED = 100  # episodes that tell where the states are
 DIGITS = range(1, 17)  # significant digits that are tried, the fewest first
@@ -27,15 +27,17 @@ def simplify(
     Everything is compared by `worth` from the same `config.n_validation` starts, so report the result from others.
     Returns the policy, its codewords `gathered`, and what was tried, one row each: stage ("cells", "prune", "round"),
     cells, nonzero coefficients, digits (0: as they are), mean return, failing, kept. The rows of stage "cells" are the
-    curve of return over cells. Where no number of cells will do, the best one goes on and nothing may cost it more
-    than `tolerance`. Raises ValueError as `refine` does, and for a tolerance below 0.
+    curve of return over cells; `attrs` hold the teacher's mean return. Where no number of cells will do, the best one
+    goes on and nothing may cost it more than `tolerance`. Raises ValueError as `refine` does, and for a tolerance below
+    0.
     """
     check_seed(seed)
     if not tolerance >= 0:
         raise ValueError(f"tolerance is {tolerance}, expected a return of at least 0")
     task = get_task(task)
     starts = start_states(task, config.n_validation, seed)
-    bar = worth(play(teacher, task, starts), config.failure_price) - tolerance
+    own = play(teacher, task, starts)
+    bar = worth(own, config.failure_price) - tolerance
     tried = _Tried(task, starts, config.failure_price)
     policies = []
     for k in range(1, config.n_cells + 1):
@@ -45,14 +47,16 @@ def simplify(
     best = int(np.argmax(tried.worths))
     if tried.worths[best] < bar:  # no number of cells will do
         bar = tried.worths[best] - tolerance
-    visited = np.concatenate([episode.states for episode in record(policies[best], task, starts[:N_VISITED])])
-    policy = prune(gathered(policies[best], visited), lambda one: tried.reaches(bar, "prune", one))
+    states = visited(policies[best], task, starts[:N_VISITED])
+    policy = prune(gathered(policies[best], states), lambda one: tried.reaches(bar, "prune", one))
     for digits in DIGITS:
         short = rounded(policy, digits)
         if short is not None and tried.reaches(bar, "round", short, digits=digits):
             policy = short
             break
-    return policy, pd.DataFrame(tried.rows)
+    frame = pd.DataFrame(tried.rows)
+    frame.attrs["teacher"] = float(own.returns.mean())
+    return policy, frame
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:

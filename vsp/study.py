@@ -52,7 +52,10 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="only say which results are stale")
     arguments = parser.parse_args()
     if arguments.check:
-        print(*stale(), sep="\n", end="\n" if stale() else "")
+        from . import beyond
+
+        found = [*stale(), *beyond.stale(RESULTS)]
+        print(*found, sep="\n", end="\n" if found else "")
         return
     runs, results = Path(arguments.out) / "build" / "study", Path(arguments.out) / "data" / "results"
     for name, study in STUDIES.items():

@@ -63,7 +63,7 @@ class Form:
         """What adds up to the output at `state` (d,): a row per action (m,), a column per feature and the bias."""
         return pd.DataFrame(parameters.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
-    def expression(self, column: np.ndarray, digits: int, symbol: Callable[[str], str] = str) -> str:
+    def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
         """One action's output as text: parameters (p,), and how a variable's name is printed."""
         return expression(column, tuple(symbol(term) for term in self.terms), digits)
 
@@ -130,7 +130,7 @@ class Network(Form):
         rest = self.outputs(state, parameters) - first.sum(axis=1)
         return pd.DataFrame(np.column_stack([first, rest]), columns=[*self.terms, "rest"])
 
-    def expression(self, column: np.ndarray, digits: int, symbol: Callable[[str], str] = str) -> str:
+    def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
         """One action's output as text, such as "0.5 tanh(1.2 x - 0.3 v + 0.1) + ... + 0.2"."""
         hidden, weights, bias = self._layers(column[:, None])
         inner = [super(Network, self).expression(one, digits, symbol) for one in hidden[..., 0].T]
@@ -270,9 +270,17 @@ class SubPolicies:
         self.parameters[cells] = theta + np.linalg.solve(ridged, slope) / units
 
 
-def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int = 3) -> str:
-    """A linear expression as text: coefficients (q + 1,), the last one the bias, of the variables `names` (q,)."""
-    terms = [f"{abs(c):.{digits}f} {name}".rstrip() for c, name in zip(coefficients, [*names, ""])]
-    signs = ["-" if c < 0 else "+" for c in coefficients]
-    text = " ".join(f"{sign} {term}" for sign, term in zip(signs, terms))
-    return text.removeprefix("+ ") if signs[0] == "+" else "-" + text[2:]
+def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | None = 3) -> str:
+    """A linear expression as text: coefficients (q + 1,), the last one the bias, of the variables `names` (q,).
+
+    `digits` are decimals; None: each number exactly, as short as it can be written, and no term that is zero.
+    """
+    terms = [(c, name) for c, name in zip(coefficients, [*names, ""]) if c or digits is not None]
+    parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
+    text = " ".join(parts)
+    return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
+
+
+def number(value: float, digits: int | None) -> str:
+    """A number with so many decimals; None: exactly, as short as it can be written."""
+    return np.format_float_positional(value, trim="-") if digits is None else f"{value:.{digits}f}"

@@ -65,7 +65,7 @@ def readings(task: str) -> pd.DataFrame:
     return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
 
 
-def equation_table(policy: VoronoiPolicy, *, digits: int = 3, swatch: bool = False) -> pd.DataFrame:
+def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: bool = False) -> pd.DataFrame:
     """T3 and T4: one row per cell, the codeword and an equation per action in LaTeX.
 
     `swatch` puts a patch in the force map's colour of the action at the codeword before the equation, for one action.
