@@ -26,6 +26,8 @@ def quick(monkeypatch):
     monkeypatch.setattr(methods, "distill", lambda teacher, task, *, seed: (paper.published_policy(task.name), None))
     monkeypatch.setattr(SoftTree, "N_STEPS", 50)
     monkeypatch.setattr(methods.moves, "N_MOVES", 1)
+    short = METHODS["refined, faithful"].settings | {"n_generations": 1, "n_tuning_episodes": 10}
+    monkeypatch.setitem(METHODS, "refined, faithful", dataclasses.replace(METHODS["refined, faithful"], settings=short))
     return monkeypatch
 
 
@@ -59,7 +61,7 @@ def test_every_method_has_the_same_budget_of_teacher_episodes(quick, name):
     training = list(played)
     if name != "refined, closest":  # which is chosen on the episodes that it was fitted to
         training.remove(SMALL.n_validation)  # whose states nobody is fitted to
-    if name == "refined":
+    if name in ("refined", "refined, faithful"):
         training.remove(SMALL.n_tuning_episodes)  # where no teacher is asked; as many as those of a round
     assert sum(training) == 40
 

@@ -9,8 +9,8 @@ from vsp.config import Refinement
 from vsp.envs import get_task
 from vsp.evaluate import start_states
 from vsp.measure import action_error
-from vsp.moves import closest, moved, nearest_two, squared_errors
-from vsp.refine import Cells, Labelled
+from vsp.moves import closest, moved, nearest_two
+from vsp.refine import Cells, Labelled, squared_error, squared_errors
 
 SMALL = Refinement(n_cells=3, n_episodes=60, n_restarts=1, n_steps=200, batch_size=128)
 LINE = np.array([[0.0], [1.0], [2.0], [9.0]])  # of codewords
@@ -74,8 +74,10 @@ def test_moves_bring_it_closer(monkeypatch):
 
 def test_more_beginnings_are_never_worse_on_what_was_seen(monkeypatch):
     monkeypatch.setattr(moves, "N_MOVES", 0)
-    losses, kept = [], moves._loss
-    monkeypatch.setattr(moves, "_loss", lambda seen, cells: losses.append(kept(seen, cells)) or losses[-1])
+    losses = []
+    monkeypatch.setattr(
+        moves, "squared_error", lambda seen, cells: losses.append(squared_error(seen, cells)) or losses[-1]
+    )
     config = dataclasses.replace(SMALL, n_restarts=4)
     policy = closest(CurvedTeacher(), SIMPLEGOAL, config, seed=0)
     assert len(set(losses)) == 4 and losses.index(min(losses)) > 0

@@ -22,6 +22,7 @@ from vsp.evaluate import outcomes
 from vsp.policy import VoronoiPolicy
 from vsp.refine import (
     SNAPSHOTS,
+    Aim,
     Cells,
     Crowd,
     Frame,
@@ -32,6 +33,7 @@ from vsp.refine import (
     expected_loss,
     play_all,
     refine,
+    squared_error,
     tune,
     worth,
 )
@@ -168,10 +170,33 @@ def test_a_failure_costs_its_price():
     assert worth(ended([10, 20], [GOAL, PIT]), 4.0) == worth(ended([10, 20], [TRUNCATED, GOAL]), 4.0) == 13
 
 
+def test_being_unlike_the_teacher_costs_its_price():
+    cells, inputs, actions = some()
+    seen, result = Labelled(inputs, actions), ended([10, 20], [GOAL, PIT])
+    error = np.mean((np.clip(hard_actions(cells, inputs), -1, 1) - actions) ** 2)
+    assert squared_error(seen, cells) == pytest.approx(error) and error > 0.1
+    assert Aim(4.0, 7.0, seen).worth(result, cells) == pytest.approx(13 - 7 * error)
+    assert Aim(4.0).worth(result, cells) == worth(result, 4.0)
+
+
+def test_tuning_stays_closer_where_errors_cost():
+    """A teacher that goes slowly: for the return alone it pays to be faster than it."""
+    frame, states = Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2)), np.random.default_rng(0).random((200, 2))
+    slow = Cells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))
+    inputs = np.column_stack([states, np.ones(200)])
+    seen = Labelled(inputs, inputs @ slow.maps[0])
+    config = dataclasses.replace(SMALL, n_cells=1, n_generations=20, tuning_step=0.2)
+    errors = []
+    for price in (0.0, 10.0, 1000.0):
+        *_, tuned = tune(frame, slow, config, Aim(0.0, price, seen), np.random.default_rng(0))
+        errors.append(squared_error(seen, tuned))
+    assert errors[0] > 5 * errors[1] > 25 * errors[2]
+
+
 def test_the_first_of_the_best_trials_is_kept():
     task = get_task(SIMPLEGOAL)
     frame = Frame(task, np.zeros(2), np.ones(2))
-    trials = Trials(frame, np.array([[0.9, 0.05], [0.05, 0.9]]), 1000.0)
+    trials = Trials(frame, np.array([[0.9, 0.05], [0.05, 0.9]]), Aim(1000.0))
     still, home = (Cells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
     again = Cells(home.codewords + 1, home.maps)
     for restart, cells in enumerate((still, home, again)):
@@ -185,7 +210,7 @@ def test_tuning_finds_a_better_policy():
     frame = Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
     slow = Cells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))
     config = dataclasses.replace(SMALL, n_cells=1, n_generations=30, tuning_step=0.2)
-    steps = list(tune(frame, slow, config, np.random.default_rng(0)))
+    steps = list(tune(frame, slow, config, Aim(0.0), np.random.default_rng(0)))
     assert len(steps) == SNAPSHOTS
     tuned = steps[-1]
     before, after = (outcomes(frame.policy(cells), SIMPLEGOAL, 500, seed=9).returns.mean() for cells in (slow, tuned))
@@ -273,7 +298,7 @@ def test_the_trials_tell_how_it_came_about(refined):
     "change",
     [{"n_cells": 2}, {"n_episodes": 30}, {"n_steps": 200}, {"batch_size": 64}, {"learning_rate": 0.01},
      {"hottest": 0.5}, {"coldest": 0.01}, {"leak": 0.2}, {"n_corrections": 2}, {"n_correction_episodes": 20},
-     {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.3}],
+     {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.3}, {"error_price": 100.0}],
 )  # fmt: skip
 def test_every_setting_acts(change):
     base = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
@@ -298,7 +323,7 @@ def test_other_validation_episodes_give_other_means(refined):
 def test_the_price_of_a_failure_decides_between_a_mean_and_a_safe_one(monkeypatch, price, kept):
     results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
     monkeypatch.setattr(module, "play", lambda *_: next(results))
-    trials = Trials(Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2)), None, price)
+    trials = Trials(Frame(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2)), None, Aim(price))
     for restart in range(2):
         trials.add("fit", restart, some(k=1)[0])
     assert trials.winner == kept

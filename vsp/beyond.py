@@ -47,6 +47,9 @@ EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validatio
 ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
 PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
 
+# `refined` that stays close to its teacher
+FAITHFUL = {"n_generations": 300, "n_tuning_episodes": 500, "tuning_step": 0.01, "error_price": 30.0}
+
 
 @dataclass(frozen=True)
 class Method:
@@ -72,6 +75,9 @@ METHODS = {
     "refined": Method(methods.refined, ("refine",), ALL),
     "refined, not tuned": Method(methods.refined, ("refine",), ALL, {"n_generations": 0}),
     "refined, closest": Method(methods.closest, ("refine", "moves"), ALL, sizes=(13,)),
+    "refined, faithful": Method(
+        methods.faithful, ("refine", "moves"), ALL, FAITHFUL, sizes=(13,), tasks=paper.TASKS[:1]
+    ),
     "k-means cells, DAgger": _by_dagger(methods.kmeans, "baselines", beginnings=3),
     "CART": Method(partial(methods.alone, fit=methods.tree), ("trees", "baselines", "refine"), EPISODES),
     "CART, DAgger": _by_dagger(methods.tree, "trees"),

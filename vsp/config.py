@@ -174,12 +174,15 @@ class Refinement:
     failure_price: float = 0.0
     """Return that a failed episode costs on top, wherever candidates are compared, for a mean hides what is rare. What
     fails is what does not end in a goal; where an end is the failure, as of a walker that falls, leave it at 0."""
+    error_price: float = 0.0
+    """Return that a mean squared action error of 1 costs on top, in units of half the action box and where the teacher
+    goes: 0 asks for the return alone, however unlike the teacher the policy becomes."""
     n_validation: int = 5000
     """Episodes that decide between restarts, rounds and before and after tuning."""
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self)).items():
-            optional, value = name in ("n_corrections", "n_generations", "failure_price"), getattr(self, name)
+            optional, value = name.endswith("_price") or name in ("n_corrections", "n_generations"), getattr(self, name)
             zero = value == 0 and isinstance(value, int | kind) and not isinstance(value, bool)
             if not (optional and zero):  # else without this part
                 _check(name, value, kind)

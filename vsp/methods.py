@@ -48,6 +48,17 @@ def closest(budget: Budget, size: int, seed: int) -> Policy:
     return moves.closest(budget.teacher, budget.task, config, seed=seed)
 
 
+def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
+    """The `closest`, tuned gently, and only as far as that pays for being less like the teacher.
+
+    The teacher plays the episodes of one round for the tuning, and those of the others for the fit.
+    """
+    config = budget.config
+    start = closest(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
+    changes |= {"n_restarts": 1, "n_corrections": 0, "n_episodes": config.n_correction_episodes}
+    return refine(budget.teacher, budget.task, replace(config, n_cells=size, **changes), seed=seed, start=start)[0]
+
+
 # Fits to states (n, d) and actions (n, m)
 
 

@@ -14,7 +14,7 @@ from .checks import check_seed
 from .config import Refinement
 from .envs import Task, get_task
 from .policy import VoronoiPolicy
-from .refine import WARM, Cells, Frame, Labelled, anneal, beginning
+from .refine import WARM, Cells, Frame, Labelled, anneal, beginning, closeness, squared_error, squared_errors
 from .rollouts import Policy, visited
 
 N_MOVES = 40  # tried after each beginning
@@ -43,14 +43,14 @@ def closest(teacher: Policy, task: str | Task, config: Refinement, *, seed: int)
         for _ in range(N_MOVES):
             cells = _better(seen, cells, moved(seen, cells, init), config, batches)
         found.append(cells)
-    return frame.policy(min(found, key=lambda cells: _loss(seen, cells)))
+    return frame.policy(min(found, key=lambda cells: squared_error(seen, cells)))
 
 
 def _better(seen: Labelled, cells: Cells, other: Cells, config: Refinement, rng: np.random.Generator) -> Cells:
     """`cells`, or `other` if it has less error once it has been fitted."""
     hottest = min(config.hottest, WARM * config.coldest)
     other = anneal(seen, other, config, rng, hottest=hottest, n_steps=config.n_steps // 2)
-    return min(cells, other, key=lambda one: _loss(seen, one))
+    return min(cells, other, key=lambda one: squared_error(seen, one))
 
 
 def moved(seen: Labelled, cells: Cells, rng: np.random.Generator) -> Cells:
@@ -72,20 +72,9 @@ def moved(seen: Labelled, cells: Cells, rng: np.random.Generator) -> Cells:
     return Cells(codewords, maps)
 
 
-def _loss(seen: Labelled, cells: Cells) -> float:
-    return float(squared_errors(seen, cells)[np.arange(len(seen.inputs)), nearest_two(seen, cells)[0]].mean())
-
-
-def squared_errors(seen: Labelled, cells: Cells) -> np.ndarray:
-    """Mean squared error of the limited action of every cell in every state, (n, k)."""
-    k, rows, m = cells.maps.shape
-    raw = (seen.inputs @ cells.maps.transpose(1, 0, 2).reshape(rows, k * m)).reshape(-1, k, m)
-    return np.square(np.clip(raw, -1.0, 1.0) - seen.actions[:, None]).mean(axis=2)
-
-
 def nearest_two(seen: Labelled, cells: Cells) -> np.ndarray:
     """The nearest and the second nearest codeword of every state, (2, n)."""
-    closeness = 2 * seen.inputs[:, :-1] @ cells.codewords.T - np.square(cells.codewords).sum(axis=1)
-    first = closeness.argmax(axis=1)
-    closeness[np.arange(len(closeness)), first] = -np.inf
-    return np.stack([first, closeness.argmax(axis=1)])
+    near = closeness(seen, cells)
+    first = near.argmax(axis=1)
+    near[np.arange(len(near)), first] = -np.inf
+    return np.stack([first, near.argmax(axis=1)])

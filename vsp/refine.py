@@ -149,7 +149,8 @@ def _refine(teacher, task, config, seed, start) -> tuple[VoronoiPolicy, pd.DataF
     states = visited(teacher, task, task.start(starts, config.n_episodes))
     frame = Frame.of(task, states)
     seen = frame.labelled(teacher, states, stakes=config.stakes)
-    trials = Trials(frame, task.start(checks, config.n_validation), config.failure_price)
+    aim = Aim(config.failure_price, config.error_price, seen)
+    trials = Trials(frame, task.start(checks, config.n_validation), aim)
 
     warm = min(config.hottest, WARM * config.coldest)  # for what is good already
     first = line(seen, config.n_cells, init) if start is None else frame.cells(start)
@@ -164,30 +165,62 @@ def _refine(teacher, task, config, seed, start) -> tuple[VoronoiPolicy, pd.DataF
         seen = seen.with_more(frame.labelled(teacher, states, stakes=config.stakes))
         cells = anneal(seen, cells, config, batches, hottest=warm, n_steps=config.n_steps // 2)
         trials.add("correct", trials.winner, cells)
-    for cells in tune(frame, trials.best, config, search):
+    for cells in tune(frame, trials.best, config, aim, search):
         trials.add("tune", trials.winner, cells)
     return frame.policy(trials.best), pd.DataFrame(trials.rows)
 
 
-class Trials:
-    """Candidates, compared by their `worth` from the same starts; the first of the best is kept."""
+@dataclass(frozen=True)
+class Aim:
+    """What candidates are compared by: their return, less what failures and being unlike the teacher cost."""
 
-    def __init__(self, frame: Frame, starts: np.ndarray, price: float):
+    failure_price: float
+    error_price: float = 0.0
+    seen: Labelled | None = None  # where the teacher goes; without it errors cost nothing
+
+    def worth(self, result: Outcomes, cells: Cells) -> float:
+        """Of `cells` that ended as `result` says."""
+        value = worth(result, self.failure_price)
+        return value - self.error_price * squared_error(self.seen, cells) if self.error_price else value
+
+
+class Trials:
+    """Candidates, compared by their worth for an `Aim` from the same starts; the first of the best is kept."""
+
+    def __init__(self, frame: Frame, starts: np.ndarray, aim: Aim):
         self.rows, self.best, self.winner = [], None, 0
-        self._frame, self._starts, self._price, self._most = frame, starts, price, -np.inf
+        self._frame, self._starts, self._aim, self._most = frame, starts, aim, -np.inf
 
     def add(self, stage: str, restart: int, cells: Cells) -> None:
         """Play `cells` from the validation starts."""
         result = play(self._frame.policy(cells), self._frame.task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.codes != GOAL)
         self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
-        if worth(result, self._price) > self._most:
-            self._most, self.best, self.winner = worth(result, self._price), cells, restart
+        if (value := self._aim.worth(result, cells)) > self._most:
+            self._most, self.best, self.winner = value, cells, restart
 
 
 def worth(result: Outcomes, price: float) -> float:
     """Mean return, less `price` for every failed episode; where none can succeed this changes no comparison."""
     return float(result.returns.mean() - price * np.mean(result.codes != GOAL))
+
+
+def squared_errors(seen: Labelled, cells: Cells) -> np.ndarray:
+    """Mean squared error of the limited action of every cell in every state, (n, k)."""
+    k, rows, m = cells.maps.shape
+    raw = (seen.inputs @ cells.maps.transpose(1, 0, 2).reshape(rows, k * m)).reshape(-1, k, m)
+    return np.square(np.clip(raw, -1.0, 1.0) - seen.actions[:, None]).mean(axis=2)
+
+
+def squared_error(seen: Labelled, cells: Cells) -> float:
+    """The same of each state's own cell, over all states."""
+    own = closeness(seen, cells).argmax(axis=1)
+    return float(squared_errors(seen, cells)[np.arange(len(own)), own].mean())
+
+
+def closeness(seen: Labelled, cells: Cells) -> np.ndarray:
+    """How near each codeword is to each state, greatest for the nearest: |x|² - |x - c|² = 2 x·c - |c|². (n, k)"""
+    return 2 * seen.inputs[:, :-1] @ cells.codewords.T - np.square(cells.codewords).sum(axis=1)
 
 
 def line(seen: Labelled, k: int, rng: np.random.Generator) -> Cells:
@@ -256,8 +289,8 @@ def expected_loss(
     return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_maps.ravel()])
 
 
-def tune(frame: Frame, cells: Cells, config: Refinement, rng: np.random.Generator) -> Iterator[Cells]:
-    """CMA-ES (Hansen 2016) on `worth`: a generation plays all its candidates from the same fresh starts.
+def tune(frame: Frame, cells: Cells, config: Refinement, aim: Aim, rng: np.random.Generator) -> Iterator[Cells]:
+    """CMA-ES (Hansen 2016) on the worth for `aim`: a generation plays all its candidates from the same fresh starts.
 
     Yields where the search stands, `SNAPSHOTS` times: rare failures may slip in later, unseen by a generation's starts.
     """
@@ -268,8 +301,9 @@ def tune(frame: Frame, cells: Cells, config: Refinement, rng: np.random.Generato
     for i in range(config.n_generations):
         starts = frame.task.start(rng, config.n_tuning_episodes)
         asked = search.ask()
-        played = play_all([frame.policy(cells.like(one)) for one in asked], frame.task, starts)
-        search.tell(asked, [-worth(result, config.failure_price) for result in played])
+        candidates = [cells.like(one) for one in asked]
+        played = play_all([frame.policy(one) for one in candidates], frame.task, starts)
+        search.tell(asked, [-aim.worth(result, one) for result, one in zip(played, candidates)])
         if (i + 1) * SNAPSHOTS // config.n_generations > i * SNAPSHOTS // config.n_generations:
             yield cells.like(search.result.xfavorite)
 
