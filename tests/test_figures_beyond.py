@@ -158,11 +158,13 @@ def test_return_over_cells_by_hand(ax):
     assert ax.get_ylim()[0] > -40  # what is not drawn does not stretch the view
 
 
-def test_what_simplify_tried_is_such_a_curve(ax):
-    rows = [("cells", 1, 4.0), ("cells", 2, 9.0), ("prune", 2, 1.0), ("round", 2, 1.0)]
-    figures_beyond.return_over_cells(ax, pd.DataFrame(rows, columns=["stage", "cells", "mean"]), 10.0, linear=0.1)
-    assert named(ax)["refined"].get_xydata().tolist() == [[1, -6], [2, -1]]
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "2"]
+def test_what_simplify_ended_with_is_a_mark_in_it(ax):
+    rows = [("cells", 1, 4.0, False), ("cells", 2, 9.0, True), ("prune", 2, 8.5, True), ("round", 2, 1.0, False)]
+    frame = pd.DataFrame(rows, columns=["stage", "cells", "mean", "kept"])
+    frame.attrs["teacher"] = 9.5
+    figures_beyond.simplified(ax, frame, 1.5)
+    assert named(ax)["simplified"].get_xydata().tolist() == [[2, -1]]
+    assert set(named(ax)["tolerance"].get_ydata()) == {-1.5}
 
 
 def test_every_method_of_the_comparison_has_a_look_of_its_own():

@@ -259,7 +259,7 @@ def rivals(frame: pd.DataFrame) -> pd.DataFrame:
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     """`refined` and what is left of it without one of its parts, at the size of the preset, as `summary` has it.
 
-    The column `part` names what was taken away, or is "all of it"; the best mean return comes first. Raises ValueError
+    The column `part` names what was taken away, in the order of `ABLATION`; "all of it" comes first. Raises ValueError
     for a task without such rows, one of `LONG`.
     """
     names = {f"refined, {part}": part for part in ABLATION} | {"refined": "all of it"}
@@ -267,7 +267,8 @@ def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     if not ablated.any():
         raise ValueError(f"no method of {sorted(set(frame['method']))} is an ablation, expected one of {sorted(names)}")
     rows = frame[(frame["size"] == frame.loc[ablated, "size"].iloc[0]) & frame["method"].isin(names)]
-    return summary(rows).assign(part=lambda table: table["method"].map(names))
+    table = summary(rows).assign(part=lambda table: table["method"].map(names)).set_index("part")
+    return table.loc[[part for part in ("all of it", *ABLATION) if part in table.index]].reset_index()
 
 
 def reached(task: str, frame: pd.DataFrame) -> pd.DataFrame:

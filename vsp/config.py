@@ -238,7 +238,7 @@ _BEST = {
     "SimpleGoal-v0": Refinement(n_cells=4, n_restarts=6, n_generations=150, failure_price=100.0),
     # One failure in ten thousand weighs ten points of return: a tuned force is so gentle that it may not suffice
     "MountainCarContinuous-v0": Refinement(
-        n_cells=2, n_episodes=100, n_correction_episodes=50, n_generations=40, n_tuning_episodes=30,
+        n_cells=3, n_episodes=100, n_correction_episodes=50, n_generations=40, n_tuning_episodes=30,
         failure_price=100_000.0,
     ),
     "Pendulum-v1": Refinement(

@@ -14,7 +14,7 @@ import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from . import geometry
 from .figures import (
@@ -41,6 +41,7 @@ METHODS = {
     "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5},
     "refined, not tuned": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4},
     "refined, closest": {"color": DISTILLED, "marker": "o"},
+    "refined, faithful": {"color": DISTILLED, "marker": "P"},
     "oblique tree, linear leaves, DAgger": {"color": COLOURS[3]},
     "CART, linear leaves, DAgger": {"color": COLOURS[4]},
     "k-means cells, DAgger": {"color": COLOURS[2]},
@@ -180,8 +181,11 @@ def comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> Figure:
     fig, axes = panels(2, height=3.6)
     return_over_cells(axes[0], frame, teacher, linear=linear)
     over_cells(axes[1], frame[frame["method"] != "teacher"], "error_teacher")
-    axes[1].set(yscale="log", ylabel="action error (half boxes)")
-    letter(axes, ["return", "error where the teacher goes"])
+    axes[1].set(yscale="log", ylabel="where the teacher goes (half boxes)")
+    axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes[1].yaxis.set_major_formatter("{x:g}")
+    axes[1].yaxis.set_minor_locator(NullLocator())
+    letter(axes, ["return", "action error"])
     legend_below(fig, axes[0], ncol=2)
     return fig
 
@@ -204,17 +208,22 @@ def against_time(ax: Axes, frame: pd.DataFrame, *, enough: float) -> Axes:
 
 
 def return_over_cells(ax: Axes, frame: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
-    """Mean return minus the teacher's, drawn by `over_cells`; `frame` may also be what `vsp.simplify` tried.
-
-    The scale is linear up to `linear` and logarithmic beyond.
-    """
-    if "stage" in frame:
-        frame = frame[frame["stage"] == "cells"].assign(method="refined", size=lambda rows: rows["cells"])
+    """Mean return minus the teacher's, by `over_cells`, on a scale linear up to `linear` and logarithmic beyond."""
     ax.set_yscale("symlog", linthresh=linear)
     over_cells(ax, frame.assign(gap=frame["mean"] - teacher), "gap")
     ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher")
     ax.set_ylabel("mean return − teacher’s")
     ax.yaxis.set_major_formatter("{x:g}")
+    return ax
+
+
+def simplified(ax: Axes, frame: pd.DataFrame, tolerance: float) -> Axes:
+    """The policy that `vsp.simplify` ended with, in `return_over_cells`, by `frame` of what it tried; the tolerance as
+    a line."""
+    last = frame[frame["kept"]].iloc[-1]
+    look = {"ls": "", "marker": "o", "ms": 5, "color": "black", "mec": "white", "mew": 0.5, "zorder": 7}
+    ax.plot(last["cells"], last["mean"] - frame.attrs["teacher"], **look, label="simplified")
+    ax.axhline(-tolerance, color="black", lw=0.8, ls=":", zorder=3, label="tolerance")
     return ax
 
 
