@@ -1,9 +1,10 @@
 import dataclasses
 
+import pandas as pd
 import pytest
 
 from vsp import race as module
-from vsp.race import OURS, TREES, race
+from vsp.race import ENOUGH, OURS, TREES, quickest, race
 
 
 def test_every_setting_runs_with_every_seed(monkeypatch):
@@ -23,3 +24,16 @@ def test_every_setting_runs_with_every_seed(monkeypatch):
 def test_settings_are_not_tuned_and_have_one_beginning():
     for config in (*OURS.values(), *TREES.values()):
         assert (config.n_generations, config.n_restarts, config.n_corrections) == (0, 1, 2)
+
+
+def test_the_quickest_that_is_good_enough_by_hand():
+    settings = [("trees", "small", 0.1, 0.95), ("trees", "large", 2.0, 0.991), ("trees", "huge", 3.0, 0.999)]
+    settings += [("cells", "few", 1.0, 0.995), ("none", "any", 0.01, 0.98)]
+    rows = [
+        {"method": method, "setting": setting, "seed": seed, "seconds": seconds * spread, "mean": share * 10 * spread,
+         "failing": 0.0, "share": share * spread}
+        for method, setting, seconds, share in settings for seed, spread in enumerate((0.5, 1.0, 1.5))
+    ]  # fmt: skip
+    found = quickest(pd.DataFrame(rows))
+    assert found[["method", "setting", "seconds"]].values.tolist() == [["cells", "few", 1.0], ["trees", "large", 2.0]]
+    assert found["share"].tolist() == [0.995, 0.991] and ENOUGH == 0.99
