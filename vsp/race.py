@@ -31,7 +31,7 @@ ENOUGH = 0.99  # of the teacher's mean return
 QUICK = replace(preset(TASK, "best"), n_restarts=1, n_generations=0, n_validation=1000)
 TREES = {  # by the episodes of the teacher: with two rounds of corrections
     f"{n} + 2 × {more} episodes": replace(QUICK, n_episodes=n, n_correction_episodes=more)
-    for n, more in ((300, 200), (2000, 500), (5000, 1000))
+    for n, more in ((300, 200), (2000, 500), (5000, 1000), (10_000, 3000))
 }
 OURS = {
     f"{cells} cells, {steps} steps": replace(QUICK, n_cells=cells, n_steps=steps, n_episodes=300)
@@ -71,9 +71,10 @@ def race(seeds=SEEDS) -> pd.DataFrame:
 
 
 def quickest(frame: pd.DataFrame) -> pd.DataFrame:
-    """The quickest setting of each method whose median share is `ENOUGH`, rows of `race`; a method without one has none.
+    """The quickest setting of each method whose median share is `ENOUGH`; a method without one is left out.
 
-    Columns: method, setting, seconds, mean, failing, share: medians over the seeds. The quickest method comes first.
+    `frame` has rows of `race`. Columns: method, setting, seconds, mean, failing, share: medians over the seeds. The
+    quickest method comes first.
     """
     scores = ["seconds", "mean", "failing", "share"]
     medians = frame.groupby(["method", "setting"], sort=False)[scores].median().reset_index()
