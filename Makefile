@@ -4,7 +4,7 @@
 # for every notebook, the checksums of all that it read and made. An altered, deleted or never made file is made again.
 
 # What each notebook makes: figures/ (PDF and PNG), figures/tables/ (TEX and CSV) and data/results/.
-NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger
+NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
 FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
@@ -13,9 +13,15 @@ TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_
   simplegoal_spread mountaincar_spread text_numbers
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
+FIGURES_06_beyond := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
+  beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
+TABLES_06_beyond := beyond_headline beyond_ablation \
+  $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
 # The notebooks that read data/runs, and what else they read: results that `make study` and `make beyond` make.
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv
+READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous-v0 beyond_Pendulum-v1 beyond_race \
+  lookup,data/results/$(n).csv)
 
 OUT ?= .
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN || echo 1)
@@ -82,10 +88,10 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
 	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
 
-beyond: venv ## our own method and others beside it, into data/results/: an HOUR or so, resumable
+beyond: venv ## our own method and others beside it, into data/results/: about an HOUR, resumable
 	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(JOBS)
 
-beyond-long: venv ## the same for LunarLander, whose physics engine is slow: some HOURS, resumable
+beyond-long: venv ## the same for LunarLander, whose physics engine is slow: about 3 HOURS, resumable
 	$(PY) -m vsp.beyond --long --out "$(OUT)" --jobs $(JOBS)
 
 lookup: venv ## times of look-ups and neighbour graphs in many dimensions, into data/results/: about 3 minutes

@@ -58,9 +58,11 @@ def test_first_code_cell_holds_the_parameters(notebook):
     )
 
 
-def test_notebooks_import_no_training_library(notebook):
+def test_only_the_cell_that_trains_imports_a_training_library(notebook):
+    """It comes in notebook 6 alone, where a reader's own agent is distilled."""
     for cell in code_cells(notebook):
-        assert "import torch" not in cell.source and "stable_baselines3" not in cell.source, cell.id
+        if cell.id != "own":
+            assert "import torch" not in cell.source and "stable_baselines3" not in cell.source, cell.id
 
 
 def test_drawing_loads_no_training_library():

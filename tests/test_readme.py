@@ -24,7 +24,7 @@ def test_artefacts_and_cells_exist():
         for path in (ROOT / "notebooks").glob("*.ipynb")
     }
     rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", README, flags=re.M)
-    assert len(rows) == 18
+    assert len(rows) == 25
     for artefacts, notebook, names in rows:
         assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
         for artefact in re.findall(r"`([a-z_/]+)`", artefacts):
@@ -59,6 +59,29 @@ def test_ledger_counts_are_those_of_the_ledger():
         (cells,) = re.findall(rf"^\| {name} \| (.*) \|$", README, flags=re.M)
         found = book.loc[book["part"] == part, "verdict"].value_counts()
         assert [int(n) for n in cells.split(" | ")] == [found.get(verdict, 0) for verdict in verdicts]
+
+
+def test_headline_is_that_of_the_table():
+    table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_headline.csv")
+    block = README.partition("## Three equations instead")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (\w+) \| ([-\d.]+) \| (\d+) \| ([-\d.]+) \| (\d+) % \| ([-\d.]+) \|$", block, flags=re.M)
+    assert rows == [
+        (row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f}",
+         f"{row['rival mean']:.2f}")
+        for row in table.to_dict("records")
+    ]  # fmt: skip
+
+
+def test_the_printed_policy_is_that_of_the_table():
+    table = (ROOT / "figures" / "tables" / "beyond_pendulum_policy.csv").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```\n(Pendulum-v1: .*?)```", README, flags=re.S)
+    cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
+    assert len(cells) == len(table.splitlines()) - 1
+    for row, (codeword, equation) in zip(table.splitlines()[1:], cells):
+        found, printed = (
+            re.findall(r"-?\d+\.?\d*", text.replace("- ", "-")) for text in (row, f"{codeword} {equation}")
+        )
+        assert found == printed
 
 
 def test_what_cells_buy_is_that_of_the_table():

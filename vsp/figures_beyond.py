@@ -181,7 +181,7 @@ def comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> Figure:
     fig, axes = panels(2, height=3.6)
     return_over_cells(axes[0], frame, teacher, linear=linear)
     over_cells(axes[1], frame[frame["method"] != "teacher"], "error_teacher")
-    axes[1].set(yscale="log", ylabel="where the teacher goes (half boxes)")
+    axes[1].set(yscale="log", ylabel="half action boxes")
     axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes[1].yaxis.set_major_formatter("{x:g}")
     axes[1].yaxis.set_minor_locator(NullLocator())
