@@ -6,12 +6,14 @@ import types
 import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples, tiny
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples, tiny
 
 from vsp import baselines, paper
 from vsp.baselines import (
     LEAVES,
     Heuristic,
+    PumpAndBalance,
+    Still,
     compare,
     dagger,
     fit,
@@ -142,6 +144,23 @@ def test_the_rule_of_thumb_of_simplegoal_by_hand():
     name, policy = rule_of_thumb(SIMPLEGOAL)
     actions, _ = policy.predict(np.array([[0.0, 0.0], [0.9, 0.2], [0.5, 1.0]]))
     assert name == "always (−1, −1)" and (actions == -1).all() and len(policy) == 1
+
+
+def test_the_pendulum_is_pumped_and_balanced_by_hand():
+    """Hanging still it has 10 J too little and is pushed along; near upright it is pushed back; never beyond 2."""
+    obs = np.array([[-1.0, 0.0, 0.1], [-1.0, 0.0, -0.1], [1.0, 0.05, 0.2], [0.0, 1.0, 5.5]])
+    actions = PumpAndBalance().predict(obs)[0].ravel()
+    assert actions[:2].tolist() == [2.0, -2.0]
+    assert actions[2:] == pytest.approx([-10 * 0.05 - 2 * 0.2, -2 * (5.5**2 / 6 - 5)])
+
+
+def test_the_pendulum_is_held_upright():
+    frame = evaluate(PumpAndBalance(), PENDULUM, 500, seed=30)
+    assert -160 < frame["return"].mean() < -140
+
+
+def test_no_teacher_does_nothing():
+    assert Still(get_task(SIMPLEGOAL)).predict(np.ones((3, 2)))[0].tolist() == [[0.0, 0.0]] * 3
 
 
 def test_the_rule_of_thumb_of_mountaincar_by_hand():

@@ -61,7 +61,7 @@ def test_every_method_has_the_same_budget_of_teacher_episodes(quick, name):
     training = list(played)
     if name != "refined, closest":  # which is chosen on the episodes that it was fitted to
         training.remove(SMALL.n_validation)  # whose states nobody is fitted to
-    if name in ("refined", "refined, faithful"):
+    if name in ("refined", "refined, no teacher", "refined, faithful"):
         training.remove(SMALL.n_tuning_episodes)  # where no teacher is asked; as many as those of a round
     assert sum(training) == 40
 

@@ -4,17 +4,17 @@ import pandas as pd
 import pytest
 
 from vsp import race as module
-from vsp.race import ENOUGH, OURS, TREES, quickest, race
+from vsp.race import ENOUGH, LINEAR_TREES, OURS, TREES, quickest, race
 
 
 def test_every_setting_runs_with_every_seed(monkeypatch):
     few = {"n_episodes": 20, "n_correction_episodes": 5, "n_validation": 20, "n_steps": 20}
-    for name, settings in (("OURS", OURS), ("TREES", TREES)):
+    for name, settings in (("OURS", OURS), ("TREES", TREES), ("LINEAR_TREES", LINEAR_TREES)):
         two = {setting: dataclasses.replace(config, **few) for setting, config in list(settings.items())[:2]}
         monkeypatch.setattr(module, name, two)
     monkeypatch.setattr(module, "N_REPORTED", 50)
     frame = race(range(2))
-    assert len(frame) == 8 and frame.groupby(["method", "setting"]).size().tolist() == [2] * 4
+    assert len(frame) == 12 and frame.groupby(["method", "setting"]).size().tolist() == [2] * 6
     assert (frame["seconds"] > 0).all() and frame["failing"].between(0, 1).all()
     assert (frame["mean"] / frame["share"]).std() == pytest.approx(0, abs=1e-9)  # all by one teacher's
     again = race(range(2))

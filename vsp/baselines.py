@@ -14,7 +14,7 @@ import pandas as pd
 from . import paper
 from .config import Refinement
 from .distill import teacher_episodes
-from .envs import GOAL, get_task
+from .envs import GOAL, Task, get_task
 from .evaluate import outcomes
 from .experiments import EVALUATION_SEED, Experiment, Results, Run
 from .policy import VoronoiPolicy
@@ -106,6 +106,30 @@ class Heuristic:
         turn = np.where(down, 0.0, 0.5 * (lean - angle) - 1.0 * spin)
         lift = np.where(down, 0.0, 0.5 * (0.55 * np.abs(x) - y)) - 0.5 * vy
         return np.clip(np.column_stack([20.0 * lift - 1.0, -20.0 * turn]), -1.0, 1.0), None
+
+
+class PumpAndBalance:
+    """The textbook's pendulum: give it the energy of standing upright, then hold it there (Åström and Furuta 2000)."""
+
+    COST = 6, 9.0  # numbers, and operations of the way that takes more of them
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Torques (n, 1) for cosine and sine of the angle and angular velocity (n, 3)."""
+        cosine, sine, velocity = np.asarray(obs, dtype=np.float64).T
+        missing = velocity**2 / 6 + 5.0 * (cosine - 1.0)  # energy of the rod, less that of standing still upright
+        torque = np.where(cosine > 0.8, -10.0 * sine - 2.0 * velocity, -2.0 * missing * np.sign(velocity))
+        return np.clip(torque, -2.0, 2.0)[:, None], None
+
+
+class Still:
+    """No teacher at all: it does nothing, whatever it sees."""
+
+    def __init__(self, task: Task):
+        self._action = np.zeros(len(task.action_low))
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Zeros (n, m) for observations (n, d)."""
+        return np.tile(self._action, (len(obs), 1)), None
 
 
 def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndarray]:

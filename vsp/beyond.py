@@ -74,6 +74,7 @@ def _by_dagger(
 METHODS = {
     "refined": Method(methods.refined, ("refine",), ALL),
     "refined, not tuned": Method(methods.refined, ("refine",), ALL, {"n_generations": 0}),
+    "refined, no teacher": Method(methods.untaught, ("refine", "baselines"), ALL, sizes=(3, 4)),  # those of presets
     "refined, closest": Method(methods.closest, ("refine", "moves"), ALL, sizes=(13,)),
     "refined, faithful": Method(
         methods.faithful, ("refine", "moves"), ALL, FAITHFUL, sizes=(13,), tasks=paper.TASKS[:1]
@@ -87,7 +88,7 @@ METHODS = {
     "teacher": Method(methods.the_teacher, sizes=OWN, chance=False),
     "one linear map": Method(partial(methods.alone, fit=methods.line), ("baselines", "refine"), EPISODES, sizes=OWN),
     "rule of thumb": Method(methods.by_thumb, ("baselines",), sizes=OWN, chance=False, tasks=paper.TASKS),
-    "heuristic": Method(methods.by_hand, ("baselines",), sizes=OWN, chance=False, tasks=LONG),
+    "heuristic": Method(methods.by_hand, ("baselines",), sizes=OWN, chance=False, tasks=("Pendulum-v1", *LONG)),
     "TD-AVQ": Method(methods.td_avq, ("tdavq",), sizes=OWN, tasks=paper.TASKS[:1]),
     "TD-AVQ, coarse": Method(methods.td_avq, ("tdavq",), settings=tdavq.COARSE, sizes=OWN, tasks=paper.TASKS[:1]),
     "the paper's method": Method(methods.paper_method, reads=PAPER, sizes=OWN, tasks=paper.TASKS),
@@ -101,6 +102,7 @@ ABLATION = {
     "no leak": {"leak": 1e-9},
     "not tuned": {"n_generations": 0},
     "failures at no price": {"failure_price": 0.0},
+    "no teacher": {},
     "drawn by stakes": {"stakes": True},
 }
 
@@ -242,18 +244,23 @@ def rivals(frame: pd.DataFrame) -> pd.DataFrame:
     """`refined` beside the best of the other methods at every size, one row per size.
 
     Columns: size, mean, low, high, rival (its name), rival mean, rival low, rival high, ahead: "ours" or "theirs" where
-    the intervals of the two do not meet, else "level"; untuned: the mean of `refined` without tuning.
+    the intervals of the two do not meet, else "level"; untuned: the mean of `refined` without tuning, and untuned ahead
+    likewise.
     """
     table, found = summary(frame), []
     for size, rows in table[table["size"] > 0].groupby("size"):
         (own,) = rows[rows["method"] == "refined"].to_dict("records")
-        untuned = rows.loc[rows["method"] == "refined, not tuned", "mean"].iloc[0]
+        (untuned,) = rows[rows["method"] == "refined, not tuned"].to_dict("records")
         best = rows[~rows["method"].str.startswith("refined")].iloc[0]
-        ahead = "ours" if own["low"] > best["high"] else "theirs" if best["low"] > own["high"] else "level"
         row = {"size": size, **{name: own[name] for name in INTERVAL}, "rival": best["method"]}
         row |= {f"rival {name}": best[name] for name in INTERVAL}
-        found.append(row | {"ahead": ahead, "untuned": untuned})
+        row |= {"ahead": _ahead(own, best), "untuned": untuned["mean"], "untuned ahead": _ahead(untuned, best)}
+        found.append(row)
     return pd.DataFrame(found)
+
+
+def _ahead(own: dict, other: pd.Series) -> str:
+    return "ours" if own["low"] > other["high"] else "theirs" if other["low"] > own["high"] else "level"
 
 
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
@@ -271,13 +278,13 @@ def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     return table.loc[[part for part in ("all of it", *ABLATION) if part in table.index]].reset_index()
 
 
-def reached(task: str, frame: pd.DataFrame) -> pd.DataFrame:
-    """How many seeds of `refined` come up to their teacher, as `AS_GOOD` understands it, one row per size.
+def reached(task: str, frame: pd.DataFrame, method: str = "refined") -> pd.DataFrame:
+    """How many seeds of a method come up to their teacher, as `AS_GOOD` understands it, one row per size.
 
     Columns: size, policies, reached (share of them), gap (median, to the teacher's mean return), failing (the most).
     """
     teacher = frame[frame["method"] == "teacher"].iloc[0]
-    rows = frame[frame["method"] == "refined"].assign(good=lambda own: AS_GOOD[task](own, teacher))
+    rows = frame[frame["method"] == method].assign(good=lambda own: AS_GOOD[task](own, teacher))
     parts = rows.groupby("size").agg(policies=("good", "size"), reached=("good", "mean"), gap=("mean", "median"),
                                      failing=("failing", "max"))  # fmt: skip
     return parts.assign(gap=parts["gap"] - teacher["mean"]).reset_index()
@@ -287,15 +294,16 @@ def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """What came out in short: `refined` at the size of the preset, one row per task of `frames`, as `read` has them.
 
     Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing, as in `reached`, rival (the
-    best of the other methods with as many cells or leaves) and rival mean.
+    best of the other methods with as many cells or leaves), rival mean, and rival reached.
     """
     columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
     found = []
     for task, frame in frames.items():
         table = rivals(frame).merge(reached(task, frame), on="size").rename(columns={"size": "cells"})
         (row,) = table.loc[table["cells"] == preset(task, "best").n_cells, columns].to_dict("records")
+        theirs = reached(task, frame, row["rival"]).set_index("size")
         teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
-        found.append({"task": task, "teacher": teacher, **row})
+        found.append({"task": task, "teacher": teacher, **row, "rival reached": theirs.loc[row["cells"], "reached"]})
     return pd.DataFrame(found)
 
 

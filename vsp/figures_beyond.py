@@ -54,6 +54,7 @@ METHODS = {
     "one linear map": {"color": "black", "marker": "s"},
     "rule of thumb": {"color": "black", "marker": "*"},
     "heuristic": {"color": "black", "marker": "P"},
+    "refined, no teacher": {"color": DISTILLED, "ls": ":"},
 }
 # What vsp.lookup_study measures: a colour per method, dashed for the Manhattan distance
 _MEASURED = {"cdist": OTHER, "matrix product": GOAL, "kd-tree": COLOURS[4]}

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from . import moves, tdavq
-from .baselines import Heuristic, dagger, kmeans_cells, linear_map, rule_of_thumb
+from .baselines import Heuristic, PumpAndBalance, Still, dagger, kmeans_cells, linear_map, rule_of_thumb
 from .config import Refinement
 from .distill import distill
 from .envs import Task
@@ -37,6 +37,11 @@ def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
     """`refine`, with some settings changed."""
     config = replace(budget.config, n_cells=size, **changes)
     return refine(budget.teacher, budget.task, config, seed=seed)[0]
+
+
+def untaught(budget: Budget, size: int, seed: int) -> Policy:
+    """`refine` with a teacher that does nothing: what the tuning finds by itself."""
+    return refined(replace(budget, teacher=Still(budget.task)), size, seed)
 
 
 def closest(budget: Budget, size: int, seed: int) -> Policy:
@@ -129,8 +134,8 @@ def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
 
 
 def by_hand(budget: Budget, size: int, seed: int) -> Policy:
-    """Gymnasium's own controller."""
-    return Heuristic()
+    """A controller that a person programs."""
+    return {"Pendulum-v1": PumpAndBalance, "LunarLanderContinuous-v3": Heuristic}[budget.task.name]()
 
 
 def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
