@@ -100,7 +100,7 @@ def test_latex_by_hand():
     assert policy.to_latex(2) == (
         "\\begin{tabular}{ll}\n\\toprule\ncodeword & $\\tau$ \\\\\n\\midrule\n"
         "$[1.00,\\ 0.00,\\ 0.50]$ & $1.00 \\cos \\theta - 2.50 \\sin \\theta + 0.00 \\omega + 0.12$ \\\\\n"
-        "\\midrule\n\\multicolumn{2}{l}{Manhattan distances} \\\\\n\\bottomrule\n\\end{tabular}\n"
+        "\\midrule\n\\multicolumn{2}{l}{One cell, wherever its codeword is} \\\\\n\\bottomrule\n\\end{tabular}\n"
     )
 
 
@@ -120,13 +120,14 @@ def test_a_policy_in_words_by_hand():
         "limited to F from -1 to 1\n"
     )
     plain = VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 2)), task=SIMPLEGOAL)
-    assert plain.to_text(1).splitlines()[1:] == [
-        "Manhattan distances.",
-        "nearest to x 0.0, y 0.0:",
+    assert plain.to_text(1).splitlines() == [
+        "SimpleGoal-v0: one linear policy.",
         "  Δx = 0.0 x + 0.0 y + 0.0",
         "  Δy = 0.0 x + 0.0 y + 0.0",
         "limited to Δx from -1 to 1, Δy from -1 to 1",
     ]
+    two = VoronoiPolicy(np.eye(2), np.zeros((2, 3, 1)), task=MOUNTAINCAR)
+    assert two.to_text().splitlines()[1] == "Manhattan distances." and "{Manhattan distances}" in two.to_latex()
 
 
 def test_latex_of_exact_numbers_says_what_states_are_divided_by():

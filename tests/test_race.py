@@ -37,3 +37,4 @@ def test_the_quickest_that_is_good_enough_by_hand():
     found = quickest(pd.DataFrame(rows))
     assert found[["method", "setting", "seconds"]].values.tolist() == [["cells", "few", 1.0], ["trees", "large", 2.0]]
     assert found["share"].tolist() == [0.995, 0.991] and ENOUGH == 0.99
+    assert found["crossing"].tolist() == [2 / 3, 2 / 3]  # the median and what is above it

@@ -63,13 +63,21 @@ def test_ledger_counts_are_those_of_the_ledger():
 
 def test_headline_is_that_of_the_table():
     table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_headline.csv")
-    block = README.partition("## Three equations instead")[2].partition("\n## ")[0]
-    rows = re.findall(r"^\| (\w+) \| ([-\d.]+) \| (\d+) \| ([-\d.]+) \| (\d+) % \| ([-\d.]+) \|$", block, flags=re.M)
+    block = README.partition("## Three or four cells")[2].partition("\n## ")[0]
+    pattern = r"^\| (\w+) \| ([-\d.]+) \| (\d+) \| ([-\d.]+) \| (\d+) % \| ([-\d.]+) \| (\d+) % \|$"
+    rows = re.findall(pattern, block, flags=re.M)
     assert rows == [
         (row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f}",
-         f"{row['rival mean']:.2f}")
+         f"{row['rival mean']:.2f}", f"{100 * row['rival reached']:.0f}")
         for row in table.to_dict("records")
     ]  # fmt: skip
+
+
+def test_what_is_found_without_a_teacher_is_that_of_the_table():
+    table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_ablation.csv")
+    without = table[table["part"] == "no teacher"].set_index("task")["mean"]
+    (text,) = re.findall(r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\)", README)
+    assert text == (f"{without['SimpleGoal']:.2f}", f"{without['Pendulum']:.2f}")
 
 
 def test_the_printed_policy_is_that_of_the_table():

@@ -161,10 +161,13 @@ void vsp_act(const double *state, double *action) {{
 
 def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
     """The whole policy in plain words: what distances are, and for every codeword its equations."""
-    lines = [_headline(policy), f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}."]
+    lines = [_headline(policy)]
+    if len(policy) > 1:
+        lines.append(f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}.")
     for i, codeword in enumerate(policy.codewords):
         place = ", ".join(f"{name} {number(c, digits)}" for name, c in zip(policy.task.inputs, codeword))
-        lines += [f"nearest to {place}:", *(f"  {equation}" for equation in policy.equations(i, digits))]
+        lines += [f"nearest to {place}:"] if len(policy) > 1 else []
+        lines += [f"  {equation}" for equation in policy.equations(i, digits)]
     lows, highs = ([number(limit, None) for limit in box] for box in (policy.task.action_low, policy.task.action_high))
     limits = (f"{name} from {low} to {high}" for name, low, high in zip(policy.task.outputs, lows, highs))
     return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
@@ -196,6 +199,8 @@ def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
     """What distances to the codewords are: a caption for their table."""
+    if len(policy) == 1:
+        return "One cell, wherever its codeword is"
     if (policy.scale == 1).all():
         return f"{policy.metric.capitalize()} distances"
     units = ",\\ ".join(number(unit, digits) for unit in policy.scale)
@@ -226,6 +231,8 @@ def symbol(name: str) -> str:
 
 
 def _headline(policy: VoronoiPolicy) -> str:
+    if len(policy) == 1:
+        return f"{policy.task.name}: one {policy.form.name} policy."
     return (
         f"{policy.task.name}: {len(policy)} {policy.form.name} policies, each valid where its codeword is the nearest."
     )

@@ -48,7 +48,7 @@ METHODS = {
     "CART, DAgger": {"color": COLOURS[7]},
     "CART": {"color": COLOURS[7], "ls": "--"},
     "soft tree, DAgger": {"color": COLOURS[5]},
-    "the paper's method": {"color": COLOURS[3], "marker": "D"},
+    "the paper's method": {"color": "black", "marker": "D"},
     "TD-AVQ": {"color": COLOURS[9], "marker": "^"},
     "TD-AVQ, coarse": {"color": COLOURS[9], "marker": "v"},
     "one linear map": {"color": "black", "marker": "s"},
@@ -243,7 +243,7 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str) -> Axes:
         low, middle, high = (rows.groupby("size")[column].quantile(share) for share in (0.1, 0.5, 0.9))
         if "marker" not in style:
             ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, **style}, label=method)
-            if style["color"] == DISTILLED:
+            if style["color"] == DISTILLED and len(middle) > 2:  # of fewer sizes it would hide more than it shows
                 ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
             continue
         look = {"ls": "", "ms": 4.5, "mec": "white", "mew": 0.4, "elinewidth": 0.7, "zorder": 6, **style}
@@ -275,10 +275,10 @@ def times_over_dimension(ax: Axes, frame: pd.DataFrame, *, limit: float | None =
 def shares_over(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, by: str) -> Axes:
     """A share over a number, logarithmic: a line per value of the column `by`, darker by its rank."""
     groups = list(frame.dropna(subset=y).sort_values(x).groupby(by))
-    for color, (value, rows) in zip(sns.color_palette("crest", max(5, len(groups))), groups):
+    for color, (value, rows) in zip(sns.color_palette("viridis_r", len(groups) + 1)[1:], groups):
         ax.plot(rows[x], rows[y], marker=".", ms=3, color=color, label=f"{by} = {value}")
     ax.set(xscale="log", ylim=(0, 1.03), xlabel=x, ylabel=y)
-    ax.legend(frameon=False, fontsize=6, handlelength=1.0, labelspacing=0.15, borderaxespad=0.1)
+    ax.legend(frameon=False, fontsize=7, handlelength=1.0, labelspacing=0.15, borderaxespad=0.1)
     return _ticks(ax, frame[x])
 
 

@@ -1,4 +1,4 @@
-"""`closest`: cells that act as much like the teacher as so many can. `refine` asks what they return instead.
+"""`closest`: cells that act as much like the teacher as so many are found to. `refine` asks what they return instead.
 
 Annealing alone ends in places where some cells have little to do and others too much. So cells are moved: one that is
 missed least goes to where another errs most, all are fitted on from there, and what helped is kept (Ueda et al. 2000

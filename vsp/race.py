@@ -87,10 +87,11 @@ def race(seeds=SEEDS) -> pd.DataFrame:
 def quickest(frame: pd.DataFrame) -> pd.DataFrame:
     """The quickest setting of each method whose median share is `ENOUGH`; a method without one is left out.
 
-    `frame` has rows of `race`. Columns: method, setting, seconds, mean, failing, share: medians over the seeds. The
-    quickest method comes first.
+    `frame` has rows of `race`. Columns: method, setting, seconds, mean, failing, share: medians over the seeds;
+    crossing, the share of the seeds that come to `ENOUGH`. The quickest method comes first.
     """
-    scores = ["seconds", "mean", "failing", "share"]
-    medians = frame.groupby(["method", "setting"], sort=False)[scores].median().reset_index()
+    groups = frame.assign(crossing=frame["share"] >= ENOUGH).groupby(["method", "setting"], sort=False)
+    medians = groups[["seconds", "mean", "failing", "share"]].median()
+    medians = medians.assign(crossing=groups["crossing"].mean()).reset_index()
     enough = medians[medians["share"] >= ENOUGH].sort_values("seconds", ignore_index=True)
     return enough.drop_duplicates("method", ignore_index=True)

@@ -28,8 +28,8 @@ def save_table(
     """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
 
     `latex` is the table as LaTeX code, for equations, or a part of it where the whole is too long for a page; without
-    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor; a table of
-    more than `PAGE` rows is a longtable.
+    it numbers get three decimals. The LaTeX needs the packages booktabs, xcolor and, for a table of
+    more than `PAGE` rows, longtable.
     """
     path = Path(out) / "figures" / "tables" / name
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
