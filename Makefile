@@ -70,12 +70,12 @@ help: ## this list
 	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
-paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 2 minutes
+paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 4 minutes
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
 	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
 
-quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 50 s
+quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 90 s
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
 
 runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: about 45 s, resumable

@@ -180,14 +180,14 @@ def test_a_summary_has_a_row_per_method_and_size():
 
 
 def test_rivals_are_others_than_ourselves():
-    small, large = beyond.rivals(ROWS).to_dict("records")
+    small, large = beyond.rivals(beyond.summary(ROWS)).to_dict("records")
     assert (small["size"], small["rival"], small["rival mean"], small["ahead"]) == (2, "CART", 6.0, "level")
     assert (large["size"], large["rival"], large["ahead"], large["untuned"]) == (4, "CART", "level", 20.0)
     assert small["untuned ahead"] == large["untuned ahead"] == "ours"
     better = ROWS.assign(mean=ROWS["mean"] + 10 * (ROWS["method"] == "refined"))
-    assert beyond.rivals(better)["ahead"].tolist() == ["ours", "ours"]
+    assert beyond.rivals(beyond.summary(better))["ahead"].tolist() == ["ours", "ours"]
     worse = ROWS.assign(mean=ROWS["mean"] - 10 * (ROWS["method"] == "refined"))
-    assert beyond.rivals(worse)["ahead"].tolist() == ["theirs", "theirs"]
+    assert beyond.rivals(beyond.summary(worse))["ahead"].tolist() == ["theirs", "theirs"]
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_what_is_as_good_as_the_teacher(task, shares):
 
 
 def test_the_headline_is_of_the_size_of_the_preset():
-    (row,) = beyond.headline({SIMPLEGOAL: ROWS}).to_dict("records")
+    (row,) = beyond.headline({SIMPLEGOAL: ROWS}, {SIMPLEGOAL: beyond.summary(ROWS)}).to_dict("records")
     low, high = (pytest.approx(end) for end in (9.0, 11.0))
     assert row == {
         "task": SIMPLEGOAL, "teacher": 9.01, "cells": 4, "mean": 10.0, "low": low, "high": high, "reached": 1.0,

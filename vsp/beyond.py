@@ -240,14 +240,14 @@ def summary(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found).sort_values(**order)
 
 
-def rivals(frame: pd.DataFrame) -> pd.DataFrame:
-    """`refined` beside the best of the other methods at every size, one row per size.
+def rivals(table: pd.DataFrame) -> pd.DataFrame:
+    """`refined` in a `summary` beside the best of the other methods at every size, one row per size.
 
     Columns: size, mean, low, high, rival (its name), rival mean, rival low, rival high, ahead: "ours" or "theirs" where
     the intervals of the two do not meet, else "level"; untuned: the mean of `refined` without tuning, and untuned ahead
     likewise.
     """
-    table, found = summary(frame), []
+    found = []
     for size, rows in table[table["size"] > 0].groupby("size"):
         (own,) = rows[rows["method"] == "refined"].to_dict("records")
         (untuned,) = rows[rows["method"] == "refined, not tuned"].to_dict("records")
@@ -290,8 +290,10 @@ def reached(task: str, frame: pd.DataFrame, method: str = "refined") -> pd.DataF
     return parts.assign(gap=parts["gap"] - teacher["mean"]).reset_index()
 
 
-def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """What came out in short: `refined` at the size of the preset, one row per task of `frames`, as `read` has them.
+def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """What came out in short: `refined` at the size of the preset, one row per task.
+
+    `frames` are as `read` has them, by task, and `summaries` theirs.
 
     Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing, as in `reached`, rival (the
     best of the other methods with as many cells or leaves), rival mean, and rival reached.
@@ -299,7 +301,7 @@ def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
     columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
     found = []
     for task, frame in frames.items():
-        table = rivals(frame).merge(reached(task, frame), on="size").rename(columns={"size": "cells"})
+        table = rivals(summaries[task]).merge(reached(task, frame), on="size").rename(columns={"size": "cells"})
         (row,) = table.loc[table["cells"] == preset(task, "best").n_cells, columns].to_dict("records")
         theirs = reached(task, frame, row["rival"]).set_index("size")
         teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
