@@ -75,7 +75,7 @@ paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the
 	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
 
-quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 90 s
+quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 2 minutes
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
 
 runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: about 45 s, resumable
@@ -88,10 +88,10 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
 	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
 
-beyond: venv ## our own method and others beside it, into data/results/: about an HOUR, resumable
+beyond: venv ## our own method and others beside it, into data/results/: 1 to 1.5 HOURS, resumable
 	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(JOBS)
 
-beyond-long: venv ## the same for LunarLander, whose physics engine is slow: about 3 HOURS, resumable
+beyond-long: venv ## the same for LunarLander, whose physics engine is slow: some HOURS, resumable
 	$(PY) -m vsp.beyond --long --out "$(OUT)" --jobs $(JOBS)
 
 lookup: venv ## times of look-ups and neighbour graphs in many dimensions, into data/results/: about 3 minutes

@@ -18,13 +18,12 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, partial
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
-from . import methods, paper, store, study, tdavq
+from . import methods, paper, store, tdavq
 from .config import Config, Refinement, preset
 from .envs import get_task
-from .evaluate import interval, start_states
+from .evaluate import start_states
 from .experiments import code_id
 from .measure import measure
 from .methods import Budget
@@ -38,11 +37,10 @@ TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
 SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy of a long task may lose
-MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameters", "operations")
-INTERVAL = ("mean", "low", "high")
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
 OWN = (0,)
+REFINE = ("refine", "crowd")  # modules
 EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_price")
 ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
 PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
@@ -68,25 +66,25 @@ def _by_dagger(
     fit: Callable[..., Policy], module: str, *, beginnings: int = 1, rounds: int = 5, sizes: tuple[int, ...] = SIZES
 ) -> Method:
     settings = {"rounds": rounds, "beginnings": beginnings}
-    return Method(partial(methods.corrected, fit=fit), (module, "baselines", "refine"), EPISODES, settings, sizes)
+    return Method(partial(methods.corrected, fit=fit), (module, "baselines", *REFINE), EPISODES, settings, sizes)
 
 
 METHODS = {
-    "refined": Method(methods.refined, ("refine",), ALL),
-    "refined, not tuned": Method(methods.refined, ("refine",), ALL, {"n_generations": 0}),
-    "refined, no teacher": Method(methods.untaught, ("refine", "baselines"), ALL, sizes=(3, 4)),  # those of presets
-    "refined, closest": Method(methods.closest, ("refine", "moves"), ALL, sizes=(13,)),
+    "refined": Method(methods.refined, REFINE, ALL),
+    "refined, not tuned": Method(methods.refined, REFINE, ALL, {"n_generations": 0}),
+    "refined, no teacher": Method(methods.untaught, (*REFINE, "baselines"), ALL, sizes=(3, 4)),  # those of presets
+    "refined, closest": Method(methods.closest, (*REFINE, "moves"), ALL, sizes=(13,)),
     "refined, faithful": Method(
-        methods.faithful, ("refine", "moves"), ALL, FAITHFUL, sizes=(13,), tasks=paper.TASKS[:1]
+        methods.faithful, (*REFINE, "moves"), ALL, FAITHFUL, sizes=(13,), tasks=paper.TASKS[:1]
     ),
     "k-means cells, DAgger": _by_dagger(methods.kmeans, "baselines", beginnings=3),
-    "CART": Method(partial(methods.alone, fit=methods.tree), ("trees", "baselines", "refine"), EPISODES),
+    "CART": Method(partial(methods.alone, fit=methods.tree), ("trees", "baselines", *REFINE), EPISODES),
     "CART, DAgger": _by_dagger(methods.tree, "trees"),
     "CART, linear leaves, DAgger": _by_dagger(methods.linear_tree, "trees"),
     "oblique tree, linear leaves, DAgger": _by_dagger(methods.oblique_linear_tree, "trees", beginnings=2),
     "soft tree, DAgger": _by_dagger(methods.soft_tree, "trees", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
     "teacher": Method(methods.the_teacher, sizes=OWN, chance=False),
-    "one linear map": Method(partial(methods.alone, fit=methods.line), ("baselines", "refine"), EPISODES, sizes=OWN),
+    "one linear map": Method(partial(methods.alone, fit=methods.line), ("baselines", *REFINE), EPISODES, sizes=OWN),
     "rule of thumb": Method(methods.by_thumb, ("baselines",), sizes=OWN, chance=False, tasks=paper.TASKS),
     "heuristic": Method(methods.by_hand, ("baselines",), sizes=OWN, chance=False, tasks=("Pendulum-v1", *LONG)),
     "TD-AVQ": Method(methods.td_avq, ("tdavq",), sizes=OWN, tasks=paper.TASKS[:1]),
@@ -216,110 +214,6 @@ def stale(folder: str | os.PathLike) -> list[str]:
         elif made != {job.key for job in jobs(task)}:
             found.append(f"data/results/{path.name} was made with other settings or code: `make {target}` renews it")
     return found
-
-
-def read(task: str, folder: str | os.PathLike = study.RESULTS) -> pd.DataFrame:
-    """The committed rows of `task`; `failing` is NaN where no episode of any method can reach a goal."""
-    frame = pd.read_csv(Path(folder) / f"beyond_{task}.csv", dtype={"key": str})
-    return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame
-
-
-def summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """One row per method and size of `frame`, rows as `read` has them, the best mean return of a size first.
-
-    Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median,
-    failing, error_teacher, error_own, cells, parameters, operations: means over the seeds.
-    """
-    found = []
-    for (method, size), rows in frame.groupby(["method", "size"], sort=False):
-        low, high = interval(rows["mean"].to_numpy(), np.mean) if len(rows) > 1 else (np.nan, np.nan)
-        scores = {"mean": rows["mean"].mean(), "low": low, "high": high, "median": rows["mean"].median()}
-        means = {name: rows[name].mean() for name in MEASURED[1:]}
-        found.append({"method": method, "size": size, "policies": len(rows), **scores, **means})
-    order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
-    return pd.DataFrame(found).sort_values(**order)
-
-
-def rivals(table: pd.DataFrame) -> pd.DataFrame:
-    """`refined` in a `summary` beside the best of the other methods at every size, one row per size.
-
-    Columns: size, mean, low, high, rival (its name), rival mean, rival low, rival high, ahead: "ours" or "theirs" where
-    the intervals of the two do not meet, else "level"; untuned: the mean of `refined` without tuning, and untuned ahead
-    likewise.
-    """
-    found = []
-    for size, rows in table[table["size"] > 0].groupby("size"):
-        (own,) = rows[rows["method"] == "refined"].to_dict("records")
-        (untuned,) = rows[rows["method"] == "refined, not tuned"].to_dict("records")
-        best = rows[~rows["method"].str.startswith("refined")].iloc[0]
-        row = {"size": size, **{name: own[name] for name in INTERVAL}, "rival": best["method"]}
-        row |= {f"rival {name}": best[name] for name in INTERVAL}
-        row |= {"ahead": _ahead(own, best), "untuned": untuned["mean"], "untuned ahead": _ahead(untuned, best)}
-        found.append(row)
-    return pd.DataFrame(found)
-
-
-def _ahead(own: dict, other: pd.Series) -> str:
-    return "ours" if own["low"] > other["high"] else "theirs" if other["low"] > own["high"] else "level"
-
-
-def ablation(frame: pd.DataFrame) -> pd.DataFrame:
-    """`refined` and what is left of it without one of its parts, at the size of the preset, as `summary` has it.
-
-    The column `part` names what was taken away, in the order of `ABLATION`; "all of it" comes first. Raises ValueError
-    for a task without such rows, one of `LONG`.
-    """
-    names = {f"refined, {part}": part for part in ABLATION} | {"refined": "all of it"}
-    ablated = frame["method"].isin(names) & ~frame["method"].isin(METHODS)
-    if not ablated.any():
-        raise ValueError(f"no method of {sorted(set(frame['method']))} is an ablation, expected one of {sorted(names)}")
-    rows = frame[(frame["size"] == frame.loc[ablated, "size"].iloc[0]) & frame["method"].isin(names)]
-    table = summary(rows).assign(part=lambda table: table["method"].map(names)).set_index("part")
-    return table.loc[[part for part in ("all of it", *ABLATION) if part in table.index]].reset_index()
-
-
-def reached(task: str, frame: pd.DataFrame, method: str = "refined") -> pd.DataFrame:
-    """How many seeds of a method come up to their teacher, as `AS_GOOD` understands it, one row per size.
-
-    Columns: size, policies, reached (share of them), gap (median, to the teacher's mean return), failing (the most).
-    """
-    teacher = frame[frame["method"] == "teacher"].iloc[0]
-    rows = frame[frame["method"] == method].assign(good=lambda own: AS_GOOD[task](own, teacher))
-    parts = rows.groupby("size").agg(policies=("good", "size"), reached=("good", "mean"), gap=("mean", "median"),
-                                     failing=("failing", "max"))  # fmt: skip
-    return parts.assign(gap=parts["gap"] - teacher["mean"]).reset_index()
-
-
-def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """What came out in short: `refined` at the size of the preset, one row per task.
-
-    `frames` are as `read` has them, by task, and `summaries` theirs.
-
-    Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing, as in `reached`, rival (the
-    best of the other methods with as many cells or leaves), rival mean, and rival reached.
-    """
-    columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
-    found = []
-    for task, frame in frames.items():
-        table = rivals(summaries[task]).merge(reached(task, frame), on="size").rename(columns={"size": "cells"})
-        (row,) = table.loc[table["cells"] == preset(task, "best").n_cells, columns].to_dict("records")
-        theirs = reached(task, frame, row["rival"]).set_index("size")
-        teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
-        found.append({"task": task, "teacher": teacher, **row, "rival reached": theirs.loc[row["cells"], "reached"]})
-    return pd.DataFrame(found)
-
-
-# When a policy is as good as its teacher. SimpleGoal: the mean return within 0.03 and the failures within 0.1 points.
-# MountainCar: no failure, and a higher return. Pendulum, where nothing can fail: within one part in a hundred.
-# LunarLander: within two.
-AS_GOOD = {
-    "SimpleGoal-v0": lambda own, teacher: (
-        (own["mean"] >= teacher["mean"] - 0.03) & (own["failing"] <= teacher["failing"] + 0.001)
-    ),
-    "MountainCarContinuous-v0": lambda own, teacher: (own["mean"] > teacher["mean"]) & (own["failing"] == 0),
-    "Pendulum-v1": lambda own, teacher: own["mean"] >= teacher["mean"] - 0.01 * abs(teacher["mean"]),
-    "LunarLanderContinuous-v3": lambda own, teacher: own["mean"] >= 0.98 * teacher["mean"],
-}
 
 
 def main() -> None:

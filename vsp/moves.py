@@ -35,7 +35,7 @@ def closest(teacher: Policy, task: str | Task, config: Refinement, *, seed: int)
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     states = visited(teacher, task, task.start(starts, config.n_episodes))
     frame = Frame.of(task, states)
-    seen = frame.labelled(teacher, states, stakes=config.stakes)
+    seen = frame.labelled(teacher, states)
     found = []
     for _ in range(config.n_restarts):
         cells = beginning(seen, config.n_cells, init)
