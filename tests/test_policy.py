@@ -10,11 +10,12 @@ from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 from vsp import store
 from vsp.baselines import refit
 from vsp.config import Refinement
+from vsp.crowd import Crowd
 from vsp.envs import get_task
 from vsp.geometry import distances
 from vsp.measure import cost
 from vsp.policy import VoronoiPolicy
-from vsp.refine import Crowd, refine
+from vsp.refine import refine
 from vsp.simplify import prune, rounded
 from vsp.store import DamagedFile
 from vsp.subpolicies import expression, form_of
