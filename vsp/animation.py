@@ -1,0 +1,186 @@
+"""A distillation as moving pictures: the partition grows over the map of the policy that it makes.
+
+`Growth` draws a run at any of its iterations, quickly; `save_growth` makes a GIF of it, and a still picture beside it
+for whoever wants no motion.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from . import figures, geometry, store
+from .envs import Task, get_task
+from .figures_explorer import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map, state
+from .history import History
+from .policy import VoronoiPolicy
+from .rollouts import Policy
+
+WIDTH, HEIGHT = 6.0, 2.6  # inches
+FINE = 301  # grid points per axis on which cells are looked up
+MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map: few arrows
+FRAMES = 32
+STEP, HOLD = 160, 2500  # milliseconds that a frame is shown, and the last one
+DPI, COLOURS = 100, 64  # of a GIF
+
+
+class Maps:
+    """The policy maps of a task and the cells on them, over grids that are made once.
+
+    Raises ValueError for a task that has no such map.
+    """
+
+    def __init__(self, task: Task):
+        if task.name not in MAPS:
+            raise ValueError(f"task is {task.name}, expected one of {list(MAPS)}: a map has two inputs")
+        self.task = task
+        self._fine = geometry.grid(task.low, task.high, FINE)
+        self._grid = geometry.grid(task.low, task.high, MAPS[task.name])
+
+    def ground(self, ax) -> None:
+        """Axes, goal and pit."""
+        ground(ax, self.task.name)
+
+    def policy(self, ax, actor: Policy, *, color: str = figures.DISTILLED):
+        """What `actor` does everywhere."""
+        x, y, states = self._grid
+        return policy_map(ax, x, y, actor.predict(states)[0], color=color)
+
+    def cells(self, ax, policy: VoronoiPolicy, point: np.ndarray | None = None) -> None:
+        """The cells of `policy` with their codewords; that of the state `point` (2,) is outlined."""
+        x, y, states = self._fine
+        borders(ax, x, y, policy.cells(states), chosen=None if point is None else int(policy.cells(point)))
+        figures.codewords(ax, policy.codewords)
+        if point is not None:
+            state(ax, point)
+
+
+class Growth:
+    """Draws a run at any iteration: the teacher's map, the copy's with its cells, their number over the iterations.
+
+    Raises ValueError for a task without such maps, and for what is no history of the paper's method.
+    """
+
+    def __init__(self, teacher: Policy, history: History, task: str | Task, *, dpi: int = 180, chosen: bool = False):
+        if not isinstance(history, History):
+            kind = type(history).__name__
+            raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
+        self.history, self.maps = history, Maps(get_task(task))
+        self._chosen = chosen  # whether states will be chosen, for the legend
+        self.stage, self._axes = self._set_stage(teacher, dpi)
+
+    def __len__(self) -> int:
+        return len(self.history.cells)
+
+    def _set_stage(self, teacher: Policy, dpi: int) -> tuple[Stage, np.ndarray]:
+        fig, axes = figures.panels(3, width=WIDTH, height=HEIGHT, dpi=dpi)
+        fig.get_layout_engine().set(wspace=0.04)
+        for ax in axes[:2]:
+            self.maps.ground(ax)
+        axes[1].set_ylabel("")
+        axes[1].tick_params(labelleft=False)
+        image = self.maps.policy(axes[0], teacher, color=figures.TEACHER)
+        if len(self.maps.task.outputs) == 1:
+            figures.force_bar(fig, image, axes[:2])
+            fig.axes[-1].set(ylabel="", title="force")  # beside the bar it would seem to belong to the next panel
+        passes = [[e.iteration for e in self.history.events if e.kind == kind] for kind in ("split", "merge")]
+        cells_and_changes(axes[2], np.array(self.history.cells), *passes)
+        figures.letter(axes, ["teacher", "copy", "cells"])
+        nothing = np.zeros((0, 2))
+        changes(figures.codewords(axes[1], nothing), nothing, nothing)  # for the legend
+        if self._chosen:
+            state(axes[1], np.full(2, np.nan))
+        figures.legend_below(fig, axes[1], ncol=6)
+        return Stage(fig), axes
+
+    def shoot(self, n: int, *, since: int | None = None, point: np.ndarray | None = None) -> np.ndarray:
+        """The run after iteration n, with what changed after `since` (None: in the last pass that changed anything),
+        and the cell of the state `point` (2,). (height, width, 3) bytes. Raises ValueError outside the run."""
+        policy = self.history.policy_at(n)
+        since = self.last_change(n) - 1 if since is None else since
+        recent = [e for e in self.history.events if since < e.iteration <= n]
+        came, went = ([e.codeword for e in recent if e.kind == kind] for kind in ("split", "merge"))
+        came = [one for one in came if (policy.codewords == one).all(axis=1).any()]  # and was not merged since
+
+        def paint() -> None:
+            for ax in self._axes[:2]:
+                self.maps.cells(ax, policy, point)
+            self.maps.policy(self._axes[1], policy)
+            changes(self._axes[1], np.reshape(came, (-1, 2)), np.reshape(went, (-1, 2)))
+            moment(self._axes[2], n, self.history.cells[n])
+
+        return self.stage.shoot(paint)
+
+    def last_change(self, n: int) -> int:
+        """The last iteration up to n that split or merged; 0 if there is none."""
+        return max((e.iteration for e in self.history.events if e.iteration <= n), default=0)
+
+    def words(self, n: int) -> str:
+        """What there is to see after iteration n."""
+        k, last = self.history.cells[n], self.last_change(n)
+        kinds = [e.kind for e in self.history.events if e.iteration == last]
+        text = f"Iteration {n} of {len(self)}: {k} {'cell' if k == 1 else 'cells'}."
+        if kinds:
+            text += f" Last change, iteration {last}: {kinds.count('split')} came by splits, "
+            text += f"{kinds.count('merge')} went by merges."
+        return text
+
+
+class Animation:
+    """A GIF as a notebook shows it: a still picture where the reader's system asks for no motion, and to be folded away
+    where it disturbs."""
+
+    def __init__(self, gif: bytes, still: bytes, alt: str):
+        self.gif, self.still, self.alt = gif, still, alt
+
+    def _repr_html_(self) -> str:
+        gif, still = (base64.b64encode(part).decode() for part in (self.gif, self.still))
+        return (
+            "<figure><details open><summary>moving picture (click to hide)</summary><picture>"
+            f'<source media="(prefers-reduced-motion: reduce)" srcset="data:image/png;base64,{still}">'
+            f'<img alt="{html.escape(self.alt)}" src="data:image/gif;base64,{gif}" width="{int(WIDTH * DPI)}">'
+            "</picture></details></figure>"
+        )
+
+    def __repr__(self) -> str:
+        return self.alt
+
+
+def save_growth(
+    history: History, teacher: Policy, task: str | Task, name: str, *, out: str | os.PathLike, alt: str,
+    quick: bool = False,
+) -> Animation:  # fmt: skip
+    """Write OUT/figures/NAME.gif, and its last frame as NAME.png; returns the animation to show.
+
+    Early iterations, where most happens, get more frames than late ones. `alt` says what there is to see for someone
+    who cannot; `quick` adds a watermark. No dates are in the files, so that the same run gives the same bytes. Raises
+    ValueError as `Growth` does.
+    """
+    growth = Growth(teacher, history, task, dpi=DPI)
+    if quick:
+        growth.stage.watermark()
+    moments = np.unique((np.linspace(0, 1, FRAMES) ** 2 * (len(growth) - 1)).astype(int)).tolist()
+    images = [growth.shoot(n, since=before) for before, n in zip([-1, *moments], moments)]
+    path = Path(out) / "figures" / name
+    with store.atomic_path(path.with_suffix(".gif")) as temporary:
+        _write_gif(temporary, images)
+    with store.atomic_path(path.with_suffix(".png")) as temporary:
+        temporary.write_bytes(png(images[-1], colours=COLOURS))
+    return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), alt)
+
+
+def _write_gif(path: Path, images: list[np.ndarray]) -> None:
+    """All images in the same colours, so that a frame holds only what differs from the one before."""
+    some = Image.fromarray(np.concatenate([images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]))
+    colours = np.reshape(some.quantize(COLOURS).getpalette(), (-1, 3))
+    colours[(colours > 247).all(axis=1)] = 255  # paper stays white
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.ravel().tolist())
+    frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    durations = [STEP] * (len(frames) - 1) + [HOLD]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=False)
