@@ -19,6 +19,13 @@ folder.mkdir(parents=True)
 (folder / "a.txt").write_text(f"quick is {quick}")
 (folder / "b.txt").write_text("always the same")"""
 
+WIDGET = """\
+import ipywidgets
+class Explorer:
+    def _repr_mimebundle_(self, **kwargs):
+        return {**ipywidgets.IntSlider()._repr_mimebundle_(), "text/html": "strip"}
+Explorer()"""
+
 
 def write(folder: Path, *cells: str, parameters: str = 'out = ".."\nruns = "../data/runs"\nquick = False') -> Path:
     """A notebook of code cells; a cell that begins with `# skip` is tagged so that it never runs."""
@@ -62,6 +69,20 @@ def test_success_twice(tmp_path):
     assert not (out / "build" / "running" / "story").exists()
 
 
+def test_of_a_widget_its_still_picture_is_left(tmp_path):
+    """No view, which has a random name, no state, and nothing of widgets without a picture: the same bytes twice."""
+    bar = "from tqdm.auto import tqdm\nfor _ in tqdm(range(3)):\n    print('step')"
+    notebook = write(tmp_path, WIDGET, "display(Explorer())", "ipywidgets.IntSlider()", bar, "'text'")
+    copy = tmp_path / "figures" / "executed" / "story.ipynb"
+    assert runner.run(notebook, tmp_path) == ["figures/executed/story.ipynb"]
+    executed = nbformat.read(copy, as_version=4)
+    outputs = [[output.get("data", output.get("text")) for output in cell.outputs] for cell in executed.cells]
+    still = {"text/html": "strip", "text/plain": "IntSlider(value=0)"}
+    assert outputs == [[], [still], [still], [], ["step\nstep\nstep\n"], [{"text/plain": "'text'"}]]
+    assert "widget" not in str(executed.metadata) and "widget-view" not in copy.read_text()
+    assert runner.run(notebook, tmp_path) == []
+
+
 FAULTS = {
     "failing cell": (["1 / 0"], "code cell 3 (1 / 0) failed: ZeroDivisionError"),
     "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell 3 (import os) did not end: DeadKernel"),
@@ -72,6 +93,10 @@ FAULTS = {
     "address": (["object()"], "code cell 3 (object()) shows 'at 0x"),
     "warning": (["import warnings; warnings.warn('x')"], "shows 'ipykernel_"),
     "path": (["print(out)"], "code cell 3 (print(out)) shows a folder of this machine"),
+    "hidden in a widget": (
+        ["import ipywidgets\nwith ipywidgets.Output():\n    1 / 0"],
+        "story.ipynb: a widget holds ZeroDivisionError: division by zero",
+    ),
     "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
     "missing": (["2"], "did not make figures/c.pdf"),
 }

@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from PIL import Image
 
 from . import figures, geometry, store
@@ -42,9 +43,19 @@ class Maps:
         self._fine = geometry.grid(task.low, task.high, FINE)
         self._grid = geometry.grid(task.low, task.high, MAPS[task.name])
 
-    def ground(self, ax) -> None:
-        """Axes, goal and pit."""
-        ground(ax, self.task.name)
+    def panels(self, teacher: Policy, dpi: int) -> tuple[Figure, np.ndarray]:
+        """A figure of three panels and its axes (3,): the teacher's map, one for the copy's, and a free one."""
+        fig, axes = figures.panels(3, width=WIDTH, height=HEIGHT, dpi=dpi)
+        fig.get_layout_engine().set(wspace=0.04)
+        for ax in axes[:2]:
+            ground(ax, self.task.name)
+        axes[1].set_ylabel("")
+        axes[1].tick_params(labelleft=False)
+        image = self.policy(axes[0], teacher, color=figures.TEACHER)
+        if len(self.task.outputs) == 1:
+            figures.force_bar(fig, image, axes[:2])
+            fig.axes[-1].set(ylabel="", title="force")  # beside the bar it would seem to belong to the next panel
+        return fig, axes
 
     def policy(self, ax, actor: Policy, *, color: str = figures.DISTILLED):
         """What `actor` does everywhere."""
@@ -66,7 +77,7 @@ class Growth:
     Raises ValueError for a task without such maps, and for what is no history of the paper's method.
     """
 
-    def __init__(self, teacher: Policy, history: History, task: str | Task, *, dpi: int = 180, chosen: bool = False):
+    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = 180, chosen: bool = False):
         if not isinstance(history, History):
             kind = type(history).__name__
             raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
@@ -78,16 +89,7 @@ class Growth:
         return len(self.history.cells)
 
     def _set_stage(self, teacher: Policy, dpi: int) -> tuple[Stage, np.ndarray]:
-        fig, axes = figures.panels(3, width=WIDTH, height=HEIGHT, dpi=dpi)
-        fig.get_layout_engine().set(wspace=0.04)
-        for ax in axes[:2]:
-            self.maps.ground(ax)
-        axes[1].set_ylabel("")
-        axes[1].tick_params(labelleft=False)
-        image = self.maps.policy(axes[0], teacher, color=figures.TEACHER)
-        if len(self.maps.task.outputs) == 1:
-            figures.force_bar(fig, image, axes[:2])
-            fig.axes[-1].set(ylabel="", title="force")  # beside the bar it would seem to belong to the next panel
+        fig, axes = self.maps.panels(teacher, dpi)
         passes = [[e.iteration for e in self.history.events if e.kind == kind] for kind in ("split", "merge")]
         cells_and_changes(axes[2], np.array(self.history.cells), *passes)
         figures.letter(axes, ["teacher", "copy", "cells"])
@@ -161,7 +163,7 @@ def save_growth(
     who cannot; `quick` adds a watermark. No dates are in the files, so that the same run gives the same bytes. Raises
     ValueError as `Growth` does.
     """
-    growth = Growth(teacher, history, task, dpi=DPI)
+    growth = Growth(history, teacher, task, dpi=DPI)
     if quick:
         growth.stage.watermark()
     moments = np.unique((np.linspace(0, 1, FRAMES) ** 2 * (len(growth) - 1)).astype(int)).tolist()

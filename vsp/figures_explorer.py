@@ -80,7 +80,7 @@ def ground(ax: Axes, task: str) -> Axes:
 
 
 def policy_map(ax: Axes, x: np.ndarray, y: np.ndarray, actions: np.ndarray, *, color: str):
-    """Actions (n, m) on a grid: arrows of one colour where there are two of them, else a force map, which is returned."""
+    """Actions (n, m) on a grid: arrows of one colour where m is 2, else a force map. Returns what is drawn."""
     if actions.shape[1] == 2:
         return arrows(ax, np.column_stack([x.ravel(), y.ravel()]), actions, color=color)
     return force_map(ax, x, y, actions[:, 0])
@@ -141,11 +141,11 @@ def moment(ax: Axes, n: int, cells: int) -> Axes:
     return ax
 
 
-def trials(ax: Axes, frame: pd.DataFrame) -> Axes:
-    """Mean return over cells, a dot per row of `frame` (columns cells, mean); the last row has a ring."""
+def trials(ax: Axes, frame: pd.DataFrame, this: int) -> Axes:
+    """Mean return over cells, a dot per row of `frame` (columns cells, mean); the row `this` has a ring."""
     ax.scatter(frame["cells"], frame["mean"], s=16, color=DISTILLED, zorder=3, label="a trial")
-    last = frame.iloc[-1]
-    ax.scatter(last["cells"], last["mean"], s=70, facecolor="none", edgecolor="black", lw=1.2, zorder=4,
+    chosen = frame.iloc[this]
+    ax.scatter(chosen["cells"], chosen["mean"], s=70, facecolor="none", edgecolor="black", lw=1.2, zorder=4,
                label="this trial")  # fmt: skip
     ax.set_xlim(0, 1.15 * max(10, frame["cells"].max()))
     return ax

@@ -32,6 +32,8 @@ from .store import ROOT
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
+_WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
 
 
 class NotebookError(RuntimeError):
@@ -141,9 +143,11 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
         )
     except Exception as error:  # whatever it was, the copy tells how far the notebook came
         stopped = error
-    executed = nbformat.read(copy_path, as_version=4).cells if copy_path.exists() else []
-    cells = [c for c in executed if c.cell_type == "code" and "injected-parameters" not in c.metadata.get("tags", [])]
+    executed = nbformat.read(copy_path, as_version=4) if copy_path.exists() else nbformat.v4.new_notebook()
+    code = [cell for cell in executed.cells if cell.cell_type == "code"]
+    cells = [cell for cell in code if "injected-parameters" not in cell.metadata.get("tags", [])]
     _check_cells(notebook, cells, stopped)
+    _check_widgets(notebook, executed.metadata)
     return cells
 
 
@@ -165,6 +169,15 @@ def _check_cells(notebook: Path, cells: list[nbformat.NotebookNode], stopped: Ex
         count = cell.execution_count or count
     if stopped:
         raise NotebookError(f"{notebook.name}: {stopped}") from stopped
+
+
+def _check_widgets(notebook: Path, metadata: dict) -> None:
+    """No error hides in a widget: an `Output` widget keeps those of its block to itself, and the cell goes on."""
+    widgets = metadata.get("widgets", {}).get(_WIDGET_STATE, {}).get("state", {}).values()
+    for output in (output for widget in widgets for output in widget["state"].get("outputs", [])):
+        if output["output_type"] == "error":
+            trace = _COLOUR.sub("", "\n".join(output["traceback"]))
+            raise NotebookError(f"{notebook.name}: a widget holds {output['ename']}: {output['evalue']}\n{trace}")
 
 
 def _where(notebook: Path, number: int, cell: nbformat.NotebookNode) -> str:
@@ -201,10 +214,16 @@ def _write_copy(source: nbformat.NotebookNode, cells: list[nbformat.NotebookNode
 
 
 def _clean(outputs: list[nbformat.NotebookNode], number: int) -> list[nbformat.NotebookNode]:
-    """Outputs of code cell `number`; text that arrived in pieces, at the whim of a buffer, in one piece."""
+    """Outputs of code cell `number`; text that arrived in pieces, at the whim of a buffer, in one piece.
+
+    Of a widget, which answers nobody without a kernel and is named at random, its still picture is left; one that has
+    none, such as a progress bar, leaves nothing.
+    """
     result: list[nbformat.NotebookNode] = []
     for output in outputs:
-        output.get("data", {}).pop("application/vnd.jupyter.widget-view+json", None)  # named at random
+        data = output.get("data", {})
+        if data.pop(_WIDGET_VIEW, None) and set(data) <= {"text/plain"}:
+            continue
         if "execution_count" in output:
             output.execution_count = number
         if output.output_type == "stream" and result and result[-1].get("name") == output.name:
