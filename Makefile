@@ -3,10 +3,12 @@
 # What is up to date is decided by content, never by file times (a fresh clone has no order in them): build/state holds,
 # for every notebook, the checksums of all that it read and made. An altered, deleted or never made file is made again.
 
-# What each notebook makes: figures/ (PDF and PNG), figures/tables/ (TEX and CSV) and data/results/.
+# What each notebook makes: figures/ (PDF and PNG; of animations GIF, and PNG in its stead), figures/tables/ (TEX and
+# CSV) and data/results/.
 NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
+ANIMATIONS_02_distillation := growth_simplegoal growth_mountaincar
 FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
 RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv made_on.txt
 TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_policies mountaincar_linear_policies \
@@ -37,6 +39,7 @@ PIP := $(PY) -m pip --disable-pip-version-check
 STATE = $(OUT)/build/state
 INPUTS := $(sort $(wildcard vsp/*.py data/paper/* data/teachers/*.* data/teachers/short/*)) environment.lock
 outputs = figures/executed/$(1).ipynb $(foreach f,$(FIGURES_$(1)),figures/$(f).pdf figures/$(f).png) \
+  $(foreach a,$(ANIMATIONS_$(1)),figures/$(a).gif figures/$(a).png) \
   $(foreach t,$(TABLES_$(1)),figures/tables/$(t).tex figures/tables/$(t).csv) \
   $(addprefix data/results/,$(RESULTS_$(1)))
 
@@ -67,6 +70,7 @@ help: ## this list
 	@echo
 	@$(foreach n,$(NOTEBOOKS),echo '  $(n)'; \
 	  $(foreach f,$(FIGURES_$(n)),echo '    figures/$(f).pdf .png';) \
+	  $(foreach a,$(ANIMATIONS_$(n)),echo '    figures/$(a).gif .png';) \
 	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 

@@ -25,8 +25,8 @@ from .rollouts import Policy
 WIDTH, HEIGHT = 6.0, 2.6  # inches
 FINE = 301  # grid points per axis on which cells are looked up
 MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map: few arrows
-FRAMES = 32
-STEP, HOLD = 160, 2500  # milliseconds that a frame is shown, and the last one
+FRAMES = 24
+STEP, HOLD = 200, 2500  # milliseconds that a frame is shown, and the last one
 DPI, COLOURS = 100, 64  # of a GIF
 
 
@@ -172,7 +172,7 @@ def save_growth(
     with store.atomic_path(path.with_suffix(".gif")) as temporary:
         _write_gif(temporary, images)
     with store.atomic_path(path.with_suffix(".png")) as temporary:
-        temporary.write_bytes(png(images[-1], colours=COLOURS))
+        temporary.write_bytes(png(images[-1], small=True))
     return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), alt)
 
 

@@ -88,8 +88,8 @@ class Replay(Explorer):
         self.iteration = widgets.IntSlider(0, 0, last, description="iteration n", **_LABELS)
         self.player = widgets.Play(min=0, max=last, step=max(1, last // 100), interval=150, description="play the run")
         widgets.jslink((self.player, "value"), (self.iteration, "value"))
-        self.previous = widgets.Button(description="previous change", icon="step-backward")
-        self.next = widgets.Button(description="next change", icon="step-forward")
+        self.previous = widgets.Button(description="previous change", icon="step-backward", layout={"width": "170px"})
+        self.next = widgets.Button(description="next change", icon="step-forward", layout={"width": "170px"})
         self.previous.on_click(lambda _: self._jump(-1))
         self.next.on_click(lambda _: self._jump(1))
         self.point = tuple(
@@ -99,7 +99,7 @@ class Replay(Explorer):
             )
             for name, low, high in zip(self.task.input_labels, self.task.low, self.task.high)
         )  # fmt: skip
-        super().__init__(widgets.HBox([self.iteration, self.player, self.previous, self.next]), *self.point)
+        super().__init__(widgets.HBox([self.player, self.previous, self.next]), self.iteration, *self.point)
         for control in (self.iteration, *self.point):
             control.observe(self._turn, names="value")
         self._turn()
@@ -113,8 +113,8 @@ class Replay(Explorer):
         if ahead:
             self.iteration.value = ahead[0] if way > 0 else ahead[-1]
 
-    def show(self, n: int, *, colours: int | None = None) -> str:
-        """The page of iteration n as HTML, its picture in so many `colours`."""
+    def show(self, n: int, *, small: bool = False) -> str:
+        """The page of iteration n as HTML (`small`: with a small picture)."""
         point = np.array([slider.value for slider in self.point])
         policy = self.growth.history.policy_at(n)
         cell, words = int(policy.cells(point)), self.growth.words(n)
@@ -122,17 +122,17 @@ class Replay(Explorer):
         codeword = ", ".join(f"{value:.3f}" for value in policy.codewords[cell])
         where = f"The chosen state, {place}, is in cell {cell}, whose codeword is ({codeword}). There:"
         actions = {"teacher": self.teacher.predict(point)[0], "copy": policy.predict(point)[0]}
-        table = pd.DataFrame(actions, index=list(self.task.outputs)).rename_axis("action")
+        table = pd.DataFrame({"action": self.task.outputs, **actions})
         equations = "".join(f"<li><code>{html.escape(line)}</code></li>" for line in policy.equations(cell))
         shown = f"<p>{words}</p><p>{where}</p><ul>{equations}</ul>{_table(table, '{:.3f}')}"
         alt = (
             f"{words} The teacher's policy map, the copy's with its cells, and the number of cells over the iterations."
         )
-        return _page(self.growth.shoot(n, point=point), alt, shown, colours)
+        return _page(self.growth.shoot(n, point=point), alt, shown, small)
 
     def strip(self) -> list[str]:
         """Pages of three moments of the run."""
-        return [self.show(round(share * (len(self.growth) - 1)), colours=128) for share in MOMENTS]
+        return [self.show(round(share * (len(self.growth) - 1)), small=True) for share in MOMENTS]
 
 
 class Laboratory(Explorer):
@@ -145,8 +145,7 @@ class Laboratory(Explorer):
         if not isinstance(self.config, Config):
             raise ValueError(f"config is a {type(self.config).__name__}, expected a Config: it has no cells to split")
         self.trials: list[tuple[Config, VoronoiPolicy, dict]] = []
-        own = evaluate(self.teacher, self.task, N_STARTS, seed=EVALUATION_SEED)
-        self._own = {"mean": own["return"].mean(), "failures": int((own["outcome"] != "goal").sum())}
+        self._own = _judge(self.teacher, self.task)
         self.stage, self._axes = self._set_stage()
         self.settings = {name: self._slider(name) for name in REACH}
         fitting = [name for name in FORMS if self._fits(name)]
@@ -192,51 +191,51 @@ class Laboratory(Explorer):
         self.status.value = "done"
 
     def trial(self, changes: dict[str, object]) -> int:
-        """Distil and judge with those fields of the configuration changed; returns the number of the trial, that of an
-        earlier one if it had the same settings."""
-        changes = {name: float(f"{v:.6g}") if isinstance(v, float) else v for name, v in changes.items()}
-        config = dataclasses.replace(self.config, **changes)
-        share = SHARE.get(config.sub_policy, 1.0)
-        parts = {name: max(1, round(share * getattr(config, name))) for name in ("n_epochs", "n_freeze")}
-        config = dataclasses.replace(config, **parts)
+        """Distil and judge with those fields of the configuration changed; returns the trial's place in `trials`, that
+        of an earlier one if it had the same settings."""
+        config = self._config(changes)
         for place, (earlier, _, _) in enumerate(self.trials):
             if earlier == config:
                 return place
         policy, _ = distill(self.teacher, self.task, config, seed=self.seed)
-        result = evaluate(policy, self.task, N_STARTS, seed=EVALUATION_SEED)
-        failures = int((result["outcome"] != "goal").sum())
-        self.trials.append(
-            (config, policy, {"cells": len(policy), "mean": result["return"].mean(), "failures": failures})
-        )
+        self.trials.append((config, policy, _judge(policy, self.task)))
         return len(self.trials) - 1
+
+    def _config(self, changes: dict[str, object]) -> Config:
+        """The configuration of a trial, with as many iterations as its class of sub-policy is granted."""
+        rounded = {name: float(f"{v:.6g}") if isinstance(v, float) else v for name, v in changes.items()}
+        config = dataclasses.replace(self.config, **rounded)  # a slider says 0.30000000000000004
+        share = SHARE.get(config.sub_policy, 1.0)
+        parts = {name: max(1, round(share * getattr(config, name))) for name in ("n_epochs", "n_freeze")}
+        return dataclasses.replace(config, **parts)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per trial: its settings and what came out."""
-        fields = [*self.settings, "n_epochs"]
-        rows = [{name: getattr(config, name) for name in fields} | result for config, _, result in self.trials]
+        rows = [
+            {name: getattr(config, name) for name in self.settings}
+            | {"iterations": config.n_epochs, "cells": len(policy), "mean return": result["mean"]}
+            | {"failures": result["failures"]}
+            for config, policy, result in self.trials
+        ]
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="trial"))
 
-    def show(self, place: int, *, colours: int | None = None) -> str:
-        """The page of a trial as HTML, its picture in so many `colours`."""
-        _, policy, result = self.trials[place]
-        frame = self.to_frame()
-        row = frame.iloc[place]
+    def show(self, place: int, *, among: int | None = None, small: bool = False) -> str:
+        """The page of a trial as HTML, beside the first `among` trials (None: all)."""
+        policy, result = self.trials[place][1:]
+        frame = self.to_frame()[:among]
         words = (
-            f"Trial {place + 1}: max_pol_loss {row.max_pol_loss:.2g}, min_pol_distance {row.min_pol_distance:.3g}, "
-            f"min_param_distance {row.min_param_distance:.3g}, {row.sub_policy} sub-policies, {row.n_epochs} of the "
-            f"{self.config.n_epochs} iterations: {result['cells']} cells, mean return {result['mean']:.2f}, "
-            f"{result['failures']} of {N_STARTS} starts do not reach the goal. "
-            f"Teacher: {self._own['mean']:.2f}, {self._own['failures']} of {N_STARTS}."
+            f"Trial {place + 1}: {len(policy)} cells, mean return {result['mean']:.2f}; {result['failures']} of "
+            f"{N_STARTS} starts do not reach the goal. The teacher: {self._own['mean']:.2f}; {self._own['failures']}. "
+            f"Played: {frame['iterations'].iloc[place]} of {self.config.n_epochs} iterations."
         )
-        shown = frame.rename(columns={"n_epochs": "iterations", "mean": "mean return"})[::-1].head(SHOWN)
-        alt = f"{words} The teacher's policy map, the copy's with its cells, and mean return over cells of all trials."
-        return _page(self._shoot(place, frame), alt, f"<p>{words}</p>{_table(shown.reset_index(), '{:.4g}')}", colours)
+        settings = ", ".join(f"{name} {value}" for name, value in frame.iloc[place][list(self.settings)].items())
+        alt = f"{words} With {settings}. The teacher's policy map, the copy's with its cells, and all trials so far."
+        table = _table(frame[::-1].head(SHOWN).reset_index(), "{:.4g}")
+        return _page(self._shoot(policy, frame, place), alt, f"<p>{words}</p>{table}", small)
 
-    def _shoot(self, place: int, frame: pd.DataFrame) -> np.ndarray:
-        policy = self.trials[place][1]
-        ax = self._axes[2]
-        ax.clear()
-        teacher_line(trials(ax, frame, place), self._own["mean"]).legend(loc="lower right", fontsize=6)
+    def _shoot(self, policy: VoronoiPolicy, frame: pd.DataFrame, place: int) -> np.ndarray:
+        self._axes[2].clear()
+        trials(teacher_line(self._axes[2], self._own["mean"]), frame, place).legend(fontsize=6)
         figures.letter(self._axes, ["teacher", "copy", "trials"])
         self.stage.stand()
 
@@ -248,8 +247,8 @@ class Laboratory(Explorer):
         return self.stage.shoot(paint)
 
     def strip(self) -> list[str]:
-        """Pages of the first trials."""
-        return [self.show(place, colours=128) for place in range(len(FIRST))]
+        """Pages of the first trials, each as it was when no later one was there."""
+        return [self.show(place, among=place + 1, small=True) for place in range(len(FIRST))]
 
 
 class Remembered:
@@ -270,9 +269,15 @@ class Remembered:
         return self._answers[key].copy(), None
 
 
-def _page(image: np.ndarray, alt: str, shown: str, colours: int | None) -> str:
+def _judge(policy: Policy, task: Task) -> dict[str, float]:
+    """Mean return, and how many of the shared starts do not end in the goal."""
+    result = evaluate(policy, task, N_STARTS, seed=EVALUATION_SEED)
+    return {"mean": result["return"].mean(), "failures": int((result["outcome"] != "goal").sum())}
+
+
+def _page(image: np.ndarray, alt: str, shown: str, small: bool) -> str:
     """A picture with its alternative text, and what is written below it."""
-    data = base64.b64encode(png(image, colours=colours)).decode()
+    data = base64.b64encode(png(image, small=small)).decode()
     height, width = image.shape[:2]
     size = f'width="720" height="{round(720 * height / width)}"'  # given, so that nothing jumps while it loads
     return (
@@ -282,4 +287,4 @@ def _page(image: np.ndarray, alt: str, shown: str, colours: int | None) -> str:
 
 
 def _table(frame: pd.DataFrame, number: str) -> str:
-    return frame.to_html(float_format=number.format, border=0, index=frame.index.name is not None)
+    return frame.to_html(float_format=number.format, border=0, index=False)

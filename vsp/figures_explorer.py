@@ -62,13 +62,13 @@ class Stage:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
 
-def png(image: np.ndarray, *, colours: int | None = None) -> bytes:
-    """An image (height, width, 3) as a PNG file without dates; with so many `colours`, a third as large."""
+def png(image: np.ndarray, *, small: bool = False) -> bytes:
+    """An image (height, width, 3) as a PNG file without dates; `small`: in 256 colours, slower and a third as large."""
     picture, file = Image.fromarray(image), io.BytesIO()
-    if colours is None:
-        picture.save(file, "png", compress_level=1)  # quick
+    if small:
+        picture.quantize(256, dither=Image.Dither.NONE).save(file, "png", optimize=True)
     else:
-        picture.quantize(colours, dither=Image.Dither.NONE).save(file, "png", optimize=True)
+        picture.save(file, "png", compress_level=1)
     return file.getvalue()
 
 
@@ -142,10 +142,10 @@ def moment(ax: Axes, n: int, cells: int) -> Axes:
 
 
 def trials(ax: Axes, frame: pd.DataFrame, this: int) -> Axes:
-    """Mean return over cells, a dot per row of `frame` (columns cells, mean); the row `this` has a ring."""
-    ax.scatter(frame["cells"], frame["mean"], s=16, color=DISTILLED, zorder=3, label="a trial")
+    """Mean return over cells, a dot per row of `frame` (columns cells, mean return); the row `this` has a ring."""
+    ax.scatter(frame["cells"], frame["mean return"], s=16, color=DISTILLED, zorder=3, label="a trial")
     chosen = frame.iloc[this]
-    ax.scatter(chosen["cells"], chosen["mean"], s=70, facecolor="none", edgecolor="black", lw=1.2, zorder=4,
+    ax.scatter(chosen["cells"], chosen["mean return"], s=70, facecolor="none", edgecolor="black", lw=1.2, zorder=4,
                label="this trial")  # fmt: skip
     ax.set_xlim(0, 1.15 * max(10, frame["cells"].max()))
     return ax
