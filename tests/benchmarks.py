@@ -10,6 +10,7 @@ import pytest
 import vsp
 from vsp import geometry
 from vsp.evaluate import outcomes
+from vsp.explorer import laboratory, replay
 
 DISTILLATION = {"SimpleGoal-v0": 3.0, "MountainCarContinuous-v0": 4.0}  # seconds
 
@@ -63,3 +64,27 @@ def test_look_up(k, capsys):
         taken = seconds(partial(look_up, codewords, states), repeats=20)
         report(capsys, f"{look_up.__name__}, 1000 states, {k} codewords", 1000 * taken, "ms")
     assert (geometry.nearest_brute(codewords, states) == geometry.nearest_kdtree(codewords, states)).all()
+
+
+@pytest.mark.parametrize("task", vsp.paper.TASKS)
+def test_a_slider_answers_at_once(task, capsys):
+    teacher = vsp.load_teacher(task)
+    shown = replay(teacher, task, vsp.distill(teacher, task, seed=0)[1])
+    moments = iter(range(0, 2000, 100))
+    taken = seconds(lambda: setattr(shown.iteration, "value", next(moments)), repeats=15)
+    report(capsys, f"a step of the slider, {task}", 1000 * taken, "ms")
+    assert taken < 0.15
+
+
+@pytest.mark.parametrize("task", vsp.paper.TASKS)
+def test_a_trial_of_the_laboratory(task, capsys):
+    """With every class of sub-policy, in the smallest cells that the slider allows."""
+    lab = laboratory(vsp.load_teacher(task), task)
+    distance = lab.settings["min_pol_distance"].min
+    for sub_policy in lab.settings["sub_policy"].options:
+        begin = time.perf_counter()
+        place = lab.trial({"sub_policy": sub_policy, "min_pol_distance": distance})
+        lab.show(place)
+        taken = time.perf_counter() - begin
+        report(capsys, f"a trial with {len(lab.trials[place][1])} {sub_policy} cells, {task}", taken, "s")
+        assert taken < 2

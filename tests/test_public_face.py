@@ -87,10 +87,11 @@ def test_a_student_earns_most_of_what_its_teacher_does():
 
 
 MODULES = (
-    "agents", "baselines", "beyond", "buffers", "checks", "config", "distill", "envs", "evaluate", "experiments",
-    "export", "figures", "figures_beyond", "geometry", "history", "ledger", "lime", "lookup_study", "measure",
-    "methods", "moments", "paper", "partition", "policy", "race", "readings", "refine", "regions", "rollouts",
-    "runner", "simplify", "store", "study", "subpolicies", "tables", "tdavq", "teachers", "training", "trees",
+    "agents", "animation", "baselines", "beyond", "buffers", "checks", "config", "distill", "envs", "evaluate",
+    "experiments", "explorer", "export", "figures", "figures_beyond", "figures_explorer", "geometry", "history",
+    "ledger", "lime", "lookup_study", "measure", "methods", "moments", "paper", "partition", "policy", "race",
+    "readings", "refine", "regions", "rollouts", "runner", "simplify", "store", "study", "subpolicies", "tables",
+    "tdavq", "teachers", "training", "trees",
 )  # fmt: skip
 
 

@@ -105,15 +105,16 @@ class Growth:
         and the cell of the state `point` (2,). (height, width, 3) bytes. Raises ValueError outside the run."""
         policy = self.history.policy_at(n)
         since = self.last_change(n) - 1 if since is None else since
-        recent = [e for e in self.history.events if since < e.iteration <= n]
-        came, went = ([e.codeword for e in recent if e.kind == kind] for kind in ("split", "merge"))
-        came = [one for one in came if (policy.codewords == one).all(axis=1).any()]  # and was not merged since
+        recent = [(e.kind, tuple(e.codeword)) for e in self.history.events if since < e.iteration <= n]
+        there = set(map(tuple, policy.codewords))
+        came = {place for kind, place in recent if kind == "split" and place in there}
+        went = {place for kind, place in recent if kind == "merge" and place not in there}  # and did not come again
 
         def paint() -> None:
             for ax in self._axes[:2]:
                 self.maps.cells(ax, policy, point)
             self.maps.policy(self._axes[1], policy)
-            changes(self._axes[1], np.reshape(came, (-1, 2)), np.reshape(went, (-1, 2)))
+            changes(self._axes[1], *(np.reshape(sorted(places), (-1, 2)) for places in (came, went)))
             moment(self._axes[2], n, self.history.cells[n])
 
         return self.stage.shoot(paint)

@@ -1,0 +1,157 @@
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image, ImageSequence
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
+
+from vsp import animation
+from vsp.animation import Animation, Growth, save_growth
+from vsp.distill import distill
+
+mpl.use("Agg")
+ROOT = Path(__file__).resolve().parents[1]
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+ALT = 'cells "grow" & <merge>'
+
+
+@pytest.fixture(scope="module", params=TEACHERS)
+def run(request):
+    config = tiny(min_pol_distance=0.2 if request.param == SIMPLEGOAL else 0.1)
+    return request.param, TEACHERS[request.param], distill(TEACHERS[request.param], request.param, config, seed=0)[1]
+
+
+@pytest.fixture(scope="module")
+def growth(run):
+    task, teacher, history = run
+    return Growth(history, teacher, task, dpi=60, chosen=True)
+
+
+def kinds(history, first, last):
+    return [e.kind for e in history.events if first <= e.iteration <= last]
+
+
+def test_words_say_what_the_history_says(run, growth):
+    history = run[2]
+    last = max(e.iteration for e in history.events)
+    came, went = (kinds(history, last, last).count(kind) for kind in ("split", "merge"))
+    assert growth.words(119) == (
+        f"Iteration 119 of 120: {history.cells[-1]} cells. "
+        f"Last change, iteration {last}: {came} came by splits, {went} went by merges."
+    )
+    assert growth.words(0) == "Iteration 0 of 120: 1 cell." and len(growth) == 120
+
+
+def test_what_changed_is_marked(run, growth, monkeypatch):
+    """Rings on the codewords of the last pass, or since an iteration, that are still there; crosses on those gone."""
+    history, marked = run[2], []
+    monkeypatch.setattr(animation, "changes", lambda ax, came, went: marked.append((came.tolist(), went.tolist())))
+    passes = sorted({e.iteration for e in history.events})
+    assert len(passes) > 2 and {"split", "merge"} <= set(kinds(history, 0, 120))
+    for n in (passes[0], passes[1] - 1, passes[-1], 119):
+        growth.shoot(n)
+        pass_of = max(p for p in passes if p <= n)
+        before, after = (history.policy_at(m).codewords.tolist() for m in (pass_of - 1, n))
+        came, went = marked.pop()
+        assert came == sorted(codeword for codeword in after if codeword not in before)
+        assert all(codeword in went for codeword in before if codeword not in after)
+        brief = [codeword for codeword in went if codeword not in before]  # came and went in one pass
+        assert len(came) + len(brief) == kinds(history, pass_of, pass_of).count("split")
+    growth.shoot(119, since=-1)
+    first = history.policy_at(0).codewords[0]  # no split brought it
+    final = [codeword for codeword in history.policy_at(119).codewords.tolist() if codeword != first.tolist()]
+    came, went = marked.pop()
+    assert came == sorted(final) and went and not any(codeword in final for codeword in went)
+
+
+def test_a_shot_shows_the_iteration_and_the_state(growth):
+    early, late, again = growth.shoot(0), growth.shoot(119), growth.shoot(0)
+    chosen = growth.shoot(119, point=np.mean([growth.maps.task.low, growth.maps.task.high], axis=0))
+    assert np.array_equal(early, again) and early.shape == (156, 360, 3)
+    assert (early != late).any() and (late != chosen).any()
+    assert not plt.get_fignums()
+
+
+def test_borders_are_those_of_the_policy_then(run, growth, monkeypatch):
+    task, _, history = run
+    seen = []
+    monkeypatch.setattr(animation, "borders", lambda ax, x, y, index, chosen: seen.append((x, y, index, chosen)))
+    point = growth.maps.task.low + 0.3 * (growth.maps.task.high - growth.maps.task.low)
+    growth.shoot(60, point=point)
+    policy = history.policy_at(60)
+    for x, y, index, chosen in seen:
+        assert np.array_equal(index, policy.cells(np.column_stack([x.ravel(), y.ravel()])))
+        assert chosen == policy.cells(point)
+    assert len(seen) == 2  # over the teacher's map and over the copy's
+
+
+@pytest.fixture(scope="module")
+def saved(run, tmp_path_factory):
+    task, teacher, history = run
+    out = tmp_path_factory.mktemp("out")
+    return save_growth(history, teacher, task, "growth", out=out, alt=ALT), out / "figures"
+
+
+def test_the_gif_is_short_small_and_ends_on_the_final_partition(run, saved):
+    task, teacher, history = run
+    gif = Image.open(saved[1] / "growth.gif")
+    frames = [(frame.info["duration"], np.asarray(frame.convert("RGB"), int)) for frame in ImageSequence.Iterator(gif)]
+    assert 20 <= len(frames) <= 40 and sum(duration for duration, _ in frames) < 10_000
+    assert frames[-1][0] >= 2000 and len(saved[0].gif) < 600_000
+    shot = Growth(history, teacher, task, dpi=animation.DPI).shoot(119, since=114)
+    still = np.asarray(Image.open(saved[1] / "growth.png").convert("RGB"), int)
+    for shown in (frames[-1][1], still):
+        assert np.abs(shown - shot).mean() < 3  # but for fewer colours
+    assert np.abs(frames[0][1] - shot).mean() > 3
+    assert (still[0, 0] == 255).all() and all((frame[0, 0] == 255).all() for _, frame in frames)
+
+
+def test_it_is_shown_with_words_and_without_motion_where_none_is_wanted(saved):
+    shown, folder = saved
+    text = shown._repr_html_()
+    assert 'alt="cells &quot;grow&quot; &amp; &lt;merge&gt;"' in text and repr(shown) == ALT
+    found = re.search(r'<source media="\(prefers-reduced-motion: reduce\)" srcset="([^"]+)"><img (.+?)>', text)
+    still, moving = found.groups()
+    assert still.startswith("data:image/png;base64,") and 'src="data:image/gif;base64,' in moving
+    assert shown.gif == (folder / "growth.gif").read_bytes() and shown.still == (folder / "growth.png").read_bytes()
+    assert text.index("<details open>") < text.index("<picture>") < text.index("</details>")
+
+
+def test_another_process_writes_the_same_bytes_and_a_quick_run_is_marked(tmp_path):
+    history = distill(CurvedTeacher(), SIMPLEGOAL, tiny(n_epochs=60), seed=0)[1]
+    folders = [tmp_path / name for name in ("here", "quick", "there")]
+    for folder, quick in zip(folders, (False, True)):
+        save_growth(history, CurvedTeacher(), SIMPLEGOAL, "growth", out=folder, alt=ALT, quick=quick)
+    code = f"""
+import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
+import matplotlib; matplotlib.use("Agg")
+from support import CurvedTeacher, tiny
+from vsp.animation import save_growth
+from vsp.distill import distill
+history = distill(CurvedTeacher(), {SIMPLEGOAL!r}, tiny(n_epochs=60), seed=0)[1]
+save_growth(history, CurvedTeacher(), {SIMPLEGOAL!r}, "growth", out={str(folders[2])!r}, alt="")
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONHASHSEED": "7", "PATH": ""}, cwd=tmp_path)
+    for name in ("growth.gif", "growth.png"):
+        here, quick, there = ((folder / "figures" / name).read_bytes() for folder in folders)
+        assert here == there != quick
+
+
+def test_what_cannot_be_drawn_is_named(run):
+    task, teacher, history = run
+    with pytest.raises(ValueError, match="task is Pendulum-v1, expected one of .*SimpleGoal-v0"):
+        Growth(history, teacher, PENDULUM)
+    with pytest.raises(ValueError, match="history is a DataFrame, expected the History"):
+        Growth(pd.DataFrame(), teacher, task)
+    with pytest.raises(ValueError, match="iteration 120, expected 0 to 119"):
+        Growth(history, teacher, task, dpi=40).shoot(120)
+
+
+def test_an_animation_needs_no_file():
+    assert "data:image/gif;base64,R0lG" in Animation(b"GIF", b"PNG", "x")._repr_html_()
