@@ -73,6 +73,15 @@ def test_a_quick_run_is_marked_on_every_shot():
     marked.watermark()
     shots = [marked.shoot(lambda: None) for _ in range(2)]
     assert (shots[0] != plain.shoot(lambda: None)).any() and np.array_equal(*shots)
+    (covered, left), (hidden, right) = stage(), stage()
+    covered.watermark()
+    for axes in (left, right):
+        axes[0].set_position([0, 0, 1, 1])
+    over, under = (
+        one.shoot(lambda: axes[0].fill_between([0, 1], 0, 1, color="red", zorder=9))
+        for one, axes in ((covered, left), (hidden, right))
+    )
+    assert (over != under).any()  # on top of what is painted
 
 
 def test_a_png_has_the_pixels_and_no_date():

@@ -46,8 +46,8 @@ class Stage:
 
     def watermark(self) -> None:
         """Mark all shots as those of a quick run, as `figures.save_figure` does."""
-        self.fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
-        self.stand()
+        about = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
+        self.fig.text(0.5, 0.5, "quick run", animated=True, **about)  # drawn last, by each shot
 
     def shoot(self, paint: Callable[[], object]) -> np.ndarray:
         """The figure with what `paint` draws into its axes. (height, width, 3) bytes"""
@@ -59,6 +59,8 @@ class Stage:
                 ax.draw_artist(artist)  # the spines once more, for a map would cover half of them
             for artist in added:
                 artist.remove()
+        for mark in self.fig.texts:
+            self.fig.draw_artist(mark)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
 
