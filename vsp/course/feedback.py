@@ -83,6 +83,12 @@ class Exercise:
             raise self.wrong(f"NaN or infinity in {what}", "finite numbers", hint)
         return values
 
+    def size(self, value: object) -> int:
+        """How many entries `value` has. Raises NotYet for what is no collection."""
+        if not hasattr(value, "__len__"):
+            raise self.wrong(f"{value!r} as the result", "a list")
+        return len(value)
+
     def compare(self, value: np.ndarray, right: object, mistakes: Sequence[Mistake], otherwise: Mistake) -> None:
         """Raise NotYet unless `value` is `right`, with the words of the first mistake that it agrees with."""
         if not _close(value, right):
