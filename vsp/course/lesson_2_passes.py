@@ -87,9 +87,8 @@ def split_regions(function: Callable) -> None:
         )
         new = partition.codewords[before:, 0]
         if not _same(new, case.splits):
-            raise SPLIT.wrong(
-                _count(len(new), "split"), f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint
-            )
+            found = "a split elsewhere" if len(new) == len(case.splits) else _count(len(new), "split")
+            raise SPLIT.wrong(found, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         if SPLIT.size(added) != len(new):
             raise SPLIT.wrong(f"{len(added)} codewords returned", f"the {len(new)} new ones of the partition", 1)
     _emptied(function)
