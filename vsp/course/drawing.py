@@ -39,5 +39,7 @@ def copy_and_error(policy: VoronoiPolicy, teacher: Policy) -> tuple[Figure, np.n
 
 def on_the_way(ax: Axes, states: np.ndarray, error: np.ndarray) -> Axes:
     """The error (n,) of a copy in the states (n, 2) that were visited: a dot each, the larger the worse."""
-    figures.square(ax).scatter(*states.T, s=2 + 12 * error, color=figures.DISTILLED, alpha=0.4, lw=0, zorder=2)
+    figures.square(ax).scatter(
+        *states.T, s=1 + 12 * error, color=figures.DISTILLED, alpha=0.4, lw=0, zorder=6, clip_on=False
+    )
     return ax
