@@ -586,6 +586,16 @@ def stale_indices(partition, config):
     return removed
 
 
+@wrong("2.4", "does your loop come to an end")
+def for_ever(partition, config):
+    i = 0
+    while i < len(partition.codewords):
+        near = partition.neighbours()[i]
+        if not near.any():
+            i += 1
+    return []
+
+
 @wrong("2.4", "nothing is averaged")
 def average(partition, config):
     before = partition.models.parameters.copy()
@@ -970,11 +980,12 @@ def state_of_each_failure(policy, teacher, task, starts):
 
 
 @right("3.4")
-def start_by_start(policy, teacher, task, starts):
+def by_the_last_step(policy, teacher, task, starts):
     counts = [0] * len(policy)
-    for start in starts:
-        if failing(policy, teacher, task, start[None])[0]:
-            counts[int(policy.cells(record(policy, task, start[None])[0].states)[-1])] += 1
+    for ours, theirs in zip(record(policy, task, starts), record(teacher, task, starts)):
+        ends = [task.step(e.states[-1:], e.actions[-1:])[2][0] for e in (ours, theirs)]
+        if ends[0] != GOAL and ends[1] == GOAL:
+            counts[int(policy.cells(ours.states[-1]))] += 1
     return counts
 
 
