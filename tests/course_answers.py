@@ -264,7 +264,7 @@ def state_by_state(codewords, coefficients, states):
 
 wrong("1.6", "is not written yet")(np.array([[0.3, 0.3], [0.7, 0.7]]))
 wrong("1.6", "expected at most 6")(np.random.default_rng(0).uniform(size=(7, 2)))
-wrong("1.6", "at most 50 %")(np.array([[0.9, 0.1], [0.9, 0.2], [0.9, 0.3]]))
+wrong("1.6", "at most 50%")(np.array([[0.9, 0.7], [0.9, 0.8], [0.9, 0.9]]))
 wrong("1.6", "there twice")(np.array([[0.5, 0.5], [0.5, 0.5]]))
 wrong("1.6", "outside the unit square")(np.array([[0.5, 0.5], [5, 0.5]]))
 wrong("1.6", "a row x, y per codeword")(np.array([0.1, 0.2, 0.3]))
@@ -850,7 +850,7 @@ def half_interval(ours, theirs):
     return (ours - theirs).mean(), 1.96 * (ours - theirs).std() / np.sqrt(len(ours))
 
 
-@wrong("3.2", "the two numbers")
+@wrong("3.2", "the gap and its standard error")
 def gap_only(ours, theirs):
     return (ours - theirs).mean()
 

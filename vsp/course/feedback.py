@@ -66,19 +66,23 @@ class Exercise:
         except NotImplementedError:
             raise self.unsolved() from None
         except Exception as error:
-            raise self.wrong(f"{type(error).__name__} ({error}) when it is called", "a result", None) from None
+            found, advice = f"{type(error).__name__} ({error}) when it is called", "call it yourself on a small case"
+            raise self.wrong(found, f"a result: {advice} and read where it stops") from None
         if result is None:
             raise self.wrong("None as the result", "something after `return`")
         return result
 
-    def array(self, value: object, shape: tuple[int, ...], what: str = "the result", hint: int | None = None):
-        """`value` as an array of floats. Raises NotYet unless its shape is `shape` and all are finite."""
+    def array(
+        self, value: object, shape: tuple[int, ...], what: str = "a result", hint: int | None = None, meaning: str = ""
+    ) -> np.ndarray:
+        """`value` as an array of floats. Raises NotYet unless its shape is `shape` and all are finite; `meaning` says
+        what an array of that shape is to hold."""
         try:
             values = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
             raise self.wrong(f"{what} of type {type(value).__name__}", f"numbers of shape {shape}", hint) from None
         if values.shape != shape:
-            raise self.wrong(f"{what} of shape {values.shape}", f"{shape}", hint)
+            raise self.wrong(f"{what} of shape {values.shape}", f"{shape}{': ' if meaning else ''}{meaning}", hint)
         if not np.isfinite(values).all():
             raise self.wrong(f"NaN or infinity in {what}", "finite numbers", hint)
         return values

@@ -260,7 +260,7 @@ def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task
         raise BY_HAND.wrong(f"{len(points)} codewords", f"at most {AT_MOST}", 3)
     one, many = (_imitation(c, states, actions, task) for c in (points[:1], points))
     if many > one / 2:
-        raise BY_HAND.wrong(f"{many / one:.0%} of the error of one map with {len(points)} codewords", "at most 50 %", 2)
+        raise BY_HAND.wrong(f"{many / one:.1%} of the error of one map with {len(points)} codewords", "at most 50%", 2)
     BY_HAND.passed(f"{len(points)} codewords leave {many / one:.0%} of the error of one map.")
 
 

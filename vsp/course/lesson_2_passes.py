@@ -104,7 +104,7 @@ def split_regions(function: Callable) -> None:
             found = "a split elsewhere" if len(new) == len(case.splits) else _count(len(new), "split")
             raise SPLIT.wrong(found, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         if SPLIT.size(added) != len(new):
-            raise SPLIT.wrong(f"{len(added)} codewords returned", f"the {len(new)} new ones of the partition", 1)
+            raise SPLIT.wrong(f"{len(added)} codewords returned", f"one for every new cell, {len(new)}", 1)
     _emptied(function)
     for seed in range(4):
         _like_ours(function, seed)
@@ -202,7 +202,9 @@ def _in_a_row(function: Callable, case: MergeCase) -> None:
         expected = f"{' or '.join(sorted({str(len(left)) for left in case.left}))} left, in a case of {case.what}"
         raise MERGE.wrong(f"{len(kept)} of {len(places)} cells left{_which(kept, case)}", expected, case.hint)
     if MERGE.size(removed) != len(places) - len(kept):
-        raise MERGE.wrong(f"{len(removed)} codewords returned", f"the {len(places) - len(kept)} that went", 1)
+        raise MERGE.wrong(
+            f"{len(removed)} codewords returned", f"one for every cell that went, {len(places) - len(kept)}", 1
+        )
 
 
 def _which(kept: list[int], case: MergeCase) -> str:

@@ -72,7 +72,7 @@ def paired_gap(function: Callable) -> None:
 
 def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
     value = PAIRED_GAP.array(
-        PAIRED_GAP.call(function, ours, theirs), (2,), "the two numbers, gap and standard error,", 1
+        PAIRED_GAP.call(function, ours, theirs), (2,), hint=1, meaning="the gap and its standard error"
     )
     n, difference = len(ours), ours - theirs
     if not np.isclose(value[0], difference.mean()):
@@ -118,7 +118,7 @@ def interval(function: Callable) -> None:
 
 def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator) -> None:
     values = INTERVAL.call(function, returns, rng)
-    low, high = INTERVAL.array(values, (2,), "the ends of the interval", 1)
+    low, high = INTERVAL.array(values, (2,), hint=1, meaning="the ends of the interval")
     if low > high:
         raise INTERVAL.wrong("the upper end first", "the lower end first", 1)
     means = returns.mean(axis=1)
@@ -182,7 +182,7 @@ def blame(function: Callable) -> None:
 
 def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray) -> None:
     k = len(policy)
-    value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), "a count per cell,", 1)
+    value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), hint=1, meaning="a count per cell")
     ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
     episodes = record(policy, task, starts)
     last = policy.cells(np.array([episode.states[-1] for episode in episodes]))
