@@ -14,7 +14,8 @@ from IPython.core.interactiveshell import InteractiveShell
 
 import vsp
 from vsp.course import build, drawing, feedback, lesson_1, lesson_2, lesson_3
-from vsp.distill import distill, teacher_episodes
+from vsp.distill import distill, merge_regions, split_regions, teacher_episodes
+from vsp.partition import Partition
 
 LESSONS = build.read_sources()
 EXERCISES = {
@@ -226,6 +227,20 @@ def test_solutions_run_and_pass_every_check(lesson, monkeypatch, capsys):
     _, failed = run(build.solution(lesson), monkeypatch)
     assert not failed
     assert capsys.readouterr().out.count("✓ ") == len(by_kind(lesson, build.is_check))
+
+
+def test_the_solutions_of_lesson_2_together_are_the_papers_method(monkeypatch):
+    """Cell by cell the same partition as with the passes of vsp, from the same random numbers."""
+    names, _ = run(build.solution(LESSONS["lesson_2_algorithms.ipynb"]), monkeypatch)
+    config = vsp.preset(SIMPLEGOAL).quick()
+    grown = []
+    for split, merge in ((names["split_regions"], names["merge_regions"]), (split_regions, merge_regions)):
+        rng, partition = np.random.default_rng(1), Partition(names["task"], config)
+        episodes = list(teacher_episodes(names["teacher"], names["task"], config.n_epochs, rng))
+        names["algorithm_1"](partition, episodes, config, rng, split, merge)
+        grown.append(partition)
+    assert np.array_equal(grown[0].codewords, grown[1].codewords) and len(grown[0].codewords) > 5
+    assert np.array_equal(grown[0].models.parameters, grown[1].models.parameters)
 
 
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):

@@ -8,7 +8,6 @@ import nbformat
 import pytest
 
 pytest.importorskip("nbgrader", reason="nbgrader is not installed: `make test-site` brings it")
-pytest.importorskip("vsp.course")
 
 from nbgrader.api import Gradebook  # noqa: E402
 from nbgrader.apps import NbGraderAPI  # noqa: E402
