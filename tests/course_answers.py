@@ -194,6 +194,11 @@ def the_distances(codewords, states):
     return cdist(states, codewords, "cityblock").min(axis=1)
 
 
+@wrong("1.4", "begin at 1")
+def counted_from_one(codewords, states):
+    return cdist(states, codewords, "cityblock").argmin(axis=1) + 1
+
+
 @wrong("1.4", "farthest")
 def farthest(codewords, states):
     return cdist(states, codewords, "cityblock").argmax(axis=1)
@@ -771,6 +776,15 @@ def wrong_gradient(task):
     return Half("half", ("d",), ("state[0] - state[1]",), np.ones(1), lambda s: s[..., :1] - s[..., 1:])
 
 
+@wrong("2.7", "cannot be read")
+def training_that_stops(task):
+    class Broken(Form):
+        def batch(self, inputs, parameters):
+            return inputs @ parameters[0, :1], None
+
+    return Broken("broken", ("d",), ("state[0] - state[1]",), np.ones(1), lambda s: s[..., :1] - s[..., 1:])
+
+
 @wrong("2.7", "of the error that constants have")
 def nothing_in_it(task):
     return form_of(lambda s: 1e-9 * np.sin(40 * s[..., :1]), ("1e-9 * sin(40 * state[0])",))
@@ -955,7 +969,7 @@ def blame_the_start(policy, teacher, task, starts):
     return count_cells(policy, starts[failing(policy, teacher, task, starts)])
 
 
-@wrong("3.4", "every step of a failed episode")
+@wrong("3.4", "every step of a failure")
 def blame_everyone(policy, teacher, task, starts):
     mask = failing(policy, teacher, task, starts)
     return count_cells(policy, np.concatenate([e.states for e in record(policy, task, starts[mask])]))
@@ -1092,6 +1106,11 @@ def starts_only(policy, teacher, task, starts, states, actions):
 @wrong("3.6", "one for each state")
 def labels_missing(policy, teacher, task, starts, states, actions):
     return np.concatenate([states, gone_through(policy, task, starts)]), actions
+
+
+@wrong("3.6", "cannot be read")
+def nonsense(policy, teacher, task, starts, states, actions):
+    return "states", "actions"
 
 
 @wrong("3.6", "two arrays")

@@ -7,6 +7,7 @@ mistake would give, and points to a hint.
 from __future__ import annotations
 
 import copy
+import functools
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,6 +50,21 @@ class Exercise:
         """The exception to raise where the student has not begun."""
         todo = "put your own code in place of the stub, run that cell, then this one"
         return NotYet(f"{self.number} {self.name} is not written yet: {todo}.")
+
+    def checks(self, check: Callable) -> Callable:
+        """Decorator of the exercise's check: what the check cannot read it says in words, like all else."""
+
+        @functools.wraps(check)
+        def careful(*answer: object, **settings: object) -> None:
+            try:
+                check(*answer, **settings)
+            except NotYet:
+                raise
+            except Exception as error:
+                found = f"something that cannot be read ({type(error).__name__}: {error})"
+                raise self.wrong(found, "an answer as the text describes it") from None
+
+        return careful
 
     def passed(self, text: str) -> None:
         """Say that all is well."""
@@ -93,10 +109,12 @@ class Exercise:
             raise self.wrong(f"{value!r} as the result", "a list")
         return len(value)
 
-    def compare(self, value: np.ndarray, right: object, mistakes: Sequence[Mistake], otherwise: Mistake) -> None:
+    def compare(
+        self, value: object, right: object, mistakes: Sequence[Mistake], otherwise: Mistake, rtol: float = 1e-6
+    ) -> None:
         """Raise NotYet unless `value` is `right`, with the words of the first mistake that it agrees with."""
-        if not _close(value, right):
-            mistake = next((m for m in mistakes if _close(value, m.result)), otherwise)
+        if not _close(value, right, rtol):
+            mistake = next((m for m in mistakes if _close(value, m.result, rtol)), otherwise)
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
     def answers(self, given: object, options: dict[str, Sequence[str] | type]) -> dict:
@@ -133,6 +151,6 @@ def seal(number: str, key: str, answer: str) -> str:
     return hashlib.sha256(f"vsp course|{number}|{key}|{answer}".encode()).hexdigest()[:16]
 
 
-def _close(value: object, right: object) -> bool:
+def _close(value: object, right: object, rtol: float) -> bool:
     value, right = np.asarray(value, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    return value.shape == right.shape and np.allclose(value, right, rtol=1e-6, atol=1e-9)
+    return value.shape == right.shape and np.allclose(value, right, rtol=rtol, atol=1e-9)

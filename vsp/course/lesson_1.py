@@ -37,6 +37,7 @@ SHARES = ("less than a quarter", "about half", "more than three quarters")
 PLACES = ("beyond the pit, seen from the goal", "between goal and pit", "along the walls")
 
 
+@READING.checks
 def reading(answers: dict, teacher: Policy) -> None:
     """1.1: answers `right of the pit`, `beyond the pit`, `at the limit`, `sudden turn`."""
     options = {"right of the pit": WAYS, "beyond the pit": WAYS, "at the limit": SHARES, "sudden turn": PLACES}
@@ -72,6 +73,7 @@ def _sharpest(states: np.ndarray, actions: np.ndarray) -> str:
     return PLACES[int(np.argmax([turn[mask].mean() for mask in (beyond, between, wall)]))]
 
 
+@FIT_LINEAR.checks
 def fit_linear(function: Callable) -> None:
     """1.2: `fit_linear(states, actions)` returns coefficients (d + 1, m), weights above the bias."""
     for seed in SEEDS:
@@ -112,6 +114,7 @@ class _Map:
         return np.asarray(obs) @ self.weights, None
 
 
+@ACTION_ERROR.checks
 def action_error(function: Callable) -> None:
     """1.3: `action_error(policy, teacher, states)` returns the mean squared difference of two policies' actions."""
     for seed in SEEDS:
@@ -143,6 +146,7 @@ def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
     )
 
 
+@NEAREST.checks
 def nearest(function: Callable) -> None:
     """1.4: `nearest(codewords, states)` returns the index of the nearest codeword by Manhattan distance. (n,)"""
     for seed in SEEDS:
@@ -163,37 +167,28 @@ def _looks_up(function: Callable, codewords: np.ndarray, states: np.ndarray) -> 
     value = NEAREST.array(value, (len(states),), hint=1)
     if (value != np.round(value)).any():
         raise NEAREST.wrong("numbers that are no integers", "indices of codewords, not distances to them", 1)
+    right = geometry.nearest(codewords, states)
+    otherwise = Mistake(None, f"the right cell for {(value == right).mean():.0%} of the states", "it for all", 1)
+    NEAREST.compare(value, right, _other_cells(codewords, states), otherwise)
+
+
+def _other_cells(codewords: np.ndarray, states: np.ndarray) -> list[Mistake]:
     apart = geometry.distances(states, codewords)
     last = len(codewords) - 1 - apart[:, ::-1].argmin(axis=1)
-    mistakes = [
+    euclidean, chebyshev = (geometry.nearest(codewords, states, metric) for metric in ("euclidean", "chebyshev"))
+    late = np.abs((states[:, None] - codewords).sum(axis=2)).argmin(axis=1)
+    late_words = "differences that cancel before their size is taken"
+    return [
         Mistake(last, "the later of two codewords that are equally near", "the one with the lower index", 3),
-        Mistake(
-            geometry.nearest(codewords, states, "euclidean"),
-            "the cells of the Euclidean distance",
-            "those of the Manhattan distance",
-            2,
-        ),
-        Mistake(
-            geometry.nearest(codewords, states, "chebyshev"),
-            "cells by the largest difference along one axis",
-            "those by the sum over the axes",
-            2,
-        ),
-        Mistake(
-            np.abs((states[:, None] - codewords).sum(axis=2)).argmin(axis=1),
-            "differences that cancel before their size is taken",
-            "absolute values first, then the sum",
-            2,
-        ),
+        Mistake(euclidean, "the cells of the Euclidean distance", "those of the Manhattan distance", 2),
+        Mistake(chebyshev, "cells by the largest difference along one axis", "those by the sum over the axes", 2),
+        Mistake(late, late_words, "absolute values first, then the sum", 2),
         Mistake(apart.argmax(axis=1), "the codeword farthest away", "the nearest one", 1),
-        Mistake(value + 1 if (value >= 1).all() else None, "indices that begin at 1", "indices that begin at 0", 1),
+        Mistake(apart.argmin(axis=1) + 1, "indices that begin at 1", "indices that begin at 0", 1),
     ]
-    known = [mistake for mistake in mistakes if mistake.result is not None]
-    share = (value == apart.argmin(axis=1)).mean()
-    otherwise = Mistake(None, f"the right cell for {share:.0%} of the states", "it for all", 1)
-    NEAREST.compare(value, apart.argmin(axis=1), known, otherwise)
 
 
+@ACT.checks
 def act(function: Callable) -> None:
     """1.5: `act(codewords, coefficients, states)` returns each state's action by its cell's map, within [-1, 1]."""
     for seed in SEEDS:
@@ -242,6 +237,7 @@ def leftover(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray) -> 
     return total / actions.size
 
 
+@BY_HAND.checks
 def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> None:
     """1.6: at most `AT_MOST` codewords whose maps have at most half the error of one map for everything."""
     try:
@@ -269,6 +265,7 @@ def _imitation(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, t
     return float(np.square(piecewise(codewords, states, actions, task).predict(states)[0] - actions).mean())
 
 
+@PLACE.checks
 def place(function: Callable) -> None:
     """1.7: `place(states, actions, k)` returns k codewords that beat random ones, on both tasks."""
     for name, n_episodes in (("SimpleGoal-v0", 150), ("MountainCarContinuous-v0", 10)):

@@ -51,17 +51,15 @@ CHANGES = {
 }
 
 
+@READING.checks
 def reading(answers: dict, history: History, config: Config) -> None:
     """2.1: answers `frozen from` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
     options = {"frozen from": float, "half of the cells": MOMENTS, "fewer cells by": CAUSES, "loss jumps by": CAUSES}
     READING.answers(answers, options)
     begin, last = config.n_epochs - config.n_freeze, max((e.iteration for e in history.events), default=0)
     if not min(last, begin) - 0.04 * config.n_epochs <= answers["frozen from"] <= begin + 0.04 * config.n_epochs:
-        side = (
-            "the number of cells still changes after it"
-            if answers["frozen from"] < last
-            else "the partition stands still before it"
-        )
+        early = answers["frozen from"] < last
+        side = "the number of cells still changes after it" if early else "the partition stands still before it"
         raise READING.wrong(f"iteration {answers['frozen from']:g}, but {side}", "where the shading begins", 1)
     cells = np.array(history.cells)
     early = int(np.argmax(cells >= cells[-1] / 2))
@@ -81,40 +79,34 @@ def reading(answers: dict, history: History, config: Config) -> None:
     READING.passed("the plot has told you what the algorithm does when.")
 
 
+@RUNNING_MEAN.checks
 def running_mean(function: Callable) -> None:
     """2.2: `running_mean(cells, losses)` returns, per step, the mean loss since its cell was entered. (T,)"""
-    cases = [
-        (np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0])),
-        (np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3, 5, 1, 4, 0])),
-    ]
+    _forgets(function, np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0]))
+    _forgets(function, np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3.0, 5.0, 1.0, 4.0, 0.0]))
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        cases.append((np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8)), np.zeros(0)))
-        cases[-1] = (cases[-1][0], rng.uniform(size=len(cases[-1][0])))
-    for cells, losses in cases:
-        right = _since(cells, losses)
-        value = RUNNING_MEAN.array(RUNNING_MEAN.call(function, cells, losses), losses.shape, hint=1)
-        counts = np.arange(1, len(losses) + 1)
-        by_cell = [losses[: t + 1][cells[: t + 1] == cells[t]].mean() for t in range(len(losses))]
-        entered = np.concatenate([[True], cells[1:] != cells[:-1]]).cumsum()
-        whole = [losses[entered == entered[t]].mean() for t in range(len(losses))]
-        sums = right * (counts - np.array([np.argmax(entered == e) for e in entered]))
-        mistakes = [
-            Mistake(losses.cumsum() / counts, "the mean since the episode began", "it since the cell was entered", 2),
-            Mistake(by_cell, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
-            Mistake(whole, "losses of later steps", "only those up to the step", 1),
-            Mistake(sums, "sums", "means", 1),
-            Mistake(losses, "the losses themselves", "their mean since the cell was entered", 1),
-        ]
-        step = int(np.argmin(np.isclose(value, right)))
-        otherwise = Mistake(
-            None,
-            f"another number at step {step} of cells {cells.tolist()[:8]}...",
-            "the mean since that cell was entered",
-            1,
-        )
-        RUNNING_MEAN.compare(value, right, mistakes, otherwise)
+        cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
+        _forgets(function, cells, rng.uniform(size=len(cells)))
     RUNNING_MEAN.passed("it forgets whenever the episode enters another cell.")
+
+
+def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
+    right, steps = _since(cells, losses), np.arange(1, len(losses) + 1)
+    value = RUNNING_MEAN.array(RUNNING_MEAN.call(function, cells, losses), losses.shape, hint=1)
+    by_cell = [losses[:t][cells[:t] == cells[t - 1]].mean() for t in steps]
+    visit = np.concatenate([[True], cells[1:] != cells[:-1]]).cumsum()
+    whole = [losses[visit == v].mean() for v in visit]
+    sums = right * (steps - [np.argmax(visit == v) for v in visit])
+    mistakes = [
+        Mistake(losses.cumsum() / steps, "the mean since the episode began", "it since the cell was entered", 2),
+        Mistake(by_cell, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
+        Mistake(whole, "losses of later steps", "only those up to the step", 1),
+        Mistake(sums, "sums", "means", 1),
+        Mistake(losses, "the losses themselves", "their mean since the cell was entered", 1),
+    ]
+    found = f"another number at step {np.argmin(np.isclose(value, right))} of cells {cells.tolist()}"
+    RUNNING_MEAN.compare(value, right, mistakes, Mistake(None, found, "the mean since that cell was entered", 1))
 
 
 def _since(cells: np.ndarray, losses: np.ndarray) -> np.ndarray:
@@ -147,6 +139,7 @@ class _Witness:
         self.done.append("clear")
 
 
+@ALGORITHM_1.checks
 def algorithm_1(function: Callable) -> None:
     """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)`: who is called when."""
     schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 11, 50))
@@ -163,16 +156,8 @@ def _on_schedule(function: Callable, config: Config) -> None:
     def note(what: str) -> Callable:
         return lambda *_: partition.done.append(what) or []
 
-    ALGORITHM_1.call(
-        lambda *given: function(*given) or True,
-        partition,
-        list(episodes),
-        config,
-        np.random.default_rng(0),
-        note("split"),
-        note("merge"),
-        keep=True,
-    )
+    given = partition, list(episodes), config, np.random.default_rng(0), note("split"), note("merge")
+    ALGORITHM_1.call(lambda *given: function(*given) or True, *given, keep=True)
     if not any(isinstance(done, Episode) for done in partition.done):
         raise ALGORITHM_1.wrong("no episode observed", "one in every iteration", 1)
     if "add" not in partition.done or not np.array_equal(partition.codewords[0], episodes[0].states[0]):
@@ -214,6 +199,7 @@ def _one_round(n: int, done: list[str], config: Config) -> None:
         raise ALGORITHM_1.wrong("a merge before a split in one iteration", "splits first, as the paper prints it", 2)
 
 
+@PREDICTION.checks
 def prediction(answers: dict, teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> None:
     """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer."""
     PREDICTION.answers(answers, dict.fromkeys(CHANGES, TREND))

@@ -19,6 +19,7 @@ from .feedback import Exercise
 FORM = Exercise("2.7", "my_form")
 
 
+@FORM.checks
 def my_form(function: Callable, teacher: Policy, task: Task) -> None:
     """2.7: `my_form(task)` returns a `Form` that is new, consistent, has a right gradient, and beats a constant."""
     form = FORM.call(function, task)

@@ -91,6 +91,7 @@ SPLITS = (
 # fmt: on
 
 
+@SPLIT.checks
 def split_regions(function: Callable) -> None:
     """2.3: `split_regions(partition, episode, config, rng)` as Algorithm 2; returns the new codewords."""
     for case in SPLITS:
@@ -181,6 +182,7 @@ MERGES = (
 )
 
 
+@MERGE.checks
 def merge_regions(function: Callable) -> None:
     """2.4: `merge_regions(partition, config)` as Algorithm 3; returns the codewords that went."""
     _in_a_row(function, MERGES[0])

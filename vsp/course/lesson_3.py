@@ -37,6 +37,7 @@ WHERE = ("inside the box", "in the lower whisker", "nowhere")
 SEES = ("the median", "the height of the box", "the mean")
 
 
+@READING.checks
 def reading(answers: dict, ours: np.ndarray, theirs: np.ndarray) -> None:
     """3.1: answers `higher median`, `inside the box`, `pit episodes`, `sees the pit`, about two arrays of returns."""
     options = {"higher median": WHO, "inside the box": INSIDE, "pit episodes": WHERE, "sees the pit": SEES}
@@ -61,6 +62,7 @@ def reading(answers: dict, ours: np.ndarray, theirs: np.ndarray) -> None:
     READING.passed("a plot may hide just what went wrong.")
 
 
+@PAIRED_GAP.checks
 def paired_gap(function: Callable) -> None:
     """3.2: `paired_gap(ours, theirs)` returns the mean gap and its standard error, start by start."""
     for seed in range(3):
@@ -71,42 +73,32 @@ def paired_gap(function: Callable) -> None:
 
 
 def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
-    value = PAIRED_GAP.array(
-        PAIRED_GAP.call(function, ours, theirs), (2,), hint=1, meaning="the gap and its standard error"
-    )
-    n, difference = len(ours), ours - theirs
-    if not np.isclose(value[0], difference.mean()):
-        turned = np.isclose(value[0], -difference.mean())
-        raise PAIRED_GAP.wrong(
-            "a gap with the sign turned" if turned else "another number as the gap", "the mean of ours less theirs", 1
-        )
-    error = difference.std(ddof=1) / np.sqrt(n)
-    if np.isclose(value[1], error, rtol=0.01):  # n or n - 1
-        return
-    mistakes = [
-        Mistake(
-            np.sqrt(ours.var() / n + theirs.var() / n),
-            "the standard error of two samples that have nothing to do with each other",
-            "that of the differences: both played from the same starts",
-            2,
-        ),
-        Mistake(difference.std(), "the deviation of single differences", "that of their mean, which is smaller", 3),
+    values = PAIRED_GAP.call(function, ours, theirs)
+    gap, error = PAIRED_GAP.array(values, (2,), hint=1, meaning="the gap and its standard error")
+    right = (ours - theirs).mean()
+    turned = Mistake(-right, "a gap with the sign turned", "the mean of ours less theirs", 1)
+    otherwise = Mistake(None, f"a gap of {gap:.3g}", "the mean of ours less theirs", 1)
+    PAIRED_GAP.compare(gap, right, [turned], otherwise)
+    right = (ours - theirs).std(ddof=1) / np.sqrt(len(ours))
+    words = f"a standard error of {error:.3g}", "the deviation of the mean of the differences"
+    PAIRED_GAP.compare(error, right, _other_errors(ours, theirs), Mistake(None, *words, 3), rtol=0.01)  # n or n - 1
+
+
+def _other_errors(ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
+    n, difference, deviation = len(ours), ours - theirs, (ours - theirs).std()
+    unrelated = "the standard error of two samples that have nothing to do with each other"
+    shared = "that of the differences: both played from the same starts"
+    return [
+        Mistake(np.sqrt(ours.var() / n + theirs.var() / n), unrelated, shared, 2),
+        Mistake(deviation, "the deviation of single differences", "that of their mean, which is smaller", 3),
         Mistake(difference.var() / n, "a variance", "its root", 3),
-        Mistake(
-            abs(ours.std() - theirs.std()) / np.sqrt(n),
-            "a difference of deviations",
-            "the deviation of the differences",
-            2,
-        ),
-        Mistake(ours.std() / np.sqrt(n), "the deviation of our returns", "that of the differences", 2),
-        Mistake(1.96 * error, "half a 95 % interval", "the standard error itself", 3),
+        Mistake(abs(ours.std() - theirs.std()) / np.sqrt(n), "a difference of two deviations", shared, 2),
+        Mistake(ours.std() / np.sqrt(n), "the deviation of our returns", shared, 2),
+        Mistake(1.96 * deviation / np.sqrt(n), "half a 95 % interval", "the standard error itself", 3),
     ]
-    for mistake in mistakes:
-        if np.isclose(value[1], mistake.result, rtol=0.01):
-            raise PAIRED_GAP.wrong(mistake.found, mistake.expected, mistake.hint)
-    raise PAIRED_GAP.wrong(f"a standard error of {value[1]:.3g}", "the deviation of the mean of the differences", 3)
 
 
+@INTERVAL.checks
 def interval(function: Callable) -> None:
     """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
     for seed in range(3):
@@ -119,38 +111,31 @@ def interval(function: Callable) -> None:
 def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator) -> None:
     values = INTERVAL.call(function, returns, rng)
     low, high = INTERVAL.array(values, (2,), hint=1, meaning="the ends of the interval")
+    means = returns.mean(axis=1)
+    width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # what a bootstrap of the mean comes to, in large samples
     if low > high:
         raise INTERVAL.wrong("the upper end first", "the lower end first", 1)
-    means = returns.mean(axis=1)
-    if not low <= means.mean() <= high:
-        raise INTERVAL.wrong(
-            f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}", "one around it", 1
-        )
-    p = len(means)
-    width = 2 * 1.96 * means.std() / np.sqrt(p)  # what a bootstrap of the mean comes to, in large samples
-    ratio, single = (high - low) / width, 2 * 1.96 * returns.std() / np.sqrt(returns.size) / width
-    if 0.92 < ratio < 1.09:
-        return
-    spread_of_runs = (np.percentile(means, 97.5) - np.percentile(means, 2.5)) / width
-    if ratio < 1e-9:
+    if high - low < 1e-6 * width:
         raise INTERVAL.wrong("an interval of no width", "draws *with* replacement, which differ from each other", 2)
-    mistakes = [
-        (
-            single,
-            "an interval as narrow as if every episode were a witness of its own",
-            "one as wide as the policies differ",
-            3,
-        ),
-        (spread_of_runs, "the range of single policies", "the range of *means* of as many policies as there are", 2),
-        (1.645 / 1.96, "an interval for 90 %", "one for 95 %: a tail of 2.5 % on either side", 1),
-        (1 / 1.96, "one standard error to either side", "the middle 95 % of the resampled means", 1),
-        (np.sqrt(p), "resamples of one policy", "as many draws as there are policies", 2),
+    if not low <= means.mean() <= high:
+        found = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
+        raise INTERVAL.wrong(found, "one around it", 1)
+    middle = "the middle 95 % of the means of resampled policies"
+    otherwise = Mistake(None, f"an interval that is too {'narrow' if high - low < width else 'wide'}", middle, 2)
+    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=0.08)
+
+
+def _other_widths(returns: np.ndarray, width: float) -> list[Mistake]:
+    means = returns.mean(axis=1)
+    single = 2 * 1.96 * returns.std() / np.sqrt(returns.size)
+    alone = "an interval as narrow as if every episode were a witness of its own"
+    return [
+        Mistake(single, alone, "one as wide as the policies differ", 3),
+        Mistake(np.ptp(np.percentile(means, [2.5, 97.5])), "the range of single policies", "the range of *means*", 2),
+        Mistake(1.645 / 1.96 * width, "an interval for 90 %", "one for 95 %: a tail of 2.5 % on either side", 1),
+        Mistake(width / 1.96, "one standard error to either side", "the middle 95 % of the resampled means", 1),
+        Mistake(np.sqrt(len(means)) * width, "resamples of one policy", "as many draws as there are policies", 2),
     ]
-    for size, found, expected, hint in mistakes:
-        if abs(ratio / size - 1) < 0.07:
-            raise INTERVAL.wrong(found, expected, hint)
-    narrow = "narrow" if ratio < 1 else "wide"
-    raise INTERVAL.wrong(f"an interval that is too {narrow}", "the middle 95 % of the means of resampled policies", 2)
 
 
 def _random_policy(rng: np.random.Generator, k: int = 5) -> VoronoiPolicy:
@@ -170,6 +155,7 @@ class _Sometimes:
         return np.where(np.asarray(obs)[..., :1] < 0.34, 0.0, actions), None
 
 
+@BLAME.checks
 def blame(function: Callable) -> None:
     """3.4: `blame(policy, teacher, task, starts)` counts, per cell, the failures whose last action it chose. (k,)"""
     task, shipped = get_task(TASK), load_teacher(TASK)
@@ -184,36 +170,30 @@ def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Ta
     k = len(policy)
     value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), hint=1, meaning="a count per cell")
     ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
-    episodes = record(policy, task, starts)
-    last = policy.cells(np.array([episode.states[-1] for episode in episodes]))
-    first = policy.cells(starts)
     failed = (ours != GOAL) & (theirs == GOAL)
+    ways = [policy.cells(episode.states) for episode in record(policy, task, starts)]
 
-    def count(cells: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        return np.bincount(cells[mask], minlength=k)
+    def count(cells: list) -> np.ndarray:
+        return np.bincount(np.array(cells, dtype=int), minlength=k)
 
-    visits = np.concatenate([policy.cells(e.states) for e, f in zip(episodes, failed) if f] or [np.zeros(0, int)])
+    right = count([way[-1] for way, f in zip(ways, failed) if f])
+    too_many = "only those of starts from which the teacher reaches the goal"
+    too_many_words = "failures counted where the teacher fails too"
     mistakes = [
+        Mistake(count([way[-1] for way, o in zip(ways, ours) if o != GOAL]), too_many_words, too_many, 2),
         Mistake(
-            count(last, ours != GOAL),
-            "failures counted where the teacher fails too",
-            "only those of starts from which the teacher reaches the goal",
-            2,
+            count(policy.cells(starts)[failed]), "failures counted in the cell of their start", "in the last one", 3
         ),
-        Mistake(
-            count(first, failed), "failures counted in the cell of their start", "in the cell of the last state", 3
-        ),
-        Mistake(count(last, ours == GOAL), "successes", "failures", 1),
-        Mistake(np.bincount(visits, minlength=k), "every step of a failed episode", "its last one", 3),
-        Mistake(count(last, np.full(len(starts), True)), "all episodes", "those that fail", 1),
-        Mistake(count(last, failed) / max(1, failed.sum()), "shares", "counts", 1),
+        Mistake(count([way[-1] for way, o in zip(ways, ours) if o == GOAL]), "successes", "failures", 1),
+        Mistake(count([i for way, f in zip(ways, failed) if f for i in way]), "every step of a failure", "its last", 3),
+        Mistake(count([way[-1] for way in ways]), "all episodes", "those that fail", 1),
+        Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
     ]
-    otherwise = Mistake(
-        None, f"{value.sum():g} failures in all", f"{failed.sum()}, each in the cell of its last state", 1
-    )
-    BLAME.compare(value, count(last, failed), mistakes, otherwise)
+    otherwise = Mistake(None, f"{value.sum():g} failures", f"{failed.sum()}, each in the cell of its last state", 1)
+    BLAME.compare(value, right, mistakes, otherwise)
 
 
+@REFIT.checks
 def refit(function: Callable) -> None:
     """3.5: `refit(policy, states, actions)` returns the same cells with maps by least squares."""
     for seed in range(3):
@@ -241,22 +221,20 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
         raise REFIT.wrong("the old policy altered", "a new one: work on a copy of its coefficients", 1)
     if not np.array_equal(new.codewords, policy.codewords):
         raise REFIT.wrong("other codewords", "the same cells", 1)
-    right = baselines.refit(policy, states, actions).coefficients
     if not np.allclose(new.coefficients[2], before[2]):
         raise REFIT.wrong("another map in a cell without states", "the one it had: nothing is known there", 3)
     whole = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
     if np.allclose(new.coefficients[0], whole):
         raise REFIT.wrong("the same map in every cell", "one per cell, from the states in it", 2)
-    if not np.allclose(new.coefficients, right, rtol=1e-4, atol=1e-6):
-        constant = np.allclose(new.coefficients[[0, 1, 3, 4, 5], :2], 0)
-        errors = (np.square(p.linear(states) - actions).mean() for p in (new, baselines.refit(policy, states, actions)))
-        found, least = errors
-        words = "constants" if constant else f"a squared error of {found:.3g}"
-        raise REFIT.wrong(
-            words, "weights and bias by least squares" if constant else f"the least there is, {least:.3g}", 2
-        )
+    if np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0):
+        raise REFIT.wrong("constants", "weights and bias by least squares", 2)
+    best = baselines.refit(policy, states, actions)
+    if not np.allclose(new.coefficients, best.coefficients, rtol=1e-4, atol=1e-6):
+        found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
+        raise REFIT.wrong(f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
 
 
+@DAGGER.checks
 def dagger_round(function: Callable) -> None:
     """3.6: `dagger_round(policy, teacher, task, starts, states, actions)` returns more states and their actions."""
     task, teacher = get_task(TASK), load_teacher(TASK)
@@ -274,20 +252,17 @@ def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: E
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
     states, actions = (np.asarray(part, dtype=np.float64) for part in value)
     ours, theirs = (np.concatenate([e.states for e in record(p, task, starts)]) for p in (policy, teacher))
+    n, driver = len(before.states), ("the states that the teacher goes through", "those that the copy goes through", 1)
     sizes = {
         len(ours): ("the old states gone", "them kept, with the new ones behind or before them", 3),
-        len(theirs): ("the states that the teacher goes through", "those that the copy goes through", 1),
-        len(before.states) + len(theirs): (
-            "the states that the teacher goes through",
-            "those that the copy goes through",
-            1,
-        ),
-        len(before.states): ("no new states", "those that the copy goes through", 1),
-        len(before.states) + len(starts): ("the start states alone", "every state on the way", 1),
+        len(theirs): driver,
+        n + len(theirs): driver,
+        n: ("no new states", "those that the copy goes through", 1),
+        n + len(starts): ("the start states alone", "every state on the way", 1),
     }
-    if states.shape != (len(before.states) + len(ours), 2):
-        words = sizes.get(len(states), (f"states of shape {states.shape}", "old and new states, a row each", 1))
-        raise DAGGER.wrong(*words)
+    if states.shape != (n + len(ours), 2):
+        otherwise = f"states of shape {states.shape}", "old and new states, a row each", 1
+        raise DAGGER.wrong(*sizes.get(len(states), otherwise))
     if actions.shape != states.shape:
         raise DAGGER.wrong(f"actions of shape {actions.shape}", f"one for each state, {states.shape}", 2)
     if not np.allclose(_sorted(states), _sorted(np.concatenate([before.states, ours])), atol=1e-6):
@@ -307,6 +282,7 @@ def _sorted(rows: np.ndarray) -> np.ndarray:
     return rows[np.lexsort(np.round(rows, 5).T)]
 
 
+@CHALLENGE.checks
 def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
     """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of `copies`, from fresh starts."""
     if policy is None:
