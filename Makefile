@@ -57,7 +57,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench clean lock venv new-venv begin $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench clean course lock venv new-venv begin $(NOTEBOOKS)
 .NOTPARALLEL: # `runs` uses every core by itself
 
 help: ## this list
@@ -139,6 +139,11 @@ $(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	    --expect $(call outputs,$(1)) && state > "$$(STATE)/$(1)" && echo $(1) >> "$$(STATE)/made"; fi
 endef
 $(foreach n,$(NOTEBOOKS),$(eval $(call notebook-rules,$(n))))
+
+# The course
+
+course: venv ## three lessons: students' copies, solutions and the lecturer's guide, into build/course/: 2 s
+	@$(PY) -m vsp.course.build --out "$(OUT)"
 
 # Set-up
 

@@ -1,0 +1,90 @@
+"""The lessons in nbgrader: it makes the same students' copies as we do, and gives a solution all its points."""
+
+import os
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+
+pytest.importorskip("nbgrader", reason="nbgrader is not installed: `make test-site` brings it")
+
+from nbgrader.api import Gradebook  # noqa: E402
+from nbgrader.apps import NbGraderAPI  # noqa: E402
+from traitlets.config import Config  # noqa: E402
+
+from vsp.course import build  # noqa: E402
+from vsp.store import ROOT  # noqa: E402
+
+NAME = "lesson_1_black_box.ipynb"
+LESSON = "lesson_1"
+
+
+@pytest.fixture(scope="module")
+def course(tmp_path_factory):
+    """nbgrader on a course folder of its own, with one lesson released; the folder; and our copies."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", str(Path(sys.executable).parent), prepend=os.pathsep)  # nbgrader calls alembic by its name
+        patch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)  # for kernels
+        patch.setenv("JUPYTER_PREFER_ENV_PATH", "1")
+        yield released(tmp_path_factory.mktemp("course"))
+
+
+def released(folder):
+    copies = {path.parent.name: path for path in build.build(folder / "made") if path.name == NAME}
+    put(copies["solution"], folder / "source" / LESSON)
+    config = Config()
+    config.CourseDirectory.root = str(folder)
+    config.CourseDirectory.db_url = f"sqlite:///{folder}/gradebook.db"
+    api = NbGraderAPI(config=config)
+    result = api.generate_assignment(LESSON)
+    assert result["success"], result["error"]
+    return api, folder, copies
+
+
+def put(notebook, folder):
+    folder.mkdir(parents=True)
+    (folder / NAME).write_bytes(Path(notebook).read_bytes())
+
+
+def graded(course, who, notebook):
+    """Points of a submission, by exercise."""
+    api, folder, _ = course
+    put(notebook, folder / "submitted" / who / LESSON)
+    result = api.autograde(LESSON, who)
+    assert result["success"], result["error"]
+    with Gradebook(f"sqlite:///{folder}/gradebook.db") as book:
+        submission = book.find_submission_notebook(NAME.removesuffix(".ipynb"), LESSON, who)
+        return {grade.name: (grade.score, grade.max_score) for grade in submission.grades}
+
+
+def test_releases_are_our_students_copies(course):
+    _, folder, copies = course
+    theirs = nbformat.read(folder / "release" / LESSON / NAME, as_version=4)
+    ours = nbformat.read(copies["student"], as_version=4)
+    assert [(c.cell_type, c.id, c.source) for c in theirs.cells] == [(c.cell_type, c.id, c.source) for c in ours.cells]
+
+
+def test_a_solution_gets_all_points(course):
+    points = graded(course, "ada", course[2]["solution"])
+    assert len(points) == 7 and all(score == most for score, most in points.values()), points
+    assert sum(score for score, _ in points.values()) == build.points(build.read_sources()[NAME])
+
+
+def test_an_untouched_copy_gets_none(course):
+    points = graded(course, "bob", course[2]["student"])
+    assert len(points) == 7 and all(score == 0 for score, _ in points.values()), points
+
+
+def test_one_right_answer_gets_its_points(course, tmp_path):
+    """Also where a student altered the check: nbgrader puts it back."""
+    notebook, answers = nbformat.read(course[2]["student"], as_version=4), build.read_sources()[NAME]
+    cells = {cell.id: cell for cell in answers.cells}
+    for cell in notebook.cells:
+        if cell.id == "fit-linear-answer":
+            cell.source = cells[cell.id].source
+        if cell.id == "place-check":
+            cell.source = "print('all is well')"
+    nbformat.write(notebook, tmp_path / NAME)
+    points = graded(course, "cyd", tmp_path / NAME)
+    assert {name for name, (score, _) in points.items() if score} == {"lesson-1-fit-linear-check"}, points

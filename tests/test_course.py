@@ -1,0 +1,354 @@
+"""The course: its sources, the copies made of them, and that checks know right answers from wrong ones."""
+
+import ast
+import functools
+import hashlib
+import re
+from collections import Counter
+
+import course_answers
+import nbformat
+import numpy as np
+import pytest
+from IPython.core.interactiveshell import InteractiveShell
+
+import vsp
+from vsp.course import build, drawing, feedback, lesson_1, lesson_2, lesson_3
+from vsp.distill import distill, merge_regions, split_regions, teacher_episodes
+from vsp.partition import Partition
+
+LESSONS = build.read_sources()
+EXERCISES = {
+    exercise.number: (lesson, exercise.name)
+    for lesson in (lesson_1, lesson_2, lesson_3)
+    for exercise in vars(lesson).values()
+    if isinstance(exercise, feedback.Exercise)
+}
+SIMPLEGOAL = "SimpleGoal-v0"
+RUNS = {}
+
+
+def once(teacher, task, config=None, *, seed):
+    """`distill`, whose runs are kept for the next copy of a lesson: same arguments, same policy."""
+    key = teacher.digest, task, config or vsp.preset(task), seed
+    if key not in RUNS:
+        RUNS[key] = distill(teacher, task, config, seed=seed)
+    return RUNS[key]
+
+
+@pytest.fixture(params=LESSONS)
+def lesson(request):
+    return LESSONS[request.param]
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def by_kind(notebook, wanted):
+    return [cell for cell in notebook.cells if wanted(cell)]
+
+
+def identity(cell):
+    return cell.metadata.nbgrader.grade_id
+
+
+# The sources
+
+
+def test_there_are_three_lessons_of_five_to_seven_exercises():
+    assert [name[:8] for name in LESSONS] == ["lesson_1", "lesson_2", "lesson_3"]
+    assert all(5 <= len(by_kind(lesson, build.is_check)) <= 7 for lesson in LESSONS.values())
+
+
+def test_first_cell_has_aims_and_what_is_needed(lesson):
+    assert "After this lesson you can" in lesson.cells[0].source and "You need" in lesson.cells[0].source
+
+
+def test_sources_hold_no_output_and_unique_ids(lesson):
+    nbformat.validate(lesson)
+    assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(lesson))
+    assert max(Counter(cell.id for cell in lesson.cells).values()) == 1
+
+
+def test_worked_cells_are_short_and_define_no_helpers(lesson):
+    for cell in code_cells(lesson):
+        assert len(cell.source.splitlines()) < (25 if build.is_solution(cell) else 15), cell.id
+        defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(ast.parse(cell.source)))
+        assert build.is_solution(cell) or not defines, cell.id
+
+
+def test_more_words_than_code(lesson):
+    words = sum(len(c.source.split()) for c in lesson.cells if c.cell_type == "markdown" and not build.for_lecturer(c))
+    assert words > sum(len(cell.source.split()) for cell in code_cells(lesson))
+
+
+def test_pictures_have_alternative_text(lesson):
+    for cell in code_cells(lesson):
+        assert cell.source.count("show(") == cell.source.count("show(fig, ") == cell.source.count("fig, axes ="), (
+            cell.id
+        )
+
+
+def test_every_exercise_has_a_text_with_hints_an_answer_a_check_and_notes(lesson):
+    for i, cell in enumerate(lesson.cells):
+        if build.is_check(cell):
+            text, answer = lesson.cells[i - 2 : i]
+            notes = next(cell for cell in lesson.cells[i:] if build.for_lecturer(cell))
+            assert re.search(r"^## Exercise \d\.\d · ", text.source, re.MULTILINE), cell.id
+            n = text.source.count("<details><summary>Hint")
+            assert n == text.source.count("</details>") >= 1, cell.id
+            assert build.is_solution(answer) and {"Common mistakes", "Discuss", "Exam"} <= _emphasised(notes), cell.id
+
+
+def _emphasised(cell):
+    return set(re.findall(r"\*([A-Z][a-z ]+)\.\*", cell.source))
+
+
+def test_hints_that_checks_point_to_are_there():
+    for lesson, module in zip(LESSONS.values(), (lesson_1, lesson_2, lesson_3)):
+        texts = "\n".join(cell.source for cell in lesson.cells)
+        for number in {number for number, (owner, _) in EXERCISES.items() if owner is module}:
+            section = texts.split(f"## Exercise {number} ")[1].split("## Exercise")[0]
+            hints = {int(n) for n in re.findall(r"Hint (\d)</summary>", section)}
+            assert hints == set(range(1, len(hints) + 1)), number
+            pointed = {_hint(_message(i)) for i, entry in enumerate(course_answers.WRONG) if entry[0] == number} - {0}
+            assert pointed <= hints, (number, pointed, hints)
+
+
+def _hint(message):
+    found = re.search(r"→ Hint (\d) of exercise (\d\.\d)$", message)
+    return int(found[1]) if found else 0
+
+
+@functools.cache
+def _message(i):
+    """What the check says to the wrong answer number i."""
+    number, _, answer = course_answers.WRONG[i]
+    return _refused(number, answer)
+
+
+def test_metadata_is_what_nbgrader_expects(lesson):
+    seen = set()
+    for cell in code_cells(lesson):
+        data = cell.metadata.get("nbgrader")
+        if data is None:
+            continue
+        assert set(data) - {"points"} == {"schema_version", "grade_id", "grade", "solution", "locked", "task"}, cell.id
+        assert data.schema_version == 3 and data.task is False and data.grade != data.solution, cell.id
+        assert data.locked == data.grade == ("points" in data), cell.id
+        assert re.fullmatch(r"[A-Za-z0-9_-]+", data.grade_id) and data.grade_id not in seen, cell.id
+        seen.add(data.grade_id)
+    answers, checks = by_kind(lesson, build.is_solution), by_kind(lesson, build.is_check)
+    assert [identity(c).removesuffix("-answer") for c in answers] == [
+        identity(c).removesuffix("-check") for c in checks
+    ]
+
+
+# The copies
+
+
+def test_students_get_stubs_and_no_answers(lesson):
+    made = build.student(lesson)
+    text = "\n".join(_stripped(cell.source) for cell in made.cells)
+    for cell in by_kind(lesson, build.is_solution):
+        answer = re.search(r"### BEGIN SOLUTION\n(.*?)\s*### END SOLUTION", cell.source, re.DOTALL)[1]
+        lines = _stripped(answer).splitlines()
+        for i in range(max(1, len(lines) - 1)):  # a line alone may stand in a worked cell too, two do not
+            assert "\n".join(lines[i : i + 2]) not in text, cell.id
+    assert "SOLUTION" not in text and "lecturer" not in text and "Common mistakes" not in text
+    assert all(build.STUB[1] in cell.source for cell in by_kind(made, build.is_solution))
+    assert all(cell.metadata.editable is False for cell in by_kind(made, build.is_check))
+
+
+def _stripped(text):
+    return "\n".join(line.strip() for line in text.splitlines())
+
+
+def test_answers_to_questions_cannot_be_read_in_a_students_copy(lesson):
+    """Options stand in a comment, all of them; none is marked, and the dictionary has None for every question."""
+    for cell in by_kind(build.student(lesson), build.is_solution):
+        tree = ast.parse(cell.source)
+        for node in (node for node in ast.walk(tree) if isinstance(node, ast.Dict)):
+            assert all(isinstance(value, ast.Constant) and value.value is None for value in node.values), cell.id
+
+
+def test_a_stub_takes_the_place_of_an_answer():
+    source = "def f(x):\n    y = x\n    ### BEGIN SOLUTION\n    return y + 1\n    ### END SOLUTION\n"
+    stub = "def f(x):\n    y = x\n    # YOUR CODE HERE\n    raise NotImplementedError()\n"
+    assert build.without_answers(source) == stub
+
+
+@pytest.mark.parametrize("source", ["x = 1", "### BEGIN SOLUTION\nx = 1", "x = 1\n### END SOLUTION"])
+def test_marks_come_in_pairs(source):
+    with pytest.raises(ValueError, match="in pairs"):
+        build.without_answers(source)
+
+
+def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
+    before = {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in build.SOURCES.glob("*")}
+    first = {path.name: path.read_bytes() for path in build.build(tmp_path / "a") if path.suffix == ".md"}
+    twice = [build.build(tmp_path / name) for name in ("a", "b")]
+    assert [p.read_bytes() for p in twice[0]] == [p.read_bytes() for p in twice[1]]
+    assert first["guide.md"] == twice[0][-1].read_bytes()
+    assert before == {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in before}
+    copies = sorted(str(path.relative_to(tmp_path / "b" / "build" / "course")) for path in twice[1])
+    assert copies == sorted(["guide.md", *(f"{kind}/{name}" for kind in ("student", "solution") for name in LESSONS)])
+
+
+def test_the_guide_keeps_answers_apart_from_what_students_see():
+    students, lecturers = build.guide(LESSONS).split("# For lecturers only")
+    assert "SOLUTION" not in students and "Common mistakes" not in students and "```" not in students
+    for lesson in LESSONS.values():
+        assert all(cell.source in lecturers for cell in by_kind(lesson, build.is_solution))
+        assert all(cell.source in lecturers for cell in by_kind(lesson, build.for_lecturer))
+        assert f"| all | {build.points(lesson)} |" in students
+    assert students.count("| Exercise ") == len(EXERCISES) == lecturers.count("### Exercise ")
+
+
+# Running the copies, cell by cell, in one namespace each
+
+
+def run(notebook, monkeypatch):
+    """The names of a notebook after its last cell, and what went wrong in which cell (by id)."""
+    monkeypatch.setattr(vsp, "distill", once)
+    monkeypatch.setattr(lesson_2, "distill", once)
+    monkeypatch.setattr("vsp.course.show", lambda fig, alt: drawing.plt.close(fig) or alt)
+    names, failed = {}, {}
+    for cell in code_cells(notebook):
+        try:
+            exec(compile(cell.source, cell.id, "exec"), names)
+        except (feedback.NotYet, NotImplementedError) as error:
+            failed[cell.id] = error
+    return names, failed
+
+
+def test_solutions_run_and_pass_every_check(lesson, monkeypatch, capsys):
+    _, failed = run(build.solution(lesson), monkeypatch)
+    assert not failed
+    assert capsys.readouterr().out.count("✓ ") == len(by_kind(lesson, build.is_check))
+
+
+def test_the_solutions_of_lesson_2_together_are_the_papers_method():
+    """Cell by cell the same partition as with the passes of vsp, from the same random numbers."""
+    names = {"np": np}
+    for cell in by_kind(LESSONS["lesson_2_algorithms.ipynb"], build.is_solution):
+        if cell.id in ("split-answer", "merge-answer", "algorithm-answer"):
+            exec(cell.source, names)
+    task, teacher, *_ = examples()
+    config = vsp.preset(SIMPLEGOAL).quick()
+    grown = []
+    for split, merge in ((names["split_regions"], names["merge_regions"]), (split_regions, merge_regions)):
+        rng, partition = np.random.default_rng(1), Partition(task, config)
+        episodes = list(teacher_episodes(teacher, task, config.n_epochs, rng))
+        names["algorithm_1"](partition, episodes, config, rng, split, merge)
+        grown.append(partition)
+    assert np.array_equal(grown[0].codewords, grown[1].codewords) and len(grown[0].codewords) > 5
+    assert np.array_equal(grown[0].models.parameters, grown[1].models.parameters)
+
+
+def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
+    made = build.student(lesson)
+    _, failed = run(made, monkeypatch)
+    checks = {cell.id for cell in by_kind(made, build.is_check)}
+    assert checks <= set(failed) <= checks | {cell.id for cell in by_kind(made, build.is_solution)}
+    for check in checks:
+        assert isinstance(failed[check], feedback.NotYet), check
+        assert re.search(r"is not (written|answered) yet", str(failed[check])), failed[check]
+    assert "✓" not in capsys.readouterr().out
+
+
+def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    teacher = vsp.load_teacher(SIMPLEGOAL)
+    fig, _ = drawing.copy_and_error(vsp.baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher)
+    picture = drawing.show(fig, "a policy")
+    assert 'alt="a policy"' in picture._repr_html_() and picture.png[:4] == b"\x89PNG" and not list(tmp_path.iterdir())
+
+
+# Checks
+
+
+@functools.cache
+def examples():
+    """What the checks of some exercises need besides an answer."""
+    task, teacher = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
+    episodes = list(teacher_episodes(teacher, task, 300, np.random.default_rng(3)))
+    states, actions = (np.concatenate([getattr(e, part) for e in episodes]) for part in ("states", "actions"))
+    return task, teacher, states, actions
+
+
+def arguments(number):
+    task, teacher, states, actions = examples()
+    if number == "2.1":
+        return once(teacher, SIMPLEGOAL, vsp.preset(SIMPLEGOAL), seed=1)[1], vsp.preset(SIMPLEGOAL)
+    if number in ("3.1", "3.7"):
+        copies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in range(2, 4)]
+        played = [vsp.evaluate(p, SIMPLEGOAL, 500, seed=3)["return"].to_numpy() for p in (*copies, teacher)]
+        return (np.concatenate(played[:-1]), played[-1]) if number == "3.1" else (copies,)
+    few = {"1.1": (teacher,), "1.6": (states, actions, task), "2.7": (teacher, task)}
+    return few.get(number, (teacher, task, vsp.preset(SIMPLEGOAL).quick()) if number == "2.6" else ())
+
+
+def check(number, answer):
+    lesson, name = EXERCISES[number]
+    function = {"codewords": "by_hand"}.get(name, name)
+    getattr(lesson, function)(answer() if number == "3.7" else answer, *arguments(number))
+
+
+def _refused(number, answer):
+    with pytest.raises(feedback.NotYet) as refusal, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lesson_2, "distill", once)
+        check(number, answer)
+    return str(refusal.value)
+
+
+def label(entry):
+    number, *words, answer = entry
+    return f"{number} {getattr(answer, '__name__', words[0] if words else 'right')}"
+
+
+@pytest.mark.parametrize("i", range(len(course_answers.WRONG)), ids=lambda i: label(course_answers.WRONG[i]))
+def test_wrong_answers_are_told_what_is_wrong(i):
+    number, words, _ = course_answers.WRONG[i]
+    message = _message(i)
+    assert words in message and message.startswith(f"{number} {EXERCISES[number][1]}") and "\n" not in message
+
+
+@pytest.mark.parametrize("entry", course_answers.RIGHT, ids=label)
+def test_other_right_answers_pass(entry, capsys, monkeypatch):
+    monkeypatch.setattr(lesson_2, "distill", once)
+    check(*entry)
+    out = capsys.readouterr().out
+    assert out.startswith(f"✓ {entry[0]} ") and out.count("\n") == 1
+
+
+def test_there_are_enough_answers():
+    wrong, right = Counter(entry[0] for entry in course_answers.WRONG), Counter(n for n, _ in course_answers.RIGHT)
+    questions = {"1.1", "2.1", "2.6", "3.1"}
+    assert all(wrong[number] >= 3 and right[number] >= (1 if number in questions else 2) for number in EXERCISES)
+
+
+@pytest.mark.parametrize("number", EXERCISES)
+def test_what_is_no_answer_at_all_is_refused_in_words(number):
+    for nothing in (None, 7, "text"):
+        assert _refused(number, (lambda: nothing) if number == "3.7" else nothing).startswith(number)
+
+
+def test_a_check_leaves_what_it_was_given_as_it_was():
+    """A student's function that alters its arguments must not spoil the next case."""
+
+    def spoils(states, actions):
+        result = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
+        states[:] = actions[:] = 0.0
+        return result
+
+    lesson_1.fit_linear(spoils)
+
+
+def test_jupyter_shows_the_message_alone():
+    shell, shown = InteractiveShell.instance(), []
+    shell._showtraceback = lambda kind, value, lines: shown.append(lines)
+    shell.run_cell("from vsp.course import lesson_1\nlesson_1.fit_linear(None)")
+    InteractiveShell.clear_instance()
+    assert shown == [["✗ 1.2 fit_linear: found None, expected a function."]]

@@ -1,0 +1,292 @@
+"""Checks of lesson 1: what a policy is, linear maps, errors, cells, and codewords set by hand and by a rule.
+
+Each check takes what the student wrote, tries it on small random cases, and raises `NotYet` or prints one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .. import baselines, geometry
+from ..distill import teacher_episodes
+from ..envs import GOAL_EDGE, PIT_HIGH, Task, get_task
+from ..policy import VoronoiPolicy
+from ..rollouts import Policy
+from ..teachers import load_teacher
+from .feedback import Exercise, Mistake
+
+SEEDS = range(3)
+CASES = ((2, 2), (2, 1), (3, 2))  # dimensions of state and action
+GIVEN = ((0.3, 0.3), (0.7, 0.7))  # codewords that the notebook begins with
+AT_MOST = 6  # codewords that are set by hand
+CELLS = 8  # that a rule for codewords is asked for
+MARGIN = 0.85  # times the error of random codewords, which a rule has to beat
+
+READING = Exercise("1.1", "reading")
+FIT_LINEAR = Exercise("1.2", "fit_linear")
+ACTION_ERROR = Exercise("1.3", "action_error")
+NEAREST = Exercise("1.4", "nearest")
+ACT = Exercise("1.5", "act")
+BY_HAND = Exercise("1.6", "codewords")
+PLACE = Exercise("1.7", "place")
+
+WAYS = ("up-left", "up-right", "down-left", "down-right")
+SHARES = ("less than a quarter", "about half", "more than three quarters")
+PLACES = ("beyond the pit, seen from the goal", "between goal and pit", "along the walls")
+
+
+@READING.checks
+def reading(answers: dict, teacher: Policy) -> None:
+    """1.1: answers `right of the pit`, `beyond the pit`, `at the limit`, `sudden turn`."""
+    options = {"right of the pit": WAYS, "beyond the pit": WAYS, "at the limit": SHARES, "sudden turn": PLACES}
+    READING.answers(answers, options)
+    shortest = {"down-left": "that is the straight way to the goal, but what lies on it from here"}
+    READING.choice(answers, "right of the pit", _way(teacher, [0.9, 0.2]), {}, 1)
+    READING.choice(answers, "beyond the pit", _way(teacher, [0.7, 0.6]), shortest, 1)
+    _, _, states = geometry.grid(np.zeros(2), np.ones(2), 21)
+    actions = teacher.predict(states)[0]
+    full = (np.abs(actions) > 0.99).mean()
+    share = SHARES[int(np.digitize(full, [0.25, 0.75]))]
+    READING.choice(answers, "at the limit", share, {}, 2)
+    READING.choice(answers, "sudden turn", _sharpest(states, actions), {}, 3)
+    READING.passed("you read the map as the network means it.")
+
+
+def _way(teacher: Policy, state: list[float]) -> str:
+    dx, dy = teacher.predict(np.array(state))[0]
+    return f"{'up' if dy > 0 else 'down'}-{'right' if dx > 0 else 'left'}"
+
+
+def _sharpest(states: np.ndarray, actions: np.ndarray) -> str:
+    """Which of `PLACES` has the largest share of sudden turns, between neighbours on the grid."""
+    side = int(np.sqrt(len(states)))
+    by_row = actions.reshape(side, side, -1)
+    turn = np.zeros((side, side))
+    turn[:, 1:] += np.abs(np.diff(by_row, axis=1)).sum(axis=2)
+    turn[1:] += np.abs(np.diff(by_row, axis=0)).sum(axis=2)
+    turn, diagonal = turn.ravel(), states.sum(axis=1)
+    wall = ((states < GOAL_EDGE) | (states > 1 - GOAL_EDGE)).any(axis=1)
+    beyond = ~wall & (diagonal > 2 * PIT_HIGH - 0.1)
+    between = ~wall & (diagonal < 0.8)
+    return PLACES[int(np.argmax([turn[mask].mean() for mask in (beyond, between, wall)]))]
+
+
+@FIT_LINEAR.checks
+def fit_linear(function: Callable) -> None:
+    """1.2: `fit_linear(states, actions)` returns coefficients (d + 1, m), weights above the bias."""
+    for seed in SEEDS:
+        for d, m in CASES:
+            rng = np.random.default_rng(seed)
+            states, truth = rng.uniform(-1, 1, (40, d)), rng.normal(size=(d + 1, m))
+            exact = states @ truth[:-1] + truth[-1]
+            _fits(function, states, exact, truth)
+            _fits(function, states, exact + rng.normal(size=exact.shape), None)
+    FIT_LINEAR.passed("weights and bias, and no map has a smaller squared error.")
+
+
+def _fits(function: Callable, states: np.ndarray, actions: np.ndarray, truth: np.ndarray | None) -> None:
+    inputs = np.column_stack([states, np.ones(len(states))])
+    (d, p), m = (states.shape[1], inputs.shape[1]), actions.shape[1]
+    found = np.asarray(FIT_LINEAR.call(function, states, actions))
+    if found.shape == (d, m):
+        raise FIT_LINEAR.wrong(f"{d} rows for {d} inputs", "one row more: at the origin such a map can only say 0", 1)
+    if found.shape == (m, p) and m != p:
+        raise FIT_LINEAR.wrong(f"shape {found.shape}", f"{(p, m)}: a row per input, a column per action", 2)
+    found = FIT_LINEAR.array(found, (p, m), hint=2)
+    best = np.linalg.lstsq(inputs, actions, rcond=None)[0]
+    mistakes = [Mistake(np.roll(best, 1, axis=0), "the bias in the first row", "it in the last one", 2)]
+    error, least = (np.square(inputs @ c - actions).mean() for c in (found, best))
+    otherwise = Mistake(
+        None, f"a squared error of {error:.3g}", f"the least that a linear map can have, {least:.3g}", 1
+    )
+    FIT_LINEAR.compare(found, best if truth is None else truth, mistakes, otherwise)
+
+
+class _Map:
+    """A policy that is linear, for cases whose error is known."""
+
+    def __init__(self, weights: np.ndarray):
+        self.weights = weights
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        return np.asarray(obs) @ self.weights, None
+
+
+@ACTION_ERROR.checks
+def action_error(function: Callable) -> None:
+    """1.3: `action_error(policy, teacher, states)` returns the mean squared difference of two policies' actions."""
+    for seed in SEEDS:
+        for d, m in CASES:
+            rng = np.random.default_rng(seed)
+            states = rng.normal(size=(30, d))
+            own, other = (_Map(rng.normal(size=(d, m))) for _ in range(2))
+            difference = states @ own.weights - states @ other.weights
+            _error(function, (own, other, states), difference)
+    ACTION_ERROR.passed("a mean of squares, over states and over actions.")
+
+
+def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
+    value, squares = ACTION_ERROR.call(function, *case), np.square(difference)
+    if np.size(value) != 1:
+        raise ACTION_ERROR.wrong(f"an array of shape {np.shape(value)}", "one number for all states together", 1)
+    (value,) = ACTION_ERROR.array(np.ravel(value), (1,))
+    mistakes = [
+        Mistake(squares.sum(axis=1).mean(), "a sum over the actions", "a mean over them too", 2),
+        Mistake(squares.sum(), "a sum over everything", "a mean", 2),
+        Mistake(np.sqrt(squares.mean()), "a root", "the mean of squares as it is", 2),
+        Mistake(np.abs(difference).mean(), "a mean of absolute values", "one of squares", 2),
+        Mistake(difference.mean(), "a mean in which errors to either side cancel", "one of squares", 2),
+        Mistake(-difference.mean(), "a mean in which errors to either side cancel", "one of squares", 2),
+        Mistake(squares.mean() / 2, "half of what it should be", "the mean of squares as it is", 2),
+    ]
+    ACTION_ERROR.compare(
+        value, squares.mean(), mistakes, Mistake(None, "another number", "a mean of squared differences of actions", 1)
+    )
+
+
+@NEAREST.checks
+def nearest(function: Callable) -> None:
+    """1.4: `nearest(codewords, states)` returns the index of the nearest codeword by Manhattan distance. (n,)"""
+    for seed in SEEDS:
+        for d in (2, 3):
+            rng = np.random.default_rng(seed)
+            _looks_up(function, rng.uniform(size=(6, d)), rng.uniform(size=(200, d)))
+    _looks_up(function, np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), np.array([[0.5, 0.0], [1.0, 0.5], [0.2, 0.2]]))
+    _looks_up(function, np.array([[0.3, 0.3]]), np.random.default_rng(0).uniform(size=(5, 2)))
+    NEAREST.passed("every state found its cell.")
+
+
+def _looks_up(function: Callable, codewords: np.ndarray, states: np.ndarray) -> None:
+    value = np.asarray(NEAREST.call(function, codewords, states))
+    if value.shape == states.shape:
+        raise NEAREST.wrong("coordinates", "which row of `codewords` is nearest: an integer per state", 1)
+    if value.shape == (len(states), len(codewords)):
+        raise NEAREST.wrong("a number for each pair of state and codeword", "an integer per state", 1)
+    value = NEAREST.array(value, (len(states),), hint=1)
+    if (value != np.round(value)).any():
+        raise NEAREST.wrong("numbers that are no integers", "indices of codewords, not distances to them", 1)
+    right = geometry.nearest(codewords, states)
+    otherwise = Mistake(None, f"the right cell for {(value == right).mean():.0%} of the states", "it for all", 1)
+    NEAREST.compare(value, right, _other_cells(codewords, states), otherwise)
+
+
+def _other_cells(codewords: np.ndarray, states: np.ndarray) -> list[Mistake]:
+    apart = geometry.distances(states, codewords)
+    last = len(codewords) - 1 - apart[:, ::-1].argmin(axis=1)
+    euclidean, chebyshev = (geometry.nearest(codewords, states, metric) for metric in ("euclidean", "chebyshev"))
+    late = np.abs((states[:, None] - codewords).sum(axis=2)).argmin(axis=1)
+    late_words = "differences that cancel before their size is taken"
+    return [
+        Mistake(last, "the later of two codewords that are equally near", "the one with the lower index", 3),
+        Mistake(euclidean, "the cells of the Euclidean distance", "those of the Manhattan distance", 2),
+        Mistake(chebyshev, "cells by the largest difference along one axis", "those by the sum over the axes", 2),
+        Mistake(late, late_words, "absolute values first, then the sum", 2),
+        Mistake(apart.argmax(axis=1), "the codeword farthest away", "the nearest one", 1),
+        Mistake(apart.argmin(axis=1) + 1, "indices that begin at 1", "indices that begin at 0", 1),
+    ]
+
+
+@ACT.checks
+def act(function: Callable) -> None:
+    """1.5: `act(codewords, coefficients, states)` returns each state's action by its cell's map, within [-1, 1]."""
+    for seed in SEEDS:
+        for d, m in CASES:
+            rng = np.random.default_rng(seed)
+            codewords, states = rng.uniform(size=(4, d)), rng.uniform(size=(60, d))
+            _acts(function, codewords, rng.normal(size=(4, d + 1, m)), states)
+    ACT.passed("codewords, maps and limits make a policy.")
+
+
+def _acts(function: Callable, codewords: np.ndarray, coefficients: np.ndarray, states: np.ndarray) -> None:
+    n, m = len(states), coefficients.shape[2]
+    value = ACT.array(ACT.call(function, codewords, coefficients, states), (n, m), hint=1)
+    own = coefficients[geometry.nearest(codewords, states)]
+    weighted, bias = np.einsum("nd,ndm->nm", states, own[:, :-1]), own[:, -1]
+    raw, first = weighted + bias, states @ coefficients[0, :-1] + coefficients[0, -1]
+    ahead = np.einsum("nd,ndm->nm", states, own[:, 1:]) + own[:, 0]
+    mistakes = [
+        Mistake(raw, f"an action of {np.abs(raw).max():.2f}", "none beyond the limits -1 and 1", 3),
+        Mistake(np.clip(raw, 0, 1), "no action below 0", "limits on both sides, -1 and 1", 3),
+        Mistake(np.clip(weighted, -1, 1), "maps without their bias", "the last row of a cell's coefficients added", 2),
+        Mistake(weighted, "maps without their bias", "the last row of a cell's coefficients added", 2),
+        Mistake(np.clip(weighted, -1, 1) + bias, "the bias added after the limits", "limits last", 3),
+        Mistake(np.clip(ahead, -1, 1), "the first row taken for the bias", "it in the last row", 2),
+        Mistake(np.clip(first, -1, 1), "one map for all states", "the map of each state's own cell", 1),
+    ]
+    right = np.isclose(value, np.clip(raw, -1, 1)).all(axis=1).mean()
+    otherwise = Mistake(None, f"the right action in {right:.0%} of the states", "it in all", 1)
+    ACT.compare(value, np.clip(raw, -1, 1), mistakes, otherwise)
+
+
+def piecewise(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> VoronoiPolicy:
+    """Least-squares maps in the cells of `codewords` (k, d), for states (n, d) and actions (n, m)."""
+    task = get_task(task)
+    maps = np.zeros((len(codewords), states.shape[1] + 1, actions.shape[1]))
+    maps[:, -1] = actions.mean(axis=0)  # where no state comes
+    return baselines.refit(VoronoiPolicy(codewords, maps, task=task), states, actions)
+
+
+def leftover(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray) -> float:
+    """Mean squared error that least-squares maps in the cells of `codewords` (k, d) leave, on the data of the fit."""
+    cells, inputs, total = geometry.nearest(codewords, states), np.column_stack([states, np.ones(len(states))]), 0.0
+    for cell in np.unique(cells):
+        own, goal = inputs[cells == cell], actions[cells == cell]
+        total += np.square(own @ np.linalg.lstsq(own, goal, rcond=None)[0] - goal).sum()
+    return total / actions.size
+
+
+@BY_HAND.checks
+def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> None:
+    """1.6: at most `AT_MOST` codewords whose maps have at most half the error of one map for everything."""
+    try:
+        points = np.asarray(codewords, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise BY_HAND.wrong(f"{codewords!r:.60}", "an array with a row x, y per codeword", 1) from None
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise BY_HAND.wrong(f"shape {points.shape}", "a row x, y per codeword", 1)
+    if points.shape == (2, 2) and np.allclose(points, GIVEN):
+        raise BY_HAND.unsolved()
+    if not ((points >= 0) & (points <= 1)).all():
+        raise BY_HAND.wrong("a codeword outside the unit square", "all of them inside", 1)
+    if len(np.unique(points, axis=0)) < len(points):
+        raise BY_HAND.wrong("a codeword that is there twice", "all of them different", 1)
+    if len(points) > AT_MOST:
+        raise BY_HAND.wrong(f"{len(points)} codewords", f"at most {AT_MOST}", 3)
+    one, many = (_imitation(c, states, actions, task) for c in (points[:1], points))
+    if many > one / 2:
+        raise BY_HAND.wrong(f"{many / one:.1%} of the error of one map with {len(points)} codewords", "at most 50%", 2)
+    BY_HAND.passed(f"{len(points)} codewords leave {many / one:.0%} of the error of one map.")
+
+
+def _imitation(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> float:
+    """Mean squared error of the policy with least-squares maps in these cells."""
+    return float(np.square(piecewise(codewords, states, actions, task).predict(states)[0] - actions).mean())
+
+
+@PLACE.checks
+def place(function: Callable) -> None:
+    """1.7: `place(states, actions, k)` returns k codewords that beat random ones, on both tasks."""
+    for name, n_episodes in (("SimpleGoal-v0", 150), ("MountainCarContinuous-v0", 10)):
+        teacher, task = load_teacher(name), get_task(name)
+        for seed in SEEDS:
+            rng = np.random.default_rng(seed)
+            episodes = list(teacher_episodes(teacher, task, n_episodes, rng))
+            states = np.concatenate([e.states for e in episodes])
+            _places(function, states, np.concatenate([e.actions for e in episodes]).astype(float), task, rng)
+    PLACE.passed(f"your rule beats random codewords on both tasks, with {CELLS} cells.")
+
+
+def _places(function: Callable, states: np.ndarray, actions: np.ndarray, task: Task, rng: np.random.Generator) -> None:
+    points = PLACE.array(PLACE.call(function, states, actions, CELLS), (CELLS, states.shape[1]), "codewords", 1)
+    if len(np.unique(points, axis=0)) < CELLS:
+        raise PLACE.wrong("codewords that are there twice", "all of them different", 1)
+    own = _imitation(points, states, actions, task)
+    different = np.unique(states, axis=0)
+    random = np.median(
+        [_imitation(rng.choice(different, CELLS, replace=False), states, actions, task) for _ in range(15)]
+    )
+    if own > MARGIN * random:
+        found = f"{own / random:.0%} of the error of random codewords on {task.name}"
+        raise PLACE.wrong(found, f"at most {MARGIN:.0%}, on both tasks", 2 if own > random else 3)

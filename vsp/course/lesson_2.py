@@ -1,0 +1,223 @@
+"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters.
+
+Its other checks, of the two passes and of a class of sub-policy, have modules of their own. Each check takes what the
+student wrote, tries it on cases whose answer is known, and raises `NotYet` or prints one line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..config import Config
+from ..distill import distill
+from ..envs import Task
+from ..history import History
+from ..rollouts import Episode, Policy
+from .feedback import Exercise, Mistake
+from .lesson_2_form import FORM, my_form
+from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk
+
+__all__ = [
+    "CHANGES",
+    "FORM",
+    "MERGE",
+    "SPLIT",
+    "algorithm_1",
+    "merge_regions",
+    "my_form",
+    "prediction",
+    "reading",
+    "running_mean",
+    "split_regions",
+]
+
+READING = Exercise("2.1", "reading")
+RUNNING_MEAN = Exercise("2.2", "running_mean")
+ALGORITHM_1 = Exercise("2.5", "algorithm_1")
+PREDICTION = Exercise("2.6", "prediction")
+
+MOMENTS = ("before iteration 500", "between 500 and 2000", "after 2000")
+CAUSES = ("a split", "a merge", "a reset of the buffers", "a change of the teacher")
+TREND = ("more cells", "as many", "fewer cells")
+SAME = 0.12  # a change of the mean number of cells by less than this share counts as none
+CHANGES = {
+    "a lower distance": {"min_pol_distance": 0.15},
+    "a higher loss": {"max_pol_loss": 1e-3},
+    "easier merges": {"min_param_distance": 1.0},
+    "exact maps": {"fit": "closed_form"},
+}
+
+
+@READING.checks
+def reading(answers: dict, history: History, config: Config) -> None:
+    """2.1: answers `frozen from` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
+    options = {"frozen from": float, "half of the cells": MOMENTS, "fewer cells by": CAUSES, "loss jumps by": CAUSES}
+    READING.answers(answers, options)
+    begin, last = config.n_epochs - config.n_freeze, max((e.iteration for e in history.events), default=0)
+    if not min(last, begin) - 0.04 * config.n_epochs <= answers["frozen from"] <= begin + 0.04 * config.n_epochs:
+        early = answers["frozen from"] < last
+        side = "the number of cells still changes after it" if early else "the partition stands still before it"
+        raise READING.wrong(f"iteration {answers['frozen from']:g}, but {side}", "where the shading begins", 1)
+    cells = np.array(history.cells)
+    early = int(np.argmax(cells >= cells[-1] / 2))
+    READING.choice(answers, "half of the cells", MOMENTS[int(np.digitize(early, [500, 2000]))], {}, 1)
+    teaching = {
+        "a split": "a split adds a codeword",
+        "a reset of the buffers": "a reset empties buffers and leaves codewords where they are",
+        "a change of the teacher": "the teacher is the same all the time",
+    }
+    READING.sealed(answers, "fewer cells by", "fb8f27a3b939a5dc", teaching, 2)
+    teaching |= {
+        "a split": "look again",
+        "a merge": "a merge keeps a map that is trained already",
+        "a reset of the buffers": "an empty buffer alters no map, and it fills up again with the next episode",
+    }
+    READING.sealed(answers, "loss jumps by", "71c02946198a22ee", teaching, 3)
+    READING.passed("the plot has told you what the algorithm does when.")
+
+
+@RUNNING_MEAN.checks
+def running_mean(function: Callable) -> None:
+    """2.2: `running_mean(cells, losses)` returns, per step, the mean loss since its cell was entered. (T,)"""
+    _forgets(function, np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0]))
+    _forgets(function, np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3.0, 5.0, 1.0, 4.0, 0.0]))
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
+        _forgets(function, cells, rng.uniform(size=len(cells)))
+    RUNNING_MEAN.passed("it forgets whenever the episode enters another cell.")
+
+
+def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
+    right, steps = _since(cells, losses), np.arange(1, len(losses) + 1)
+    value = RUNNING_MEAN.array(RUNNING_MEAN.call(function, cells, losses), losses.shape, hint=1)
+    by_cell = [losses[:t][cells[:t] == cells[t - 1]].mean() for t in steps]
+    visit = np.concatenate([[True], cells[1:] != cells[:-1]]).cumsum()
+    whole = [losses[visit == v].mean() for v in visit]
+    sums = right * (steps - [np.argmax(visit == v) for v in visit])
+    mistakes = [
+        Mistake(losses.cumsum() / steps, "the mean since the episode began", "it since the cell was entered", 2),
+        Mistake(by_cell, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
+        Mistake(whole, "losses of later steps", "only those up to the step", 1),
+        Mistake(sums, "sums", "means", 1),
+        Mistake(losses, "the losses themselves", "their mean since the cell was entered", 1),
+    ]
+    found = f"another number at step {np.argmin(np.isclose(value, right))} of cells {cells.tolist()}"
+    RUNNING_MEAN.compare(value, right, mistakes, Mistake(None, found, "the mean since that cell was entered", 1))
+
+
+def _since(cells: np.ndarray, losses: np.ndarray) -> np.ndarray:
+    means, begin = np.zeros(len(losses)), 0
+    for t in range(len(losses)):
+        begin = t if t and cells[t] != cells[t - 1] else begin
+        means[t] = losses[begin : t + 1].mean()
+    return means
+
+
+class _Witness:
+    """Stands in for a partition and writes down what is done with it."""
+
+    def __init__(self) -> None:
+        self.codewords, self.done = np.zeros((0, 2)), []
+
+    def add(self, state: np.ndarray, rng: object = None) -> int:
+        self.codewords = np.vstack([self.codewords, state])
+        self.done.append("add")
+        return len(self.codewords) - 1
+
+    def observe(self, episode: Episode) -> None:
+        self.done.append(episode)
+
+    def train(self, rng: object = None) -> float:
+        self.done.append("train")
+        return 0.0
+
+    def clear(self) -> None:
+        self.done.append("clear")
+
+
+@ALGORITHM_1.checks
+def algorithm_1(function: Callable) -> None:
+    """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)`: who is called when."""
+    schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 11, 50))
+    for n_epochs, n_split, n_merge, n_freeze, n_reset in schedules:
+        rule = replace(SMALL, n_epochs=n_epochs, n_split=n_split, n_merge=n_merge, n_freeze=n_freeze, n_reset=n_reset)
+        _on_schedule(function, rule)
+    ALGORITHM_1.passed("every pass comes when it is due, and none in the freeze.")
+
+
+def _on_schedule(function: Callable, config: Config) -> None:
+    episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(config.n_epochs)]
+    partition = _Witness()
+
+    def note(what: str) -> Callable:
+        return lambda *_: partition.done.append(what) or []
+
+    given = partition, list(episodes), config, np.random.default_rng(0), note("split"), note("merge")
+    ALGORITHM_1.call(lambda *given: function(*given) or True, *given, keep=True)
+    if not any(isinstance(done, Episode) for done in partition.done):
+        raise ALGORITHM_1.wrong("no episode observed", "one in every iteration", 1)
+    if "add" not in partition.done or not np.array_equal(partition.codewords[0], episodes[0].states[0]):
+        raise ALGORITHM_1.wrong(
+            "another first codeword or none", "the first state of the first episode, added before it is observed", 1
+        )
+    rounds = _rounds(partition.done)
+    if len(rounds) != config.n_epochs or any(r[0] is not e for r, e in zip(rounds, episodes)):
+        raise ALGORITHM_1.wrong(f"{len(rounds)} episodes observed", f"each of the {config.n_epochs}, in their order", 1)
+    if "add" in [done for r in rounds for done in r]:
+        raise ALGORITHM_1.wrong("codewords added in the loop", "the first one only: the rest is up to `split`", 1)
+    for n, done in enumerate(rounds):
+        _one_round(n, done[1:], config)
+
+
+def _rounds(done: list) -> list[list]:
+    """What was done, cut where an episode was observed; what came before the first is left out."""
+    cuts = [i for i, what in enumerate(done) if isinstance(what, Episode)]
+    return [done[a:b] for a, b in zip(cuts, [*cuts[1:], len(done)])]
+
+
+def _one_round(n: int, done: list[str], config: Config) -> None:
+    frozen = config.n_epochs - config.n_freeze
+    if done[:1] != ["train"] or done.count("train") != 1:
+        raise ALGORITHM_1.wrong(
+            f"{done or 'nothing'} in iteration {n} after its episode was observed", "one training step first", 1
+        )
+    for what, every in (("split", config.n_split), ("merge", config.n_merge), ("clear", config.n_reset)):
+        due = n > 0 and n % every == 0 and (what == "clear" or n < frozen)
+        if (what in done) != due and not (n == 0 and what == "clear"):
+            period = {"split": "n_split", "merge": "n_merge", "clear": "n_reset"}[what]
+            if due:
+                raise ALGORITHM_1.wrong(f"no `{what}` in iteration {n}", f"one every {period} = {every} iterations", 2)
+            why = f"the freeze begins at {frozen}" if n >= frozen and n % every == 0 else "it is not due then"
+            why = "a map that was trained once tells nothing yet" if n == 0 else why
+            raise ALGORITHM_1.wrong(f"`{what}` in iteration {n}", f"none: {why}", 3 if n >= frozen else 2)
+    passes = [what for what in done if what in ("split", "merge")]
+    if passes == ["merge", "split"]:
+        raise ALGORITHM_1.wrong("a merge before a split in one iteration", "splits first, as the paper prints it", 2)
+
+
+@PREDICTION.checks
+def prediction(answers: dict, teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> None:
+    """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer."""
+    PREDICTION.answers(answers, dict.fromkeys(CHANGES, TREND))
+    usual = _cells(teacher, task, config, seeds)
+    wrong = []
+    for name, change in CHANGES.items():
+        ratio = _cells(teacher, task, replace(config, **change), seeds) / usual
+        near = [TREND[i] for i in {int(np.digitize(-ratio, [-1 - s, -1 + s])) for s in (SAME / 2, 2 * SAME)}]
+        wrong += [name] if answers[name] not in near else []
+    if wrong:
+        raise PREDICTION.wrong(
+            f"that the runs disagree with you on {wrong}",
+            "a prediction that the cell below bears out: run it, and find out why",
+            1,
+        )
+    PREDICTION.passed("the runs did what you said.")
+
+
+def _cells(teacher: Policy, task: Task, config: Config, seeds: range) -> float:
+    """Mean number of cells over `seeds`."""
+    return float(np.mean([len(distill(teacher, task.name, config, seed=seed)[0]) for seed in seeds]))

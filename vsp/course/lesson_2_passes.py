@@ -1,0 +1,261 @@
+"""Checks of lesson 2: the splitting and the merging pass, on small partitions whose answer is known.
+
+Where the paper is silent (vsp/readings.py) every reading counts as right, but for what the lesson's text says.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..config import Config, preset
+from ..distill import split_regions as vsp_split
+from ..envs import get_task
+from ..partition import Partition
+from ..rollouts import Episode
+from .feedback import Exercise
+
+SPLIT = Exercise("2.3", "split_regions")
+MERGE = Exercise("2.4", "merge_regions")
+
+TASK = "SimpleGoal-v0"
+# Small numbers, by which the cases below are worked out; new cells begin at 0, so that no random number has a say
+SMALL = replace(preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
+
+
+def on_a_line(places: list[float], biases: list[float], config: Config = SMALL) -> Partition:
+    """A partition with codewords at x = `places`, y = 0.5, constant maps and one state in each buffer."""
+    partition = Partition(get_task(TASK), config)
+    for x in places:
+        partition.add(np.array([x, 0.5]), np.random.default_rng(0))
+    partition.models.parameters[:, -1] = np.asarray(biases, dtype=float)[:, None]
+    partition.observe(Episode(partition.codewords.copy(), np.zeros((len(places), 2))))
+    return partition
+
+
+def _patient(partition: Partition) -> Partition:
+    """The same partition, which loses its patience with a loop that never ends."""
+    for name in ("neighbours", "comparable_parameters"):
+        turns, asked = iter(range(500)), getattr(partition, name)
+
+        def ask(*given, turns=turns, asked=asked):
+            if next(turns, None) is None:
+                raise RuntimeError("still not done after 500 turns: does your loop come to an end?")
+            return asked(*given)
+
+        setattr(partition, name, ask)
+    return partition
+
+
+def walk(places: list[float], actions: list[float]) -> Episode:
+    """An episode along y = 0.5 with the same number for both actions: for a map that says 0, the loss is its square."""
+    places, actions = np.array(places), np.array(actions)
+    return Episode(np.column_stack([places, np.full(len(places), 0.5)]), np.column_stack([actions, actions]))
+
+
+@dataclass(frozen=True)
+class SplitCase:
+    """A partition and an episode, where a pass has to split, and what it means if it does not."""
+
+    places: list[float]
+    biases: list[float]
+    way: list[float]
+    actions: list[float]
+    splits: list[float]
+    what: str
+    hint: int
+
+
+# fmt: off
+SPLITS = (
+    SplitCase([0.1], [1], [0.12, 0.15, 0.2, 0.25], [0, 0, 0, 0], [],
+              "a bad map but no state far from its codeword: both conditions must hold", 1),
+    SplitCase([0.1], [0], [0.4, 0.5, 0.6], [0, 0, 0], [], "a copy without any error", 1),
+    SplitCase([0.1], [1], [0.15, 0.25, 0.4], [0, 0, 0], [0.4], "mean loss 1 and one state that is far enough", 1),
+    SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0, 0, 0.6], [],
+              "one bad state after good ones: the mean counts, not the last loss", 2),
+    SplitCase([0.1], [0], [0.15, 0.2, 0.4], [1, 1, 0], [0.4],
+              "good at the end but bad on the way: the mean counts, not the last loss", 2),
+    SplitCase([0.1, 0.9], [0, 0], [0.15, 0.2, 0.6, 0.65], [1, 1, 0.1, 0.1], [],
+              "bad in one cell, good in the next: the mean begins anew in another cell", 3),
+    SplitCase([0.1, 0.9], [0, 0], [0.15, 0.2, 0.95, 0.4], [1, 1, 0, 0], [],
+              "back in a cell that was left: the mean begins anew there too", 3),
+    SplitCase([0.1], [1], [0.4, 0.45, 0.5], [0, 0, 0], [0.4],
+              "states next to a codeword that came a moment ago: they are in its cell now", 4),
+    SplitCase([0.1], [1], [0.35, 0.12, 0.95], [0, 0, 1], [0.35, 0.95],
+              "two places in one episode: go on after a split", 4),
+)
+# fmt: on
+
+
+@SPLIT.checks
+def split_regions(function: Callable) -> None:
+    """2.3: `split_regions(partition, episode, config, rng)` as Algorithm 2; returns the new codewords."""
+    for case in SPLITS:
+        partition = on_a_line(case.places, case.biases)
+        before = len(partition.codewords)
+        added = SPLIT.call(
+            function, partition, walk(case.way, case.actions), SMALL, np.random.default_rng(0), keep=True
+        )
+        new = partition.codewords[before:, 0]
+        if not _same(new, case.splits):
+            found = "a split elsewhere" if len(new) == len(case.splits) else _count(len(new), "split")
+            raise SPLIT.wrong(found, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
+        if SPLIT.size(added) != len(new):
+            raise SPLIT.wrong(f"{len(added)} codewords returned", f"one for every new cell, {len(new)}", 1)
+    _emptied(function)
+    for seed in range(4):
+        _like_ours(function, seed)
+    SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
+
+
+def _same(found: np.ndarray, right: list[float]) -> bool:
+    return len(found) == len(right) and np.allclose(found, right)
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
+
+
+def _emptied(function: Callable) -> None:
+    """Whether the buffers of the split cell and of its neighbours are empty, and no others."""
+    partition = on_a_line([0.05, 0.55, 0.75, 0.95], [1, 0, 0, 0])
+    SPLIT.call(function, partition, walk([0.27], [0]), SMALL, np.random.default_rng(0), keep=True)
+    left = partition.buffers.counts.tolist()
+    if left != [0, 0, 1, 1, 0]:
+        words = {
+            (1, 1, 1, 1, 0): "full buffers beside a new cell",
+            (0, 0, 0, 0, 0): "all buffers empty after a split",
+            (1, 0, 1, 1, 0): "a full buffer in the cell that was split, which has just lost states",
+            (0, 1, 1, 1, 0): "full buffers in the neighbours of the cell that was split",
+        }
+        found = words.get(tuple(left), f"buffers of {left} states in a case of four cells in a row")
+        raise SPLIT.wrong(found, "those of the cell that was split and of its old neighbours emptied, no others", 5)
+
+
+def _like_ours(function: Callable, seed: int) -> None:
+    """A random partition and episode: the same codewords as ours, under one of the readings of R14."""
+    rng = np.random.default_rng(seed)
+    task = get_task(TASK)
+    partition = Partition(task, SMALL)
+    for codeword in rng.uniform(size=(4, 2)):
+        partition.add(codeword, rng)
+    partition.models.parameters[:] = rng.normal(size=partition.models.parameters.shape)
+    states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
+    partition.observe(Episode(partition.codewords.copy(), np.zeros((4, 2))))
+    episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
+    own = copy.deepcopy(partition)
+    SPLIT.call(function, own, episode, SMALL, np.random.default_rng(0), keep=True)
+    ways = []
+    for after in ("reset", "kept"):
+        other = copy.deepcopy(partition)
+        vsp_split(other, episode, replace(SMALL, loss_after_split=after), np.random.default_rng(0))
+        ways.append(other.codewords)
+    if not any(own.codewords.shape == way.shape and np.allclose(own.codewords, way) for way in ways):
+        raise SPLIT.wrong(
+            _count(len(own.codewords) - 4, "split"),
+            f"{_count(len(ways[0]) - 4, 'split')}, at certain states, on a random walk",
+            1,
+        )
+
+
+@dataclass(frozen=True)
+class MergeCase:
+    """Biases of cells in a row, which places may be left after a pass, and what it means if others are."""
+
+    biases: list[float]
+    left: list[list[int]]
+    what: str
+    hint: int
+
+
+MERGES = (
+    MergeCase([0, 0], [[0], [1]], "two equal cells: one goes, one stays", 2),
+    MergeCase([0, 5, 10], [[0, 1, 2]], "cells that are all different", 1),
+    MergeCase([0, 0.1, 5], [[0, 2]], "two alike beside a third: the one whose turn comes first stays", 1),
+    MergeCase([0, 5, 0, 5], [[0, 1, 2, 3]], "equal maps in cells that are not neighbours", 3),
+    MergeCase([0, 0.5, 1.0], [[0, 2]], "a removed cell between two that are not alike: what is gone removes no one", 2),
+    MergeCase([5, 0, 0.1, 0.2, 9], [[0, 1, 3, 4], [0, 3, 4], [0, 1, 4]], "three alike in the middle", 4),
+)
+
+
+@MERGE.checks
+def merge_regions(function: Callable) -> None:
+    """2.4: `merge_regions(partition, config)` as Algorithm 3; returns the codewords that went."""
+    _in_a_row(function, MERGES[0])
+    _measured(function)
+    for case in MERGES[1:]:
+        _in_a_row(function, case)
+    _emptied_by_merge(function)
+    for seed in range(4):
+        _properties(function, seed)
+    MERGE.passed("neighbours that agree have become one, and nobody else is gone.")
+
+
+def _in_a_row(function: Callable, case: MergeCase) -> None:
+    places = np.linspace(0.05, 0.95, len(case.biases)).tolist()
+    partition = on_a_line(places, case.biases)
+    removed = MERGE.call(function, _patient(partition), SMALL, keep=True)
+    kept = [round((x - 0.05) / 0.9 * (len(places) - 1)) for x in partition.codewords[:, 0]]
+    if kept not in case.left:
+        expected = f"{' or '.join(sorted({str(len(left)) for left in case.left}))} left, in a case of {case.what}"
+        raise MERGE.wrong(f"{len(kept)} of {len(places)} cells left{_which(kept, case)}", expected, case.hint)
+    if MERGE.size(removed) != len(places) - len(kept):
+        raise MERGE.wrong(
+            f"{len(removed)} codewords returned", f"one for every cell that went, {len(places) - len(kept)}", 1
+        )
+
+
+def _which(kept: list[int], case: MergeCase) -> str:
+    return ", but not the right ones" if len(kept) in {len(left) for left in case.left} else ""
+
+
+def _measured(function: Callable) -> None:
+    """Whether parameters are compared by their largest difference."""
+    single = "one parameter that differs by more than the limit (its size counts, not its sign), the others equal"
+    many = "six parameters that each differ by less than the limit"
+    cases = (([0, 0, 0.7, 0, 0, 0], 2, single), ([0.5, -0.5, 0.5, 0.5, -0.5, 0.5], 1, many))
+    for difference, left, what in cases:
+        partition = on_a_line([0.2, 0.8], [0, 0])
+        partition.models.parameters[1] = np.reshape(difference, (3, 2))
+        MERGE.call(function, _patient(partition), SMALL, keep=True)
+        if len(partition.codewords) != left:
+            raise MERGE.wrong(f"{_count(len(partition.codewords), 'cell')} left", f"{left}, in a case of {what}", 1)
+
+
+def _emptied_by_merge(function: Callable) -> None:
+    partition = on_a_line([0.05, 0.2, 0.5, 0.7, 0.95], [0, 0.1, 5, 10, 15])
+    MERGE.call(function, _patient(partition), SMALL, keep=True)
+    counts = partition.buffers.counts.tolist()
+    if counts not in ([0, 1, 1, 1], [0, 0, 1, 1]):
+        words = {(1, 1, 1, 1): "the survivor's buffer as it was", (0, 0, 0, 0): "all buffers emptied"}
+        found = words.get(tuple(counts), f"buffers of {counts} states in a case of five cells in a row")
+        raise MERGE.wrong(found, "those of the survivor and of its neighbours emptied, no others", 5)
+
+
+def _properties(function: Callable, seed: int) -> None:
+    """On a random partition: whoever went had a twin, and of neighbours that were alike one went at least."""
+    rng = np.random.default_rng(seed)
+    partition = Partition(get_task(TASK), SMALL)
+    for codeword in rng.uniform(size=(12, 2)):
+        partition.add(codeword, rng)
+    partition.models.parameters[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
+    partition.observe(Episode(partition.codewords.copy(), np.zeros((12, 2))))
+    before, graph, own = partition.codewords.copy(), partition.neighbours(), copy.deepcopy(partition)
+    parameters = partition.comparable_parameters()
+    MERGE.call(function, _patient(own), SMALL, keep=True)
+    alive = (before[:, None] == own.codewords).all(axis=2).any(axis=1)
+    alike = np.abs(parameters[:, None] - parameters).max(axis=2) < SMALL.min_param_distance
+    alike &= ~np.eye(len(before), dtype=bool)
+    if not alike[~alive].any(axis=1).all() or alive.sum() != len(own.codewords):
+        raise MERGE.wrong("a cell gone, or altered, that was like no other", "only cells removed that have a twin", 1)
+    if (graph & alike)[np.ix_(alive, alive)].any():
+        raise MERGE.wrong("two neighbours with like maps, both still there", "one of them removed, in every pair", 4)
+    same = own.models.parameters.shape == (alive.sum(), 3, 2) and np.allclose(
+        own.models.parameters, partition.models.parameters[alive]
+    )
+    if not same:
+        raise MERGE.wrong("other maps in the cells that are left", "those that they had: nothing is averaged", 1)

@@ -1,0 +1,310 @@
+"""Checks of lesson 3: what a box plot hides, paired gaps, intervals over policies, blame, exact maps, DAgger.
+
+Each check takes what the student wrote, tries it on small random cases, and raises `NotYet` or prints one line.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+
+import numpy as np
+
+from .. import baselines
+from ..distill import teacher_episodes
+from ..envs import GOAL, Task, get_task
+from ..evaluate import spread, start_states
+from ..policy import VoronoiPolicy
+from ..rollouts import Episode, Policy, play, record
+from ..teachers import load_teacher
+from .feedback import Exercise, Mistake
+
+TASK = "SimpleGoal-v0"
+FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
+FRESH = 2_000_003  # seed of the start states that a challenger is judged on
+
+READING = Exercise("3.1", "reading")
+PAIRED_GAP = Exercise("3.2", "paired_gap")
+INTERVAL = Exercise("3.3", "interval")
+BLAME = Exercise("3.4", "blame")
+REFIT = Exercise("3.5", "refit")
+DAGGER = Exercise("3.6", "dagger_round")
+CHALLENGE = Exercise("3.7", "challenger")
+
+WHO = ("the teacher", "the copies")
+INSIDE = ("a quarter", "half", "three quarters", "nearly all")
+WHERE = ("inside the box", "in the lower whisker", "nowhere")
+SEES = ("the median", "the height of the box", "the mean")
+
+
+@READING.checks
+def reading(answers: dict, ours: np.ndarray, theirs: np.ndarray) -> None:
+    """3.1: answers `higher median`, `inside the box`, `pit episodes`, `sees the pit`, about two arrays of returns."""
+    options = {"higher median": WHO, "inside the box": INSIDE, "pit episodes": WHERE, "sees the pit": SEES}
+    READING.answers(answers, options)
+    facts, own = spread(ours), spread(theirs)
+    READING.choice(answers, "higher median", WHO[int(facts["median"] > own["median"])], {}, 1)
+    inside = ((ours >= facts["q1"]) & (ours <= facts["q3"])).mean()
+    teaching = {"a quarter": "a quarter lies between one edge and the median", "nearly all": "that is box and whiskers"}
+    READING.choice(
+        answers, "inside the box", INSIDE[int(np.abs(np.array([0.25, 0.5, 0.75, 1]) - inside).argmin())], teaching, 1
+    )
+    pit = np.median(ours[ours < 0]) if (ours < 0).any() else -10.0
+    place = WHERE[int(pit < facts["q1"]) + int(pit < facts["lower_fence"])]
+    teaching = {
+        "in the lower whisker": "read off how far down it reaches; what does a fall into the pit return",
+        "inside the box": "a fall into the pit costs ten points",
+    }
+    READING.choice(answers, "pit episodes", place, teaching, 2)
+    without = ours[ours >= facts["lower_fence"]]
+    change = [abs(spread(without)[name] - facts[name]) for name in ("median", "iqr", "mean")]
+    READING.choice(answers, "sees the pit", SEES[int(np.argmax(change))], {}, 3)
+    READING.passed("a plot may hide just what went wrong.")
+
+
+@PAIRED_GAP.checks
+def paired_gap(function: Callable) -> None:
+    """3.2: `paired_gap(ours, theirs)` returns the mean gap and its standard error, start by start."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        luck = rng.normal(scale=5, size=400)
+        _gap(function, luck + rng.normal(size=400) - 0.4, luck + rng.normal(size=400))
+    PAIRED_GAP.passed("shared starts make a small gap visible.")
+
+
+def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
+    values = PAIRED_GAP.call(function, ours, theirs)
+    gap, error = PAIRED_GAP.array(values, (2,), hint=1, meaning="the gap and its standard error")
+    right = (ours - theirs).mean()
+    turned = Mistake(-right, "a gap with the sign turned", "the mean of ours less theirs", 1)
+    otherwise = Mistake(None, f"a gap of {gap:.3g}", "the mean of ours less theirs", 1)
+    PAIRED_GAP.compare(gap, right, [turned], otherwise)
+    right = (ours - theirs).std(ddof=1) / np.sqrt(len(ours))
+    words = f"a standard error of {error:.3g}", "the deviation of the mean of the differences"
+    PAIRED_GAP.compare(error, right, _other_errors(ours, theirs), Mistake(None, *words, 3), rtol=0.01)  # n or n - 1
+
+
+def _other_errors(ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
+    n, difference, deviation = len(ours), ours - theirs, (ours - theirs).std()
+    unrelated = "the standard error of two samples that have nothing to do with each other"
+    shared = "that of the differences: both played from the same starts"
+    return [
+        Mistake(np.sqrt(ours.var() / n + theirs.var() / n), unrelated, shared, 2),
+        Mistake(deviation, "the deviation of single differences", "that of their mean, which is smaller", 3),
+        Mistake(difference.var() / n, "a variance", "its root", 3),
+        Mistake(abs(ours.std() - theirs.std()) / np.sqrt(n), "a difference of two deviations", shared, 2),
+        Mistake(ours.std() / np.sqrt(n), "the deviation of our returns", shared, 2),
+        Mistake(1.96 * deviation / np.sqrt(n), "half a 95 % interval", "the standard error itself", 3),
+    ]
+
+
+@INTERVAL.checks
+def interval(function: Callable) -> None:
+    """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        returns = 10 + rng.normal(scale=2, size=(30, 1)) + rng.normal(scale=6, size=(30, 400))
+        _interval(function, returns, rng)
+    INTERVAL.passed("policies are resampled, with all their episodes.")
+
+
+def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator) -> None:
+    values = INTERVAL.call(function, returns, rng)
+    low, high = INTERVAL.array(values, (2,), hint=1, meaning="the ends of the interval")
+    means = returns.mean(axis=1)
+    width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # what a bootstrap of the mean comes to, in large samples
+    if low > high:
+        raise INTERVAL.wrong("the upper end first", "the lower end first", 1)
+    if high - low < 1e-6 * width:
+        raise INTERVAL.wrong("an interval of no width", "draws *with* replacement, which differ from each other", 2)
+    if not low <= means.mean() <= high:
+        found = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
+        raise INTERVAL.wrong(found, "one around it", 1)
+    middle = "the middle 95 % of the means of resampled policies"
+    otherwise = Mistake(None, f"an interval that is too {'narrow' if high - low < width else 'wide'}", middle, 2)
+    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=0.08)
+
+
+def _other_widths(returns: np.ndarray, width: float) -> list[Mistake]:
+    means = returns.mean(axis=1)
+    single = 2 * 1.96 * returns.std() / np.sqrt(returns.size)
+    alone = "an interval as narrow as if every episode were a witness of its own"
+    return [
+        Mistake(single, alone, "one as wide as the policies differ", 3),
+        Mistake(np.ptp(np.percentile(means, [2.5, 97.5])), "the range of single policies", "the range of *means*", 2),
+        Mistake(1.645 / 1.96 * width, "an interval for 90 %", "one for 95 %: a tail of 2.5 % on either side", 1),
+        Mistake(width / 1.96, "one standard error to either side", "the middle 95 % of the resampled means", 1),
+        Mistake(np.sqrt(len(means)) * width, "resamples of one policy", "as many draws as there are policies", 2),
+    ]
+
+
+def _random_policy(rng: np.random.Generator, k: int = 5) -> VoronoiPolicy:
+    """A policy that mostly walks towards the goal, and often into the pit."""
+    maps = np.concatenate([rng.normal(scale=0.3, size=(k, 2, 2)), rng.uniform(-1, -0.2, size=(k, 1, 2))], axis=1)
+    return VoronoiPolicy(rng.uniform(0.1, 0.9, size=(k, 2)), maps, task=TASK)
+
+
+class _Sometimes:
+    """A teacher that stands still in the left third of the square, and so misses the goal from there."""
+
+    def __init__(self, teacher: Policy):
+        self.teacher = teacher
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        actions, _ = self.teacher.predict(obs)
+        return np.where(np.asarray(obs)[..., :1] < 0.34, 0.0, actions), None
+
+
+@BLAME.checks
+def blame(function: Callable) -> None:
+    """3.4: `blame(policy, teacher, task, starts)` counts, per cell, the failures whose last action it chose. (k,)"""
+    task, shipped = get_task(TASK), load_teacher(TASK)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        teacher = _Sometimes(shipped) if seed % 2 else shipped
+        _blames(function, _random_policy(rng), teacher, task, task.start(rng, 150))
+    BLAME.passed("every failure is on the account of the cell that made the last step.")
+
+
+def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray) -> None:
+    k = len(policy)
+    value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), hint=1, meaning="a count per cell")
+    ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
+    failed = (ours != GOAL) & (theirs == GOAL)
+    ways = [policy.cells(episode.states) for episode in record(policy, task, starts)]
+
+    def count(cells: list) -> np.ndarray:
+        return np.bincount(np.array(cells, dtype=int), minlength=k)
+
+    right = count([way[-1] for way, f in zip(ways, failed) if f])
+    too_many = "only those of starts from which the teacher reaches the goal"
+    too_many_words = "failures counted where the teacher fails too"
+    mistakes = [
+        Mistake(count([way[-1] for way, o in zip(ways, ours) if o != GOAL]), too_many_words, too_many, 2),
+        Mistake(
+            count(policy.cells(starts)[failed]), "failures counted in the cell of their start", "in the last one", 3
+        ),
+        Mistake(count([way[-1] for way, o in zip(ways, ours) if o == GOAL]), "successes", "failures", 1),
+        Mistake(count([i for way, f in zip(ways, failed) if f for i in way]), "every step of a failure", "its last", 3),
+        Mistake(count([way[-1] for way in ways]), "all episodes", "those that fail", 1),
+        Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
+    ]
+    otherwise = Mistake(None, f"{value.sum():g} failures", f"{failed.sum()}, each in the cell of its last state", 1)
+    BLAME.compare(value, right, mistakes, otherwise)
+
+
+@REFIT.checks
+def refit(function: Callable) -> None:
+    """3.5: `refit(policy, states, actions)` returns the same cells with maps by least squares."""
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        policy = _random_policy(rng, 6)
+        states = rng.uniform(size=(300, 2))
+        states = states[policy.cells(states) != 2]  # a cell that no state comes to
+        _refits(function, policy, states, np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1))
+    REFIT.passed("in these cells no maps are nearer to the teacher.")
+
+
+def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray) -> None:
+    before = policy.coefficients.copy()
+    try:
+        new = function(policy, states.copy(), actions.copy())
+    except (IndexError, np.linalg.LinAlgError, ValueError) as error:
+        raise REFIT.wrong(
+            f"{type(error).__name__} ({error})", "a result, also where no state is in a cell", 3
+        ) from None
+    except Exception:
+        new = REFIT.call(function, policy, states, actions)  # says what the matter is
+    if not isinstance(new, VoronoiPolicy):
+        raise REFIT.wrong(f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
+    if not np.array_equal(policy.coefficients, before):
+        raise REFIT.wrong("the old policy altered", "a new one: work on a copy of its coefficients", 1)
+    if not np.array_equal(new.codewords, policy.codewords):
+        raise REFIT.wrong("other codewords", "the same cells", 1)
+    if not np.allclose(new.coefficients[2], before[2]):
+        raise REFIT.wrong("another map in a cell without states", "the one it had: nothing is known there", 3)
+    whole = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
+    if np.allclose(new.coefficients[0], whole):
+        raise REFIT.wrong("the same map in every cell", "one per cell, from the states in it", 2)
+    if np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0):
+        raise REFIT.wrong("constants", "weights and bias by least squares", 2)
+    best = baselines.refit(policy, states, actions)
+    if not np.allclose(new.coefficients, best.coefficients, rtol=1e-4, atol=1e-6):
+        found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
+        raise REFIT.wrong(f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
+
+
+@DAGGER.checks
+def dagger_round(function: Callable) -> None:
+    """3.6: `dagger_round(policy, teacher, task, starts, states, actions)` returns more states and their actions."""
+    task, teacher = get_task(TASK), load_teacher(TASK)
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        policy, starts = _random_policy(rng), task.start(rng, 20)
+        before = next(teacher_episodes(teacher, task, 1, rng))
+        _labels(function, policy, teacher, task, starts, before)
+    DAGGER.passed("the copy went there, the teacher said what is right there, and nothing was forgotten.")
+
+
+def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: Episode) -> None:
+    value = DAGGER.call(function, policy, teacher, task, starts, before.states, before.actions)
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
+    states, actions = (np.asarray(part, dtype=np.float64) for part in value)
+    ours, theirs = (np.concatenate([e.states for e in record(p, task, starts)]) for p in (policy, teacher))
+    n, driver = len(before.states), ("the states that the teacher goes through", "those that the copy goes through", 1)
+    sizes = {
+        len(ours): ("the old states gone", "them kept, with the new ones behind or before them", 3),
+        len(theirs): driver,
+        n + len(theirs): driver,
+        n: ("no new states", "those that the copy goes through", 1),
+        n + len(starts): ("the start states alone", "every state on the way", 1),
+    }
+    if states.shape != (n + len(ours), 2):
+        otherwise = f"states of shape {states.shape}", "old and new states, a row each", 1
+        raise DAGGER.wrong(*sizes.get(len(states), otherwise))
+    if actions.shape != states.shape:
+        raise DAGGER.wrong(f"actions of shape {actions.shape}", f"one for each state, {states.shape}", 2)
+    if not np.allclose(_sorted(states), _sorted(np.concatenate([before.states, ours])), atol=1e-6):
+        raise DAGGER.wrong("other states", "the old ones and those that the copy goes through", 1)
+    own = np.isclose(actions, policy.predict(states)[0], atol=1e-4).all(axis=1).mean()
+    right = np.isclose(actions, teacher.predict(states)[0], atol=1e-4).all(axis=1).mean()
+    if right < 1:
+        copied = own > 0.5
+        raise DAGGER.wrong(
+            "the copy's own actions" if copied else f"the teacher's action for {right:.0%} of the states",
+            "the teacher's action for every state",
+            2,
+        )
+
+
+def _sorted(rows: np.ndarray) -> np.ndarray:
+    return rows[np.lexsort(np.round(rows, 5).T)]
+
+
+@CHALLENGE.checks
+def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
+    """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of `copies`, from fresh starts."""
+    if policy is None:
+        raise CHALLENGE.unsolved()
+    if not isinstance(policy, VoronoiPolicy):
+        kind = policy.__name__ if inspect.isclass(policy) else type(policy).__name__
+        raise CHALLENGE.wrong(f"a {kind}", "a vsp.VoronoiPolicy", 1)
+    if len(policy) >= FEWER_THAN:
+        raise CHALLENGE.wrong(f"{len(policy)} cells", f"fewer than {FEWER_THAN}", 1)
+    if policy.task.name != copies[0].task.name:
+        raise CHALLENGE.wrong(f"a policy for {policy.task.name}", f"one for {copies[0].task.name}", 1)
+    task = get_task(TASK)
+    starts = start_states(task, 2000, FRESH)
+    own, *others = (play(p, task, starts) for p in [policy, *copies])
+    best = max(other.returns.mean() for other in others)
+    if own.returns.mean() <= best:
+        found = (
+            f"a mean return of {own.returns.mean():.2f} from fresh starts, {(own.codes != GOAL).mean():.1%} failures"
+        )
+        raise CHALLENGE.wrong(found, f"more than the best copy's {best:.2f}", 2)
+    teacher = play(load_teacher(TASK), task, starts).returns.mean()
+    ours, failing = f"{len(policy)} cells return {own.returns.mean():.2f}", (own.codes != GOAL).mean()
+    CHALLENGE.passed(
+        f"{ours}, the best copy {best:.2f}, the teacher {teacher:.2f}; {failing:.1%} of the episodes fail."
+    )
