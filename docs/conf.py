@@ -29,6 +29,7 @@ if not any(SOURCE.glob("course/*.ipynb")):
 # API: docstrings are prose in which `name` is code, and a link where there is such a name
 default_role = "py:obj"
 add_module_names = False
+autodoc_inherit_docstrings = False  # Gymnasium has its own pages
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints = "signature"
