@@ -45,6 +45,8 @@ html_math_renderer = "mathml"
 html_copy_source = True  # for the button that downloads a notebook
 html_last_updated_fmt = None  # the same bytes on every day
 html_show_copyright = False
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system says
+html_use_index = html_domain_indices = False  # the search finds names
 html_theme_options = {
     "logo": {"text": html_title, "alt_text": ""},  # the words beside the logo say the same
     "navbar_persistent": [],  # the search field is in the sidebar

@@ -73,6 +73,8 @@ def _join_headers(table) -> None:
 def _align(table) -> None:
     """Mark the columns of numbers. They are counted from the right, for cells that span rows stand on the left."""
     columns = list(zip_longest(*(row.find_all(["th", "td"])[::-1] for row in table.find_all("tr"))))
+    if len(columns) > 9:
+        table["class"] = [*table.get("class", []), "wide"]  # printed smaller
     for column in columns:
         values = [cell.get_text(strip=True) for cell in column if cell is not None and cell.find_parent("tbody")]
         if values and all(_NUMBER.fullmatch(value) for value in values):
