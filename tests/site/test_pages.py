@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from conftest import Visit
+from visits import Visit
 
 SITE = Path(os.environ.get("SITE", "nowhere"))
 NAMES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob("*.html") if "_static" not in path.parts)
@@ -132,7 +132,7 @@ def test_a_search_for_merge_finds_the_distillation(start):
 
 def test_a_reader_can_choose_the_dark_page(start):
     before = start.evaluate("getComputedStyle(document.body).backgroundColor")
-    for _ in range(2):  # from what the system says to light, and on to dark
-        start.locator("button.theme-switch-button:visible").first.click()
+    start.get_by_role("button", name="Color mode").click()
+    start.locator(".dropdown-menu.show").get_by_text("Dark").click()
     assert start.evaluate("document.documentElement.dataset.theme") == "dark"
     assert start.evaluate("getComputedStyle(document.body).backgroundColor") != before
