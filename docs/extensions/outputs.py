@@ -12,7 +12,7 @@ from mathematics import mathml
 
 _IMAGE = re.compile(r"data:image/(png|gif);base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
-_NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?|nan|NaN|inf|True|False|")
+_NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?|nan|NaN|inf|True|False|[–—]|")
 
 
 def _outputs(app, doctree, docname):
@@ -71,15 +71,17 @@ def _join_headers(table) -> None:
 
 
 def _align(table) -> None:
-    """Mark the columns of numbers. They are counted from the right, for cells that span rows stand on the left."""
+    """Mark columns of numbers and of words. They are counted from the right, for cells that span rows are on the left."""
     columns = list(zip_longest(*(row.find_all(["th", "td"])[::-1] for row in table.find_all("tr"))))
     if len(columns) > 9:
         table["class"] = [*table.get("class", []), "wide"]  # printed smaller
     for column in columns:
         values = [cell.get_text(strip=True) for cell in column if cell is not None and cell.find_parent("tbody")]
-        if values and all(_NUMBER.fullmatch(value) for value in values):
-            for cell in filter(None, column):
-                cell["class"] = "number"
+        kind = "number" if values and all(map(_NUMBER.fullmatch, values)) else None
+        if not kind and max(map(len, values), default=0) > 20:
+            kind = "words"  # which need some room
+        for cell in filter(None, column) if kind else ():
+            cell["class"] = kind
 
 
 def setup(app):
