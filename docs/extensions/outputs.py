@@ -71,7 +71,7 @@ def _join_headers(table) -> None:
 
 
 def _align(table) -> None:
-    """Mark columns of numbers and of words. They are counted from the right, for cells that span rows are on the left."""
+    """Mark columns of numbers and of words; counted from the right, for cells that span rows are on the left."""
     columns = list(zip_longest(*(row.find_all(["th", "td"])[::-1] for row in table.find_all("tr"))))
     if len(columns) > 9:
         table["class"] = [*table.get("class", []), "wide"]  # printed smaller
