@@ -57,7 +57,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench clean course lock venv new-venv begin $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench clean course lock lock-site venv new-venv venv-site site test-site begin $(NOTEBOOKS)
 .NOTPARALLEL: # `runs` uses every core by itself
 
 help: ## this list
@@ -111,7 +111,7 @@ lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
 test: venv ## runs the tests: about 3 minutes
-	@MPLBACKEND=Agg $(PY) -m pytest -q tests
+	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests
 
 bench: venv ## measures speed: about 5 s
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py
@@ -144,6 +144,27 @@ $(foreach n,$(NOTEBOOKS),$(eval $(call notebook-rules,$(n))))
 
 course: venv ## three lessons: students' copies, solutions and the lecturer's guide, into build/course/: 2 s
 	@$(PY) -m vsp.course.build --out "$(OUT)"
+
+# The site
+
+SITE = $(OUT)/build/site
+
+# The pages are laid out as the repository is, so that a link of the README leads to the same thing on the site. The old
+# site stays until the new one is whole.
+site: venv-site course ## the companion as pages for a browser, into build/site/: under a minute
+	@rm -rf "$(SITE)-work"; source="$(SITE)-work/source"; \
+	mkdir -p "$$source/notebooks" "$$source/figures" "$$source/data" "$$source/course"; \
+	cp -R docs/*.md docs/api README.md CITATION.cff "$$source"; \
+	cp figures/executed/*.ipynb "$$source/notebooks"; \
+	cp -R figures/*.* figures/tables "$$source/figures"; \
+	cp data/README.md "$$source/data"; \
+	cp "$(OUT)"/build/course/student/*.ipynb "$$source/course"
+	@SITE_SOURCE="$(SITE)-work/source" $(PY) -m sphinx -q -W -E -c docs -d "$(SITE)-work/doctrees" \
+	  "$(SITE)-work/source" "$(SITE)-work/pages"
+	@rm -rf "$(SITE)"; mv "$(SITE)-work/pages" "$(SITE)"; rm -r "$(SITE)-work"; echo "made: open $(SITE)/index.html"
+
+test-site: site ## looks at the site and at JupyterLab in a browser, which needs Chromium: about 4 minutes
+	@SITE="$(SITE)" MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/site
 
 # Set-up
 
@@ -187,16 +208,38 @@ new-venv:
 	$(PIP) check; \
 	{ cksum environment.lock; pwd; } > .venv/built-from
 
+# What only the site and its tests need goes into the same .venv when it is first asked for; a new .venv forgets it.
+venv-site: venv
+	@cksum docs/environment.lock | cmp -s - .venv/site-built-from || { set -e; \
+	echo "Adding the packages of docs/environment.lock to .venv; this happens once and takes about half a minute."; \
+	rm -f .venv/site-built-from; \
+	$(PIP) install -qq --no-deps --require-hashes --requirement docs/environment.lock; \
+	$(PIP) check; \
+	cksum docs/environment.lock > .venv/site-built-from; }
+
 # SHA-256 of a CPU build of torch (2.13.0+cpu, Python 3.11, Linux x86_64), accepted beside the registry's builds.
 TORCH_CPU := 6746dbcbeb526eb61330b76b41ff1b4eb848951103a892eeb080dfa2b264667b
 ANYWHERE := ; python_full_version < '3.12' and (sys_platform == 'darwin' or sys_platform == 'linux')
 
-lock: venv ## resolves pyproject.toml anew, to the newest versions, and writes environment.lock: under a minute
-	@mkdir -p build; test -x build/uv/bin/uv || { $(PY) -m venv build/uv && build/uv/bin/python -m pip install -qq uv; }
-	@build/uv/bin/uv pip compile -q --universal --generate-hashes --python-version 3.11 --extra test --no-annotate \
-	  --no-header --output-file build/resolved.lock pyproject.toml
+UV := build/uv/bin/uv
+RESOLVE := $(UV) pip compile -q --universal --generate-hashes --python-version 3.11 --extra test --no-annotate --no-header
+
+lock: venv ## resolves pyproject.toml and docs/requirements.in anew, to the newest versions: under a minute
+	@mkdir -p build; test -x $(UV) || { $(PY) -m venv build/uv && build/uv/bin/python -m pip install -qq uv; }
+	@$(RESOLVE) --output-file build/resolved.lock pyproject.toml
 	@{ echo '# The whole environment with the checksums of every file, for Linux and macOS: written by `make lock`.'; \
 	  sed "s/ $(ANYWHERE)//" build/resolved.lock \
 	  | awk '{ print } /^torch==/ { print "    --hash=sha256:$(TORCH_CPU) \\" }'; } > build/environment.lock
 	@rm build/resolved.lock; mv build/environment.lock environment.lock; \
 	  echo "environment.lock: $$(grep -c '^[a-z]' environment.lock) packages"
+	@$(MAKE) --no-print-directory lock-site
+
+# Only what environment.lock lacks, resolved to go with it.
+lock-site:
+	@$(RESOLVE) --constraints environment.lock --output-file build/resolved.lock pyproject.toml docs/requirements.in
+	@{ echo '# What the site needs beside environment.lock, with checksums, for Linux and macOS: written by `make lock`.'; \
+	  sed "s/ $(ANYWHERE)//" build/resolved.lock \
+	  | awk -F== 'NR == FNR { known[$$1] = /^[a-z]/; next } /^[a-z]/ { fresh = !known[$$1] } fresh' environment.lock -; } \
+	  > build/environment.lock
+	@rm build/resolved.lock; mv build/environment.lock docs/environment.lock; \
+	  echo "docs/environment.lock: $$(grep -c '^[a-z]' docs/environment.lock) packages more"
