@@ -151,14 +151,15 @@ SITE = $(OUT)/build/site
 
 # The pages are laid out as the repository is, so that a link of the README leads to the same thing on the site. The old
 # site stays until the new one is whole.
-site: venv-site course ## the companion as pages for a browser, into build/site/: under a minute
+site: venv-site ## the companion as pages for a browser, into build/site/: about a minute
+	@$(PY) -m vsp.course.pages --out "$(OUT)"
 	@rm -rf "$(SITE)-work"; source="$(SITE)-work/source"; \
 	mkdir -p "$$source/notebooks" "$$source/figures" "$$source/data" "$$source/course"; \
 	cp -R docs/*.md docs/api README.md CITATION.cff "$$source"; \
 	cp figures/executed/*.ipynb "$$source/notebooks"; \
 	cp -R figures/*.* figures/tables "$$source/figures"; \
 	cp data/README.md "$$source/data"; \
-	cp "$(OUT)"/build/course/student/*.ipynb "$$source/course"
+	cp "$(OUT)"/build/course/pages/*.ipynb "$$source/course"
 	@SITE_SOURCE="$(SITE)-work/source" $(PY) -m sphinx -q -W -E -c docs -d "$(SITE)-work/doctrees" \
 	  "$(SITE)-work/source" "$(SITE)-work/pages"
 	@rm -rf "$(SITE)"; mv "$(SITE)-work/pages" "$(SITE)"; rm -r "$(SITE)-work"; echo "made: open $(SITE)/index.html"

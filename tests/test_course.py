@@ -13,7 +13,7 @@ import pytest
 from IPython.core.interactiveshell import InteractiveShell
 
 import vsp
-from vsp.course import build, drawing, feedback, lesson_1, lesson_2, lesson_3
+from vsp.course import build, drawing, feedback, lesson_1, lesson_2, lesson_3, pages
 from vsp.distill import distill, merge_regions, split_regions, teacher_episodes
 from vsp.partition import Partition
 
@@ -352,3 +352,26 @@ def test_jupyter_shows_the_message_alone():
     shell.run_cell("from vsp.course import lesson_1\nlesson_1.fit_linear(None)")
     InteractiveShell.clear_instance()
     assert shown == [["✗ 1.2 fit_linear: found None, expected a function."]]
+
+
+# Pages
+
+
+def small_lesson(worked):
+    new = nbformat.v4
+    answer = new.new_code_cell(f"{build.BEGIN}\nx = 1\n{build.END}", metadata={"nbgrader": {"solution": True}})
+    check = new.new_code_cell("assert x == 1", metadata={"nbgrader": {"grade": True, "points": 1}})
+    return build.student(new.new_notebook(cells=[new.new_code_cell("print(6 * 7)"), answer, check, worked]))
+
+
+def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
+    made = pages.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
+    assert [len(cell.outputs) for cell in made.cells] == [1, 0, 0, 1]
+    assert made.cells[0].outputs[0].text == "42\n" and made.cells[3].outputs[0].data["text/plain"] == "5"
+    assert [cell.execution_count for cell in made.cells] == [1, 2, 3, 4]
+    assert not any("execution" in cell.metadata for cell in made.cells)
+
+
+def test_a_page_must_not_need_an_answer():
+    with pytest.raises(RuntimeError, match="needs-x.*name 'x'"):
+        pages.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))

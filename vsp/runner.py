@@ -208,12 +208,12 @@ def _write_copy(source: nbformat.NotebookNode, cells: list[nbformat.NotebookNode
     }
     targets = [cell for cell in result.cells if cell.cell_type == "code"]
     for number, (target, cell) in enumerate(zip(targets, cells, strict=True), 1):
-        target.outputs, target.execution_count = _clean(cell.outputs, number), number
+        target.outputs, target.execution_count = clean_outputs(cell.outputs, number), number
     path.parent.mkdir(parents=True, exist_ok=True)
     nbformat.write(result, path)
 
 
-def _clean(outputs: list[nbformat.NotebookNode], number: int) -> list[nbformat.NotebookNode]:
+def clean_outputs(outputs: list[nbformat.NotebookNode], number: int) -> list[nbformat.NotebookNode]:
     """Outputs of code cell `number`; text that arrived in pieces, at the whim of a buffer, in one piece.
 
     Of a widget, which answers nobody without a kernel and is named at random, its still picture is left; one that has
