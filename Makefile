@@ -160,7 +160,7 @@ site: venv-site ## the companion as pages for a browser, into build/site/: about
 	cp -R figures/*.* figures/tables "$$source/figures"; \
 	cp data/README.md "$$source/data"; \
 	cp "$(OUT)"/build/course/pages/*.ipynb "$$source/course"
-	@SITE_SOURCE="$(SITE)-work/source" $(PY) -m sphinx -q -W -E -c docs -d "$(SITE)-work/doctrees" \
+	@$(PY) -m sphinx -q -W -E -c docs -d "$(SITE)-work/doctrees" \
 	  "$(SITE)-work/source" "$(SITE)-work/pages"
 	@rm -rf "$(SITE)"; mv "$(SITE)-work/pages" "$(SITE)"; rm -r "$(SITE)-work"; echo "made: open $(SITE)/index.html"
 

@@ -1,11 +1,9 @@
 """The site, for Sphinx: `make site` puts the pages beside the executed notebooks in build/site-source and calls it."""
 
-import os
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = Path(os.environ["SITE_SOURCE"])
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 
 project = "vsp"
