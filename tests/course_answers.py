@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 
 import vsp
 from vsp import baselines
-from vsp.envs import GOAL
+from vsp.envs import GOAL, PIT
 from vsp.rollouts import play, record
 from vsp.subpolicies import Form
 
@@ -66,9 +66,19 @@ def transposed(states, actions):
     return lstsq(ones(states), actions, rcond=None)[0].T
 
 
-@wrong("1.2", "expected (3, 2)")
+@wrong("1.2", "4 things")
 def all_of_lstsq(states, actions):
+    return lstsq(ones(states), actions, rcond=None)
+
+
+@wrong("1.2", "expected (3, 2)")
+def one_action_alone(states, actions):
     return lstsq(ones(states), actions, rcond=None)[0][:, :1]
+
+
+@wrong("1.2", "the least that a linear map can have")
+def too_few_steps(states, actions):
+    return by_descent(states, actions, n=20)
 
 
 @wrong("1.2", "the least that a linear map can have")
@@ -91,6 +101,14 @@ def solves_a_rectangle(states, actions):
 def normal_equations(states, actions):
     inputs = ones(states)
     return np.linalg.solve(inputs.T @ inputs, inputs.T @ actions)
+
+
+@right("1.2")
+def by_descent(states, actions, n=1000):
+    inputs, coefficients = ones(states), np.zeros((states.shape[1] + 1, actions.shape[1]))
+    for _ in range(n):
+        coefficients -= 0.2 * inputs.T @ (inputs @ coefficients - actions) / len(states)
+    return coefficients
 
 
 @right("1.2")
@@ -127,6 +145,11 @@ def absolute(policy, teacher, states):
 @wrong("1.3", "cancel")
 def signed(policy, teacher, states):
     return (teacher.predict(states)[0] - policy.predict(states)[0]).mean()
+
+
+@wrong("1.3", "the square of a mean")
+def squared_too_late(policy, teacher, states):
+    return (policy.predict(states)[0] - teacher.predict(states)[0]).mean() ** 2
 
 
 @wrong("1.3", "TypeError")
@@ -167,7 +190,17 @@ def largest_axis(codewords, states):
     return np.abs(states[:, None] - codewords).max(axis=2).argmin(axis=1)
 
 
-@wrong("1.4", "cancel before their size")
+@wrong("1.4", "differences that cancel")
+def no_abs(codewords, states):
+    return (states[:, None] - codewords).sum(axis=2).argmin(axis=1)
+
+
+@wrong("1.4", "the first two inputs alone")
+def in_the_plane(codewords, states):
+    return cdist(states[:, :2], codewords[:, :2], "cityblock").argmin(axis=1)
+
+
+@wrong("1.4", "differences that cancel")
 def abs_too_late(codewords, states):
     return np.abs((states[:, None] - codewords).sum(axis=2)).argmin(axis=1)
 
@@ -232,6 +265,11 @@ def limits_from_zero(codewords, coefficients, states):
     return raw(codewords, coefficients, states).clip(0, 1)
 
 
+@wrong("1.5", "one limit only")
+def upper_limit_only(codewords, coefficients, states):
+    return np.minimum(raw(codewords, coefficients, states), 1)
+
+
 @wrong("1.5", "without their bias")
 def weights_only(codewords, coefficients, states):
     own = coefficients[by_scipy(codewords, states)]
@@ -269,6 +307,7 @@ def state_by_state(codewords, coefficients, states):
 
 wrong("1.6", "is not written yet")(np.array([[0.3, 0.3], [0.7, 0.7]]))
 wrong("1.6", "expected at most 6")(np.random.default_rng(0).uniform(size=(7, 2)))
+wrong("1.6", "a row x, y per codeword")(np.zeros((0, 2)))
 wrong("1.6", "at most 50%")(np.array([[0.9, 0.7], [0.9, 0.8], [0.9, 0.9]]))
 wrong("1.6", "there twice")(np.array([[0.5, 0.5], [0.5, 0.5]]))
 wrong("1.6", "outside the unit square")(np.array([[0.5, 0.5], [5, 0.5]]))
@@ -320,6 +359,14 @@ def clusters_of_states(states, actions, k):
     return KMeans(k, n_init=1, random_state=0).fit(states).cluster_centers_
 
 
+@wrong("1.7", "→ Hint 3")
+def leaves_of_a_tree(states, actions, k):
+    from sklearn.tree import DecisionTreeRegressor
+
+    leaves = DecisionTreeRegressor(max_leaf_nodes=k, random_state=0).fit(states, actions).apply(states)
+    return np.array([states[leaves == leaf].mean(axis=0) for leaf in np.unique(leaves)])
+
+
 @wrong("1.7", "there twice")
 def the_same_again(states, actions, k):
     return np.tile(states.mean(axis=0), (k, 1))
@@ -339,6 +386,26 @@ def best_of_many(states, actions, k):
     rng = np.random.default_rng(11)
     draws = (rng.choice(np.unique(states, axis=0), k, replace=False) for _ in range(80))
     return min(draws, key=lambda p: leftover(p, states, actions))
+
+
+@right("1.7")
+def clusters_of_states_and_actions(states, actions, k):
+    from sklearn.cluster import KMeans
+
+    both = np.column_stack([states, actions])
+    return KMeans(k, n_init=4, random_state=0).fit(both).cluster_centers_[:, : states.shape[1]]
+
+
+@right("1.7")
+def exchanged_one_by_one(states, actions, k):
+    rng, candidates = np.random.default_rng(0), np.unique(states, axis=0)
+    points = rng.choice(candidates, k, replace=False)
+    for state in rng.permutation(candidates)[:80]:
+        tried = points.copy()
+        tried[rng.integers(k)] = state
+        new = len(np.unique(tried, axis=0)) == k
+        points = tried if new and leftover(tried, states, actions) < leftover(points, states, actions) else points
+    return points
 
 
 # 2.1 reading
@@ -426,6 +493,8 @@ def split_pass(
     empty="both",
     most=99,
     again=True,
+    whose=lambda i: i,
+    metric="cityblock",
 ):
     """Algorithm 2 with one thing wrong, as the options say."""
     previous, losses, added = None, [], []
@@ -434,8 +503,9 @@ def split_pass(
         i = locate(state)
         if i != previous:
             previous, losses = i, [] if forget else losses
-        losses.append(partition.loss(i, state, action))
-        apart = partition.far(i, state) or (not far and not (partition.codewords == state).all(axis=1).any())
+        losses.append(partition.loss(whose(i), state, action))
+        gap = cdist([state], partition.codewords[[i]], metric)[0, 0]
+        apart = gap > config.min_pol_distance or (not far and not (partition.codewords == state).all(axis=1).any())
         if (value(losses) > config.max_pol_loss or not loss) and apart:
             near = partition.neighbours()[i]
             near[i] = empty != "neighbours"
@@ -453,8 +523,11 @@ def splits(**options):
     return functools.partial(split_pass, **options)
 
 
-wrong("2.3", "the mean counts, not the last loss")(splits(value=lambda losses: losses[-1]))
-wrong("2.3", "the mean counts, not the last loss")(splits(value=max))
+wrong("2.3", "neither the last loss nor the sum")(splits(value=lambda losses: losses[-1]))
+wrong("2.3", "neither the last loss nor the sum")(splits(value=max))
+wrong("2.3", "neither the last loss nor the sum")(splits(value=sum))
+wrong("2.3", "not the last ones")(splits(value=lambda losses: np.mean(losses[-3:])))
+wrong("2.3", "not the last ones")(splits(value=np.median))
 wrong("2.3", "the mean begins anew")(splits(forget=False))
 wrong("2.3", "a codeword that came a moment ago")(splits(refresh=False))
 wrong("2.3", "no state far from its codeword")(splits(far=False))
@@ -463,6 +536,10 @@ wrong("2.3", "go on after a split")(splits(most=1))
 wrong("2.3", "all buffers empty")(splits(empty="all"))
 wrong("2.3", "full buffers beside a new cell")(splits(empty="none"))
 wrong("2.3", "which has just lost states")(splits(empty="neighbours"))
+
+
+wrong("2.3", "ask for the loss of its own")(splits(whose=lambda i: 0))
+wrong("2.3", "by `partition.loss` and `partition.far`")(splits(metric="euclidean"))
 
 
 @wrong("2.3", "0 codewords returned")
@@ -518,6 +595,7 @@ def merge_pass(
     keep_first=True,
     once=False,
     above=False,
+    step_back=True,
 ):
     """Algorithm 3 with one thing wrong, as the options say."""
     removed, i = [], 0
@@ -529,11 +607,12 @@ def merge_pass(
         if alike.any():
             if not keep_first:
                 alike = np.arange(len(alike)) == i
+            near &= empty != "survivor"
             near[i] = empty != "neighbours"
             partition.reset(near & (empty != "none") | (empty == "all"))
             removed += list(partition.codewords[alike])
             partition.keep(~alike)
-            i -= alike[:i].sum()
+            i -= alike[:i].sum() * step_back
             if once:
                 return removed
         i += 1
@@ -550,7 +629,10 @@ wrong("2.4", "its size counts, not its sign")(merges(measure=lambda d: d.max(axi
 wrong("2.4", "cells that are not neighbours")(merges(neighbours=False))
 wrong("2.4", "whose turn comes first stays")(merges(keep_first=False))
 wrong("2.4", "one goes, one stays")(merges(above=True))
-wrong("2.4", "the survivor's buffer")(merges(empty="none"))
+wrong("2.4", "all buffers as they were")(merges(empty="none"))
+wrong("2.4", "the survivor's buffer")(merges(empty="neighbours"))
+wrong("2.4", "beside the cell that is gone")(merges(empty="survivor"))
+wrong("2.4", "every cell that is left has its turn")(merges(step_back=False))
 wrong("2.4", "all buffers emptied")(merges(empty="all"))
 
 
@@ -651,6 +733,7 @@ def frame(
     order="split",
     train=True,
     late=False,
+    over=lambda episode, episodes: episode,
 ):
     """Algorithm 1 with one thing wrong, as the options say."""
     for n, episode in enumerate(episodes):
@@ -660,7 +743,9 @@ def frame(
         for _ in range(int(train)):
             partition.train(rng)
         if (n or zero) and n < config.n_epochs - config.n_freeze + freeze:
-            passes = [(n % config.n_split == 0, "split", lambda: split(partition, episode, config, rng))]
+            passes = [
+                (n % config.n_split == 0, "split", lambda: split(partition, over(episode, episodes), config, rng))
+            ]
             passes.append((n % config.n_merge == 0, "merge", lambda: merge(partition, config)))
             for due, name, action in passes if order == "split" else passes[::-1]:
                 if due and not (name == "merge" and late and n % config.n_split):
@@ -685,6 +770,11 @@ wrong("2.5", "one training step")(frames(train=False))
 wrong("2.5", "no `merge`")(frames(late=True))
 
 
+wrong("2.5", "the freeze begins at")(frames(freeze=-1))
+wrong("2.5", "something else")(frames(over=lambda episode, episodes: episodes[0]))
+wrong("2.5", "something else")(frames(over=lambda episode, episodes: episodes))
+
+
 @wrong("2.5", "no episode observed")
 def empty_frame(partition, episodes, config, rng, split, merge):
     return partition
@@ -706,6 +796,19 @@ def with_next(partition, episodes, config, rng, split, merge):
         if n % config.n_reset == 0:  # also at n = 0, where it does no harm
             partition.clear()
     return partition
+
+
+@right("2.5")
+def by_name(partition, episodes, config, rng, split, merge):
+    frame(
+        partition,
+        episodes,
+        config,
+        rng,
+        lambda p, e, c, r: split(partition=p, episode=e, config=c, rng=r),
+        lambda p, c: merge(p, config=c),
+    )
+    return partition.codewords
 
 
 @right("2.5")
@@ -767,6 +870,16 @@ def code_that_does_not_run(task):
     return form_of(lambda s: s[..., :1] ** 2, ("x ** 2",))
 
 
+@wrong("2.7", "'**' in the code")
+def power_that_c_lacks(task):
+    return form_of(lambda s: s**3, ("state[0] ** 3", "state[1] ** 3"))
+
+
+@wrong("2.7", "no functions but")
+def function_that_python_lacks(task):
+    return form_of(lambda s: s.max(axis=-1, keepdims=True), ("fmax(state[0], state[1])",))
+
+
 @wrong("2.7", "a gradient of")
 def wrong_gradient(task):
     class Half(Form):
@@ -803,6 +916,19 @@ def polar(task):
 
     code = ("hypot(state[0] - 0.5, state[1] - 0.5)", "atan2(state[1] - 0.5, state[0] - 0.5)")
     return form_of(features, code, ("r", "φ"), sizes=np.array([0.8, 3.2]))
+
+
+@right("2.7")
+def bumps(task):
+    centres = [(0.2, 0.2), (0.7, 0.7), (0.3, 0.8), (0.8, 0.3)]
+
+    def features(s):
+        return np.stack([np.exp(-10 * ((s[..., 0] - x) ** 2 + (s[..., 1] - y) ** 2)) for x, y in centres], axis=-1)
+
+    def square(i, c):
+        return f"(state[{i}] - {c}) * (state[{i}] - {c})"
+
+    return form_of(features, tuple(f"exp(-10 * ({square(0, x)} + {square(1, y)}))" for x, y in centres))
 
 
 @right("2.7")
@@ -882,6 +1008,12 @@ def by_covariance(ours, theirs):
     return sum(ours) / n - sum(theirs) / n, ((c[0, 0] + c[1, 1] - 2 * c[0, 1]) / n) ** 0.5
 
 
+@right("3.2")
+def by_bootstrap(ours, theirs):
+    gaps, rng = ours - theirs, np.random.default_rng(0)
+    return gaps.mean(), rng.choice(gaps, (4000, len(gaps))).mean(axis=1).std()
+
+
 # 3.3 interval
 
 
@@ -911,6 +1043,12 @@ def range_of_policies(returns, rng):
     return middle(returns.mean(axis=1))
 
 
+@wrong("3.3", "without the mean")
+def medians(returns, rng):
+    p = len(returns)
+    return middle(np.median(returns, axis=1)[rng.integers(p, size=(4000, p))].mean(axis=1))
+
+
 @wrong("3.3", "the upper end first")
 def upside_down(returns, rng):
     p = len(returns)
@@ -929,6 +1067,19 @@ def by_vsp(returns, rng):
     from vsp.evaluate import interval
 
     return interval(returns, np.mean, n_resamples=4000, seed=4)
+
+
+@right("3.3")
+def corrected_bootstrap(returns, rng):
+    from scipy.stats import bootstrap
+
+    return bootstrap((returns.mean(axis=1),), np.mean, rng=rng).confidence_interval
+
+
+@right("3.3")
+def policies_and_starts(returns, rng):
+    p, n = returns.shape
+    return middle([returns[rng.integers(p, size=p)][:, rng.integers(n, size=n)].mean() for _ in range(2000)])
 
 
 @right("3.3")
@@ -964,6 +1115,18 @@ def all_failures(policy, teacher, task, starts):
     return count_cells(policy, [e.states[-1] for e in record(policy, task, starts[mask])])
 
 
+@wrong("3.4", "only the episodes that end in the pit")
+def pit_only(policy, teacher, task, starts):
+    mask = failing(policy, teacher, task, starts) & (play(policy, task, starts).codes == PIT)
+    return count_cells(policy, [e.states[-1] for e in record(policy, task, starts[mask])])
+
+
+@wrong("3.4", "in other cells")
+def the_teachers_way(policy, teacher, task, starts):
+    mask = failing(policy, teacher, task, starts)
+    return count_cells(policy, [e.states[-1] for e in record(teacher, task, starts[mask])])
+
+
 @wrong("3.4", "the cell of their start")
 def blame_the_start(policy, teacher, task, starts):
     return count_cells(policy, starts[failing(policy, teacher, task, starts)])
@@ -994,6 +1157,12 @@ def state_of_each_failure(policy, teacher, task, starts):
 
 
 @right("3.4")
+def of_those_that_fail(policy, teacher, task, starts):
+    mask = failing(policy, teacher, task, starts)
+    return count_cells(policy, [e.states[-1] for e in record(policy, task, starts[mask])])
+
+
+@right("3.4")
 def by_the_last_step(policy, teacher, task, starts):
     counts = [0] * len(policy)
     for ours, theirs in zip(record(policy, task, starts), record(teacher, task, starts)):
@@ -1017,6 +1186,14 @@ def by_inverse(policy, states, actions):
         own = ones(states[cells == i])
         coefficients.append(np.linalg.inv(own.T @ own) @ own.T @ actions[cells == i])
     return fitted(policy, np.array(coefficients))
+
+
+@wrong("3.5", "read where it stops")
+def without_bias(policy, states, actions):
+    new, cells = policy.coefficients.copy(), policy.cells(states)
+    for i in np.unique(cells):
+        new[i] = lstsq(states[cells == i], actions[cells == i], rcond=None)[0]
+    return fitted(policy, new)
 
 
 @wrong("3.5", "in a cell without states")
@@ -1072,6 +1249,16 @@ def with_sums_of_products(policy, states, actions):
     return vsp.VoronoiPolicy(policy.codewords, new, task="SimpleGoal-v0")
 
 
+@right("3.5")
+def with_descent(policy, states, actions):
+    new, cells = policy.coefficients.copy(), policy.cells(states)
+    for i in np.unique(cells):
+        inputs = ones(states[cells == i])
+        for _ in range(5000):
+            new[i] -= 0.3 * inputs.T @ (inputs @ new[i] - actions[cells == i]) / len(inputs)
+    return fitted(policy, new)
+
+
 # 3.6 dagger_round
 
 
@@ -1098,7 +1285,13 @@ def forget_the_old(policy, teacher, task, starts, states, actions):
     return new, teacher.predict(new)[0]
 
 
-@wrong("3.6", "the start states alone")
+@wrong("3.6", "in different orders")
+def shuffled(policy, teacher, task, starts, states, actions):
+    new = gone_through(policy, task, starts)
+    return np.concatenate([states, new]), np.concatenate([teacher.predict(new)[0], actions])
+
+
+@wrong("3.6", "one new state per episode")
 def starts_only(policy, teacher, task, starts, states, actions):
     return np.concatenate([states, starts]), np.concatenate([actions, teacher.predict(starts)[0]])
 

@@ -122,6 +122,7 @@ class _Witness:
 
     def __init__(self) -> None:
         self.codewords, self.done = np.zeros((0, 2)), []
+        self.strays = 0  # splitting passes over anything but the last episode
 
     def add(self, state: np.ndarray, rng: object = None) -> int:
         self.codewords = np.vstack([self.codewords, state])
@@ -138,11 +139,20 @@ class _Witness:
     def clear(self) -> None:
         self.done.append("clear")
 
+    def split(self, partition: object, episode: Episode, config: Config, rng: object) -> list:
+        self.done.append("split")
+        self.strays += episode is not next(what for what in self.done[::-1] if isinstance(what, Episode))
+        return []
+
+    def merge(self, partition: object, config: Config) -> list:
+        self.done.append("merge")
+        return []
+
 
 @ALGORITHM_1.checks
 def algorithm_1(function: Callable) -> None:
     """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)`: who is called when."""
-    schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 11, 50))
+    schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 14, 50))
     for n_epochs, n_split, n_merge, n_freeze, n_reset in schedules:
         rule = replace(SMALL, n_epochs=n_epochs, n_split=n_split, n_merge=n_merge, n_freeze=n_freeze, n_reset=n_reset)
         _on_schedule(function, rule)
@@ -152,12 +162,8 @@ def algorithm_1(function: Callable) -> None:
 def _on_schedule(function: Callable, config: Config) -> None:
     episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(config.n_epochs)]
     partition = _Witness()
-
-    def note(what: str) -> Callable:
-        return lambda *_: partition.done.append(what) or []
-
-    given = partition, list(episodes), config, np.random.default_rng(0), note("split"), note("merge")
-    ALGORITHM_1.call(lambda *given: function(*given) or True, *given, keep=True)
+    given = partition, list(episodes), config, np.random.default_rng(0), partition.split, partition.merge
+    ALGORITHM_1.call(lambda *given: [function(*given)], *given, keep=True)  # it may return nothing
     if not any(isinstance(done, Episode) for done in partition.done):
         raise ALGORITHM_1.wrong("no episode observed", "one in every iteration", 1)
     if "add" not in partition.done or not np.array_equal(partition.codewords[0], episodes[0].states[0]):
@@ -171,6 +177,8 @@ def _on_schedule(function: Callable, config: Config) -> None:
         raise ALGORITHM_1.wrong("codewords added in the loop", "the first one only: the rest is up to `split`", 1)
     for n, done in enumerate(rounds):
         _one_round(n, done[1:], config)
+    if partition.strays:
+        raise ALGORITHM_1.wrong("a splitting pass over something else", "one over the episode just observed", 1)
 
 
 def _rounds(done: list) -> list[list]:
@@ -189,11 +197,13 @@ def _one_round(n: int, done: list[str], config: Config) -> None:
         due = n > 0 and n % every == 0 and (what == "clear" or n < frozen)
         if (what in done) != due and not (n == 0 and what == "clear"):
             period = {"split": "n_split", "merge": "n_merge", "clear": "n_reset"}[what]
+            hint, freeze = 3 if n >= frozen - 1 else 2, f"the freeze begins at {frozen}"
             if due:
-                raise ALGORITHM_1.wrong(f"no `{what}` in iteration {n}", f"one every {period} = {every} iterations", 2)
-            why = f"the freeze begins at {frozen}" if n >= frozen and n % every == 0 else "it is not due then"
+                expected = f"one every {period} = {every} iterations" + (f": {freeze}" if n == frozen - 1 else "")
+                raise ALGORITHM_1.wrong(f"no `{what}` in iteration {n}", expected, hint)
+            why = freeze if n >= frozen and n % every == 0 else "it is not due then"
             why = "a map that was trained once tells nothing yet" if n == 0 else why
-            raise ALGORITHM_1.wrong(f"`{what}` in iteration {n}", f"none: {why}", 3 if n >= frozen else 2)
+            raise ALGORITHM_1.wrong(f"`{what}` in iteration {n}", f"none: {why}", hint)
     passes = [what for what in done if what in ("split", "merge")]
     if passes == ["merge", "split"]:
         raise ALGORITHM_1.wrong("a merge before a split in one iteration", "splits first, as the paper prints it", 2)

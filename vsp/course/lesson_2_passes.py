@@ -75,10 +75,14 @@ SPLITS = (
               "a bad map but no state far from its codeword: both conditions must hold", 1),
     SplitCase([0.1], [0], [0.4, 0.5, 0.6], [0, 0, 0], [], "a copy without any error", 1),
     SplitCase([0.1], [1], [0.15, 0.25, 0.4], [0, 0, 0], [0.4], "mean loss 1 and one state that is far enough", 1),
-    SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0, 0, 0.6], [],
-              "one bad state after good ones: the mean counts, not the last loss", 2),
-    SplitCase([0.1], [0], [0.15, 0.2, 0.4], [1, 1, 0], [0.4],
-              "good at the end but bad on the way: the mean counts, not the last loss", 2),
+    SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0, 0, 0.7], [],
+              "one bad state after good ones in its cell: the mean counts, neither the last loss nor the sum", 2),
+    SplitCase([0.1], [0], [0.15, 0.2, 0.22, 0.25, 0.4], [1, 1, 0, 0, 0], [0.4],
+              "good at the end but bad on the way: the mean of all losses in the cell counts, not the last ones", 2),
+    SplitCase([0.1, 0.9], [1, 0], [0.6, 0.65], [0, 0], [],
+              "a good map in the state's own cell, a bad one in another: ask for the loss of its own", 1),
+    SplitCase([0.1, 0.9], [0, 1], [0.85, 0.95], [0, 0], [],
+              "states near the codeword of their own cell, far from another: its own counts", 1),
     SplitCase([0.1, 0.9], [0, 0], [0.15, 0.2, 0.6, 0.65], [1, 1, 0.1, 0.1], [],
               "bad in one cell, good in the next: the mean begins anew in another cell", 3),
     SplitCase([0.1, 0.9], [0, 0], [0.15, 0.2, 0.95, 0.4], [1, 1, 0, 0], [],
@@ -155,11 +159,9 @@ def _like_ours(function: Callable, seed: int) -> None:
         vsp_split(other, episode, replace(SMALL, loss_after_split=after), np.random.default_rng(0))
         ways.append(other.codewords)
     if not any(own.codewords.shape == way.shape and np.allclose(own.codewords, way) for way in ways):
-        raise SPLIT.wrong(
-            _count(len(own.codewords) - 4, "split"),
-            f"{_count(len(ways[0]) - 4, 'split')}, at certain states, on a random walk",
-            1,
-        )
+        found = f"{_count(len(own.codewords) - 4, 'split')} on a random walk"
+        right = "where both conditions hold, by `partition.loss` and `partition.far`"
+        raise SPLIT.wrong(found, f"{_count(len(ways[0]) - 4, 'split')}, {right}", 1)
 
 
 @dataclass(frozen=True)
@@ -172,14 +174,17 @@ class MergeCase:
     hint: int
 
 
+# fmt: off
 MERGES = (
     MergeCase([0, 0], [[0], [1]], "two equal cells: one goes, one stays", 2),
     MergeCase([0, 5, 10], [[0, 1, 2]], "cells that are all different", 1),
     MergeCase([0, 0.1, 5], [[0, 2]], "two alike beside a third: the one whose turn comes first stays", 1),
     MergeCase([0, 5, 0, 5], [[0, 1, 2, 3]], "equal maps in cells that are not neighbours", 3),
     MergeCase([0, 0.5, 1.0], [[0, 2]], "a removed cell between two that are not alike: what is gone removes no one", 2),
-    MergeCase([5, 0, 0.1, 0.2, 9], [[0, 1, 3, 4], [0, 3, 4], [0, 1, 4]], "three alike in the middle", 4),
+    MergeCase([5, 0, 0.1, 0.2, 9, 9.1], [[0, 1, 3, 4], [0, 3, 4], [0, 1, 4]],
+              "three alike in the middle and two at the end: every cell that is left has its turn", 4),
 )
+# fmt: on
 
 
 @MERGE.checks
@@ -227,11 +232,16 @@ def _measured(function: Callable) -> None:
 
 
 def _emptied_by_merge(function: Callable) -> None:
-    partition = on_a_line([0.05, 0.2, 0.5, 0.7, 0.95], [0, 0.1, 5, 10, 15])
+    partition = on_a_line([0.05, 0.2, 0.5, 0.7, 0.95], [5, 0, 0.1, 10, 15])
     MERGE.call(function, _patient(partition), SMALL, keep=True)
     counts = partition.buffers.counts.tolist()
-    if counts not in ([0, 1, 1, 1], [0, 0, 1, 1]):
-        words = {(1, 1, 1, 1): "the survivor's buffer as it was", (0, 0, 0, 0): "all buffers emptied"}
+    if counts not in ([0, 0, 1, 1], [0, 0, 0, 1]):
+        words = {
+            (1, 1, 1, 1): "all buffers as they were",
+            (0, 0, 0, 0): "all buffers emptied",
+            (1, 0, 1, 1): "a full buffer beside the cell that is gone",
+            (0, 1, 1, 1): "the survivor's buffer as it was",
+        }
         found = words.get(tuple(counts), f"buffers of {counts} states in a case of five cells in a row")
         raise MERGE.wrong(found, "those of the survivor and of its neighbours emptied, no others", 5)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import baselines
 from ..distill import teacher_episodes
-from ..envs import GOAL, Task, get_task
+from ..envs import GOAL, PIT, Task, get_task
 from ..evaluate import spread, start_states
 from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy, play, record
@@ -81,7 +81,8 @@ def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
     PAIRED_GAP.compare(gap, right, [turned], otherwise)
     right = (ours - theirs).std(ddof=1) / np.sqrt(len(ours))
     words = f"a standard error of {error:.3g}", "the deviation of the mean of the differences"
-    PAIRED_GAP.compare(error, right, _other_errors(ours, theirs), Mistake(None, *words, 3), rtol=0.01)  # n or n - 1
+    otherwise = Mistake(None, *words, 3)
+    PAIRED_GAP.compare(error, right, _other_errors(ours, theirs), otherwise, rtol=0.05)  # n or n - 1, or a bootstrap
 
 
 def _other_errors(ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
@@ -103,7 +104,8 @@ def interval(function: Callable) -> None:
     """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        returns = 10 + rng.normal(scale=2, size=(30, 1)) + rng.normal(scale=6, size=(30, 400))
+        luck = 6 * rng.exponential(size=(30, 400))  # skewed, so that a mean is no median
+        returns = 4 + rng.normal(scale=2, size=(30, 1)) + luck
         _interval(function, returns, rng)
     INTERVAL.passed("policies are resampled, with all their episodes.")
 
@@ -122,7 +124,7 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
         raise INTERVAL.wrong(found, "one around it", 1)
     middle = "the middle 95 % of the means of resampled policies"
     otherwise = Mistake(None, f"an interval that is too {'narrow' if high - low < width else 'wide'}", middle, 2)
-    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=0.08)
+    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=0.1)
 
 
 def _other_widths(returns: np.ndarray, width: float) -> list[Mistake]:
@@ -145,14 +147,14 @@ def _random_policy(rng: np.random.Generator, k: int = 5) -> VoronoiPolicy:
 
 
 class _Sometimes:
-    """A teacher that stands still in the left third of the square, and so misses the goal from there."""
+    """A teacher that stands still in the right third of the square, and so misses the goal from there."""
 
     def __init__(self, teacher: Policy):
         self.teacher = teacher
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         actions, _ = self.teacher.predict(obs)
-        return np.where(np.asarray(obs)[..., :1] < 0.34, 0.0, actions), None
+        return np.where(np.asarray(obs)[..., :1] > 0.66, 0.0, actions), None
 
 
 @BLAME.checks
@@ -184,12 +186,19 @@ def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Ta
         Mistake(
             count(policy.cells(starts)[failed]), "failures counted in the cell of their start", "in the last one", 3
         ),
+        Mistake(
+            count([way[-1] for way, f, o in zip(ways, failed, ours) if f and o == PIT]),
+            "only the episodes that end in the pit",
+            "also those that run out of steps",
+            2,
+        ),
         Mistake(count([way[-1] for way, o in zip(ways, ours) if o == GOAL]), "successes", "failures", 1),
         Mistake(count([i for way, f in zip(ways, failed) if f for i in way]), "every step of a failure", "its last", 3),
         Mistake(count([way[-1] for way in ways]), "all episodes", "those that fail", 1),
         Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
     ]
-    otherwise = Mistake(None, f"{value.sum():g} failures", f"{failed.sum()}, each in the cell of its last state", 1)
+    number = "as many failures, but in other cells" if value.sum() == right.sum() else f"{value.sum():g} failures"
+    otherwise = Mistake(None, number, f"{failed.sum()}, each in the cell of the policy's last state", 3)
     BLAME.compare(value, right, mistakes, otherwise)
 
 
@@ -200,21 +209,21 @@ def refit(function: Callable) -> None:
         rng = np.random.default_rng(seed)
         policy = _random_policy(rng, 6)
         states = rng.uniform(size=(300, 2))
-        states = states[policy.cells(states) != 2]  # a cell that no state comes to
-        _refits(function, policy, states, np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1))
+        actions = np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1)
+        REFIT.call(function, policy, states, actions)  # what stops here does not stop at a cell without states
+        known = policy.cells(states) != 2
+        _refits(function, policy, states[known], actions[known])
     REFIT.passed("in these cells no maps are nearer to the teacher.")
 
 
 def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray) -> None:
+    """With no state in cell 2."""
     before = policy.coefficients.copy()
     try:
         new = function(policy, states.copy(), actions.copy())
-    except (IndexError, np.linalg.LinAlgError, ValueError) as error:
-        raise REFIT.wrong(
-            f"{type(error).__name__} ({error})", "a result, also where no state is in a cell", 3
-        ) from None
-    except Exception:
-        new = REFIT.call(function, policy, states, actions)  # says what the matter is
+    except Exception as error:
+        found = f"{type(error).__name__} ({error})"
+        raise REFIT.wrong(found, "a result, also where no state is in a cell", 3) from None
     if not isinstance(new, VoronoiPolicy):
         raise REFIT.wrong(f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
     if not np.array_equal(policy.coefficients, before):
@@ -229,8 +238,8 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
     if np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0):
         raise REFIT.wrong("constants", "weights and bias by least squares", 2)
     best = baselines.refit(policy, states, actions)
-    if not np.allclose(new.coefficients, best.coefficients, rtol=1e-4, atol=1e-6):
-        found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
+    found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
+    if found > 1.01 * least:  # maps that were found by descent are right too
         raise REFIT.wrong(f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
 
 
@@ -258,7 +267,7 @@ def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: E
         len(theirs): driver,
         n + len(theirs): driver,
         n: ("no new states", "those that the copy goes through", 1),
-        n + len(starts): ("the start states alone", "every state on the way", 1),
+        n + len(starts): ("one new state per episode", "every state on the way", 1),
     }
     if states.shape != (n + len(ours), 2):
         otherwise = f"states of shape {states.shape}", "old and new states, a row each", 1
@@ -268,7 +277,10 @@ def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: E
     if not np.allclose(_sorted(states), _sorted(np.concatenate([before.states, ours])), atol=1e-6):
         raise DAGGER.wrong("other states", "the old ones and those that the copy goes through", 1)
     own = np.isclose(actions, policy.predict(states)[0], atol=1e-4).all(axis=1).mean()
-    right = np.isclose(actions, teacher.predict(states)[0], atol=1e-4).all(axis=1).mean()
+    labels = teacher.predict(states)[0]
+    right = np.isclose(actions, labels, atol=1e-4).all(axis=1).mean()
+    if right < 1 and np.allclose(_sorted(actions), _sorted(labels), atol=1e-4):
+        raise DAGGER.wrong("states and actions in different orders", "the same order for both", 3)
     if right < 1:
         copied = own > 0.5
         raise DAGGER.wrong(
