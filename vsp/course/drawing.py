@@ -22,14 +22,18 @@ def show(fig: Figure, alt: str) -> figures.Picture:
     return figures.Picture(png.getvalue(), alt)
 
 
+def squared_error(policy: Policy, teacher: Policy, states: np.ndarray) -> np.ndarray:
+    """Of the actions in each of the states (n, d), the mean over their components. (n,)"""
+    return np.square(policy.predict(states)[0] - teacher.predict(states)[0]).mean(axis=1)
+
+
 def copy_and_error(policy: VoronoiPolicy, teacher: Policy) -> tuple[Figure, np.ndarray]:
     """The arrows of a policy on SimpleGoal beside its squared error, both with cells and codewords."""
     x, y, grid = geometry.grid(policy.task.low, policy.task.high, 101)
     _, _, sparse = geometry.grid(policy.task.low, policy.task.high, 21)
     fig, axes = figures.panels(2)
     figures.arrows(figures.square(axes[0]), sparse, policy.predict(sparse)[0], color=figures.DISTILLED)
-    error = np.square(policy.predict(grid)[0] - teacher.predict(grid)[0]).mean(axis=1)
-    figures.error_map(figures.square(axes[1]), x, y, error, label="squared error")
+    figures.error_map(figures.square(axes[1]), x, y, squared_error(policy, teacher, grid), label="squared error")
     for ax in axes:
         figures.cells(ax, x, y, policy.cells(grid))
         figures.codewords(ax, policy.codewords, numbers=True)

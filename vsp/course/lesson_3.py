@@ -15,7 +15,7 @@ from ..distill import teacher_episodes
 from ..envs import GOAL, PIT, Task, get_task
 from ..evaluate import spread, start_states
 from ..policy import VoronoiPolicy
-from ..rollouts import Episode, Policy, play, record
+from ..rollouts import Episode, Policy, play, record, visited
 from ..teachers import load_teacher
 from .feedback import Exercise, Mistake
 
@@ -157,6 +157,18 @@ class _Sometimes:
         return np.where(np.asarray(obs)[..., :1] > 0.66, 0.0, actions), None
 
 
+def failures(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
+    """From which starts (n, d) the teacher reaches the goal and the policy does not. (n,) bool"""
+    ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
+    return (ours != GOAL) & (theirs == GOAL)
+
+
+def last_states(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
+    """Where the policy acted last in its failures from `starts` (n, d), of which there must be some. (f, d)"""
+    failed = starts[failures(policy, teacher, task, starts)]
+    return np.array([episode.states[-1] for episode in record(policy, task, failed)])
+
+
 @BLAME.checks
 def blame(function: Callable) -> None:
     """3.4: `blame(policy, teacher, task, starts)` counts, per cell, the failures whose last action it chose. (k,)"""
@@ -171,8 +183,7 @@ def blame(function: Callable) -> None:
 def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray) -> None:
     k = len(policy)
     value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), hint=1, meaning="a count per cell")
-    ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
-    failed = (ours != GOAL) & (theirs == GOAL)
+    ours, failed = play(policy, task, starts).codes, failures(policy, teacher, task, starts)
     ways = [policy.cells(episode.states) for episode in record(policy, task, starts)]
 
     def count(cells: list) -> np.ndarray:
@@ -260,7 +271,7 @@ def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: E
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
     states, actions = (np.asarray(part, dtype=np.float64) for part in value)
-    ours, theirs = (np.concatenate([e.states for e in record(p, task, starts)]) for p in (policy, teacher))
+    ours, theirs = (visited(p, task, starts) for p in (policy, teacher))
     n, driver = len(before.states), ("the states that the teacher goes through", "those that the copy goes through", 1)
     sizes = {
         len(ours): ("the old states gone", "them kept, with the new ones behind or before them", 3),
@@ -288,6 +299,15 @@ def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: E
             "the teacher's action for every state",
             2,
         )
+
+
+def corrected(
+    policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray, states: np.ndarray, actions: np.ndarray
+) -> VoronoiPolicy:
+    """The policy after a round of DAgger from `starts` (n, d), its maps fitted again to the enlarged data."""
+    more = visited(policy, task, starts)
+    labels = np.concatenate([actions, teacher.predict(more)[0]])
+    return baselines.refit(policy, np.concatenate([states, more]), labels)
 
 
 def _sorted(rows: np.ndarray) -> np.ndarray:
