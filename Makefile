@@ -16,14 +16,14 @@ TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
 FIGURES_06_beyond := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
-  beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
-TABLES_06_beyond := beyond_headline beyond_ablation \
+  beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
+TABLES_06_beyond := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
 # The notebooks that read data/runs, and what else they read: results that `make study` and `make beyond` make.
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv
 READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous-v0 beyond_Pendulum-v1 beyond_race \
-  lookup,data/results/$(n).csv)
+  beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) data/results/beyond_LunarLanderContinuous-v3.policy
 
 OUT ?= .
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN || echo 1)
@@ -95,7 +95,7 @@ study: venv ## the studies of the readings and of the teachers, into data/result
 beyond: venv ## our own method and others beside it, into data/results/: 1 to 1.5 HOURS, resumable
 	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(JOBS)
 
-beyond-long: venv ## the same for LunarLander, whose physics engine is slow: some HOURS, resumable
+beyond-long: venv ## the same for LunarLander, whose physics engine is slow: 3 to 4 HOURS, resumable
 	$(PY) -m vsp.beyond --long --out "$(OUT)" --jobs $(JOBS)
 
 lookup: venv ## times of look-ups and neighbour graphs in many dimensions, into data/results/: about 3 minutes

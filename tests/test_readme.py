@@ -76,8 +76,12 @@ def test_headline_is_that_of_the_table():
 def test_what_is_found_without_a_teacher_is_that_of_the_table():
     table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_ablation.csv")
     without = table[table["part"] == "no teacher"].set_index("task")["mean"]
-    (text,) = re.findall(r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\)", README)
-    assert text == (f"{without['SimpleGoal']:.2f}", f"{without['Pendulum']:.2f}")
+    lander = pd.read_csv(ROOT / "figures" / "tables" / "beyond_lunarlander.csv").set_index(["method", "size"])["mean"]
+    pattern = r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\) and LunarLander \(([\d.]+)\)"
+    (text,) = re.findall(pattern, README)
+    found = without["SimpleGoal"], without["Pendulum"], lander["refined, no teacher", 4]
+    assert text == tuple(f"{mean:.2f}" for mean in found)
+    assert re.findall(r"as any partition does\n  \(([\d.]+)\)", README) == [f"{lander['refined', 1]:.2f}"]
 
 
 def test_the_printed_policy_is_that_of_the_table():

@@ -205,7 +205,7 @@ def test_readings_are_the_fields_that_the_papers_table_does_not_print():
 def test_a_frame_as_latex_is_what_the_table_holds(tmp_path):
     shown = as_latex(FRAME)
     assert shown.columns.tolist() == [r"name\_of", "value", "count", "gap"]
-    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "-2.000"]
+    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "$-$2.000"]
     assert shown["value"].tolist() == ["0.333", "0.0001"] and shown["count"].tolist() == ["10", "2000000"]
     for name, latex in (("plain", None), ("given", shown)):
         save_table(FRAME, name, caption="c", out=tmp_path, latex=latex)

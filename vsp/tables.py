@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 from pathlib import Path
 
 import matplotlib as mpl
@@ -43,7 +44,7 @@ def save_table(
 
 
 def as_latex(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame as text that LaTeX prints as it stands: floats with three decimals."""
+    """The frame as text that LaTeX prints as it stands: floats with three decimals, a minus as long as a plus."""
     return as_text(frame).map(_escape).rename(columns=_escape)
 
 
@@ -136,7 +137,8 @@ def _text(value: object, digits: int) -> str:
 
 
 def _escape(text: str) -> str:
-    return text.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&")
+    text = text.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&")
+    return re.sub(r"^-(?=\d)", "$-$", text)
 
 
 def _patch(force: float) -> str:
