@@ -16,6 +16,8 @@ from .subpolicies import HIDDEN, number
 if TYPE_CHECKING:
     from .policy import VoronoiPolicy
 
+# Functions that a `Form` may use in its code: C and Python's math have them by the same names
+SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs")
 _SYMBOLS = {
     "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
     "cos ": r"\cos ", "sin ": r"\sin ", "tanh": r"\tanh",
@@ -89,7 +91,7 @@ def to_python(policy: VoronoiPolicy) -> str:
     return "\n".join([
         f'"""{_headline(policy)}"""',
         "",
-        "from math import atan2, sqrt, tanh  # noqa: F401",
+        f"from math import {', '.join(SHARED)}  # noqa: F401",
         "",
         *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
         "",
