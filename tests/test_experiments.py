@@ -125,7 +125,7 @@ def test_all_that_is_there_is_made_no_more(made, tmp_path, monkeypatch, capsys):
     assert not asked and capsys.readouterr().err == ""
     make_all([(SMALL, 1), (OTHER, 1), (SMALL, 4)], runs=tmp_path, label="a study")
     shown = capsys.readouterr().err
-    assert asked == [(OTHER, 1), (SMALL, 4)] and "a study" in shown and "3/3" in shown
+    assert asked == [(OTHER, 1), (SMALL, 4)] and "a study" in shown and "3 of 3 runs" in shown
     make_all([], runs=tmp_path, label="a study")
     assert len(asked) == 2 and files(tmp_path).keys() == {f"000{seed}.run" for seed in (0, 1, 2, 4)}
 
@@ -135,7 +135,7 @@ def test_progress_says_how_many_are_done(tmp_path, capsys):
     capsys.readouterr()
     make_runs(SMALL, [0, 1], runs=tmp_path)
     shown = capsys.readouterr().err
-    assert SIMPLEGOAL in shown and "2/2" in shown
+    assert SIMPLEGOAL in shown and "2 of 2 runs" in shown
     make_runs(SMALL, [0, 1], runs=tmp_path)
     assert capsys.readouterr().err == ""
 

@@ -11,7 +11,6 @@ import argparse
 import hashlib
 import json
 import os
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -28,6 +27,7 @@ from .experiments import code_id
 from .measure import measure
 from .methods import Budget
 from .policy import VoronoiPolicy
+from .progress import progress
 from .race import race
 from .rollouts import Policy, play
 from .simplify import simplify
@@ -170,7 +170,6 @@ def make_row(job: Job, folder: str | os.PathLike) -> None:
 def make_all(folder: str | os.PathLike, *, workers: int = 1, tasks=TASKS) -> None:
     """Make the rows that are missing in `folder`."""
     from joblib import Parallel, delayed, parallel_config
-    from tqdm import tqdm
 
     asked = [job for task in tasks for job in jobs(task)]
     missing = [job for job in asked if not job.path(folder).exists()]
@@ -178,10 +177,8 @@ def make_all(folder: str | os.PathLike, *, workers: int = 1, tasks=TASKS) -> Non
         finished = Parallel(n_jobs=workers, return_as="generator_unordered")(
             delayed(make_row)(job, folder) for job in missing
         )
-        calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
-        for _ in tqdm(
-            finished, "beyond", initial=len(asked) - len(missing), total=len(asked), unit="row", mininterval=calm
-        ):
+        done = len(asked) - len(missing)
+        for _ in progress(finished, "beyond", total=len(asked), unit="rows", done=done):
             pass
 
 

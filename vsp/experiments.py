@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 import platform
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -29,6 +28,7 @@ from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
 from .evaluate import interval, outcomes, spread
 from .policy import VoronoiPolicy
+from .progress import progress
 from .rollouts import Outcomes
 from .teachers import Teacher, load_teacher
 
@@ -143,13 +143,11 @@ def make_all(work: Iterable[tuple[Experiment, int]], *, runs: str | os.PathLike,
     if not missing:
         return
     from joblib import Parallel, delayed, parallel_config
-    from tqdm import tqdm
 
     with parallel_config("loky", inner_max_num_threads=1):
         finished = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(make_run)(*one) for one in missing)
         done = len(asked) - len(missing)
-        calm = 0.1 if sys.stderr.isatty() else 10  # a log file wants few lines
-        for _ in tqdm(finished, label, initial=done, total=len(asked), unit="run", mininterval=calm):
+        for _ in progress(finished, label, total=len(asked), unit="runs", done=done):
             pass
 
 

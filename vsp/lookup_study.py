@@ -21,6 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from . import geometry, store
 from .experiments import cpu_type
+from .progress import progress
 
 DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)  # 8, 11 and 17 are those of LunarLander, Hopper and HalfCheetah
 SIZES = (10, 30, 100, 300, 1000)  # codewords
@@ -108,7 +109,7 @@ def seconds(work: Callable[[], object], *, total: float = 0.1) -> tuple[float, o
 def look_ups(dimensions=DIMENSIONS, sizes=SIZES, *, total: float = 0.1) -> pd.DataFrame:
     """Seconds that `N_STATES` states take, a kd-tree's making included: one row per method, metric, d and k."""
     rows = []
-    for d in dimensions:
+    for d in progress(dimensions, "look-ups", total=len(dimensions), unit="dimensions"):
         states = np.random.default_rng(d).random((N_STATES, d))
         for k in sizes:
             points = codewords(d, k)
@@ -161,7 +162,7 @@ def graphs(dimensions=DIMENSIONS, sizes=SIZES, *, witnesses=WITNESSES, limit: fl
     reference has).
     """
     rows = []
-    for d in dimensions:
+    for d in progress(dimensions, "graphs", total=len(dimensions), unit="dimensions"):
         made = {method: column(method, d, sizes, limit=limit) for method in GRAPHS}
         for k in sizes:
             about = {"metric": METRIC, "d": d, "k": k}

@@ -13,13 +13,13 @@ from functools import partial
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
-from tqdm import tqdm
 
 from .baselines import dagger
 from .config import Refinement, preset
 from .envs import GOAL, get_task
 from .evaluate import start_states
 from .measure import N_REPORTED, REPORT_SEED
+from .progress import progress
 from .refine import refine
 from .rollouts import Policy, play
 from .teachers import Teacher, load_teacher
@@ -73,7 +73,7 @@ def race(seeds=SEEDS) -> pd.DataFrame:
     ]
     for _, _, make in entries:
         make(seed=0)  # imports, and memory that is had once
-    for seed in tqdm(seeds, "race", unit="seed"):
+    for seed in progress(seeds, "race", total=len(seeds), unit="seeds"):
         for method, setting, make in entries:
             began = time.perf_counter()
             policy = make(seed=seed)

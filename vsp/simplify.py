@@ -12,6 +12,7 @@ from .config import Refinement
 from .envs import GOAL, Task, get_task
 from .evaluate import start_states
 from .policy import VoronoiPolicy
+from .progress import progress
 from .refine import refine, worth
 from .rollouts import Outcomes, Policy, play, visited
 
@@ -40,7 +41,7 @@ def simplify(
     bar = worth(own, config.failure_price) - tolerance
     tried = _Tried(task, starts, config.failure_price)
     policies = []
-    for k in range(1, config.n_cells + 1):
+    for k in progress(range(1, config.n_cells + 1), "cells tried", total=config.n_cells, unit="sizes"):
         policies.append(refine(teacher, task, dataclasses.replace(config, n_cells=k), seed=seed)[0])
         if tried.reaches(bar, "cells", policies[-1]):
             break
