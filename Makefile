@@ -110,7 +110,7 @@ short-teachers: venv ## trains the further teachers that `make study` compares: 
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
-test: venv ## runs the tests: about 3 minutes
+test: venv ## runs the tests: about 4 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests
 
 bench: venv ## measures speed: about 5 s
