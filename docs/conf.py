@@ -1,4 +1,4 @@
-"""The site, for Sphinx: `make site` puts the pages beside the executed notebooks in build/site-source and calls it."""
+"""The site, for Sphinx: `make site` gathers pages and executed notebooks in build/site-work/source and calls it."""
 
 import sys
 from pathlib import Path

@@ -193,7 +193,7 @@ def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFra
 
 
 def simplest(task: str) -> VoronoiPolicy:
-    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about half an hour."""
+    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
     teacher, config = load_teacher(task), preset(task, "best")
     starts = start_states(get_task(task), config.n_validation, 0)
     own = play(teacher, get_task(task), starts).returns.mean()
