@@ -15,3 +15,15 @@ def pytest_addoption(parser):
 @pytest.fixture
 def teacher():
     return CurvedTeacher()
+
+
+@pytest.fixture
+def ax():
+    """Axes to draw into."""
+    import matplotlib.pyplot as plt
+
+    from vsp.figures import panels
+
+    fig, axes = panels()
+    yield axes[0]
+    plt.close(fig)

@@ -133,13 +133,6 @@ def test_style_does_not_leak():
 # What is drawn
 
 
-@pytest.fixture
-def ax():
-    fig, axes = panels()
-    yield axes[0]
-    plt.close(fig)
-
-
 def test_panels():
     fig, axes = panels(3, height=1.5, sharey=True)
     assert axes.shape == (3,) and fig.get_size_inches() == pytest.approx([12.2 / 2.54, 1.5])

@@ -14,13 +14,6 @@ from vsp.policy import VoronoiPolicy
 mpl.use("Agg")
 
 
-@pytest.fixture
-def ax():
-    fig, axes = panels()
-    yield axes[0]
-    plt.close(fig)
-
-
 def labels(ax):
     return [text.get_text() for text in ax.get_yticklabels()]
 

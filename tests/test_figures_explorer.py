@@ -14,13 +14,6 @@ from vsp.figures import panels
 mpl.use("Agg")
 
 
-@pytest.fixture
-def ax():
-    fig, axes = panels()
-    yield axes[0]
-    plt.close(fig)
-
-
 def named(ax):
     return dict(zip(*reversed(ax.get_legend_handles_labels())))
 
