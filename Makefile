@@ -110,8 +110,8 @@ short-teachers: venv ## trains the further teachers that `make study` compares: 
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
-test: venv ## runs the tests: about 4 minutes
-	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests
+test: venv ## runs the tests, several at a time: 2 to 4 minutes
+	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
 bench: venv ## measures speed: about 5 s
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py

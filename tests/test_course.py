@@ -346,7 +346,8 @@ def test_a_check_leaves_what_it_was_given_as_it_was():
     lesson_1.fit_linear(spoils)
 
 
-def test_jupyter_shows_the_message_alone():
+def test_jupyter_shows_the_message_alone(monkeypatch):
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)  # IPython would take its packages for this process's
     shell, shown = InteractiveShell.instance(), []
     shell._showtraceback = lambda kind, value, lines: shown.append(lines)
     shell.run_cell("from vsp.course import lesson_1\nlesson_1.fit_linear(None)")
