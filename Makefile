@@ -154,12 +154,12 @@ SITE = $(OUT)/build/site
 site: venv-site ## the companion as pages for a browser, into build/site/: about a minute
 	@$(PY) -m vsp.course.pages --out "$(OUT)"
 	@rm -rf "$(SITE)-work"; source="$(SITE)-work/source"; \
-	mkdir -p "$$source/notebooks" "$$source/figures" "$$source/data" "$$source/course"; \
+	mkdir -p "$$source/notebooks/course" "$$source/figures" "$$source/data"; \
 	cp -R docs/*.md docs/api README.md CITATION.cff "$$source"; \
 	cp figures/executed/*.ipynb "$$source/notebooks"; \
 	cp -R figures/*.* figures/tables "$$source/figures"; \
 	cp data/README.md "$$source/data"; \
-	cp "$(OUT)"/build/course/pages/*.ipynb "$$source/course"
+	cp "$(OUT)"/build/course/pages/*.ipynb "$$source/notebooks/course"
 	@$(PY) -m sphinx -q -W -E -c docs -d "$(SITE)-work/doctrees" \
 	  "$(SITE)-work/source" "$(SITE)-work/pages"
 	@rm -rf "$(SITE)"; mv "$(SITE)-work/pages" "$(SITE)"; rm -r "$(SITE)-work"; echo "made: open $(SITE)/index.html"
