@@ -116,8 +116,9 @@ test: venv ## runs the tests, several at a time: 2 to 4 minutes
 bench: venv ## measures speed: about 5 s
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py
 
-clean: ## removes build/ and data/runs/, nothing that is committed: at once
-	rm -rf "$(OUT)/build" "$(OUT)/data/runs"
+clean: ## removes build/ (but build/course, where somebody may have written) and data/runs/: at once
+	@test ! -d "$(OUT)/build" || find "$(OUT)/build" -mindepth 1 -maxdepth 1 ! -name course -exec rm -rf {} +
+	rm -rf "$(OUT)/data/runs"
 	@for d in figures data; do test ! -d "$(OUT)/$$d" || find "$(OUT)/$$d" -type f -name '.?*-????????.*' -delete; done
 
 # Notebooks
@@ -142,7 +143,7 @@ $(foreach n,$(NOTEBOOKS),$(eval $(call notebook-rules,$(n))))
 
 # The course
 
-course: venv ## three lessons: students' copies, solutions and the lecturer's guide, into build/course/: 2 s
+course: venv ## three lessons: a hand-out for students, solutions and the lecturer's guide, into build/course/: 3 s
 	@$(PY) -m vsp.course.build --out "$(OUT)"
 
 # The site

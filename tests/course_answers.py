@@ -1188,7 +1188,7 @@ def by_inverse(policy, states, actions):
     return fitted(policy, np.array(coefficients))
 
 
-@wrong("3.5", "read where it stops")
+@wrong("3.5", "print what that line works with")
 def without_bias(policy, states, actions):
     new, cells = policy.coefficients.copy(), policy.cells(states)
     for i in np.unique(cells):

@@ -1,9 +1,14 @@
 """The course: its sources, the copies made of them, and that checks know right answers from wrong ones."""
 
 import ast
+import builtins
 import functools
 import hashlib
+import os
 import re
+import subprocess
+import sys
+import zipfile
 from collections import Counter
 
 import course_answers
@@ -13,7 +18,7 @@ import pytest
 from IPython.core.interactiveshell import InteractiveShell
 
 import vsp
-from vsp.course import build, drawing, feedback, lesson_1, lesson_2, lesson_3, pages
+from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages
 from vsp.distill import distill, merge_regions, split_regions, teacher_episodes
 from vsp.partition import Partition
 
@@ -187,13 +192,16 @@ def test_marks_come_in_pairs(source):
 
 def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
     before = {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in build.SOURCES.glob("*")}
-    first = {path.name: path.read_bytes() for path in build.build(tmp_path / "a") if path.suffix == ".md"}
+    first = {(path.parent.name, path.name): path.read_bytes() for path in build.build(tmp_path / "a")}
     twice = [build.build(tmp_path / name) for name in ("a", "b")]
     assert [p.read_bytes() for p in twice[0]] == [p.read_bytes() for p in twice[1]]
-    assert first["guide.md"] == twice[0][-1].read_bytes()
+    assert all(path.read_bytes() == first[path.parent.name, path.name] for path in twice[0])
+    assert not list(tmp_path.rglob("*.kept-*"))
     assert before == {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in before}
     copies = sorted(str(path.relative_to(tmp_path / "b" / "build" / "course")) for path in twice[1])
-    assert copies == sorted(["guide.md", *(f"{kind}/{name}" for kind in ("student", "solution") for name in LESSONS)])
+    assert copies == sorted(
+        ["guide.md", "handout.zip", *(f"{kind}/{name}" for kind in ("student", "solution") for name in LESSONS)]
+    )
 
 
 def test_the_guide_keeps_answers_apart_from_what_students_see():
@@ -247,7 +255,20 @@ def test_the_solutions_of_lesson_2_together_are_the_papers_method():
     assert np.array_equal(grown[0].models.parameters, grown[1].models.parameters)
 
 
+def refuse(*packages):
+    """An `__import__` that finds none of `packages`."""
+    imports = builtins.__import__
+
+    def find(name, *others):
+        assert name.split(".")[0] not in packages, name
+        return imports(name, *others)
+
+    return find
+
+
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
+    """And needs no package that the hand-out leaves out."""
+    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "pygame", "Box2D"))
     made = build.student(lesson)
     _, failed = run(made, monkeypatch)
     checks = {cell.id for cell in by_kind(made, build.is_check)}
@@ -320,7 +341,8 @@ def test_other_right_answers_pass(entry, capsys, monkeypatch):
     monkeypatch.setattr(lesson_2, "distill", once)
     check(*entry)
     out = capsys.readouterr().out
-    assert out.startswith(f"✓ {entry[0]} ") and out.count("\n") == 1
+    assert out.startswith(f"✓ {entry[0]} ") and out.count("✓") == 1
+    assert max(map(len, out.splitlines())) <= feedback.WIDTH
 
 
 def test_there_are_enough_answers():
@@ -355,6 +377,63 @@ def test_jupyter_shows_the_message_alone(monkeypatch):
     assert shown == [["✗ 1.2 fit_linear: found None, expected a function."]]
 
 
+def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
+    source = "def within(x):\n    return x[3]\n\ndef fit(x):\n    return within(x)\n"
+    names, path = {}, tmp_path / "cell.py"
+    path.write_text(source)
+    exec(compile(source, str(path), "exec"), names)
+    with pytest.raises(feedback.NotYet, match=r"found IndexError \(.*\) in line 2 of its cell, `return x\[3\]`, exp"):
+        feedback.Exercise("1.2", "fit").call(names["fit"], [1])
+    with pytest.raises(feedback.NotYet, match="TypeError.* when it is called"):
+        feedback.Exercise("1.2", "fit").call(len, 1)
+
+
+def test_a_long_message_is_shown_in_lines():
+    lines = feedback.NotYet("word-with-hyphens " * 30)._render_traceback_()
+    assert len(lines) > 5 and max(map(len, lines)) <= feedback.WIDTH
+    assert " ".join(lines) == "✗ " + " ".join(["word-with-hyphens"] * 30)
+
+
+# What is written
+
+
+def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
+    copy = tmp_path / "build/course/student" / list(LESSONS)[0]
+    for n in (1, 2):
+        build.build(tmp_path)
+        capsys.readouterr()
+        copy.write_text(f"mine {n}")
+    build.build(tmp_path)
+    assert [path.read_text() for path in sorted(copy.parent.glob("*kept*"))] == ["mine 1", "mine 2"]
+    assert "was edited: kept as lesson_1_black_box.kept-2.ipynb" in capsys.readouterr().out
+    assert nbformat.read(copy, as_version=4).cells
+
+
+def test_a_hand_out_stands_on_its_own(tmp_path):
+    """Package and teachers are found where it was unpacked; the answers are not in it."""
+    handout.write_handout(tmp_path / "handout.zip", {"lesson.ipynb": "{}"})
+    with zipfile.ZipFile(tmp_path / "handout.zip") as archive:
+        assert not [name for name in archive.namelist() if b"BEGIN SOL" in archive.read(name) and "/vsp/" not in name]
+        archive.extractall(tmp_path)
+    folder = tmp_path / handout.FOLDER
+    code = (
+        "import vsp; from vsp.course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); vsp.load_teacher('{}')"
+    )
+    names = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(SIMPLEGOAL)], cwd=folder, env=names, capture_output=True, text=True
+    )
+    assert done.stdout.strip() == str(folder / "vsp" / "__init__.py"), done.stderr
+
+
+def test_a_hand_out_asks_for_locked_versions_without_torch():
+    lines = handout.requirements().splitlines()
+    locked = (build.ROOT / "environment.lock").read_text(encoding="utf-8")
+    assert len(lines) > 12 and all(f"\n{line} " in locked for line in lines)
+    names = {line.partition("==")[0] for line in lines}
+    assert {"numpy", "jupyterlab", "ipywidgets", "gymnasium"} <= names and not names & set(handout.UNUSED)
+
+
 # Pages
 
 
@@ -371,6 +450,11 @@ def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
     assert made.cells[0].outputs[0].text == "42\n" and made.cells[3].outputs[0].data["text/plain"] == "5"
     assert [cell.execution_count for cell in made.cells] == [1, 2, 3, 4]
     assert not any("execution" in cell.metadata for cell in made.cells)
+
+
+def test_a_page_gives_no_prediction_away():
+    spoiler = nbformat.v4.new_code_cell("2 + 3", metadata={"tags": ["spoiler"]})
+    assert [len(cell.outputs) for cell in pages.page(small_lesson(spoiler)).cells] == [1, 0, 0, 0]
 
 
 def test_a_page_must_not_need_an_answer():

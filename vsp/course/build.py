@@ -1,4 +1,4 @@
-"""Student copies, solution copies and a lecturer's guide, all from the sources of the lessons.
+"""Student copies, a hand-out of them, solution copies and a lecturer's guide, all from the sources of the lessons.
 
     python -m vsp.course.build --out .
 
@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import copy
+import itertools
+import json
 import os
 import re
 from pathlib import Path
@@ -18,24 +20,43 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from ..store import ROOT, write_text
+from ..store import ROOT, sha256, write_json, write_text
+from .handout import write_handout
 
 SOURCES = ROOT / "notebooks" / "course"
+MADE = ".made.json"  # the checksums of what was written
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
 _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
 
 
 def build(out: str | os.PathLike) -> list[Path]:
-    """Write the copies and the guide to OUT/build/course; returns the files. The same sources, the same bytes."""
-    folder, lessons, written = Path(out) / "build" / "course", read_sources(), []
-    for name, lesson in lessons.items():
-        for kind, made in (("student", student(lesson)), ("solution", solution(lesson))):
-            written.append(folder / kind / name)
-            write_text(written[-1], nbformat.writes(made) + "\n")
-    written.append(folder / "guide.md")
-    write_text(written[-1], guide(lessons))
-    return written
+    """Write copies, hand-out and guide to OUT/build/course; returns the files. The same sources, the same bytes.
+
+    A copy that somebody has written into is kept, under another name.
+    """
+    folder, lessons = Path(out) / "build" / "course", read_sources()
+    students = {name: nbformat.writes(student(lesson)) + "\n" for name, lesson in lessons.items()}
+    texts = {f"student/{name}": text for name, text in students.items()}
+    texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
+    texts["guide.md"] = guide(lessons)
+    _keep_edited(folder, texts)
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    write_json(folder / MADE, {name: sha256(folder / name) for name in texts})
+    write_handout(folder / "handout.zip", students)
+    return [folder / name for name in (*texts, "handout.zip")]
+
+
+def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
+    """Rename the files that are about to be replaced and are not what was written here the last time."""
+    made = json.loads((folder / MADE).read_text(encoding="utf-8")) if (folder / MADE).exists() else {}
+    for path in (folder / name for name in texts):
+        if path.exists() and sha256(path) != made.get(path.relative_to(folder).as_posix()):
+            names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
+            kept = next(name for name in names if not name.exists())
+            path.rename(kept)
+            print(f"{path} was edited: kept as {kept.name}")
 
 
 def read_sources() -> dict[str, NotebookNode]:
@@ -131,14 +152,20 @@ def _deeper(markdown: str) -> str:
 
 _BEFORE = """# Lecturer's guide
 
-Three lessons of 90 minutes. `make course` writes the copies beside this guide: hand out `student/`; keep `solution/`.
-Students need the environment that `make` sets up; `.venv/bin/jupyter lab build/course/student` opens the lessons. Every
-exercise is followed by a check that answers at once. It calls what the student wrote and does not compare text, so any
-way of solving an exercise counts, and nobody has to wait for you to hear what is wrong.
+Three lessons of 90 minutes. `make course` writes beside this guide:
 
-With nbgrader: the files in `solution/` are sources. Copy one to `source/<assignment>/`, run
-`nbgrader generate_assignment`, and grade as ever; points are in the cells. The lessons in `notebooks/course` have the
-same cells and the notes below besides: do not release those.
+- `handout.zip`, for your students: the lessons without answers, and all that they need. It says how to set up, with
+  Python 3.11, in a few minutes and without torch. Let them do that at home. A clone of the repository has the answers.
+- `student/`, the same lessons to look at: `.venv/bin/jupyter lab build/course/student`. Work in a copy elsewhere; but
+  what somebody wrote here is kept, under another name, when `make course` runs again.
+- `solution/`, the lessons with answers. Run one as a whole (15 s) to see all its pictures.
+
+Every exercise is followed by a check that answers at once. It calls what the student wrote and does not compare text,
+so any way of solving an exercise counts, and nobody has to wait for you to hear what is wrong.
+
+With nbgrader: activate the environment that has it (it looks for its parts on the path); the files in `solution/` are
+sources. Copy one to `source/<assignment>/`, run `nbgrader generate_assignment`, and grade as ever; points are in the
+cells. The lessons in `notebooks/course` have the same cells and the notes below: do not release those.
 """
 
 

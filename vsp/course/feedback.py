@@ -9,17 +9,21 @@ from __future__ import annotations
 import copy
 import functools
 import hashlib
+import textwrap
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+WIDTH = 90  # characters of a message's lines
 
 
 class NotYet(AssertionError):
     """An answer that is missing or not right yet. Jupyter shows its message and no traceback."""
 
     def _render_traceback_(self) -> list[str]:
-        return [f"✗ {self}"]
+        return _lines(f"✗ {self}")
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Exercise:
 
     def passed(self, text: str) -> None:
         """Say that all is well."""
-        print(f"✓ {self.number} {self.name}: {text}")
+        print(*_lines(f"✓ {self.number} {self.name}: {text}"), sep="\n")
 
     def call(self, function: Callable, *arguments: object, keep: bool = False) -> object:
         """What `function` returns for copies of `arguments`, or for these themselves if it is to alter them (`keep`).
@@ -82,8 +86,8 @@ class Exercise:
         except NotImplementedError:
             raise self.unsolved() from None
         except Exception as error:
-            found, advice = f"{type(error).__name__} ({error}) when it is called", "call it yourself on a small case"
-            raise self.wrong(found, f"a result: {advice} and read where it stops") from None
+            found = f"{type(error).__name__} ({error}) {_place(function, error)}"
+            raise self.wrong(found, "a result: print what that line works with") from None
         if result is None:
             raise self.wrong("None as the result", "something after `return`")
         return result
@@ -149,6 +153,18 @@ class Exercise:
 def seal(number: str, key: str, answer: str) -> str:
     """A salted digest of an answer, which cannot be read."""
     return hashlib.sha256(f"vsp course|{number}|{key}|{answer}".encode()).hexdigest()[:16]
+
+
+def _place(function: Callable, error: Exception) -> str:
+    """The line of the student's cell, that of `function`, where `error` arose: the last that was entered."""
+    file = getattr(getattr(function, "__code__", None), "co_filename", None)
+    lines = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    return f"in line {lines[-1].lineno} of its cell, `{lines[-1].line}`" if lines else "when it is called"
+
+
+def _lines(text: str) -> list[str]:
+    """`text` in lines that a notebook need not break."""
+    return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def _close(value: object, right: object, rtol: float) -> bool:

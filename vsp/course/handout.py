@@ -1,0 +1,57 @@
+"""The hand-out: the students' copies and all that they need, in one file.
+
+Without torch, which the lessons do not use (teachers act by NumPy), a student's set-up is a small download.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+import zipfile
+from pathlib import Path
+
+from ..store import ROOT, atomic_path
+
+FOLDER = "vsp-course"
+UNUSED = ("papermill", "stable-baselines3", "torch")  # of the package's dependencies, by the lessons
+FILES = ("LICENSE", "vsp/**/*.py", "data/paper/*", "data/teachers/*.*")
+
+README = """# vsp: the course
+
+Set up once, with Python 3.11 (Linux, macOS):
+
+    python3.11 -m venv .venv
+    .venv/bin/python -m pip install -r requirements.txt
+
+and then, each time:
+
+    .venv/bin/jupyter lab
+
+On Windows, `py -3.11 -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`.
+
+Begin with lesson_1_black_box.ipynb. Whatever you change stays in this folder.
+"""
+
+
+def write_handout(path: Path, copies: dict[str, str]) -> None:
+    """Write a zip file of the students' `copies` (file name: text) with the package, its data and the packages to
+    install. The same sources, the same bytes."""
+    texts = {**copies, "README.md": README, "requirements.txt": requirements()}
+    files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
+    contents = {name: text.encode() for name, text in texts.items()}
+    contents |= {name: file.read_bytes() for name, file in files.items()}
+    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+        for name in sorted(contents):
+            member = zipfile.ZipInfo(f"{FOLDER}/{name}")  # dated 1980, as all of them
+            member.external_attr = 0o644 << 16
+            archive.writestr(member, contents[name], zipfile.ZIP_DEFLATED)
+
+
+def requirements() -> str:
+    """What pip is to install for the lessons, in the versions of environment.lock."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = [re.match(r"[\w-]+", line)[0] for line in project["dependencies"]]
+    locked = dict(
+        re.findall(r"^([\w-]+)==(\S+)", (ROOT / "environment.lock").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    return "".join(f"{name}=={locked[name]}\n" for name in wanted if name not in UNUSED)
