@@ -173,8 +173,8 @@ def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", default=".", help="folder that build/course is made in")
-    for path in build(parser.parse_args().out):
-        print(path)
+    *files, guide, handout = build(parser.parse_args().out)
+    print(f"{len(files)} notebooks in {guide.parent}; begin with {guide}; for students: {handout}")
 
 
 if __name__ == "__main__":
