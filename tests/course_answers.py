@@ -1038,6 +1038,17 @@ def ninety(returns, rng):
     return middle(returns.mean(axis=1)[rng.integers(p, size=(8000, p))].mean(axis=1), 5)
 
 
+@wrong("3.3", "too few resamples")
+def a_hundred_resamples(returns, rng):
+    p = len(returns)
+    return middle(returns.mean(axis=1)[rng.integers(p, size=(100, p))].mean(axis=1))
+
+
+@wrong("3.3", "too few resamples")
+def few_and_always_the_same(returns, rng):
+    return a_hundred_resamples(returns, np.random.default_rng(1))
+
+
 @wrong("3.3", "the range of single policies")
 def range_of_policies(returns, rng):
     return middle(returns.mean(axis=1))
@@ -1301,6 +1312,18 @@ def labels_missing(policy, teacher, task, starts, states, actions):
     return np.concatenate([states, gone_through(policy, task, starts)]), actions
 
 
+@wrong("3.6", "the pair that `predict` returns")
+def labels_with_the_second_thing(policy, teacher, task, starts, states, actions):
+    new = gone_through(policy, task, starts)
+    return np.concatenate([states, new]), np.concatenate([actions, teacher.predict(new)])
+
+
+@wrong("3.6", "the pair that `predict` returns")
+def second_thing_in_a_list(policy, teacher, task, starts, states, actions):
+    new = gone_through(policy, task, starts)
+    return np.vstack([states, new]), [*actions, *teacher.predict(new)]
+
+
 @wrong("3.6", "cannot be read")
 def nonsense(policy, teacher, task, starts, states, actions):
     return "states", "actions"
@@ -1360,6 +1383,16 @@ def one_linear_map():
 @wrong("3.7", "a vsp.VoronoiPolicy")
 def the_teacher_in_person():
     return teacher()
+
+
+@wrong("3.7", "the class VoronoiPolicy itself")
+def the_class_itself():
+    return vsp.VoronoiPolicy
+
+
+@wrong("3.7", "the policy alone")
+def policy_and_history():
+    return one_linear_map(), None
 
 
 @wrong("3.7", "one for SimpleGoal-v0")

@@ -22,6 +22,7 @@ from .feedback import Exercise, Mistake
 TASK = "SimpleGoal-v0"
 FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
 FRESH = 2_000_003  # seed of the start states that a challenger is judged on
+NEAR = 0.1  # how far the width of an interval may be from what it comes to in large samples, relatively
 
 READING = Exercise("3.1", "reading")
 PAIRED_GAP = Exercise("3.2", "paired_gap")
@@ -123,8 +124,22 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
         found = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
         raise INTERVAL.wrong(found, "one around it", 1)
     middle = "the middle 95 % of the means of resampled policies"
+    if not np.isclose(high - low, width, rtol=NEAR) and _unsteady(function, returns, width):
+        found = "ends that come out differently every time: too few resamples"
+        raise INTERVAL.wrong(found, "a few thousand", 2)
     otherwise = Mistake(None, f"an interval that is too {'narrow' if high - low < width else 'wide'}", middle, 2)
-    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=0.1)
+    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=NEAR)
+
+
+def _unsteady(function: Callable, returns: np.ndarray, width: float) -> bool:
+    """Whether other draws give another interval: of 100 resamples the ends move by 7 % of its width, of 1000 by 2 %.
+
+    Rows change places, so that draws differ even where the student's generator begins anew in each call.
+    """
+    rngs = [np.random.default_rng(seed) for seed in range(10)]
+    ends = np.array([INTERVAL.call(function, rng.permutation(returns), rng) for rng in rngs], dtype=np.float64)
+    mean_width = np.ptp(ends, axis=1).mean()
+    return bool(np.isclose(mean_width, width, rtol=NEAR) or ends.std(axis=0).max() > 0.05 * mean_width)
 
 
 def _other_widths(returns: np.ndarray, width: float) -> list[Mistake]:
@@ -262,12 +277,38 @@ def dagger_round(function: Callable) -> None:
         rng = np.random.default_rng(seed)
         policy, starts = _random_policy(rng), task.start(rng, 20)
         before = next(teacher_episodes(teacher, task, 1, rng))
-        _labels(function, policy, teacher, task, starts, before)
+        try:
+            _labels(function, policy, teacher, task, starts, before)
+        except Exception:
+            if _right_without_pairs(function, policy, teacher, task, starts, before):
+                found = "the pair that `predict` returns, used as the actions"
+                raise DAGGER.wrong(found, "its first part, `predict(states)[0]`", 2) from None
+            raise
     DAGGER.passed("the copy went there, the teacher said what is right there, and nothing was forgotten.")
 
 
-def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: Episode) -> None:
-    value = DAGGER.call(function, policy, teacher, task, starts, before.states, before.actions)
+class _NoPair:
+    """A teacher whose `predict` returns its actions and no second thing."""
+
+    def __init__(self, teacher: Policy):
+        self.teacher = teacher
+
+    def predict(self, obs: np.ndarray) -> np.ndarray:
+        return self.teacher.predict(obs)[0]
+
+
+def _right_without_pairs(function, policy, teacher, *case) -> bool:
+    """Whether all would be well if `predict` returned the actions alone."""
+    try:
+        _labels(function, policy, teacher, *case, asked=_NoPair(teacher))
+    except Exception:
+        return False
+    return True
+
+
+def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: Episode, asked=None) -> None:
+    """`asked` is the teacher that the student's function gets, if another one."""
+    value = DAGGER.call(function, policy, asked or teacher, task, starts, before.states, before.actions)
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
     states, actions = (np.asarray(part, dtype=np.float64) for part in value)
@@ -319,9 +360,12 @@ def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
     """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of `copies`, from fresh starts."""
     if policy is None:
         raise CHALLENGE.unsolved()
+    if inspect.isclass(policy):
+        raise CHALLENGE.wrong(f"the class {policy.__name__} itself", "a policy that was made with it", 1)
+    if isinstance(policy, tuple) and any(isinstance(part, VoronoiPolicy) for part in policy):
+        raise CHALLENGE.wrong("a policy and something else", "the policy alone: `vsp.distill` returns two things", 1)
     if not isinstance(policy, VoronoiPolicy):
-        kind = policy.__name__ if inspect.isclass(policy) else type(policy).__name__
-        raise CHALLENGE.wrong(f"a {kind}", "a vsp.VoronoiPolicy", 1)
+        raise CHALLENGE.wrong(f"a {type(policy).__name__}", "a vsp.VoronoiPolicy", 1)
     if len(policy) >= FEWER_THAN:
         raise CHALLENGE.wrong(f"{len(policy)} cells", f"fewer than {FEWER_THAN}", 1)
     if policy.task.name != copies[0].task.name:
