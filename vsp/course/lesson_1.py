@@ -42,7 +42,7 @@ def reading(answers: dict, teacher: Policy) -> None:
     """1.1: answers `right of the pit`, `beyond the pit`, `at the limit`, `sudden turn`."""
     options = {"right of the pit": WAYS, "beyond the pit": WAYS, "at the limit": SHARES, "sudden turn": PLACES}
     READING.answers(answers, options)
-    shortest = {"down-left": "that is the straight way to the goal, but what lies on it from here"}
+    shortest = {"down-left": "that is the straight way to the goal; look at what lies on it"}
     READING.choice(answers, "right of the pit", _way(teacher, [0.9, 0.2]), {}, 1)
     READING.choice(answers, "beyond the pit", _way(teacher, [0.7, 0.6]), shortest, 1)
     _, _, states = geometry.grid(np.zeros(2), np.ones(2), 21)
@@ -109,8 +109,8 @@ def _fits(function: Callable, states: np.ndarray, actions: np.ndarray) -> None:
 
 
 def _whatever(exercise: Exercise, function: Callable, case: tuple, others: dict[str, object]) -> Mistake | None:
-    """What to say of a function that does not look at one of its arguments but, as a rule, at a variable of the
-    notebook: its result for `case` stays if that argument is another one. `others` has one for each, by name."""
+    """What to say of a function whose result for `case` stays the same when one of the arguments is replaced: as a rule
+    it takes a variable of the notebook instead. `others` has another value for each argument, by name."""
     here, blind = exercise.call(function, *case), []
     for i, (name, other) in enumerate(others.items()):
         try:
@@ -174,7 +174,8 @@ def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
 
 
 def _measured(function: Callable, case: tuple) -> object:
-    """The result for `case`, or a word on pairs taken for actions: what fails with `_Map` alone does not do more."""
+    """The result for `case`. Raises NotYet, in other words where the function would work if `predict` returned the
+    actions alone: then it has forgotten the second thing."""
     try:
         return ACTION_ERROR.call(function, *case)
     except NotYet as failed:
