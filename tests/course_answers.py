@@ -97,6 +97,23 @@ def solves_a_rectangle(states, actions):
     return np.linalg.solve(ones(states), actions)
 
 
+def notebook_variables():
+    """States and actions as the lesson has them beside the arguments."""
+    rng = np.random.default_rng(0)
+    return rng.uniform(size=(50, 2)), rng.uniform(-1, 1, (50, 2))
+
+
+@wrong("1.2", "the same result for any `states` and any `actions`")
+def of_the_notebook(states, actions):
+    states, actions = notebook_variables()
+    return lstsq(ones(states), actions, rcond=None)[0]
+
+
+@wrong("1.2", "the same result for any `states`,")
+def inputs_of_nothing(states, actions):
+    return lstsq(ones(0 * states), actions, rcond=None)[0]
+
+
 @right("1.2")
 def normal_equations(states, actions):
     inputs = ones(states)
@@ -152,9 +169,29 @@ def squared_too_late(policy, teacher, states):
     return (policy.predict(states)[0] - teacher.predict(states)[0]).mean() ** 2
 
 
-@wrong("1.3", "TypeError")
+@wrong("1.3", "the first of its two things. → Hint 1")
 def with_the_second_thing(policy, teacher, states):
     return np.square(policy.predict(states) - teacher.predict(states)).mean()
+
+
+@wrong("1.3", "the first of its two things")
+def one_of_them_with_the_second_thing(policy, teacher, states):
+    return np.square(policy.predict(states)[0] - np.array(teacher.predict(states))).mean()
+
+
+@wrong("1.3", "TypeError")
+def with_a_wrong_call(policy, teacher, states):
+    return np.square(policy.predict(states)[0] - teacher.predict()[0]).mean()
+
+
+@wrong("1.3", "the same result for any `policy`,")
+def of_another_policy(policy, teacher, states):
+    return np.square(np.ones_like(teacher.predict(states)[0]) - teacher.predict(states)[0]).mean()
+
+
+@wrong("1.3", "the same result for any `policy` and any `teacher` and any `states`")
+def typed_in(policy, teacher, states):
+    return 0.137
 
 
 @wrong("1.3", "one number for all states")
@@ -305,14 +342,16 @@ def state_by_state(codewords, coefficients, states):
 
 # 1.6 codewords
 
-wrong("1.6", "is not written yet")(np.array([[0.3, 0.3], [0.7, 0.7]]))
-wrong("1.6", "expected at most 6")(np.random.default_rng(0).uniform(size=(7, 2)))
+wrong("1.6", "is not written yet")(np.array([[0.3, 0.3], [0.7, 0.6]]))
+wrong("1.6", "expected at most 8")(np.random.default_rng(0).uniform(size=(9, 2)))
 wrong("1.6", "a row x, y per codeword")(np.zeros((0, 2)))
 wrong("1.6", "at most 50%")(np.array([[0.9, 0.7], [0.9, 0.8], [0.9, 0.9]]))
+wrong("1.6", "→ Hint 2")([[0.6, 0.7], [0.7, 0.6], [0.7, 0.85], [0.85, 0.7], [0.8, 0.95], [0.95, 0.8], [0.3, 0.3]])
 wrong("1.6", "there twice")(np.array([[0.5, 0.5], [0.5, 0.5]]))
 wrong("1.6", "outside the unit square")(np.array([[0.5, 0.5], [5, 0.5]]))
 wrong("1.6", "a row x, y per codeword")(np.array([0.1, 0.2, 0.3]))
 right("1.6")(np.array([[0.04, 0.15], [0.14, 0.05], [0.3, 0.5], [0.5, 0.3], [0.65, 0.85], [0.85, 0.65]]))
+right("1.6")([[x, y] for x in (0.25, 0.75) for y in (0.12, 0.37, 0.62, 0.87)])
 right("1.6")([[0.05, 0.2], [0.2, 0.05], [0.2, 0.6], [0.6, 0.2], [0.6, 0.8], [0.8, 0.6]])
 
 
@@ -359,6 +398,13 @@ def clusters_of_states(states, actions, k):
     return KMeans(k, n_init=1, random_state=0).fit(states).cluster_centers_
 
 
+@wrong("1.7", "→ Hint 2")
+def unlucky_clusters_of_states_and_actions(states, actions, k):
+    from scipy.cluster.vq import kmeans2
+
+    return kmeans2(np.column_stack([states, actions]), k, minit="++", seed=0)[0][:, : states.shape[1]]
+
+
 @wrong("1.7", "→ Hint 3")
 def leaves_of_a_tree(states, actions, k):
     from sklearn.tree import DecisionTreeRegressor
@@ -393,7 +439,14 @@ def clusters_of_states_and_actions(states, actions, k):
     from sklearn.cluster import KMeans
 
     both = np.column_stack([states, actions])
-    return KMeans(k, n_init=4, random_state=0).fit(both).cluster_centers_[:, : states.shape[1]]
+    return KMeans(k, n_init=1, random_state=8).fit(both).cluster_centers_[:, : states.shape[1]]
+
+
+@right("1.7")
+def best_of_twenty(states, actions, k):
+    rng, candidates = np.random.default_rng(1), np.unique(states, axis=0)
+    draws = [rng.choice(candidates, k, replace=False) for _ in range(20)]
+    return min(draws, key=lambda p: leftover(p, states, actions))
 
 
 @right("1.7")

@@ -121,6 +121,12 @@ def test_hints_that_checks_point_to_are_there():
             assert pointed <= hints, (number, pointed, hints)
 
 
+def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
+    text = " ".join(cell.source for cell in LESSONS["lesson_1_black_box.ipynb"].cells)
+    assert f"{lesson_1.CELLS} codewords, at most {lesson_1.MARGIN * 100:.0f} % of the error" in text
+    assert lesson_1.AT_MOST == 8 and "**at most eight codewords that" in text
+
+
 def _hint(message):
     found = re.search(r"→ Hint (\d) of exercise (\d\.\d)$", message)
     return int(found[1]) if found else 0
@@ -285,6 +291,18 @@ def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
     fig, _ = drawing.copy_and_error(vsp.baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher)
     picture = drawing.show(fig, "a policy")
     assert 'alt="a policy"' in picture._repr_html_() and picture.png[:4] == b"\x89PNG" and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("on_the_way", [False, True])
+def test_two_squares_side_by_side_are_of_one_size(on_the_way):
+    _, teacher, states, _ = examples()
+    policy = vsp.baselines.rule_of_thumb(SIMPLEGOAL)[1]
+    fig, axes = drawing.copy_and_error(policy, teacher, states if on_the_way else None)
+    fig.canvas.draw()
+    one, other = (ax.get_window_extent() for ax in axes)
+    drawing.plt.close(fig)
+    assert (one.width, one.y0, one.y1) == pytest.approx((other.width, other.y0, other.y1))
+    assert one.width == pytest.approx(one.height)
 
 
 # Checks
