@@ -741,7 +741,6 @@ def stale_indices(partition, config):
     return removed
 
 
-@wrong("2.4", "does your loop come to an end")
 @wrong("2.4", "→ Hint 2")
 def for_ever(partition, config):
     i = 0

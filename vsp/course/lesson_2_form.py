@@ -35,7 +35,7 @@ def my_form(function: Callable, teacher: Policy, task: Task) -> None:
         if _alike(features, form_of(name, task).features(states)) and type(form) in (Form, type(form_of(name, task))):
             raise FORM.wrong(f"the features of {name!r}", "a class that is not there yet", 1)
     if type(form) is Form and _within(features, form_of("linear", task).features(states)):
-        raise FORM.wrong("features that are sums of the state's components", "one that 'linear' cannot make of them", 4)
+        raise FORM.wrong("features that are sums of the state's components", "at least one that is no such sum", 4)
     _code(form, states, features)
     _gradient(form, features, len(task.outputs))
     constant, own = _errors(form_of("constant", task), teacher, task), _errors(form, teacher, task)
