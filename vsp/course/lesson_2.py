@@ -1,4 +1,4 @@
-"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters.
+"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs that it shows.
 
 Its other checks, of the two passes and of a class of sub-policy, have modules of their own. Each check takes what the
 student wrote, tries it on cases whose answer is known, and raises `NotYet` or prints one line.
@@ -6,17 +6,23 @@ student wrote, tries it on cases whose answer is known, and raises `NotYet` or p
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from ..config import Config
-from ..distill import distill
+from ..distill import distill, teacher_episodes
+from ..distill import merge_regions as vsp_merge
+from ..distill import split_regions as vsp_split
 from ..envs import Task
 from ..history import History
+from ..partition import Partition
+from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
-from .feedback import Exercise, Mistake
+from .feedback import Exercise, Mistake, NotYet
 from .lesson_2_form import FORM, my_form
 from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk
 
@@ -26,11 +32,13 @@ __all__ = [
     "MERGE",
     "SPLIT",
     "algorithm_1",
+    "grown",
     "merge_regions",
     "my_form",
     "prediction",
     "reading",
     "running_mean",
+    "runs",
     "split_regions",
 ]
 
@@ -53,14 +61,14 @@ CHANGES = {
 
 @READING.checks
 def reading(answers: dict, history: History, config: Config) -> None:
-    """2.1: answers `frozen from` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
-    options = {"frozen from": float, "half of the cells": MOMENTS, "fewer cells by": CAUSES, "loss jumps by": CAUSES}
+    """2.1: answers `last change` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
+    options = {"last change": float, "half of the cells": MOMENTS, "fewer cells by": CAUSES, "loss jumps by": CAUSES}
     READING.answers(answers, options)
-    begin, last = config.n_epochs - config.n_freeze, max((e.iteration for e in history.events), default=0)
-    if not min(last, begin) - 0.04 * config.n_epochs <= answers["frozen from"] <= begin + 0.04 * config.n_epochs:
-        early = answers["frozen from"] < last
-        side = "the number of cells still changes after it" if early else "the partition stands still before it"
-        raise READING.wrong(f"iteration {answers['frozen from']:g}, but {side}", "where the shading begins", 1)
+    given, last = answers["last change"], max((event.iteration for event in history.events), default=0)
+    if abs(given - last) > 0.04 * config.n_epochs:
+        side = "the number of cells still changes after it" if given < last else "nothing changes there any more"
+        side = "that is where the freeze begins" if given == config.n_epochs - config.n_freeze else side
+        raise READING.wrong(f"iteration {given:g}, but {side}", "the last step of the left curve", 1)
     cells = np.array(history.cells)
     early = int(np.argmax(cells >= cells[-1] / 2))
     READING.choice(answers, "half of the cells", MOMENTS[int(np.digitize(early, [500, 2000]))], {}, 1)
@@ -73,7 +81,8 @@ def reading(answers: dict, history: History, config: Config) -> None:
     teaching |= {
         "a split": "look again",
         "a merge": "a merge keeps a map that is trained already",
-        "a reset of the buffers": "an empty buffer alters no map, and it fills up again with the next episode",
+        "a reset of the buffers": "an emptied buffer holds few states for a while, which moves the loss a little, also "
+        "in the freeze; the large jumps are another matter",
     }
     READING.sealed(answers, "loss jumps by", "71c02946198a22ee", teaching, 3)
     READING.passed("the plot has told you what the algorithm does when.")
@@ -98,21 +107,26 @@ def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
     visit = np.concatenate([[True], cells[1:] != cells[:-1]]).cumsum()
     whole = [losses[visit == v].mean() for v in visit]
     sums = right * (steps - [np.argmax(visit == v) for v in visit])
+    stuck = _since(cells, losses, lambda t: cells[t] != cells[0])
+    remember = "the mean since the cell was entered (is the cell of the step before remembered in every step?)"
     mistakes = [
         Mistake(losses.cumsum() / steps, "the mean since the episode began", "it since the cell was entered", 2),
         Mistake(by_cell, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
         Mistake(whole, "losses of later steps", "only those up to the step", 1),
         Mistake(sums, "sums", "means", 1),
-        Mistake(losses, "the losses themselves", "their mean since the cell was entered", 1),
+        Mistake(losses, "the losses themselves, as if the mean began anew at every step", remember, 2),
+        Mistake(stuck, "a mean that begins anew at every step outside the first cell", remember, 2),
     ]
     found = f"another number at step {np.argmin(np.isclose(value, right))} of cells {cells.tolist()}"
     RUNNING_MEAN.compare(value, right, mistakes, Mistake(None, found, "the mean since that cell was entered", 1))
 
 
-def _since(cells: np.ndarray, losses: np.ndarray) -> np.ndarray:
+def _since(cells: np.ndarray, losses: np.ndarray, entered: Callable[[int], bool] | None = None) -> np.ndarray:
+    """The mean at every step since a cell was entered, which is where `entered` says so."""
+    entered = entered or (lambda t: cells[t] != cells[t - 1])
     means, begin = np.zeros(len(losses)), 0
     for t in range(len(losses)):
-        begin = t if t and cells[t] != cells[t - 1] else begin
+        begin = t if t and entered(t) else begin
         means[t] = losses[begin : t + 1].mean()
     return means
 
@@ -209,25 +223,79 @@ def _one_round(n: int, done: list[str], config: Config) -> None:
         raise ALGORITHM_1.wrong("a merge before a split in one iteration", "splits first, as the paper prints it", 2)
 
 
+def grown(
+    split: Callable, merge: Callable, frame: Callable, teacher: Policy, task: Task, config: Config, seed: int = 0
+) -> tuple[VoronoiPolicy, VoronoiPolicy]:
+    """What the student's three functions make of a run, and what vsp's make of it with the same random numbers.
+
+    For a function that is a stub still, vsp's stands in; a line says whose are at work.
+    """
+    ours, stubs = (vsp_split, vsp_merge, _algorithm_1), set()
+    own = [_or_ours(function, our, stubs) for function, our in zip((split, merge, frame), ours)]
+    made = []
+    for passes in (own, ours):
+        rng, partition = np.random.default_rng(seed), Partition(task, config)
+        episodes = list(teacher_episodes(teacher, task, config.n_epochs, rng))
+        passes[2](partition, episodes, config, rng, *passes[:2])
+        made.append(partition.policy())
+    names = [name for name in ("split_regions", "merge_regions", "algorithm_1") if name not in stubs]
+    print(f"Yours: {', '.join(names) or 'none yet'}. vsp's stand in for: {', '.join(sorted(stubs)) or 'none'}.")
+    same = np.array_equal(made[0].codewords, made[1].codewords)
+    print(f"{len(made[0])} cells on the left, {len(made[1])} on the right: {'' if same else 'not '}the same codewords.")
+    return made[0], made[1]
+
+
+def _or_ours(own: Callable, ours: Callable, stubs: set[str]) -> Callable:
+    """`own`, or `ours` where `own` is a stub: then its name goes to `stubs`."""
+
+    @functools.wraps(own)
+    def either(*given: object, **named: object) -> object:
+        try:
+            return own(*given, **named)
+        except NotImplementedError:
+            stubs.add(own.__name__)
+            return ours(*given, **named)
+
+    return either
+
+
+def _algorithm_1(
+    partition: Partition, episodes: list[Episode], config: Config, rng: object, split: Callable, merge: Callable
+) -> None:
+    """Algorithm 1 as the lesson's text has it, for students who have not written theirs."""
+    partition.add(episodes[0].states[0], rng)
+    for n, episode in enumerate(episodes):
+        partition.observe(episode)
+        partition.train(rng)
+        thawed = 0 < n < config.n_epochs - config.n_freeze
+        if thawed and n % config.n_split == 0:
+            split(partition, episode, config, rng)
+        if thawed and n % config.n_merge == 0:
+            merge(partition, config)
+        if n and n % config.n_reset == 0:
+            partition.clear()
+
+
 @PREDICTION.checks
 def prediction(answers: dict, teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> None:
     """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer."""
     PREDICTION.answers(answers, dict.fromkeys(CHANGES, TREND))
-    usual = _cells(teacher, task, config, seeds)
-    wrong = []
-    for name, change in CHANGES.items():
-        ratio = _cells(teacher, task, replace(config, **change), seeds) / usual
+    means, wrong = runs(teacher, task, config, seeds)["mean"], []
+    for name in CHANGES:
+        ratio = means[name] / means.iloc[0]
         near = [TREND[i] for i in {int(np.digitize(-ratio, [-1 - s, -1 + s])) for s in (SAME / 2, 2 * SAME)}]
         wrong += [name] if answers[name] not in near else []
     if wrong:
-        raise PREDICTION.wrong(
-            f"that the runs disagree with you on {wrong}",
-            "a prediction that the cell below bears out: run it, and find out why",
-            1,
-        )
+        words = f"the runs disagree with you on {wrong}. Look at them in the cell below, and find out why."
+        raise NotYet(f"{PREDICTION.number} {PREDICTION.name}: {words} → Hint 1 of exercise {PREDICTION.number}")
     PREDICTION.passed("the runs did what you said.")
 
 
-def _cells(teacher: Policy, task: Task, config: Config, seeds: range) -> float:
-    """Mean number of cells over `seeds`."""
-    return float(np.mean([len(distill(teacher, task.name, config, seed=seed)[0]) for seed in seeds]))
+def runs(teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> pd.DataFrame:
+    """Numbers of cells: a row for `config` as it is and one for each of `CHANGES` alone; seed by seed, and the mean."""
+    changes = {"as it is": {}} | CHANGES
+    cells = {
+        name: [len(distill(teacher, task.name, replace(config, **change), seed=seed)[0]) for seed in seeds]
+        for name, change in changes.items()
+    }
+    return pd.DataFrame(cells, index=[f"seed {seed}" for seed in seeds]).T.assign(mean=lambda t: t.mean(axis=1))

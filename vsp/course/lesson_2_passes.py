@@ -16,7 +16,7 @@ from ..distill import split_regions as vsp_split
 from ..envs import get_task
 from ..partition import Partition
 from ..rollouts import Episode
-from .feedback import Exercise
+from .feedback import Exercise, NotYet
 
 SPLIT = Exercise("2.3", "split_regions")
 MERGE = Exercise("2.4", "merge_regions")
@@ -24,6 +24,28 @@ MERGE = Exercise("2.4", "merge_regions")
 TASK = "SimpleGoal-v0"
 # Small numbers, by which the cases below are worked out; new cells begin at 0, so that no random number has a say
 SMALL = replace(preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
+# Errors in students' code that tell which hint helps: the exercise, the error, words of it, and the hint
+CURES = (
+    (SPLIT, NameError, "", 1),
+    (SPLIT, IndexError, "boolean", 5),
+    (SPLIT, ValueError, "broadcast", 5),
+    (MERGE, IndexError, "boolean", 5),
+    (MERGE, ValueError, "broadcast", 5),
+    (MERGE, IndexError, "out of bounds", 2),
+    (MERGE, RuntimeError, "come to an end", 2),
+)
+
+
+def _call(exercise: Exercise, function: Callable, *given: object) -> object:
+    """What the student's pass returns; where it stops with an error, the refusal points to the hint that helps."""
+    try:
+        return exercise.call(function, *given, keep=True)
+    except NotYet as refusal:
+        error = refusal.__context__
+        for owner, kind, words, hint in CURES:
+            if owner is exercise and isinstance(error, kind) and words in str(error):
+                raise NotYet(f"{refusal} → Hint {hint} of exercise {exercise.number}") from None
+        raise
 
 
 def on_a_line(places: list[float], biases: list[float], config: Config = SMALL) -> Partition:
@@ -75,8 +97,12 @@ SPLITS = (
               "a bad map but no state far from its codeword: both conditions must hold", 1),
     SplitCase([0.1], [0], [0.4, 0.5, 0.6], [0, 0, 0], [], "a copy without any error", 1),
     SplitCase([0.1], [1], [0.15, 0.25, 0.4], [0, 0, 0], [0.4], "mean loss 1 and one state that is far enough", 1),
+    SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0.4, 0.4, 0.4], [],
+              "many small losses in one cell: their mean counts, not their sum", 2),
+    SplitCase([0.1], [0], [0.15, 0.4, 0.45], [0.7, 0, 0], [],
+              "a bad state first and good ones after it: the mean counts, not the largest loss", 2),
     SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0, 0, 0.7], [],
-              "one bad state after good ones in its cell: the mean counts, neither the last loss nor the sum", 2),
+              "one bad state after good ones in its cell: all losses since it was entered count, not the last one", 3),
     SplitCase([0.1], [0], [0.15, 0.2, 0.22, 0.25, 0.4], [1, 1, 0, 0, 0], [0.4],
               "good at the end but bad on the way: the mean of all losses in the cell counts, not the last ones", 2),
     SplitCase([0.1, 0.9], [1, 0], [0.6, 0.65], [0, 0], [],
@@ -101,19 +127,27 @@ def split_regions(function: Callable) -> None:
     for case in SPLITS:
         partition = on_a_line(case.places, case.biases)
         before = len(partition.codewords)
-        added = SPLIT.call(
-            function, partition, walk(case.way, case.actions), SMALL, np.random.default_rng(0), keep=True
-        )
+        added = _call(SPLIT, function, partition, walk(case.way, case.actions), SMALL, np.random.default_rng(0))
         new = partition.codewords[before:, 0]
         if not _same(new, case.splits):
             found = "a split elsewhere" if len(new) == len(case.splits) else _count(len(new), "split")
             raise SPLIT.wrong(found, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
-        if SPLIT.size(added) != len(new):
-            raise SPLIT.wrong(f"{len(added)} codewords returned", f"one for every new cell, {len(new)}", 1)
+        _told(SPLIT, added, partition.codewords[before:], "one for every new cell")
     _emptied(function)
     for seed in range(4):
         _like_ours(function, seed)
     SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
+
+
+def _told(exercise: Exercise, returned: object, right: np.ndarray, what: str) -> None:
+    """Whether the codewords (n, d) that a pass returned are the right ones, in any order."""
+    if exercise.size(returned) != len(right):
+        raise exercise.wrong(f"{len(returned)} codewords returned", f"{what}, {len(right)}", 1)
+    if len(right):
+        meaning = "the codewords themselves, not their indices"
+        values = exercise.array(returned, right.shape, "a list of codewords", 1, meaning)
+        if sorted(values.tolist()) != sorted(right.tolist()):
+            raise exercise.wrong("other codewords returned", what, 1)
 
 
 def _same(found: np.ndarray, right: list[float]) -> bool:
@@ -127,7 +161,7 @@ def _count(n: int, what: str) -> str:
 def _emptied(function: Callable) -> None:
     """Whether the buffers of the split cell and of its neighbours are empty, and no others."""
     partition = on_a_line([0.05, 0.55, 0.75, 0.95], [1, 0, 0, 0])
-    SPLIT.call(function, partition, walk([0.27], [0]), SMALL, np.random.default_rng(0), keep=True)
+    _call(SPLIT, function, partition, walk([0.27], [0]), SMALL, np.random.default_rng(0))
     left = partition.buffers.counts.tolist()
     if left != [0, 0, 1, 1, 0]:
         words = {
@@ -152,7 +186,7 @@ def _like_ours(function: Callable, seed: int) -> None:
     partition.observe(Episode(partition.codewords.copy(), np.zeros((4, 2))))
     episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
     own = copy.deepcopy(partition)
-    SPLIT.call(function, own, episode, SMALL, np.random.default_rng(0), keep=True)
+    _call(SPLIT, function, own, episode, SMALL, np.random.default_rng(0))
     ways = []
     for after in ("reset", "kept"):
         other = copy.deepcopy(partition)
@@ -203,19 +237,14 @@ def merge_regions(function: Callable) -> None:
 def _in_a_row(function: Callable, case: MergeCase) -> None:
     places = np.linspace(0.05, 0.95, len(case.biases)).tolist()
     partition = on_a_line(places, case.biases)
-    removed = MERGE.call(function, _patient(partition), SMALL, keep=True)
+    before = partition.codewords.copy()
+    removed = _call(MERGE, function, _patient(partition), SMALL)
     kept = [round((x - 0.05) / 0.9 * (len(places) - 1)) for x in partition.codewords[:, 0]]
     if kept not in case.left:
-        expected = f"{' or '.join(sorted({str(len(left)) for left in case.left}))} left, in a case of {case.what}"
-        raise MERGE.wrong(f"{len(kept)} of {len(places)} cells left{_which(kept, case)}", expected, case.hint)
-    if MERGE.size(removed) != len(places) - len(kept):
-        raise MERGE.wrong(
-            f"{len(removed)} codewords returned", f"one for every cell that went, {len(places) - len(kept)}", 1
-        )
-
-
-def _which(kept: list[int], case: MergeCase) -> str:
-    return ", but not the right ones" if len(kept) in {len(left) for left in case.left} else ""
+        found = f"cells {kept} left of a row of {len(places)} with biases {case.biases}"
+        raise MERGE.wrong(found, f"{' or '.join(map(str, case.left))}, in a case of {case.what}", case.hint)
+    gone = [i for i in range(len(places)) if i not in kept]
+    _told(MERGE, removed, before[gone], "one for every cell that went")
 
 
 def _measured(function: Callable) -> None:
@@ -226,14 +255,14 @@ def _measured(function: Callable) -> None:
     for difference, left, what in cases:
         partition = on_a_line([0.2, 0.8], [0, 0])
         partition.models.parameters[1] = np.reshape(difference, (3, 2))
-        MERGE.call(function, _patient(partition), SMALL, keep=True)
+        _call(MERGE, function, _patient(partition), SMALL)
         if len(partition.codewords) != left:
             raise MERGE.wrong(f"{_count(len(partition.codewords), 'cell')} left", f"{left}, in a case of {what}", 1)
 
 
 def _emptied_by_merge(function: Callable) -> None:
     partition = on_a_line([0.05, 0.2, 0.5, 0.7, 0.95], [5, 0, 0.1, 10, 15])
-    MERGE.call(function, _patient(partition), SMALL, keep=True)
+    _call(MERGE, function, _patient(partition), SMALL)
     counts = partition.buffers.counts.tolist()
     if counts not in ([0, 0, 1, 1], [0, 0, 0, 1]):
         words = {
@@ -256,7 +285,7 @@ def _properties(function: Callable, seed: int) -> None:
     partition.observe(Episode(partition.codewords.copy(), np.zeros((12, 2))))
     before, graph, own = partition.codewords.copy(), partition.neighbours(), copy.deepcopy(partition)
     parameters = partition.comparable_parameters()
-    MERGE.call(function, _patient(own), SMALL, keep=True)
+    _call(MERGE, function, _patient(own), SMALL)
     alive = (before[:, None] == own.codewords).all(axis=2).any(axis=1)
     alike = np.abs(parameters[:, None] - parameters).max(axis=2) < SMALL.min_param_distance
     alike &= ~np.eye(len(before), dtype=bool)
