@@ -248,39 +248,6 @@ def test_the_solutions_of_lesson_2_together_are_the_papers_method():
     assert np.array_equal(grown[0].models.parameters, grown[1].models.parameters)
 
 
-def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
-    def stub(*given):
-        raise NotImplementedError
-
-    def split_nothing(partition, episode, config, rng):
-        return []
-
-    task, teacher, *_ = examples()
-    config = vsp.preset(SIMPLEGOAL).quick()
-    stub.__name__ = "merge_regions"
-    own, ours = lesson_2.grown(split_nothing, stub, lesson_2._algorithm_1, teacher, task, config)
-    out = capsys.readouterr().out
-    assert "Yours: split_regions, algorithm_1. vsp's stand in for: merge_regions." in out
-    assert len(own) == 1 < len(ours) and "not the same codewords" in out
-    own, ours = lesson_2.grown(split_regions, stub, lesson_2._algorithm_1, teacher, task, config)
-    assert np.array_equal(own.codewords, ours.codewords) and ": the same codewords" in capsys.readouterr().out
-
-
-def test_a_threshold_decides_where_the_guide_says():
-    """The numbers that the notes to exercise 2.6 state, some of them."""
-    notes = next(c.source for c in LESSONS["lesson_2_algorithms.ipynb"].cells if c.id == "predict-notes")
-    _, teacher, *_ = examples()
-    quick = vsp.preset(SIMPLEGOAL).quick()
-    for limit, told in (
-        (quick.max_pol_loss, "(12, 9 and 12 cells"),
-        (0.3, "(12, 9 and 12 cells"),
-        (1.0, "(9, 2 and\n9)"),
-    ):
-        config = replace(quick, max_pol_loss=limit)
-        found = [len(once(teacher, SIMPLEGOAL, config, seed=seed)[0]) for seed in range(3)]
-        assert told in notes and [int(n) for n in re.findall(r"\d+", told)] == found
-
-
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
     made = build.student(lesson)
     _, failed = run(made, monkeypatch)
@@ -378,6 +345,39 @@ def test_a_check_leaves_what_it_was_given_as_it_was():
         return result
 
     lesson_1.fit_linear(spoils)
+
+
+def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
+    def stub(*given):
+        raise NotImplementedError
+
+    def split_nothing(partition, episode, config, rng):
+        return []
+
+    task, teacher, *_ = examples()
+    config = vsp.preset(SIMPLEGOAL).quick()
+    stub.__name__ = "merge_regions"
+    own, ours = lesson_2.grown(split_nothing, stub, lesson_2._algorithm_1, teacher, task, config)
+    out = capsys.readouterr().out
+    assert "Yours: split_regions, algorithm_1. vsp's stand in for: merge_regions." in out
+    assert len(own) == 1 < len(ours) and "not the same codewords" in out
+    own, ours = lesson_2.grown(split_regions, stub, lesson_2._algorithm_1, teacher, task, config)
+    assert np.array_equal(own.codewords, ours.codewords) and ": the same codewords" in capsys.readouterr().out
+
+
+def test_a_threshold_decides_where_the_guide_says():
+    """The numbers that the notes to exercise 2.6 state, some of them."""
+    notes = next(c.source for c in LESSONS["lesson_2_algorithms.ipynb"].cells if c.id == "predict-notes")
+    _, teacher, *_ = examples()
+    quick = vsp.preset(SIMPLEGOAL).quick()
+    for limit, told in (
+        (quick.max_pol_loss, "(12, 9 and 12 cells"),
+        (0.3, "(12, 9 and 12 cells"),
+        (1.0, "(9, 2 and\n9)"),
+    ):
+        config = replace(quick, max_pol_loss=limit)
+        found = [len(once(teacher, SIMPLEGOAL, config, seed=seed)[0]) for seed in range(3)]
+        assert told in notes and [int(n) for n in re.findall(r"\d+", told)] == found
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):
