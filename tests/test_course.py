@@ -285,7 +285,7 @@ def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
     stub.__name__ = "merge_regions"
     own, ours = lesson_2.grown(split_nothing, stub, lesson_2._algorithm_1, teacher, task, config)
     out = capsys.readouterr().out
-    assert "Yours: split_regions, algorithm_1. vsp's stand in for: merge_regions." in out
+    assert "Yours: split_regions, algorithm_1. Not written yet, so vsp's: merge_regions." in out
     assert len(own) == 1 < len(ours) and "not the same codewords" in out
     own, ours = lesson_2.grown(split_regions, stub, lesson_2._algorithm_1, teacher, task, config)
     assert np.array_equal(own.codewords, ours.codewords) and ": the same codewords" in capsys.readouterr().out

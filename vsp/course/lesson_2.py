@@ -239,7 +239,8 @@ def grown(
         passes[2](partition, episodes, config, rng, *passes[:2])
         made.append(partition.policy())
     names = [name for name in ("split_regions", "merge_regions", "algorithm_1") if name not in stubs]
-    print(f"Yours: {', '.join(names) or 'none yet'}. vsp's stand in for: {', '.join(sorted(stubs)) or 'none'}.")
+    stand_in = f" Not written yet, so vsp's: {', '.join(sorted(stubs))}." if stubs else ""
+    print(f"Yours: {', '.join(names) or 'none'}.{stand_in}")
     same = np.array_equal(made[0].codewords, made[1].codewords)
     print(f"{len(made[0])} cells on the left, {len(made[1])} on the right: {'' if same else 'not '}the same codewords.")
     return made[0], made[1]
