@@ -1,6 +1,8 @@
 """The sources of the notebooks: prose first, short cells, no output; and what they import."""
 
 import ast
+import html
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -48,6 +50,17 @@ def test_every_saved_figure_has_alternative_text(notebook):
             name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", None)
             if name in ("save_figure", "save_growth"):
                 assert {"alt", "out", "quick"} <= {keyword.arg for keyword in call.keywords}, cell.id
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "figures" / "executed").glob("*.ipynb")), ids=lambda path: path.stem)
+def test_alternative_texts_are_sentences(path):
+    """They say what is to be seen, and nothing that only Python would say."""
+    pages = [output.data.get("text/html", "") for cell in code_cells(nbformat.read(path, as_version=4))
+             for output in cell.outputs if "data" in output]  # fmt: skip
+    texts = [html.unescape(text) for page in pages for text in re.findall(r'<img alt="([^"]*)"', page)]
+    assert texts or path.stem.startswith("04")
+    for text in texts:
+        assert len(text) > 60 and text.endswith(".") and not re.search(r"[{}]|\('|nan\b|\bTrue\b", text), text
 
 
 def test_first_code_cell_holds_the_parameters(notebook):

@@ -105,6 +105,17 @@ def test_as_text_by_hand():
     assert shown["n"].tolist() == ["0.0001", "-2.000", "0.0005"] and shown["c"].tolist() == ["3", "True", "x_y%"]
 
 
+def test_counts_have_no_decimals_and_a_missing_one_is_missing():
+    shown = as_text(pd.DataFrame({"cells": [13.0, np.nan], "share": [1.0, 0.5], "steps": [500_000.0, 0.0]}))
+    assert shown["cells"].tolist() == ["13", tables.MISSING] and shown["steps"].tolist() == ["500000", "0"]
+    assert shown["share"].tolist() == ["1.000", "0.500"]
+
+
+def test_a_notebook_shows_no_row_numbers():
+    page = tables.show(pd.DataFrame({"a": [7.25], "b": ["x < y"]})).data
+    assert re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", page) == ["a", "b", "7.250", "x &lt; y"]
+
+
 @pytest.mark.parametrize("text", ["5 %", "a_b", "c & d"])
 def test_specials_of_latex_are_escaped(tmp_path, text):
     save_table(pd.DataFrame({"c": [text, "end"]}), "some_table", caption="c", out=tmp_path)
@@ -205,7 +216,7 @@ def test_readings_are_the_fields_that_the_papers_table_does_not_print():
 def test_a_frame_as_latex_is_what_the_table_holds(tmp_path):
     shown = as_latex(FRAME)
     assert shown.columns.tolist() == [r"name\_of", "value", "count", "gap"]
-    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "$-$2.000"]
+    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "$-$2"]
     assert shown["value"].tolist() == ["0.333", "0.0001"] and shown["count"].tolist() == ["10", "2000000"]
     for name, latex in (("plain", None), ("given", shown)):
         save_table(FRAME, name, caption="c", out=tmp_path, latex=latex)

@@ -6,6 +6,7 @@ import dataclasses
 import os
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
@@ -18,6 +19,9 @@ from .export import codeword_latex, equations_latex, symbol
 from .figures import FORCE_MAP
 from .paper import SHORT
 from .policy import VoronoiPolicy
+
+if TYPE_CHECKING:
+    from IPython.display import HTML
 
 MISSING = "–"  # in print, where the paper gives no number
 PAGE = 40  # rows that fit on one
@@ -120,8 +124,20 @@ def _like(printed: float, here: float) -> float | int:
 
 
 def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
-    """The frame as text: floats with `digits` decimals, all else as it is."""
-    return frame.map(lambda value: _text(value, digits))
+    """The frame as text: floats with `digits` decimals, or none in a column of whole numbers; all else as it is."""
+    return frame.apply(lambda column: column.map(lambda value: _text(value, 0 if _whole(column) else digits)))
+
+
+def _whole(column: pd.Series) -> bool:
+    """Whether all floats of a column are whole numbers: counts, which became floats beside a missing one."""
+    return all(value.is_integer() for value in column if isinstance(value, float) and not np.isnan(value))
+
+
+def show(frame: pd.DataFrame) -> HTML:
+    """The frame as text in a notebook, without the numbers of its rows."""
+    from IPython.display import HTML
+
+    return HTML(as_text(frame).to_html(index=False))
 
 
 def _text(value: object, digits: int) -> str:
