@@ -441,6 +441,19 @@ def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
         feedback.Exercise("1.2", "fit").call(len, 1)
 
 
+def test_errors_of_many_lines_and_what_is_no_number_are_told_in_one_line():
+    def fails():
+        raise ValueError("first\n   second")
+
+    exercise = feedback.Exercise("1.2", "fit")
+    with pytest.raises(feedback.NotYet, match=r"ValueError \(first second\) in line"):
+        exercise.call(fails)
+    with pytest.raises(
+        feedback.NotYet, match=r"a result that is not made of numbers, \['up', 'down'\], expected numbers of"
+    ):
+        exercise.array(["up", "down"], (2,))
+
+
 def test_a_long_message_is_shown_in_lines():
     lines = feedback.NotYet("word-with-hyphens " * 30)._render_traceback_()
     assert len(lines) > 5 and max(map(len, lines)) <= feedback.WIDTH

@@ -45,6 +45,7 @@ class Exercise:
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
         """The exception to raise for an answer that is not right; `hint` is the number of the hint that helps."""
+        found = " ".join(found.split())  # an error's own words may have many lines
         return NotYet(f"{self.number} {self.name}: found {found}, expected {expected}.{self._pointer(hint)}")
 
     def _pointer(self, hint: int | None) -> str:
@@ -100,7 +101,10 @@ class Exercise:
         try:
             values = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
-            raise self.wrong(f"{what} of type {type(value).__name__}", f"numbers of shape {shape}", hint) from None
+            shown = " ".join(repr(value).split())[:40]
+            raise self.wrong(
+                f"{what} that is not made of numbers, {shown}", f"numbers of shape {shape}", hint
+            ) from None
         if values.shape != shape:
             raise self.wrong(f"{what} of shape {values.shape}", f"{shape}{': ' if meaning else ''}{meaning}", hint)
         if not np.isfinite(values).all():

@@ -306,40 +306,42 @@ def _right_without_pairs(function, policy, teacher, *case) -> bool:
     return True
 
 
-def _labels(function, policy, teacher, task: Task, starts: np.ndarray, before: Episode, asked=None) -> None:
+def _labels(
+    function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray, before: Episode,
+    asked: Policy | None = None,
+) -> None:  # fmt: skip
     """`asked` is the teacher that the student's function gets, if another one."""
     value = DAGGER.call(function, policy, asked or teacher, task, starts, before.states, before.actions)
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
     states, actions = (np.asarray(part, dtype=np.float64) for part in value)
-    ours, theirs = (visited(p, task, starts) for p in (policy, teacher))
-    n, driver = len(before.states), ("the states that the teacher goes through", "those that the copy goes through", 1)
+    _gathered(states, before.states, *(visited(p, task, starts) for p in (policy, teacher)), len(starts))
+    if actions.shape != states.shape:
+        raise DAGGER.wrong(f"actions of shape {actions.shape}", f"one for each state, {states.shape}", 2)
+    labels, own = (p.predict(states)[0] for p in (teacher, policy))
+    right, copied = (np.isclose(actions, a, atol=1e-4).all(axis=1).mean() for a in (labels, own))
+    if right < 1 and np.allclose(_sorted(actions), _sorted(labels), atol=1e-4):
+        raise DAGGER.wrong("states and actions in different orders", "the same order for both", 3)
+    if right < 1:
+        found = "the copy's own actions" if copied > 0.5 else f"the teacher's action for {right:.0%} of the states"
+        raise DAGGER.wrong(found, "the teacher's action for every state", 2)
+
+
+def _gathered(states: np.ndarray, old: np.ndarray, ours: np.ndarray, theirs: np.ndarray, n_episodes: int) -> None:
+    """Whether `states` are the `old` ones and `ours`, those on the copy's way; `theirs` are on the teacher's."""
+    n, driver = len(old), ("the states that the teacher goes through", "those that the copy goes through", 1)
     sizes = {
         len(ours): ("the old states gone", "them kept, with the new ones behind or before them", 3),
         len(theirs): driver,
         n + len(theirs): driver,
         n: ("no new states", "those that the copy goes through", 1),
-        n + len(starts): ("one new state per episode", "every state on the way", 1),
+        n + n_episodes: ("one new state per episode", "every state on the way", 1),
     }
     if states.shape != (n + len(ours), 2):
         otherwise = f"states of shape {states.shape}", "old and new states, a row each", 1
         raise DAGGER.wrong(*sizes.get(len(states), otherwise))
-    if actions.shape != states.shape:
-        raise DAGGER.wrong(f"actions of shape {actions.shape}", f"one for each state, {states.shape}", 2)
-    if not np.allclose(_sorted(states), _sorted(np.concatenate([before.states, ours])), atol=1e-6):
+    if not np.allclose(_sorted(states), _sorted(np.concatenate([old, ours])), atol=1e-6):
         raise DAGGER.wrong("other states", "the old ones and those that the copy goes through", 1)
-    own = np.isclose(actions, policy.predict(states)[0], atol=1e-4).all(axis=1).mean()
-    labels = teacher.predict(states)[0]
-    right = np.isclose(actions, labels, atol=1e-4).all(axis=1).mean()
-    if right < 1 and np.allclose(_sorted(actions), _sorted(labels), atol=1e-4):
-        raise DAGGER.wrong("states and actions in different orders", "the same order for both", 3)
-    if right < 1:
-        copied = own > 0.5
-        raise DAGGER.wrong(
-            "the copy's own actions" if copied else f"the teacher's action for {right:.0%} of the states",
-            "the teacher's action for every state",
-            2,
-        )
 
 
 def corrected(
