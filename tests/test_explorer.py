@@ -229,7 +229,7 @@ def test_a_setting_makes_a_trial(lab):
     frame = lab.to_frame().reset_index()[::-1].head(explorer.SHOWN)
     for name in ("cells", "failures"):
         assert [row[heads.index(name)] for row in table[1:]] == [str(value) for value in frame[name]]
-    assert [row[0] for row in table[1:]] == [f"→ {known + 1}", *map(str, range(known, 0, -1))]
+    assert [row[0] for row in table[1:]] == [f"→\N{NO-BREAK SPACE}{known + 1}", *map(str, range(known, 0, -1))]
 
 
 def test_the_words_tell_the_copy_from_the_teacher(lab):
@@ -257,7 +257,7 @@ def test_the_status_says_that_it_works(lab, monkeypatch):
 def test_a_trial_that_fails_leaves_no_doubt(lab, monkeypatch, stage):
     """Whether the distillation fails or the drawing, the picture is an earlier trial's."""
     lab.settings["min_pol_distance"].value = 0.45
-    before, (shown,) = seen(lab), re.findall(r"→ (\d+)", lab.text.value)
+    before, (shown,) = seen(lab), re.findall(r"→\s(\d+)", lab.text.value)
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr(lab, stage, fails)
         lab.settings["min_pol_distance"].value = 0.5
@@ -313,7 +313,7 @@ def test_the_table_holds_the_trial_that_is_shown(lab, monkeypatch):
     monkeypatch.setattr(lab, "trials", lab.trials[:1] * 20)
     for place, numbers in ((19, [20, 19, 18, 17, 16, 15, 14, 13]), (2, [20, 19, 18, 17, 16, 15, 14, 3])):
         (table,) = tables(lab.show(place).text)
-        shown = [f"→ {number}" if number == place + 1 else str(number) for number in numbers]
+        shown = [f"→\N{NO-BREAK SPACE}{number}" if number == place + 1 else str(number) for number in numbers]
         assert [row[0] for row in table[1:]] == shown
 
 
@@ -322,7 +322,7 @@ def test_networks_play_fewer_iterations_and_the_page_says_so(lab):
     lab.settings["sub_policy"].value = "network"
     config = lab.trials[-1][0]
     assert (config.n_epochs, config.n_freeze, config.sub_policy) == (48, 12, "network")
-    assert "It played only 48 of 120 iterations, to be quick." in lab.text.value
+    assert "This trial played only 48 of 120 iterations, to be quick." in lab.text.value
     assert lab.trials[-1][1].form.name == "network"
     lab.settings["sub_policy"].value = "linear"
 

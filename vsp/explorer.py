@@ -70,7 +70,7 @@ class Explorer:
     """What a notebook shows: controls and a page where a kernel runs, else a strip of three pages."""
 
     ready, busy = "", ""  # what the status says
-    height = "240px"  # kept for the text, so that the picture below stays where it is
+    height = "300px"  # kept for the text, so that the picture below stays where it is
 
     def __init__(self, *controls: widgets.Widget):
         self.status, self.picture = widgets.HTML(self.ready), widgets.HTML()
@@ -139,6 +139,7 @@ class Replay(Explorer):
             control.observe(self._answer, names="value")
 
     def turn(self) -> tuple[str, Page]:
+        """The page of the iteration that the slider is at; the player and the buttons follow it."""
         n = self.iteration.value
         self.player.value = self._place(n)
         self.previous.disabled, self.next.disabled = not self._ahead(-1), not self._ahead(1)
@@ -194,7 +195,7 @@ class Laboratory(Explorer):
     paper's, and for a `Refinement`.
     """
 
-    ready, busy, height = "Change a setting: a distillation follows, in about a second.", "distilling …", "330px"
+    ready, busy, height = "Change a setting: a distillation follows, in about a second.", "distilling …", "395px"
 
     def __init__(self, teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int = 0):
         self.teacher, self.task, self.seed = Remembered(teacher), get_task(task), seed
@@ -265,6 +266,7 @@ class Laboratory(Explorer):
         self._answer()
 
     def turn(self) -> tuple[str, Page]:
+        """The page of the trial with the settings as they are."""
         place = self.trial({name: control.value for name, control in self.settings.items()})
         return f"trial {place + 1}", self.show(place)
 
@@ -314,14 +316,16 @@ class Laboratory(Explorer):
             f"{self._own['failures'] or 'no'} failures."
         )
         if config.n_epochs < self.config.n_epochs:
-            text += f" It played only {config.n_epochs} of {self.config.n_epochs} iterations, to be quick."
+            text += f" This trial played only {config.n_epochs} of {self.config.n_epochs} iterations, to be quick."
         return text
 
     def _newest(self, frame: pd.DataFrame, place: int) -> pd.DataFrame:
         """The table: the newest trials, that at `place` among them with an arrow, under heads that wrap."""
         rows = sorted({*range(len(frame))[-SHOWN:]} - {place})[-(SHOWN - 1) :] + [place]
         table = frame.iloc[sorted(rows, reverse=True)].reset_index()
-        table["trial"] = [f"→ {number}" if number == place + 1 else str(number) for number in table["trial"]]
+        table["trial"] = [
+            f"→\N{NO-BREAK SPACE}{number}" if number == place + 1 else str(number) for number in table["trial"]
+        ]
         return table.rename(columns=lambda name: name.replace("_", " "))
 
     def _shoot(self, policy: VoronoiPolicy, frame: pd.DataFrame, place: int) -> np.ndarray:
