@@ -1,3 +1,5 @@
+import base64
+import html
 import re
 import subprocess
 import sys
@@ -12,8 +14,9 @@ from PIL import Image, ImageSequence
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 
 from vsp import animation
-from vsp.animation import Animation, Growth, save_growth
+from vsp.animation import Growth, save_growth
 from vsp.distill import distill
+from vsp.history import Event
 
 mpl.use("Agg")
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,10 +45,47 @@ def test_words_say_what_the_history_says(run, growth):
     last = max(e.iteration for e in history.events)
     came, went = (kinds(history, last, last).count(kind) for kind in ("split", "merge"))
     assert growth.words(119) == (
-        f"Iteration 119 of 120: {history.cells[-1]} cells. "
-        f"Last change, iteration {last}: {came} came by splits, {went} went by merges."
+        f"After iteration 119 (0 to 119): {history.cells[-1]} cells. "
+        f"Last change, iteration {last}: {came} came by splits, {went} went by merges." + at_once(history, last)
     )
-    assert growth.words(0) == "Iteration 0 of 120: 1 cell." and len(growth) == 120
+    assert growth.words(0) == "After iteration 0 (0 to 119): 1 cell." and len(growth) == 120
+
+
+def at_once(history, n):
+    """What is said of codewords that came and went in the pass of iteration n."""
+    events = [(e.kind, tuple(e.codeword)) for e in history.events if e.iteration == n]
+    came, went = ({place for kind, place in events if kind == one} for one in ("split", "merge"))
+    both = (came & went) - {tuple(codeword) for codeword in history.policy_at(n).codewords}
+    return f" Of these, {len(both)} came and went at once: a cross without a ring." if both else ""
+
+
+def test_words_say_what_came_and_went_at_once(growth, monkeypatch):
+    """Two came, one of them went again, and one that was there before went."""
+    place = growth.history.policy_at(119).codewords[-1]
+    there = [Event(115, "split", codeword) for codeword in (place, np.array([2.0, 2.0]))]
+    gone = [Event(115, "merge", np.array([value, value])) for value in (2.0, 3.0)]
+    monkeypatch.setattr(growth.history, "events", [*there, *gone])
+    assert growth.words(119).endswith(
+        "Last change, iteration 115: 2 came by splits, 2 went by merges. Of these, 1 came and went at once: a cross "
+        "without a ring."
+    )
+    monkeypatch.setattr(growth.history, "events", there[:1])
+    assert growth.words(119).endswith("1 came by splits, 0 went by merges.")
+    assert growth.words(114).endswith("cells.")
+
+
+def test_moments_begin_close_and_reach_the_end(growth):
+    assert growth.moments(6) == [0, 4, 19, 42, 76, 119]  # 119 (i / 5)^2
+    assert growth.moments(1000) == list(range(120))
+
+
+def test_the_copy_acts_on_its_own_panel(growth, monkeypatch):
+    acting, marked = [], []
+    monkeypatch.setattr(growth.maps, "policy", lambda ax, policy: acting.append((ax, policy)))
+    monkeypatch.setattr(animation, "moment", lambda ax, n, cells: marked.append((ax, n, cells)))
+    growth.shoot(60)
+    assert acting == [(growth._axes[1], growth.history.policy_at(60))]
+    assert marked == [(growth._axes[2], 60, growth.history.cells[60])]
 
 
 def test_what_changed_is_marked(run, growth, monkeypatch):
@@ -101,6 +141,7 @@ def saved(run, tmp_path_factory):
 def test_the_gif_is_short_small_and_ends_on_the_final_partition(run, saved):
     task, teacher, history = run
     gif = Image.open(saved[1] / "growth.gif")
+    assert gif.info["loop"] == 0  # for ever
     frames = [(frame.info["duration"], np.asarray(frame.convert("RGB"), int)) for frame in ImageSequence.Iterator(gif)]
     assert 20 <= len(frames) <= 40 and sum(duration for duration, _ in frames) < 10_000
     assert frames[-1][0] >= 2000 and len(saved[0].gif) < 600_000
@@ -112,15 +153,18 @@ def test_the_gif_is_short_small_and_ends_on_the_final_partition(run, saved):
     assert (still[0, 0] == 255).all() and all((frame[0, 0] == 255).all() for _, frame in frames)
 
 
-def test_it_is_shown_with_words_and_without_motion_where_none_is_wanted(saved):
+def test_it_is_shown_with_words_and_moves_only_when_asked(saved):
     shown, folder = saved
     text = shown._repr_html_()
-    assert 'alt="cells &quot;grow&quot; &amp; &lt;merge&gt;"' in text and repr(shown) == ALT
-    found = re.search(r'<source media="\(prefers-reduced-motion: reduce\)" srcset="([^"]+)"><img (.+?)>', text)
-    still, moving = found.groups()
-    assert still.startswith("data:image/png;base64,") and 'src="data:image/gif;base64,' in moving
-    assert shown.gif == (folder / "growth.gif").read_bytes() and shown.still == (folder / "growth.png").read_bytes()
-    assert text.index("<details open>") < text.index("<picture>") < text.index("</details>")
+    still, moving = re.findall(
+        r'<img alt="([^"]*)" src="data:image/(\w+);base64,([^"]+)" width="600" height="260"', text
+    )
+    assert [html.unescape(one[0]) for one in (still, moving)] == [f"The last frame of the moving picture: {ALT}", ALT]
+    for (_, kind, data), name, held in ((still, "png", shown.still), (moving, "gif", shown.gif)):
+        assert kind == name and base64.b64decode(data) == held == (folder / f"growth.{name}").read_bytes()
+    before, folded = text.split("<details><summary>play the moving picture</summary>")
+    assert "image/png" in before and "image/gif" not in before and folded.endswith("</details></figure>")
+    assert repr(shown) == ALT
 
 
 def test_another_process_writes_the_same_bytes_and_a_quick_run_is_marked(tmp_path):
@@ -151,7 +195,3 @@ def test_what_cannot_be_drawn_is_named(run):
         Growth(pd.DataFrame(), teacher, task)
     with pytest.raises(ValueError, match="iteration 120, expected 0 to 119"):
         Growth(history, teacher, task, dpi=40).shoot(120)
-
-
-def test_an_animation_needs_no_file():
-    assert "data:image/gif;base64,R0lG" in Animation(b"GIF", b"PNG", "x")._repr_html_()

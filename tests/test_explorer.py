@@ -23,7 +23,7 @@ CONFIG = tiny(min_pol_distance=0.3)
 
 
 def pictures(page):
-    """The pixels and the alternative text of every picture of a page."""
+    """The pixels and the alternative text of every picture of a page, as HTML."""
     found = re.findall(r'<img alt="([^"]*)" src="data:image/png;base64,([^"]+)"', page)
     images = [np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")) for _, data in found]
     return images, [html.unescape(alt) for alt, _ in found]
@@ -37,7 +37,26 @@ def tables(page):
     return [[re.findall(r"<t[dh]>(.*?)</t[dh]>", row) for row in table] for table in rows]
 
 
-# Replay
+def seen(explorer):
+    """What a reader sees: the picture, its alternative text, and the text beside it."""
+    (image,), (alt,) = pictures(explorer.picture.value)
+    return image, alt, explorer.text.value
+
+
+def displayed(explorer_, monkeypatch):
+    """What it leaves in a notebook: output after output."""
+    outputs = []
+    monkeypatch.setattr(explorer, "display", lambda data, raw: outputs.append(data))
+    explorer_._ipython_display_()
+    return outputs
+
+
+def fails(*_, **__):
+    raise RuntimeError("no <room> left")
+
+
+def interrupted(*_, **__):
+    raise KeyboardInterrupt
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -61,59 +80,111 @@ def shown(run):
 
 
 def test_the_slider_turns_the_pages(shown, run):
-    history, seen = run[2], []
-    for n in (0, 40, 119):
+    history, images = run[2], []
+    for n in (1, 40, 119):
         shown.iteration.value = n
-        (image,), (alt,) = pictures(shown.page.value)
-        cells = history.cells[n]
-        assert alt.startswith(f"Iteration {n} of 120: {cells} cell{'s' * (cells > 1)}.")
-        seen.append(image)
-    assert (seen[0] != seen[1]).any() and (seen[1] != seen[2]).any()
+        image, alt, text = seen(shown)
+        cells = f"After iteration {n} (0 to 119): {history.cells[n]} cell{'s' * (history.cells[n] > 1)}."
+        assert alt.startswith(cells) and cells in text
+        images.append(image)
+    assert (images[0] != images[1]).any() and (images[1] != images[2]).any()
     assert not plt.get_fignums()  # or a notebook would show them
 
 
 @pytest.mark.parametrize("n", [0, 119])
-def test_a_chosen_state_shows_its_cell_its_equations_and_both_actions(shown, run, n):
+def test_a_chosen_state_shows_its_codeword_its_equations_and_both_actions(shown, run, n):
     task, teacher, history = run
     shown.iteration.value = n
-    before = pictures(shown.page.value)[0][0]
+    before = seen(shown)[0]
     for slider, share in zip(shown.point, (0.3, 0.4)):
         slider.value = slider.min + share * (slider.max - slider.min)
     point = np.array([slider.value for slider in shown.point])
-    policy, page = history.policy_at(n), shown.page.value
+    policy, (image, _, text) = history.policy_at(n), seen(shown)
     why = policy.explain(point)
-    assert f"is in cell {why.cell}, whose codeword is ({', '.join(f'{c:.3f}' for c in why.codeword)})" in page
-    assert [html.unescape(line) for line in re.findall(r"<code>(.*?)</code>", page)] == list(why.equations)
-    (table,) = tables(page)
-    actions = zip(policy.task.outputs, teacher.predict(point[None])[0][0], why.action, strict=True)
-    assert table == [["action", "teacher", "copy"], *([name, f"{a:.3f}", f"{b:.3f}"] for name, a, b in actions)]
-    assert (pictures(page)[0][0] != before).any()
+    assert f"is in the cell of the codeword ({', '.join(f'{c:.3f}' for c in why.codeword)})" in text
+    assert [html.unescape(line) for line in re.findall(r"<code>(.*?)</code>", text)] == list(why.equations)
+    (table,) = tables(text)
+    actions = zip(policy.task.outputs, teacher.predict(point[None])[0][0], why.raw, why.action, strict=True)
+    assert table[0] == ["action", "teacher", "equation gives", "limits", "copy"]
+    assert table[1:] == [[name, f"{a:.3f}", f"{raw:.3f}", "-1 to 1", f"{b:.3f}"] for name, a, raw, b in actions]
+    assert (image != before).any()
+
+
+def test_a_state_can_be_chosen_finely(shown):
+    for slider, low, high in zip(shown.point, shown.task.low, shown.task.high):
+        assert (slider.min, slider.max) == (low, high) and slider.step == pytest.approx((high - low) / 100)
 
 
 def test_buttons_go_from_change_to_change(shown, run):
     passes, stops = sorted({e.iteration for e in run[2].events}), []
+    assert shown.previous.disabled and not shown.next.disabled
     for _ in passes:
         shown.next.click()
         stops.append(shown.iteration.value)
-    assert stops == passes
-    shown.next.click()
-    assert shown.iteration.value == passes[-1]  # there is no next
+    assert stops == passes and shown.next.disabled and not shown.previous.disabled
     shown.iteration.value += 1
     shown.previous.click()
     assert shown.iteration.value == passes[-1]
     shown.previous.click()
-    assert shown.iteration.value == passes[-2]
+    assert shown.iteration.value == passes[-2] and not shown.next.disabled
 
 
-def test_without_a_kernel_there_are_still_pages(shown, run):
-    bundle = shown._repr_mimebundle_(include=None, exclude=None)
-    assert bundle[VIEW]["model_id"] == shown.view.model_id and bundle["text/plain"].startswith("Replay of a dist")
-    images, alts = pictures(bundle["text/html"])
-    assert [alt.split(" of ")[0] for alt in alts] == ["Iteration 1", "Iteration 12", "Iteration 119"]
-    assert len(images) == bundle["text/html"].count("<figure>") == 3 and bundle["text/html"].count("<code>") >= 3
+def test_the_player_shows_the_beginning_every_change_and_the_end(shown, run, monkeypatch):
+    """As a browser plays: one place after the other."""
+    played = []
+    monkeypatch.setattr(shown.growth, "shoot", lambda n, point: np.zeros((2, 3, 3), np.uint8))  # for speed
+    for place in range(shown.player.max + 1):
+        shown.player.value = place
+        played.append(shown.iteration.value)
+    assert played[:3] == [0, 1, 2] and played[-1] == 119 and played == sorted(set(played))
+    assert {e.iteration for e in run[2].events} <= set(played)
+    shown.player.value = 3
+    assert seen(shown)[1].startswith(f"After iteration {played[3]} ")
+
+
+def test_the_player_goes_on_from_the_slider(shown):
+    shown.iteration.value = 118  # between two places
+    assert shown.iteration.value == 118 and shown.player.value == shown.player.max - 1
+    shown.player.value += 1
+    assert shown.iteration.value == 119
+
+
+def test_the_player_has_a_name(shown):
+    row = shown.view.children[0].children[0].children[0]
+    assert row.children[0].value == shown.player.tooltip == "play the run" and row.children[1] is shown.player
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"), [(fails, "RuntimeError: no &lt;room&gt; left"), (interrupted, "KeyboardInterrupt: ")]
+)
+def test_a_page_that_fails_leaves_no_doubt(shown, monkeypatch, fault, said):
+    shown.iteration.value = 30
+    before = seen(shown)
+    with monkeypatch.context() as patch, pytest.raises((RuntimeError, KeyboardInterrupt)):
+        patch.setattr(shown.growth, "shoot", fault)
+        shown.iteration.value = 60
+    assert shown.status.value == f"<b>failed</b>: {said}. The picture below is that of iteration 30."
+    assert np.array_equal(seen(shown)[0], before[0]) and seen(shown)[2] == before[2]
+    shown.iteration.value = 61
+    assert shown.status.value == "" and seen(shown)[1].startswith("After iteration 61 ")
+
+
+def test_without_a_kernel_there_are_still_pages(shown, run, monkeypatch):
+    controls, strip = displayed(shown, monkeypatch)
+    assert controls[VIEW]["model_id"] == shown.view.model_id and set(controls) == {VIEW, "text/plain"}
+    assert controls["text/plain"] == strip["text/plain"] and strip["text/plain"].startswith("Replay of a dist")
+    images, alts = pictures(strip["text/html"])
+    assert [alt.split(" (")[0] for alt in alts] == [f"After iteration {n}" for n in (1, 12, 119)]
+    assert len(images) == strip["text/html"].count("<figure>") == 3 and strip["text/html"].count("<code>") >= 3
     task, teacher, history = run
-    again = replay(teacher, task, history)
-    assert again._repr_mimebundle_()["text/html"] == bundle["text/html"]  # the same bytes
+    again = displayed(replay(teacher, task, history), monkeypatch)
+    assert again[1] == strip and set(strip) == {"text/html", "text/plain"}  # the same bytes
+
+
+def test_a_picture_has_the_size_that_it_is_drawn_in(shown):
+    width, height = (int(side) for side in re.search(r'width="(\d+)" height="(\d+)"', shown.picture.value).groups())
+    assert width == 720 and height == pytest.approx(720 * 156 / 360, abs=1)
+    assert 'style="max-width: 100%; height: auto"' in shown.picture.value
 
 
 def test_what_cannot_be_replayed_is_named(run):
@@ -146,17 +217,69 @@ def test_it_begins_with_the_configuration_and_two_changes(lab):
 
 
 def test_a_setting_makes_a_trial(lab):
-    before, known = pictures(lab.page.value)[0][0], len(lab.trials)
+    before, known = seen(lab)[0], len(lab.trials)
     lab.settings["min_pol_distance"].value = 0.45
-    (image,), (alt,) = pictures(lab.page.value)
+    image, alt, text = seen(lab)
     assert len(lab.trials) == known + 1 and lab.trials[-1][0] == dataclasses.replace(CONFIG, min_pol_distance=0.45)
     assert (image != before).any() and alt.startswith(f"Trial {known + 1}: {len(lab.trials[-1][1])} cells")
-    (table,) = tables(lab.page.value)
+    (table,) = tables(text)
     heads, newest, *_ = table
-    assert dict(zip(heads, newest))["min_pol_distance"] == "0.45" and lab.status.value == "done"
+    assert heads[:4] == ["trial", "cells", "mean return", "failures"]
+    assert dict(zip(heads, newest))["min pol distance"] == "0.45"
     frame = lab.to_frame().reset_index()[::-1].head(explorer.SHOWN)
-    for name in ("trial", "cells", "failures"):
+    for name in ("cells", "failures"):
         assert [row[heads.index(name)] for row in table[1:]] == [str(value) for value in frame[name]]
+    assert [row[0] for row in table[1:]] == [f"→\N{NO-BREAK SPACE}{known + 1}", *map(str, range(known, 0, -1))]
+
+
+def test_the_words_tell_the_copy_from_the_teacher(lab):
+    teacher = vsp.evaluate(CurvedTeacher(), SIMPLEGOAL, 300, seed=1)
+    for place in (1, 2):
+        _, policy, result = lab.trials[place]
+        assert result["mean"] != pytest.approx(teacher["return"].mean(), abs=0.01)
+        cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
+        assert lab.show(place).text.startswith(
+            f"<p>Trial {place + 1}: {cells}, mean return {result['mean']:.2f}; {result['failures'] or 'none'} of 300 "
+            f"starts fail to reach the goal. The teacher: mean return {teacher['return'].mean():.2f}, "
+            f"{(teacher['outcome'] != 'goal').sum() or 'no'} failures.</p>"
+        )
+
+
+def test_the_status_says_that_it_works(lab, monkeypatch):
+    said = []
+    monkeypatch.setattr(lab, "trial", lambda changes: said.append(lab.status.value) or 0)
+    lab.settings["max_pol_loss"].value = 0.2
+    assert said == ["distilling …"] and lab.status.value.startswith("Change a setting")
+    lab.back.click()
+
+
+@pytest.mark.parametrize("stage", ["trial", "show"])
+def test_a_trial_that_fails_leaves_no_doubt(lab, monkeypatch, stage):
+    """Whether the distillation fails or the drawing, the picture is an earlier trial's."""
+    lab.settings["min_pol_distance"].value = 0.45
+    before, (shown,) = seen(lab), re.findall(r"→\s(\d+)", lab.text.value)
+    with monkeypatch.context() as patch, pytest.raises(RuntimeError):
+        patch.setattr(lab, stage, fails)
+        lab.settings["min_pol_distance"].value = 0.5
+    assert lab.status.value.endswith(f"RuntimeError: no &lt;room&gt; left. The picture below is trial {shown}.")
+    assert np.array_equal(seen(lab)[0], before[0]) and seen(lab)[2] == before[2]
+    lab.settings["min_pol_distance"].value = 0.45
+    assert lab.status.value.startswith("Change a setting")
+
+
+def test_the_picture_is_that_of_the_trial(lab, monkeypatch):
+    """Its map and its cells on the panel of the copy, its cells on the teacher's too, the ring on its dot."""
+    maps, cells, rings = [], [], []
+    monkeypatch.setattr(lab.maps, "policy", lambda ax, policy: maps.append((ax, policy)))
+    monkeypatch.setattr(lab.maps, "cells", lambda ax, policy: cells.append((ax, policy)))
+    monkeypatch.setattr(explorer, "trials", lambda ax, frame, this: rings.append((ax, len(frame), this)))
+    left, middle, right = lab._axes[:3]
+    for place in (0, 2):
+        policy = lab.trials[place][1]
+        lab.show(place)
+        assert maps.pop() == (middle, policy) and cells == [(left, policy), (middle, policy)]
+        assert rings.pop() == (right, len(lab.trials), place)
+        cells.clear()
 
 
 def test_the_same_settings_are_not_tried_twice(lab):
@@ -165,14 +288,41 @@ def test_the_same_settings_are_not_tried_twice(lab):
     lab.settings["min_param_distance"].value = 1.2
     lab.settings["min_param_distance"].value = 0.9 + 1e-12  # as sliders round
     assert len(lab.trials) == known + 1
-    assert pictures(lab.page.value)[1][0].startswith(f"Trial {known}:")
+    assert seen(lab)[1].startswith(f"Trial {known}:")
+
+
+def test_one_button_leads_back_to_the_first_trial(lab, monkeypatch):
+    lab.settings["min_pol_distance"].value = 0.45
+    lab.settings["min_param_distance"].value = 0.9
+    known, asked = len(lab.trials), []
+    trial = lab.trial
+    monkeypatch.setattr(lab, "trial", lambda changes: asked.append(changes) or trial(changes))
+    lab.back.click()
+    assert len(asked) == 1 and len(lab.trials) == known and seen(lab)[1].startswith("Trial 1:")
+    lab.settings["min_param_distance"].value = 0.9  # and the controls still answer
+    assert len(asked) == 2
+
+
+def test_settings_with_many_digits_are_those_of_the_first_trial():
+    fine = dataclasses.replace(CONFIG, min_pol_distance=0.301234567, n_epochs=40, n_freeze=10)
+    lab = laboratory(CurvedTeacher(), SIMPLEGOAL, fine)
+    assert lab.trials[0][0] == fine and lab.trial({name: one.value for name, one in lab.settings.items()}) == 0
+
+
+def test_the_table_holds_the_trial_that_is_shown(lab, monkeypatch):
+    monkeypatch.setattr(lab, "trials", lab.trials[:1] * 20)
+    for place, numbers in ((19, [20, 19, 18, 17, 16, 15, 14, 13]), (2, [20, 19, 18, 17, 16, 15, 14, 3])):
+        (table,) = tables(lab.show(place).text)
+        shown = [f"→\N{NO-BREAK SPACE}{number}" if number == place + 1 else str(number) for number in numbers]
+        assert [row[0] for row in table[1:]] == shown
 
 
 def test_networks_play_fewer_iterations_and_the_page_says_so(lab):
+    assert "played only" not in lab.text.value
     lab.settings["sub_policy"].value = "network"
     config = lab.trials[-1][0]
     assert (config.n_epochs, config.n_freeze, config.sub_policy) == (48, 12, "network")
-    assert "Played: 48 of 120 iterations." in lab.page.value
+    assert "This trial played only 48 of 120 iterations, to be quick." in lab.text.value
     assert lab.trials[-1][1].form.name == "network"
     lab.settings["sub_policy"].value = "linear"
 
@@ -193,14 +343,14 @@ def test_sliders_reach_what_the_first_trials_need(lab):
             assert slider.min <= min(values) and max(values) <= slider.max and not slider.continuous_update
 
 
-def test_without_a_kernel_there_are_the_first_trials(lab):
-    bundle = lab._repr_mimebundle_()
-    assert bundle[VIEW]["model_id"] == lab.view.model_id and bundle["text/plain"].startswith("Laboratory")
-    _, alts = pictures(bundle["text/html"])
+def test_without_a_kernel_there_are_the_first_trials(lab, monkeypatch):
+    controls, strip = displayed(lab, monkeypatch)
+    assert controls[VIEW]["model_id"] == lab.view.model_id and strip["text/plain"].startswith("Laboratory")
+    _, alts = pictures(strip["text/html"])
     assert [alt.split(":")[0] for alt in alts] == ["Trial 1", "Trial 2", "Trial 3"]
-    assert [len(table) - 1 for table in tables(bundle["text/html"])] == [1, 2, 3]
-    fresh = laboratory(CurvedTeacher(), SIMPLEGOAL, CONFIG, seed=3)
-    assert fresh._repr_mimebundle_()["text/html"] == bundle["text/html"]  # whatever was tried before
+    assert [len(table) - 1 for table in tables(strip["text/html"])] == [1, 2, 3]
+    fresh = displayed(laboratory(CurvedTeacher(), SIMPLEGOAL, CONFIG, seed=3), monkeypatch)
+    assert fresh[1] == strip  # whatever was tried before
 
 
 def test_a_laboratory_needs_cells_to_split():

@@ -1,4 +1,5 @@
 import base64
+import io
 import re
 import zlib
 
@@ -7,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image, UnidentifiedImageError
 
 from vsp import figures, geometry, ledger
 from vsp.envs import get_task
@@ -99,6 +101,16 @@ def test_the_alternative_text_is_in_the_html_and_in_the_files(saved):
     assert "<figure>" in shown and 'alt="Two &quot;cells&quot; &amp; their border &lt;drawn&gt; in grey"' in shown
     assert base64.b64decode(re.search(r"base64,([^\"]+)", shown)[1]) == png.read_bytes()
     assert ALT.encode() in png.read_bytes() and b"border" in streams(pdf) and repr(picture) == ALT
+
+
+def test_an_embedded_picture_has_its_own_size_and_kind():
+    picture, file = Image.new("P", (30, 10)), io.BytesIO()
+    picture.save(file, "gif")
+    shown = figures.embedded(file.getvalue(), 'a "b" <c>', width=600)
+    assert shown.startswith('<img alt="a &quot;b&quot; &lt;c&gt;" src="data:image/gif;base64,R0lG')
+    assert 'width="600" height="200" style="max-width: 100%; height: auto"' in shown
+    with pytest.raises(UnidentifiedImageError):
+        figures.embedded(b"no image", "")
 
 
 def test_a_quick_figure_is_marked(tmp_path):

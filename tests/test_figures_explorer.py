@@ -41,6 +41,19 @@ def test_a_stage_shows_what_is_painted_and_forgets_it():
     assert not axes[0].lines and not axes[1].collections and not plt.get_fignums()
 
 
+def test_what_fails_is_not_in_the_next_shot():
+    theatre, axes = stage()
+    plain = theatre.shoot(lambda: None)
+
+    def paint():
+        axes[0].plot([0, 1], [0, 1])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        theatre.shoot(paint)
+    assert np.array_equal(theatre.shoot(lambda: None), plain)
+
+
 def test_a_shot_is_the_figure_drawn_in_full():
     """Two routes, but for the edges of the axes' lines, which a shot draws twice."""
     theatre, axes = stage()
@@ -144,7 +157,10 @@ def test_cells_over_iterations_with_every_pass_below(ax):
     assert low < merges[0, 1] < splits[0, 1] < 0 and high > 4
     assert all(0 <= tick <= 4 and tick == int(tick) for tick in ax.get_yticks())
     drawing.moment(ax, 3, 4)
-    assert ax.lines[-1].get_xydata().tolist() == [[3, 4]] and ax.texts[-1].get_text() == "n = 3"
+    dotted, dot = ax.lines[-2:]
+    assert (
+        set(dotted.get_xdata()) == {3} and dot.get_xydata().tolist() == [[3, 4]] and ax.texts[-1].get_text() == "n = 3"
+    )
 
 
 def test_the_present_trial_has_a_ring(ax):

@@ -26,6 +26,15 @@ class Explorer:
         return {**ipywidgets.IntSlider()._repr_mimebundle_(), "text/html": "strip"}
 Explorer()"""
 
+EXPLORER = """\
+import numpy as np
+from vsp.explorer import Explorer, Page
+class Small(Explorer):
+    "Small."
+    def strip(self):
+        return [Page(np.zeros((2, 3, 3), np.uint8), "black", "on this page")]
+Small()"""
+
 
 def write(folder: Path, *cells: str, parameters: str = 'out = ".."\nruns = "../data/runs"\nquick = False') -> Path:
     """A notebook of code cells; a cell that begins with `# skip` is tagged so that it never runs."""
@@ -80,6 +89,17 @@ def test_of_a_widget_its_still_picture_is_left(tmp_path):
     still = {"text/html": "strip", "text/plain": "IntSlider(value=0)"}
     assert outputs == [[], [still], [still], [], ["step\nstep\nstep\n"], [{"text/plain": "'text'"}]]
     assert "widget" not in str(executed.metadata) and "widget-view" not in copy.read_text()
+    assert runner.run(notebook, tmp_path) == []
+
+
+def test_of_an_explorer_its_strip_is_left_once(tmp_path):
+    """It shows two outputs: controls, and a strip for where they cannot answer."""
+    notebook = write(tmp_path, EXPLORER)
+    assert runner.run(notebook, tmp_path) == ["figures/executed/story.ipynb"]
+    copy = tmp_path / "figures" / "executed" / "story.ipynb"
+    (output,) = nbformat.read(copy, as_version=4).cells[1].outputs
+    assert output.data["text/html"].endswith("<figcaption>on this page</figcaption></figure></div>")
+    assert "widget" not in copy.read_text() and output.data["text/plain"] == "Small."
     assert runner.run(notebook, tmp_path) == []
 
 

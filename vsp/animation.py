@@ -6,12 +6,12 @@ for whoever wants no motion.
 
 from __future__ import annotations
 
-import base64
-import html
 import os
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -57,12 +57,13 @@ class Maps:
             fig.axes[-1].set(ylabel="", title="force")  # beside the bar it would seem to belong to the next panel
         return fig, axes
 
-    def policy(self, ax, actor: Policy, *, color: str = figures.DISTILLED):
-        """What `actor` does everywhere."""
+    def policy(self, ax: Axes, actor: Policy, *, color: str = figures.DISTILLED) -> Artist:
+        """What `actor` does everywhere: arrows in `color` where it has two actions, a force map where it has one.
+        Returns what is drawn, for a colour bar."""
         x, y, states = self._grid
         return policy_map(ax, x, y, actor.predict(states)[0], color=color)
 
-    def cells(self, ax, policy: VoronoiPolicy, point: np.ndarray | None = None) -> None:
+    def cells(self, ax: Axes, policy: VoronoiPolicy, point: np.ndarray | None = None) -> None:
         """The cells of `policy` with their codewords; that of the state `point` (2,) is outlined."""
         x, y, states = self._fine
         borders(ax, x, y, policy.cells(states), chosen=None if point is None else int(policy.cells(point)))
@@ -77,7 +78,7 @@ class Growth:
     Raises ValueError for a task without such maps, and for what is no history of the paper's method.
     """
 
-    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = 180, chosen: bool = False):
+    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI, chosen: bool = False):
         if not isinstance(history, History):
             kind = type(history).__name__
             raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
@@ -104,11 +105,7 @@ class Growth:
         """The run after iteration n, with what changed after `since` (None: in the last pass that changed anything),
         and the cell of the state `point` (2,). (height, width, 3) bytes. Raises ValueError outside the run."""
         policy = self.history.policy_at(n)
-        since = self.last_change(n) - 1 if since is None else since
-        recent = [(e.kind, tuple(e.codeword)) for e in self.history.events if since < e.iteration <= n]
-        there = set(map(tuple, policy.codewords))
-        came = {place for kind, place in recent if kind == "split" and place in there}
-        went = {place for kind, place in recent if kind == "merge" and place not in there}  # and did not come again
+        came, went, _ = self._changed(n, self.last_change(n) - 1 if since is None else since)
 
         def paint() -> None:
             for ax in self._axes[:2]:
@@ -119,6 +116,18 @@ class Growth:
 
         return self.stage.shoot(paint)
 
+    def _changed(self, n: int, since: int) -> tuple[set[tuple], set[tuple], set[tuple]]:
+        """Codewords that came after `since` and are there after iteration n, those that went, and of these the ones
+        that had only come after `since`."""
+        recent = [(e.kind, tuple(e.codeword)) for e in self.history.events if since < e.iteration <= n]
+        there = set(map(tuple, self.history.policy_at(n).codewords))
+        split, merged = ({place for kind, place in recent if kind == one} for one in ("split", "merge"))
+        return split & there, merged - there, (merged - there) & split
+
+    def moments(self, number: int) -> list[int]:
+        """At most `number` iterations from the first to the last, closer to each other early, when most happens."""
+        return np.unique((np.linspace(0, 1, number) ** 2 * (len(self) - 1)).astype(int)).tolist()
+
     def last_change(self, n: int) -> int:
         """The last iteration up to n that split or merged; 0 if there is none."""
         return max((e.iteration for e in self.history.events if e.iteration <= n), default=0)
@@ -127,28 +136,26 @@ class Growth:
         """What there is to see after iteration n."""
         k, last = self.history.cells[n], self.last_change(n)
         kinds = [e.kind for e in self.history.events if e.iteration == last]
-        text = f"Iteration {n} of {len(self)}: {k} {'cell' if k == 1 else 'cells'}."
+        text = f"After iteration {n} (0 to {len(self) - 1}): {k} {'cell' if k == 1 else 'cells'}."
         if kinds:
             text += f" Last change, iteration {last}: {kinds.count('split')} came by splits, "
             text += f"{kinds.count('merge')} went by merges."
+        if brief := len(self._changed(n, last - 1)[2]):
+            text += f" Of these, {brief} came and went at once: a cross without a ring."
         return text
 
 
 class Animation:
-    """A GIF as a notebook shows it: a still picture where the reader's system asks for no motion, and to be folded away
-    where it disturbs."""
+    """A GIF as a notebook shows it: its last frame, and folded below it, so that nothing moves unasked, the GIF."""
 
     def __init__(self, gif: bytes, still: bytes, alt: str):
         self.gif, self.still, self.alt = gif, still, alt
 
     def _repr_html_(self) -> str:
-        gif, still = (base64.b64encode(part).decode() for part in (self.gif, self.still))
-        return (
-            "<figure><details open><summary>moving picture (click to hide)</summary><picture>"
-            f'<source media="(prefers-reduced-motion: reduce)" srcset="data:image/png;base64,{still}">'
-            f'<img alt="{html.escape(self.alt)}" src="data:image/gif;base64,{gif}" width="{int(WIDTH * DPI)}">'
-            "</picture></details></figure>"
-        )
+        width = int(WIDTH * DPI)
+        still = figures.embedded(self.still, f"The last frame of the moving picture: {self.alt}", width=width)
+        moving = figures.embedded(self.gif, self.alt, width=width)
+        return f"<figure>{still}<details><summary>play the moving picture</summary>{moving}</details></figure>"
 
     def __repr__(self) -> str:
         return self.alt
@@ -164,10 +171,10 @@ def save_growth(
     who cannot; `quick` adds a watermark. No dates are in the files, so that the same run gives the same bytes. Raises
     ValueError as `Growth` does.
     """
-    growth = Growth(history, teacher, task, dpi=DPI)
+    growth = Growth(history, teacher, task)
     if quick:
         growth.stage.watermark()
-    moments = np.unique((np.linspace(0, 1, FRAMES) ** 2 * (len(growth) - 1)).astype(int)).tolist()
+    moments = growth.moments(FRAMES)
     images = [growth.shoot(n, since=before) for before, n in zip([-1, *moments], moments)]
     path = Path(out) / "figures" / name
     with store.atomic_path(path.with_suffix(".gif")) as temporary:

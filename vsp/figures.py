@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import html
+import io
 import os
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
+from PIL import Image
 
 from . import envs, store
 from .envs import Task
@@ -64,6 +66,19 @@ def panels(
     return fig, axes.ravel()
 
 
+def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
+    """An image file as an HTML element that holds all of it, `width` pixels wide or as wide as there is room.
+
+    Both sides are given, so that nothing jumps while it loads, and it is decoded before it is shown, so that nothing
+    flickers where one picture takes the place of another. Raises PIL.UnidentifiedImageError for what is no image.
+    """
+    with Image.open(io.BytesIO(image)) as opened:
+        kind, height = opened.get_format_mimetype(), round(width * opened.height / opened.width)
+    size = f'width="{width}" height="{height}" style="max-width: 100%; height: auto"'
+    data = base64.b64encode(image).decode()
+    return f'<img alt="{html.escape(alt)}" src="data:{kind};base64,{data}" {size} decoding="sync">'
+
+
 class Picture:
     """A saved figure as a notebook shows it: an HTML figure whose alternative text survives every conversion."""
 
@@ -71,8 +86,7 @@ class Picture:
         self.png, self.alt = png, alt
 
     def _repr_html_(self) -> str:
-        data = base64.b64encode(self.png).decode()
-        return f'<figure><img alt="{html.escape(self.alt)}" src="data:image/png;base64,{data}" width="720"></figure>'
+        return f"<figure>{embedded(self.png, self.alt)}</figure>"
 
     def __repr__(self) -> str:
         return self.alt

@@ -12,6 +12,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -52,16 +53,21 @@ class Stage:
     def shoot(self, paint: Callable[[], object]) -> np.ndarray:
         """The figure with what `paint` draws into its axes. (height, width, 3) bytes"""
         self._canvas.restore_region(self._still)
-        paint()
-        for ax, standing in self._standing.items():
-            added = [artist for artist in ax.get_children() if artist not in standing]
-            for artist in sorted([*added, *ax.spines.values()], key=lambda artist: artist.zorder):
-                ax.draw_artist(artist)  # the spines once more, for a map would cover half of them
-            for artist in added:
-                artist.remove()
+        try:
+            paint()
+            for ax in self._standing:
+                for artist in sorted([*self._added(ax), *ax.spines.values()], key=lambda artist: artist.zorder):
+                    ax.draw_artist(artist)  # the spines once more, for a map would cover half of them
+        finally:  # what was painted until an error is not in the next shot
+            for ax in self._standing:
+                for artist in self._added(ax):
+                    artist.remove()
         for mark in self.fig.texts:
             self.fig.draw_artist(mark)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _added(self, ax: Axes) -> list[Artist]:
+        return [artist for artist in ax.get_children() if artist not in self._standing[ax]]
 
 
 def png(image: np.ndarray, *, small: bool = False) -> bytes:
@@ -78,7 +84,8 @@ def ground(ax: Axes, task: str) -> Axes:
     """The axes of a task's policy maps: the unit square with goal and pit, or position and velocity."""
     if task == "SimpleGoal-v0":
         return square(ax)
-    return ax.set(xlabel="position", ylabel="velocity (per step)", xlim=(-1.2, 0.6), ylim=(-0.07, 0.07)) and ax
+    ax.set(xlabel="position", ylabel="velocity (per step)", xlim=(-1.2, 0.6), ylim=(-0.07, 0.07))
+    return ax
 
 
 def policy_map(ax: Axes, x: np.ndarray, y: np.ndarray, actions: np.ndarray, *, color: str):
@@ -93,11 +100,11 @@ def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, chosen
     `figures.cells`. The border of the cell `chosen` is thick."""
     index = index.reshape(x.shape)
     edge = np.zeros(index.shape, dtype=bool)
-    for along in (index, index.T):
-        side = edge if along is index else edge.T
-        differs = along[1:] != along[:-1]
-        side[1:] |= differs
-        side[:-1] |= differs
+    beside, above = index[:, 1:] != index[:, :-1], index[1:] != index[:-1]
+    edge[:, 1:] |= beside
+    edge[:, :-1] |= beside
+    edge[1:] |= above
+    edge[:-1] |= above
     picture = edge[..., None] * np.array(mpl.colors.to_rgba(BORDER))
     if chosen is not None:
         inside = index == chosen

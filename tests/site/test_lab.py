@@ -1,10 +1,9 @@
-"""JupyterLab with a kernel: notebook 02 runs from top to bottom, and the slider of `explorer.replay` moves its picture.
+"""JupyterLab with a kernel: notebook 02 runs from top to bottom, its controls answer, and it can be opened again.
 
-What the second needs of `vsp/explorer.py`: an ipywidgets IntSlider whose description begins with "iteration", and an
-<img> in the same output whose source changes with it.
+What this needs of `vsp/explorer.py`: the labels of its controls, and an <img> below them.
 """
 
-import importlib.util
+import json
 import os
 import shutil
 import socket
@@ -18,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOK, TOKEN = "02_distillation.ipynb", "vsp"
-SLIDER = ".jp-OutputArea-child:has(.widget-label:text-matches('^iteration'))"
+GONE = "Error displaying widget"  # what JupyterLab says of a widget without a kernel
 UNDER_A_BUSY_MACHINE = 300_000  # ms
 
 
@@ -90,20 +89,131 @@ def test_every_cell_of_a_notebook_runs(notebook):
     assert sum("<figure>" in "".join(output.get("data", {}).get("text/html", "")) for output in _outputs(notebook)) >= 6
 
 
-@pytest.mark.skipif(not importlib.util.find_spec("vsp.explorer"), reason="there is no vsp/explorer.py yet")
-def test_the_slider_of_the_replay_changes_the_picture(notebook):
+def _below(page, place):
+    """The first such place, which is drawn when one scrolls there."""
+    for _ in range(200):
+        if page.locator(place).count():
+            page.locator(place).first.scroll_into_view_if_needed()
+            return page.locator(place).first
+        page.mouse.move(900, 500)
+        page.mouse.wheel(0, 400)
+        page.wait_for_timeout(100)
+    raise AssertionError(f"nothing here is {place}")
+
+
+class Controls:
+    """What `vsp/explorer.py` shows in a notebook."""
+
+    def __init__(self, page, label):
+        self.page = page
+        self.all = _below(page, f".vsp-controls:has(.widget-label:text-is('{label}'))")
+        self.picture = self.all.locator("img")
+
+    def slider(self, label):
+        return self.all.locator(f".widget-slider:has(.widget-label:text-is('{label}'))").get_by_role("slider")
+
+    def press(self, slider, *keys):
+        """Returns how far the slider went; another picture is there by then."""
+        before, at = self.picture.get_attribute("src"), float(slider.get_attribute("aria-valuenow"))
+        slider.focus()
+        for key in keys:
+            self.page.keyboard.press(key)
+        self.expect_another(before)
+        return float(slider.get_attribute("aria-valuenow")) - at
+
+    def expect_another(self, before):
+        _expect(self.picture).not_to_have_attribute("src", before, timeout=60_000)
+        assert self.picture.evaluate("image => image.decode().then(() => image.naturalWidth)") > 0
+
+    def expect_text(self, text):
+        _expect(self.all).to_contain_text(text, timeout=60_000)
+
+
+def _expect(place):
     from playwright.sync_api import expect
 
-    output = notebook.locator(SLIDER).first
-    while not output.count():  # cells out of view are drawn when one scrolls there
-        notebook.mouse.move(700, 500)
-        notebook.mouse.wheel(0, 600)
-        notebook.wait_for_timeout(200)
-    picture, handle = output.locator("img").first, output.get_by_role("slider").first
-    before, at = picture.get_attribute("src"), float(handle.get_attribute("aria-valuenow"))
-    handle.focus()
-    for _ in range(3):
-        notebook.keyboard.press("PageUp")
-    expect(picture).not_to_have_attribute("src", before, timeout=60_000)
-    assert float(handle.get_attribute("aria-valuenow")) > at
-    assert picture.evaluate("image => image.decode().then(() => image.naturalWidth)") > 0
+    return expect(place)
+
+
+@pytest.fixture(scope="module")
+def replay(notebook):
+    return Controls(notebook, "iteration n")
+
+
+@pytest.fixture(scope="module")
+def laboratory(notebook, replay):  # further down
+    return Controls(notebook, "min_pol_distance")
+
+
+def test_the_slider_of_the_replay_changes_the_picture(replay):
+    assert replay.press(replay.slider("iteration n"), "PageUp", "PageUp", "PageUp") > 0
+    assert replay.press(replay.slider("iteration n"), "Home") < 0
+
+
+def test_a_state_is_chosen_in_small_steps(replay):
+    replay.expect_text("x = 0.700, y = 0.700")
+    replay.press(replay.slider("state: x"), "ArrowLeft")
+    replay.expect_text("x = 0.690, y = 0.700")
+
+
+def test_the_buttons_go_from_change_to_change_while_there_is_one(replay):
+    back, on = (replay.all.get_by_role("button", name=f"{way} change") for way in ("previous", "next"))
+    _expect(back).to_be_disabled()
+    for _ in range(2):
+        before = replay.picture.get_attribute("src")
+        on.click()
+        replay.expect_another(before)
+    back.click()
+    _expect(back).to_be_disabled()  # at the first
+
+
+def test_the_player_comes_to_the_end(replay):
+    button, slider = replay.all.locator(".widget-play button").first, replay.slider("iteration n")
+    _expect(replay.all.get_by_text("play the run", exact=True)).to_be_visible()
+    replay.press(slider, "End")
+    last = float(slider.get_attribute("aria-valuenow"))
+    assert replay.press(slider, "PageDown", "PageDown") < 0
+    button.click()
+    _expect(slider).to_have_attribute("aria-valuenow", f"{last}", timeout=60_000)
+    replay.expect_text(f"After iteration {last:.0f} (0 to {last:.0f})")
+
+
+@pytest.mark.parametrize("label", ["iteration n", "min_pol_distance"])
+def test_controls_words_and_picture_are_in_view_together(notebook, laboratory, label):
+    shown = Controls(notebook, label)
+    for width in (1400, 1024):
+        notebook.set_viewport_size({"width": width, "height": 1000})
+        notebook.wait_for_timeout(500)
+        whole, room = (place.bounding_box() for place in (shown.all, notebook.locator(".jp-WindowedPanel-outer").first))
+        assert whole["height"] < room["height"] and whole["x"] + whole["width"] <= room["x"] + room["width"]
+        assert shown.picture.bounding_box()["width"] <= whole["width"]
+    notebook.set_viewport_size({"width": 1400, "height": 1000})
+
+
+def test_a_setting_of_the_laboratory_makes_a_trial_and_nothing_moves(laboratory):
+    laboratory.all.scroll_into_view_if_needed()
+    where, before = laboratory.picture.bounding_box(), laboratory.picture.get_attribute("src")
+    laboratory.all.get_by_label("sub-policy").select_option("constant")
+    laboratory.expect_text("distilling …")
+    laboratory.expect_another(before)
+    laboratory.expect_text("→ 4")
+    laboratory.expect_text("Change a setting")
+    assert laboratory.picture.bounding_box() == where
+    laboratory.all.get_by_role("button", name="back to trial 1").click()
+    laboratory.expect_text("→ 1")
+
+
+def test_the_strip_stands_in_for_the_controls_once_the_kernel_is_gone(lab, notebook, laboratory):
+    """While they live it is hidden; in a notebook that is opened again they are, and JupyterLab's word on them."""
+    assert [strip.is_visible() for strip in notebook.locator(".vsp-strip").all()] == [False, False]
+    notebook.evaluate("window.jupyterapp.commands.execute('docmanager:save')")
+    sessions = f"{lab}/api/sessions"
+    for session in json.load(urllib.request.urlopen(f"{sessions}?token={TOKEN}")):
+        end = urllib.request.Request(f"{sessions}/{session['id']}?token={TOKEN}", method="DELETE")
+        urllib.request.urlopen(end)
+    notebook.goto(f"{lab}/lab/tree/{NOTEBOOK}?token={TOKEN}&reset")
+    for place in (_below(notebook, ".vsp-strip"), _below(notebook, ".vsp-strip >> nth=1")):
+        _expect(place.locator("img")).to_have_count(3)
+        _expect(place.locator("img").first).to_be_visible()
+    notebook.get_by_text(GONE).nth(1).wait_for(state="attached")
+    assert [word.is_visible() for word in notebook.get_by_text(GONE).all()] == [False, False]
