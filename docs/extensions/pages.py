@@ -12,7 +12,8 @@ _MAP = re.compile(rb"\n?(//# |/\*# )sourceMappingURL=[^\n*]*( \*/|\*/)?")
 
 def _describe(app, pagename, templatename, context, doctree):
     """The first paragraph with something in it, as the page's description."""
-    texts = [node.astext() for node in doctree.findall(nodes.paragraph)] if doctree else []
+    found = doctree.findall(nodes.paragraph) if doctree else ()
+    texts = (node.astext() for node in found if isinstance(node.parent, nodes.section))
     text = next((text for text in texts if len(text) > 60), f"{app.config.html_title}: {pagename}")
     text = html.escape(textwrap.shorten(text, 200, placeholder=" …"))
     context["metatags"] = context.get("metatags", "") + f'\n<meta name="description" content="{text}" />'

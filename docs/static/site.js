@@ -5,3 +5,13 @@ addEventListener("beforeprint", () => {
   document.documentElement.dataset.theme = "light"
 })
 addEventListener("afterprint", () => { document.documentElement.dataset.theme = shown })
+
+// Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
+const mark = box => box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
+addEventListener("load", () => {
+  const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
+  for (const box of document.querySelectorAll("article :is(pre, .pst-scrollable-table-container, div.math)")) {
+    sizes.observe(box)
+    box.addEventListener("scroll", () => mark(box), {passive: true})
+  }
+})
