@@ -1,4 +1,4 @@
-"""Pictures and tables made fit for a page: small files of known size, tables that scroll and name their headers, MathML."""
+"""Pictures and tables fit for a page: small files of known size; tables that scroll and name their headers; MathML."""
 
 import base64
 import hashlib

@@ -20,7 +20,7 @@ def _describe(app, pagename, templatename, context, doctree):
 
 
 def _thin(app, error):
-    """Remove maps of the theme's scripts for its developers, and the names of the maps, which a browser would ask for."""
+    """Remove maps of the theme's scripts, for its developers, and their names, which a browser would ask for."""
     static = app.outdir / "_static"
     for path in [path for pattern in _UNUSED for path in static.rglob(pattern)]:
         path.unlink()

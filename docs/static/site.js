@@ -15,3 +15,6 @@ addEventListener("load", () => {
     box.addEventListener("scroll", () => mark(box), {passive: true})
   }
 })
+
+// A letter by itself, as of L∞, would find every name that has it somewhere. (Sphinx's search takes this for its own.)
+var splitQuery = query => query.split(/[^\p{Letter}\p{Number}_]+/u).filter(term => term.length > 1)

@@ -92,7 +92,8 @@ def test_it_says_in_a_sentence_what_it_is_about(opened, page):
 
 def test_captions_are_set_as_text(page):
     styles = page.evaluate(
-        "[...document.querySelectorAll('figcaption')].map(c => getComputedStyle(c)).map(s => [s.textAlign, s.fontWeight])"
+        "[...document.querySelectorAll('figcaption')].map(c => getComputedStyle(c))"
+        ".map(s => [s.textAlign, s.fontWeight])"
     )
     assert all(style == ["left", "400"] for style in styles)
 
@@ -209,7 +210,7 @@ def test_mathematics_of_tables_is_mathml(start, address):
 def test_numbers_of_the_text_stand_under_each_other(start, address):
     start.goto(address + "results.html")
     aligned = "getComputedStyle([...document.querySelectorAll('article td')].find(c => c.innerText == '%s')).textAlign"
-    assert [start.evaluate(aligned % text) for text in ("16.599", "SimpleGoal, mean return")] == ["right", "left"]
+    assert [start.evaluate(aligned % text) for text in ("16.599", "SimpleGoal, mean return")] == ["right", "start"]
 
 
 @pytest.mark.parametrize("name", ["index.html", "notebooks/06_beyond.html", "api/method.html"])
@@ -266,8 +267,10 @@ def test_without_a_script_a_page_is_light_on_a_dark_system_too(browser, address)
     def colours(**context):
         page = browser.new_context(**context).new_page()
         page.goto(address + "use.html")
-        looks = "[document.body, ...document.querySelectorAll('pre, pre *')].map(e => getComputedStyle(e)).map(s => [s.color, s.backgroundColor])"
-        found = page.evaluate(looks)
+        found = page.evaluate("""[document.body, ...document.querySelectorAll('pre, pre *')].map(element => {
+            const style = getComputedStyle(element)
+            return [style.color, style.backgroundColor]
+        })""")
         page.context.close()
         return found
 
@@ -275,9 +278,14 @@ def test_without_a_script_a_page_is_light_on_a_dark_system_too(browser, address)
 
 
 def test_a_search_quotes_the_text_and_no_list_of_headings(start, address):
-    start.goto(address + "search.html?q=ledger")
+    start.goto(address + "search.html?q=codeword")
     start.wait_for_function("document.querySelectorAll('#search-results p.context').length > 5")
     assert not any("On this page" in text for text in start.locator("#search-results p.context").all_inner_texts())
+
+
+def test_a_search_for_one_letter_does_not_find_every_name(start, address):
+    start.goto(address + "search.html?q=L∞")
+    start.wait_for_selector(".search-summary:has-text('did not match')")
 
 
 def test_a_search_for_merge_finds_the_distillation(start):
