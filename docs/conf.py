@@ -9,7 +9,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 project = "vsp"
 author = "the vsp authors"
 language = "en"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "mathematics", "outputs", "docstrings"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "mathematics", "outputs", "docstrings", "pages"]
 exclude_patterns = ["README.md"]  # its parts are included in the pages
 
 # Notebooks: shown as they were executed
@@ -34,11 +34,13 @@ html_title = "Voronoi state partitioning"
 html_favicon = html_logo = "static/logo.svg"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
+templates_path = ["templates"]
 html_math_renderer = "mathml"
 html_copy_source = True  # for the button that downloads a notebook
 html_last_updated_fmt = None  # the same bytes on every day
 html_show_copyright = False
-html_context = {"default_mode": "auto"}  # light or dark, as the reader's system says
+html_context = {"default_mode": "light"}  # without a script; else as the reader's system says: templates/layout.html
 html_use_index = html_domain_indices = False  # the search finds names
 html_theme_options = {
     "logo": {"text": html_title, "alt_text": ""},  # the words beside the logo say the same

@@ -1,47 +1,76 @@
-"""What notebooks put out, made fit for a page: pictures as files, tables that scroll and name their headers, MathML."""
+"""Pictures and tables fit for a page: small files of known size; tables that scroll and name their headers; MathML."""
 
 import base64
 import hashlib
 import html
+import io
 import re
 from itertools import zip_longest
+from pathlib import Path
 
 from bs4 import BeautifulSoup
 from docutils import nodes
 from mathematics import mathml
+from PIL import Image
 
-_IMAGE = re.compile(r"data:image/(png|gif);base64,([A-Za-z0-9+/=\s]+)")
+_IMAGE = re.compile(r"data:image/(?:png|gif);base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
 _NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?|nan|NaN|inf|True|False|[–—]|")
 
 
 def _outputs(app, doctree, docname):
-    """Rewrite the HTML of every output of `docname`."""
+    """Rewrite the HTML of every output of `docname`, and the pictures and tables of its text."""
     top = "../" * docname.count("/")
     for node in doctree.findall(nodes.raw):
         if node.get("format") == "html" and re.search(r"<(table|figure|picture|pre)\b", node.astext()):
-            text = _IMAGE.sub(lambda found: top + _save(app, *found.groups()), node.astext())
-            node.replace_self(nodes.raw("", _improve(text), format="html", classes=node["classes"]))
+            text = _improve(node.astext(), app.outdir, top)
+            node.replace_self(nodes.raw("", text, format="html", classes=node["classes"]))
+    for node in list(doctree.findall(nodes.image)):
+        if Path(node["uri"]).suffix in (".png", ".gif"):
+            soup = BeautifulSoup(f'<img alt="{html.escape(node["alt"])}">', "html.parser")
+            _picture(soup.img, (app.srcdir / node["uri"]).read_bytes(), app.outdir, top)
+            node.replace_self(nodes.raw("", str(soup), format="html"))
+    for table in doctree.findall(nodes.table):
+        _align_text(table)
 
 
-def _save(app, kind: str, data: str) -> str:
-    """Write a picture that was part of the page to a file, which a browser loads when it comes into view."""
-    image = base64.b64decode(data)
-    name = f"_images/{hashlib.sha256(image).hexdigest()[:16]}.{kind}"
-    (app.outdir / "_images").mkdir(parents=True, exist_ok=True)
-    (app.outdir / name).write_bytes(image)
-    return name
-
-
-def _improve(text: str) -> str:
+def _improve(text: str, folder: Path = None, top: str = "") -> str:
+    """HTML of an output for a page that is `top` below `folder`, which takes the pictures."""
     soup = BeautifulSoup(text, "html.parser")
     for style in soup.find_all("style"):  # pandas' and Pygments' own; the site has one style
         style.decompose()
-    for image in soup.find_all("img"):
-        image["loading"] = "lazy"
+    for tag in soup.find_all(["img", "source"]):
+        if found := _IMAGE.fullmatch(tag.get("src") or tag.get("srcset") or ""):
+            _picture(tag, base64.b64decode(found[1]), folder, top)
     for table in soup.find_all("table"):
         _table(soup, table)
     return str(soup)
+
+
+def _picture(tag, image: bytes, folder: Path, top: str) -> None:
+    """Let `tag` show a file that loads when it comes into view, has its room before, and is a link to its full size."""
+    name = top + _save(folder, image)
+    if tag.name == "source":  # another picture in the same room
+        tag["srcset"] = name
+        return
+    width, height = Image.open(io.BytesIO(image)).size
+    shown = int(tag.get("width", width))
+    tag.attrs |= {"src": name, "width": shown, "height": round(shown * height / width), "loading": "lazy"}
+    link = BeautifulSoup("", "html.parser").new_tag("a", href=name, attrs={"class": "full-size"})
+    (tag.find_parent("picture") or tag).wrap(link)
+
+
+def _save(folder: Path, image: bytes) -> str:
+    """Write a picture to a file named by its content, once: one that stands still as WebP, the same pixels in less."""
+    kind = "gif"
+    if not image.startswith(b"GIF"):
+        kind, file = "webp", io.BytesIO()
+        Image.open(io.BytesIO(image)).save(file, "WEBP", lossless=True)
+        image = file.getvalue()
+    name = f"_images/{hashlib.sha256(image).hexdigest()[:16]}.{kind}"
+    (folder / "_images").mkdir(parents=True, exist_ok=True)
+    (folder / name).write_bytes(image)
+    return name
 
 
 def _table(soup: BeautifulSoup, table) -> None:
@@ -77,11 +106,24 @@ def _align(table) -> None:
         table["class"] = [*table.get("class", []), "wide"]  # printed smaller
     for column in columns:
         values = [cell.get_text(strip=True) for cell in column if cell is not None and cell.find_parent("tbody")]
-        kind = "number" if values and all(map(_NUMBER.fullmatch, values)) else None
-        if not kind and max(map(len, values), default=0) > 20:
-            kind = "words"  # which need some room
+        kind = _kind(values)
         for cell in filter(None, column) if kind else ():
             cell["class"] = kind
+
+
+def _align_text(table: nodes.table) -> None:
+    """The same for a table of the text."""
+    for column in zip(*(row.findall(nodes.entry) for row in table.findall(nodes.row))):
+        if kind := _kind([entry.astext() for entry in column[1:]]):
+            for entry in column:
+                entry["classes"].append(kind)
+
+
+def _kind(values: list[str]) -> str | None:
+    """What a column of `values` holds, if it is to be told from others: numbers, or words, which need some room."""
+    if values and all(map(_NUMBER.fullmatch, values)):
+        return "number"
+    return "words" if max(map(len, values), default=0) > 20 else None
 
 
 def setup(app):

@@ -2,11 +2,13 @@
 
 import base64
 import importlib
+import io
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from PIL import Image
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "docs" / "extensions"))
 TABLE = """<style scoped>td { color: red }</style><table border="1" class="dataframe"><thead>
@@ -45,12 +47,46 @@ def test_dollars_in_a_table_become_mathml_and_styles_go(outputs):
     assert "style" not in text and "border" not in text
 
 
-def test_a_picture_becomes_a_file_named_by_its_content(outputs, tmp_path):
-    app = SimpleNamespace(outdir=tmp_path)
-    name = outputs._save(app, "png", base64.b64encode(b"picture").decode())
-    assert (tmp_path / name).read_bytes() == b"picture"
-    assert name == outputs._save(app, "png", base64.b64encode(b"picture").decode())
-    assert name != outputs._save(app, "png", base64.b64encode(b"another").decode())
+@pytest.fixture
+def picture():
+    """A PNG of 40 by 20 pixels, no two alike."""
+    file = io.BytesIO()
+    pixels = np.arange(40 * 20 * 3, dtype=np.uint16).view(np.uint8)[: 40 * 20 * 3].reshape(20, 40, 3)
+    Image.fromarray(pixels).save(file, "PNG")
+    return file.getvalue()
+
+
+def test_a_picture_becomes_a_file_with_the_same_pixels_named_by_its_content(outputs, tmp_path, picture):
+    name = outputs._save(tmp_path, picture)
+    with Image.open(tmp_path / name) as saved, Image.open(io.BytesIO(picture)) as drawn:
+        assert saved.format == "WEBP"
+        np.testing.assert_array_equal(np.asarray(saved.convert("RGB")), np.asarray(drawn))
+    assert name == outputs._save(tmp_path, picture)
+    assert outputs._save(tmp_path, b"GIF89a, moving") != name
+    assert sorted(path.suffix for path in tmp_path.rglob("*.*")) == [".gif", ".webp"]
+
+
+def test_a_picture_keeps_its_width_and_gets_its_height_and_a_link(outputs, tmp_path, picture):
+    data = f"data:image/png;base64,{base64.b64encode(picture).decode()}"
+    text = f'<figure><picture><source srcset="{data}"><img width="100" alt="x" src="{data}"></picture></figure>'
+    image = outputs.BeautifulSoup(outputs._improve(text, tmp_path, "../"), "html.parser").img
+    assert (image["width"], image["height"], image["loading"]) == ("100", "50", "lazy")
+    link = image.find_parent("a")
+    assert link["href"] == image["src"] == link.picture.source["srcset"] and link["href"].startswith("../_images/")
+
+
+def test_a_table_of_the_text_has_its_numbers_to_the_right(outputs):
+    from docutils import nodes
+
+    rows = [("task", "mean"), ("A", "-1.5"), ("B", "12 %")]
+    table = nodes.table("", *(nodes.row("", *(nodes.entry("", nodes.paragraph("", c)) for c in row)) for row in rows))
+    outputs._align_text(table)
+    assert [entry.astext() for entry in table.findall(nodes.entry) if entry["classes"]] == ["mean", "-1.5", "12 %"]
+
+
+def test_every_block_of_the_readme_says_its_language():
+    lines = (Path(__file__).resolve().parents[2] / "README.md").read_text("utf-8").split("\n")
+    assert "```" not in [line for line in lines if line.startswith("```")][::2]
 
 
 def test_no_sign_of_a_docstring_is_taken_for_markup_but_a_backtick(docstrings):

@@ -1,6 +1,9 @@
 """Every page of the site: it is whole, asks nobody else, and can be read by everyone, on paper and on a phone."""
 
+import io
 import os
+import re
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -26,8 +29,21 @@ def opened(request, browser, address):
 @pytest.fixture
 def page(opened):
     yield opened.page
-    opened.page.emulate_media(media="screen", color_scheme="light")
+    opened.page.emulate_media(media="null", color_scheme="light")
     opened.page.set_viewport_size(DESK)
+
+
+@pytest.fixture
+def printed(page):
+    """What a printer gets of a page on a light or a dark system: a list of pages of A4."""
+    from pypdf import PdfReader
+
+    def paper(scheme: str) -> list:
+        page.emulate_media(color_scheme=scheme)
+        page.wait_for_function(f"document.documentElement.dataset.theme == '{scheme}'")
+        return PdfReader(io.BytesIO(page.pdf(format="A4"))).pages
+
+    return paper
 
 
 @pytest.fixture
@@ -55,6 +71,40 @@ def test_every_picture_is_there_and_says_what_it_shows(page):
     )
     assert [p["src"] for p in pictures if not p["wide"]] == []
     assert [p["src"] for p in pictures if p["alt"] is None or (p["shown"] and len(p["alt"]) < 20)] == []
+
+
+def test_every_picture_has_its_room_before_it_is_there_and_leads_to_its_full_size(page):
+    pictures = page.evaluate(
+        "[...document.querySelectorAll('article img')].map(i => ({src: i.src, shape: [i.width, i.height],"
+        " rooms: i.getAttribute('height') / i.getAttribute('width'), ratio: i.naturalHeight / i.naturalWidth,"
+        " link: i.closest('a')?.href}))"
+    )
+    assert [p for p in pictures if abs(p["rooms"] - p["ratio"]) > 0.01 or p["link"] != p["src"]] == []
+    assert page.evaluate("document.body.innerHTML.includes('data:image')") is False
+
+
+def test_it_says_in_a_sentence_what_it_is_about(opened, page):
+    text = page.locator("meta[name=description]").get_attribute("content")
+    assert 30 < len(text) <= 200
+    others = [name for name in NAMES if name != opened.name]
+    assert not any(f'content="{text}"' in (SITE / name).read_text("utf-8") for name in others)
+
+
+def test_captions_are_set_as_text(page):
+    styles = page.evaluate(
+        "[...document.querySelectorAll('figcaption')].map(c => getComputedStyle(c))"
+        ".map(s => [s.textAlign, s.fontWeight])"
+    )
+    assert all(style == ["left", "400"] for style in styles)
+
+
+def test_no_dollar_is_left_outside_of_code(page):
+    text = page.evaluate("""[...document.querySelectorAll('article')].map(article => {
+        const copy = article.cloneNode(true)
+        copy.querySelectorAll('pre, code').forEach(code => code.remove())
+        return copy.textContent
+    }).join()""")
+    assert re.findall(r".{20}\$.{20}", text) == []
 
 
 def test_headings_descend_in_order_below_one_title(page):
@@ -92,6 +142,23 @@ def test_a_phone_shows_it_without_scrolling_sideways(page):
         return element.getBoundingClientRect().right > innerWidth + 1 && !cut(element.parentElement)
     }).map(element => element.outerHTML.slice(0, 160))""")
     assert beyond == []
+    cut = "[...document.querySelectorAll('.prev-next-title')].filter(t => t.scrollWidth > t.clientWidth + 1)"
+    assert page.evaluate(cut + ".map(title => title.innerText)") == []
+    broken = (
+        "[...document.querySelectorAll('td code')].filter(c => /^\\w+$/.test(c.innerText) && c.getClientRects()[1])"
+    )
+    assert page.evaluate(broken + ".map(code => code.innerText)") == []
+
+
+def test_what_goes_on_beyond_the_edge_says_so(page):
+    page.set_viewport_size(PHONE)
+    boxes = "[...document.querySelectorAll('article :is(pre, .pst-scrollable-table-container)')]"
+    page.evaluate(f"{boxes}.forEach(box => {{ box.scrollLeft = 0 }})")
+    wide = f"{boxes}.filter(box => box.scrollWidth > box.clientWidth + 2)"
+    marked = "box => getComputedStyle(box).maskImage != 'none'"
+    page.wait_for_function(f"{wide}.every({marked}) && {boxes}.filter({marked}).length == {wide}.length")
+    page.evaluate(f"{boxes}.forEach(box => {{ box.scrollLeft = box.scrollWidth }})")
+    page.wait_for_function(f"!{boxes}.some({marked})")
 
 
 def test_paper_shows_the_text_whole_and_no_navigation(opened, page):
@@ -102,6 +169,25 @@ def test_paper_shows_the_text_whole_and_no_navigation(opened, page):
         assert page.locator("article").first.is_visible()
     right = page.evaluate("[...document.querySelectorAll('article table')].map(t => t.getBoundingClientRect().right)")
     assert all(edge <= PAPER["width"] for edge in right)
+    sizes = page.evaluate("[...document.querySelectorAll('article table')].map(t => getComputedStyle(t).fontSize)")
+    assert all(float(size.removesuffix("px")) >= 7 * 96 / 72 - 0.01 for size in sizes)  # 7 points
+
+
+def test_the_printer_gets_every_word_of_tables_and_code(page, printed):
+    words = page.evaluate(
+        "[...document.querySelectorAll('article :is(th, td, pre)')]"
+        ".filter(e => !e.closest('details:not([open])') && !e.querySelector('math'))"
+        ".flatMap(e => e.innerText.split(/\\s+/)).filter(word => word.length > 3)"
+    )
+    text = "".join(sheet.extract_text() for sheet in printed("light"))
+    text = re.sub(r"\s+", "", unicodedata.normalize("NFKC", text))  # some fonts join fi and the like
+    assert sorted({word for word in words if unicodedata.normalize("NFKC", word) not in text}) == []
+
+
+def test_a_dark_page_is_printed_as_the_light_one(page, printed):
+    light, dark = ([sheet.get_contents().get_data() for sheet in printed(scheme)] for scheme in ("light", "dark"))
+    assert light == dark
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"  # and is dark again
 
 
 def test_links_within_the_site_lead_somewhere(page, address):
@@ -116,10 +202,90 @@ def test_links_within_the_site_lead_somewhere(page, address):
     assert missing == []
 
 
-def test_mathematics_is_mathml_and_no_dollar_is_left(start, address):
+def test_mathematics_of_tables_is_mathml(start, address):
     start.goto(address + "notebooks/04_appendix_tables.html")
     assert start.locator("article table math").count() > 200
-    assert "$" not in "".join(start.locator("article table").all_inner_texts())
+
+
+def test_numbers_of_the_text_stand_under_each_other(start, address):
+    start.goto(address + "results.html")
+    aligned = "getComputedStyle([...document.querySelectorAll('article td')].find(c => c.innerText == '%s')).textAlign"
+    assert [start.evaluate(aligned % text) for text in ("16.599", "SimpleGoal, mean return")] == ["right", "start"]
+
+
+@pytest.mark.parametrize("name", ["index.html", "notebooks/06_beyond.html", "api/method.html"])
+def test_nothing_moves_while_it_loads_and_little_comes_along(browser, address, name):
+    page, got = browser.new_context(viewport=DESK).new_page(), []
+    page.on("response", lambda response: got.append((response.url, int(response.headers.get("content-length", 0)))))
+    page.goto(address + name, wait_until="networkidle")
+    moved = page.evaluate("""new Promise(done => new PerformanceObserver(list => done(
+        list.getEntries().reduce((sum, entry) => sum + entry.value, 0))).observe({type: 'layout-shift', buffered: true})
+        || setTimeout(() => done(0), 500))""")
+    page.context.close()
+    assert moved < 0.05
+    assert sum(size for url, size in got if re.search(r"\.(js|css|woff2)\b", url)) < 1_000_000
+
+
+def test_nothing_is_shipped_that_no_page_asks_for():
+    assert [path.name for path in SITE.rglob("*") if path.name == "fontawesome.js" or path.suffix == ".map"] == []
+    assert not any(b"sourceMappingURL" in path.read_bytes() for path in SITE.rglob("*.js"))
+    pictures = [path.read_bytes() for path in (SITE / "_images").iterdir()]
+    assert len(set(pictures)) == len(pictures)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("name", ["index.html", "notebooks/02_distillation.html"])
+def test_the_place_of_the_keyboard_is_seen_at_every_stop(browser, address, name, scheme):
+    one = Visit(browser, address, name, viewport=DESK, color_scheme=scheme, reduced_motion="reduce")
+    unseen, stops = [], 0
+    while one.page.keyboard.press("Tab") or one.page.evaluate("document.activeElement != document.body"):
+        stops += 1
+        with_it, without = one.page.evaluate("""() => {
+            const stop = document.activeElement, looks = () => [stop, ...stop.querySelectorAll('*')].map(part => {
+                const style = getComputedStyle(part)
+                return [style.outlineStyle != 'none' && parseInt(style.outlineWidth) > 1, style.boxShadow].join()
+            }).join()
+            const before = looks()
+            stop.blur()
+            const after = looks()
+            stop.focus({focusVisible: true})
+            return [before, after]
+        }""")
+        if with_it == without:
+            unseen.append(one.page.evaluate("document.activeElement.outerHTML.slice(0, 160)"))
+    one.close()
+    assert unseen == [] and stops > 30
+
+
+def test_the_skip_link_leads_past_the_buttons(start):
+    for key in ("Tab", "Enter", "Tab"):
+        start.keyboard.press(key)
+    assert start.evaluate("!!document.activeElement.closest('article')")
+
+
+def test_without_a_script_a_page_is_light_on_a_dark_system_too(browser, address):
+    def colours(**context):
+        page = browser.new_context(**context).new_page()
+        page.goto(address + "use.html")
+        found = page.evaluate("""[document.body, ...document.querySelectorAll('pre, pre *')].map(element => {
+            const style = getComputedStyle(element)
+            return [style.color, style.backgroundColor]
+        })""")
+        page.context.close()
+        return found
+
+    assert colours(color_scheme="dark", java_script_enabled=False) == colours(color_scheme="light")
+
+
+def test_a_search_quotes_the_text_and_no_list_of_headings(start, address):
+    start.goto(address + "search.html?q=codeword")
+    start.wait_for_function("document.querySelectorAll('#search-results p.context').length > 5")
+    assert not any("On this page" in text for text in start.locator("#search-results p.context").all_inner_texts())
+
+
+def test_a_search_for_one_letter_does_not_find_every_name(start, address):
+    start.goto(address + "search.html?q=L∞")
+    start.wait_for_selector(".search-summary:has-text('did not match')")
 
 
 def test_a_search_for_merge_finds_the_distillation(start):

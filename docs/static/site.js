@@ -1,0 +1,20 @@
+// Paper is white: a dark page is printed as the light one.
+let shown
+addEventListener("beforeprint", () => {
+  shown = document.documentElement.dataset.theme
+  document.documentElement.dataset.theme = "light"
+})
+addEventListener("afterprint", () => { document.documentElement.dataset.theme = shown })
+
+// Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
+const mark = box => box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
+addEventListener("load", () => {
+  const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
+  for (const box of document.querySelectorAll("article :is(pre, .pst-scrollable-table-container, div.math)")) {
+    sizes.observe(box)
+    box.addEventListener("scroll", () => mark(box), {passive: true})
+  }
+})
+
+// A letter by itself, as of L∞, would find every name that has it somewhere. (Sphinx's search takes this for its own.)
+var splitQuery = query => query.split(/[^\p{Letter}\p{Number}_]+/u).filter(term => term.length > 1)
