@@ -86,7 +86,7 @@ def test_what_is_found_without_a_teacher_is_that_of_the_table():
 
 def test_the_printed_policy_is_that_of_the_table():
     table = (ROOT / "figures" / "tables" / "beyond_pendulum_policy.csv").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```\n(Pendulum-v1: .*?)```", README, flags=re.S)
+    (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", README, flags=re.S)
     cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
     assert len(cells) == len(table.splitlines()) - 1
     for row, (codeword, equation) in zip(table.splitlines()[1:], cells):
