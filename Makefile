@@ -165,7 +165,7 @@ site: venv-site ## the companion as pages for a browser, into build/site/: about
 	  "$(SITE)-work/source" "$(SITE)-work/pages"
 	@rm -rf "$(SITE)"; mv "$(SITE)-work/pages" "$(SITE)"; rm -r "$(SITE)-work"; echo "made: open $(SITE)/index.html"
 
-test-site: site ## looks at the site and at JupyterLab in a browser, which needs Chromium: about 4 minutes
+test-site: site ## looks at the site and at JupyterLab in a browser, which needs Chromium: about 6 minutes
 	@SITE="$(SITE)" MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/site
 
 # Set-up
