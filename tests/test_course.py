@@ -518,11 +518,6 @@ def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
     assert not any("execution" in cell.metadata for cell in made.cells)
 
 
-def test_a_page_gives_no_prediction_away():
-    spoiler = nbformat.v4.new_code_cell("2 + 3", metadata={"tags": ["spoiler"]})
-    assert [len(cell.outputs) for cell in pages.page(small_lesson(spoiler)).cells] == [1, 0, 0, 0]
-
-
 def test_a_page_must_not_need_an_answer():
     with pytest.raises(RuntimeError, match="needs-x.*name 'x'"):
         pages.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))

@@ -2,8 +2,7 @@
 
     python -m vsp.course.pages --out .
 
-A copy is run as it is handed out. Where an exercise is unsolved, in its check, and in cells tagged `spoiler`, whose
-results are to be predicted, there is nothing to see.
+A copy is run as it is handed out. Where an exercise is unsolved, and in its check, there is nothing to see.
 """
 
 from __future__ import annotations
@@ -47,10 +46,10 @@ def page(lesson: NotebookNode) -> NotebookNode:
         cell.metadata.pop("execution", None)  # times
         cell.execution_count = number
         errors = [output.evalue for output in cell.outputs if output.output_type == "error"]
-        if errors and not (is_solution(cell) or is_check(cell)):
-            raise RuntimeError(f"cell {cell.id} fails where no exercise is solved: {errors[0]}")
-        if is_solution(cell) or is_check(cell) or "spoiler" in cell.metadata.get("tags", []):
+        if is_solution(cell) or is_check(cell):
             cell.outputs = []
+        elif errors:
+            raise RuntimeError(f"cell {cell.id} fails where no exercise is solved: {errors[0]}")
         cell.outputs = clean_outputs(cell.outputs, number)
     lesson.metadata.pop("widgets", None)
     lesson.metadata.language_info = {"name": "python"}
