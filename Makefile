@@ -57,7 +57,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench clean course lock lock-site venv new-venv venv-site site test-site begin $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site begin $(NOTEBOOKS)
 .NOTPARALLEL: # `runs` uses every core by itself
 
 help: ## this list
@@ -113,8 +113,11 @@ lab: venv ## opens JupyterLab on the notebooks
 test: venv ## runs the tests, several at a time: 2 to 4 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
-bench: venv ## measures speed: about 5 s
-	@MPLBACKEND=Agg $(PY) -m pytest -q tests/benchmarks.py
+bench: venv ## measures speed and scale, into data/results/trust.csv
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(OUT)/data/results/trust.csv"
+
+torture: venv ## breaks it in every way we know, into data/results/trust.csv: HOURS
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/torture --record "$(OUT)/data/results/trust.csv"
 
 clean: ## removes build/ (but build/course, where somebody may have written) and data/runs/: at once
 	@test ! -d "$(OUT)/build" || find "$(OUT)/build" -mindepth 1 -maxdepth 1 ! -name course -exec rm -rf {} +

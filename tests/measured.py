@@ -1,0 +1,36 @@
+"""The figures that `make bench` and `make torture` measure, in one table: data/results/trust.csv."""
+
+import os
+import platform
+from pathlib import Path
+
+import pandas as pd
+
+COLUMNS = ["table", "what", "to hold", "measured", "held", "machine"]
+
+
+def machine() -> str:
+    """Processor, cores, memory and system of this machine, in words."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB, {platform.system()}"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return named[0] if named else platform.machine()
+
+
+def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: bool) -> None:
+    """Put one row into the CSV at `path`, in the place of the one with the same `table` and `what`."""
+    from vsp.store import write_text
+
+    row = dict(zip(COLUMNS, (table, what, to_hold, measured, "yes" if held else "no", machine())))
+    frame = pd.read_csv(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS)
+    same = (frame["table"] == table) & (frame["what"] == what)
+    place = frame.index[same][0] if same.any() else len(frame)
+    frame.loc[place] = row
+    write_text(path, frame.to_csv(index=False, lineterminator="\n"))
