@@ -26,8 +26,10 @@ READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous
   beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) data/results/beyond_LunarLanderContinuous-v3.policy
 
 OUT ?= .
+# How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN || echo 1)
 QUICK ?=
+DASK ?=
 PYTHON ?=
 
 ifeq ($(strip $(OUT)),)
@@ -57,11 +59,10 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site begin $(NOTEBOOKS)
-.NOTPARALLEL: # `runs` uses every core by itself
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site notebooks $(NOTEBOOKS)
 
 help: ## this list
-	@echo 'make TARGET [OUT=folder] [JOBS=processes] [PYTHON=/path/to/python3.11]'
+	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
 	@echo 'Times are for 2 cores; the first target also sets up .venv (about 2 minutes, and downloads).'
 	@echo
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  %-14s %s\n", $$1, $$2 }'
@@ -74,10 +75,15 @@ help: ## this list
 	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
-paper-figures: begin $(NOTEBOOKS) ## every figure and table of the paper, at the paper's scale: about 4 minutes
+paper-figures: venv ## every figure and table of the paper, at the paper's scale: about 3 minutes
+	@mkdir -p "$(STATE)"; : > "$(STATE)/made"
+	@$(MAKE) --no-print-directory -j $(JOBS) notebooks
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
 	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
+
+# The longest first, so that no core waits at the end.
+notebooks: runs 06_beyond $(NOTEBOOKS)
 
 quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 2 minutes
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
@@ -87,16 +93,16 @@ runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: a
 	state() { echo "$$inputs quick=$(QUICK)"; \
 	  (cd "$(OUT)/data/runs" && find . -type f | LC_ALL=C sort | xargs cksum 2>/dev/null); }; \
 	if ! state | cmp -s - "$(STATE)/runs"; then \
-	  $(PY) -m vsp.experiments --out "$(OUT)" --jobs $(JOBS) $(if $(QUICK),--quick) && state > "$(STATE)/runs"; fi
+	  $(PY) -m vsp.experiments --out "$(OUT)" --jobs $(or $(DASK),$(JOBS)) $(if $(QUICK),--quick) && state > "$(STATE)/runs"; fi
 
 study: venv ## the studies of the readings and of the teachers, into data/results/: about 15 minutes, resumable
-	$(PY) -m vsp.study --out "$(OUT)" --jobs $(JOBS)
+	$(PY) -m vsp.study --out "$(OUT)" --jobs $(or $(DASK),$(JOBS))
 
 beyond: venv ## our own method and others beside it, into data/results/: 1 to 1.5 HOURS, resumable
-	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(JOBS)
+	$(PY) -m vsp.beyond --out "$(OUT)" --jobs $(or $(DASK),$(JOBS))
 
 beyond-long: venv ## the same for LunarLander, whose physics engine is slow: 3 to 4 HOURS, resumable
-	$(PY) -m vsp.beyond --long --out "$(OUT)" --jobs $(JOBS)
+	$(PY) -m vsp.beyond --long --out "$(OUT)" --jobs $(or $(DASK),$(JOBS))
 
 lookup: venv ## times of look-ups and neighbour graphs in many dimensions, into data/results/: about 3 minutes
 	$(PY) -m vsp.lookup_study --out "$(OUT)"
@@ -125,9 +131,6 @@ clean: ## removes build/ (but build/course, where somebody may have written) and
 	@for d in figures data; do test ! -d "$(OUT)/$$d" || find "$(OUT)/$$d" -type f -name '.?*-????????.*' -delete; done
 
 # Notebooks
-
-begin:
-	@mkdir -p "$(STATE)"; : > "$(STATE)/made"
 
 # $(1): a notebook. Its state is what it reads, as found before the run, and what it makes, as found after.
 define notebook-rules

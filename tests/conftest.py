@@ -13,7 +13,9 @@ def pytest_addoption(parser):
     parser.addoption(
         "--remake-golden", action="store_true", help="write tests/golden/*.json anew from the present code"
     )
-    parser.addoption("--record", type=Path, help="the CSV that figures go into, see measured.py; else they are only shown")
+    parser.addoption(
+        "--record", type=Path, help="the CSV that figures go into, see measured.py; else they are only shown"
+    )
 
 
 @pytest.fixture

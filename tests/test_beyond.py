@@ -5,7 +5,7 @@ import pytest
 from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
 
 from vsp import beyond, comparison, measure, paper, store
-from vsp.beyond import ABLATION, METHODS, Job, jobs
+from vsp.beyond import ABLATION, METHODS, Job, jobs_of
 from vsp.config import Refinement, preset
 from vsp.envs import get_task
 from vsp.evaluate import start_states
@@ -37,7 +37,7 @@ def small(monkeypatch):
 
 @pytest.mark.parametrize("task", beyond.TASKS)
 def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
-    found = jobs(task)
+    found = jobs_of(task)
     assert len(set(found)) == len(found) == len({job.key for job in found})
     for name, method in METHODS.items():
         own = {(job.size, job.seed) for job in found if job.method == name}
@@ -50,7 +50,7 @@ def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
 
 
 def test_methods_that_know_one_task_are_not_asked_about_others():
-    own = {task: {job.method for job in jobs(task)} for task in beyond.TASKS}
+    own = {task: {job.method for job in jobs_of(task)} for task in beyond.TASKS}
     assert all(("the paper's method" in own[task]) == (task in paper.TASKS) for task in beyond.TASKS)
     assert [task for task in beyond.TASKS if "TD-AVQ" in own[task]] == [SIMPLEGOAL]
     assert [task for task in beyond.TASKS if "heuristic" in own[task]] == [PENDULUM]
@@ -60,10 +60,9 @@ def test_methods_that_know_one_task_are_not_asked_about_others():
 # Rows
 
 
-def test_a_row_holds_what_is_measured(small, tmp_path):
+def test_a_row_holds_what_is_measured(small):
     job = Job(SIMPLEGOAL, "CART", 3, 1)
-    beyond.make_row(job, tmp_path)
-    _, about = store.load(job.path(tmp_path), kind="Row")
+    about = beyond.make_row(job)
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
     policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
@@ -74,12 +73,12 @@ def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
     beyond.make_all(tmp_path, tasks=[SIMPLEGOAL])
     frame, seconds = beyond.rows(tmp_path, SIMPLEGOAL)
     assert len(frame) == 2 * 2 + 1 == len(seconds) and frame["method"].tolist() == ["CART"] * 4 + ["teacher"]
-    assert frame["key"].tolist() == [job.key for job in jobs(SIMPLEGOAL)] and (seconds["task"] == SIMPLEGOAL).all()
+    assert frame["key"].tolist() == [job.key for job in jobs_of(SIMPLEGOAL)] and (seconds["task"] == SIMPLEGOAL).all()
     made, original = [], beyond.make_row
-    small.setattr(beyond, "make_row", lambda job, folder: (made.append(job), original(job, folder)))
-    jobs(SIMPLEGOAL)[2].path(tmp_path).unlink()
+    small.setattr(beyond, "make_row", lambda job: (made.append(job), original(job))[1])
+    jobs_of(SIMPLEGOAL)[2].path(tmp_path).unlink()
     beyond.make_all(tmp_path, tasks=[SIMPLEGOAL])
-    assert made == [jobs(SIMPLEGOAL)[2]] and beyond.rows(tmp_path, SIMPLEGOAL)[0].equals(frame)
+    assert made == [jobs_of(SIMPLEGOAL)[2]] and beyond.rows(tmp_path, SIMPLEGOAL)[0].equals(frame)
 
 
 def test_other_settings_and_other_code_are_other_rows(small):

@@ -21,7 +21,6 @@ from vsp.experiments import (
     load_run,
     load_runs,
     make_all,
-    make_run,
     make_runs,
     paper_experiment,
     paper_runs,
@@ -92,9 +91,7 @@ def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monke
     (SMALL.folder(tmp_path / "runs") / "0001.run").unlink()
     times = {p: p.stat().st_mtime_ns for p in SMALL.folder(tmp_path / "runs").iterdir()}
     seeds, original = [], experiments.make_run
-    monkeypatch.setattr(
-        experiments, "make_run", lambda e, seed, folder: (seeds.append(seed), original(e, seed, folder))
-    )
+    monkeypatch.setattr(experiments, "make_run", lambda e, seed: (seeds.append(seed), original(e, seed))[1])
     make_runs(SMALL, range(3), runs=tmp_path / "runs")
     assert seeds == [1] and files(tmp_path / "runs") == files(made[0])
     assert all(path.stat().st_mtime_ns == time for path, time in times.items())
@@ -118,9 +115,7 @@ def test_runs_of_several_experiments_are_those_made_one_by_one(made, tmp_path, j
 def test_all_that_is_there_is_made_no_more(made, tmp_path, monkeypatch, capsys):
     shutil.copytree(made[0], tmp_path, dirs_exist_ok=True)
     asked, original = [], experiments.make_run
-    monkeypatch.setattr(
-        experiments, "make_run", lambda e, seed, folder: (asked.append((e, seed)), original(e, seed, folder))
-    )
+    monkeypatch.setattr(experiments, "make_run", lambda e, seed: (asked.append((e, seed)), original(e, seed))[1])
     make_all([(SMALL, 1), (SMALL, 2)], runs=tmp_path, label="a study")
     assert not asked and capsys.readouterr().err == ""
     make_all([(SMALL, 1), (OTHER, 1), (SMALL, 4)], runs=tmp_path, label="a study")
@@ -146,8 +141,8 @@ def test_an_interrupted_write_leaves_no_torn_run(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        make_run(SMALL, 0, tmp_path)
-    assert not list(tmp_path.glob("*.run")) and not list(tmp_path.iterdir())
+        make_runs(SMALL, [0], runs=tmp_path)
+    assert not files(tmp_path)
 
 
 def test_what_a_killed_writer_left_is_no_run(made, tmp_path):
@@ -245,10 +240,10 @@ def test_an_empty_folder_is_one_clear_error(tmp_path):
 def test_a_failing_run_writes_nothing_and_keeps_the_others(tmp_path, monkeypatch):
     original = experiments.make_run
 
-    def fails(experiment, seed, folder):
+    def fails(experiment, seed):
         if seed == 1:
             raise ValueError("the policy's actions hold nan")
-        original(experiment, seed, folder)
+        return original(experiment, seed)
 
     monkeypatch.setattr(experiments, "make_run", fails)
     with pytest.raises(ValueError, match="hold nan"):

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from . import methods, paper, store, tdavq
+from . import methods, paper, store, tdavq, workers
 from .config import Config, Refinement, preset
 from .envs import get_task
 from .evaluate import start_states
@@ -145,7 +145,7 @@ def _teacher(task: str) -> str:
     return load_teacher(task).digest
 
 
-def jobs(task: str) -> list[Job]:
+def jobs_of(task: str) -> list[Job]:
     """All rows of a task."""
     found, several = [], FEW_SEEDS if task in LONG else SEEDS
     for name, method in METHODS.items():
@@ -157,34 +157,28 @@ def jobs(task: str) -> list[Job]:
     return found + [Job(task, name, size, seed) for name in names for seed in several]
 
 
-def make_row(job: Job, folder: str | os.PathLike) -> None:
-    """Distil, play, and write the row."""
+def make_row(job: Job) -> dict:
+    """Distil and play: what the file of the row tells."""
     budget = Budget(load_teacher(job.task), get_task(job.task), preset(job.task, "best"))
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
     row = measure(policy, budget.teacher, budget.task)
-    store.save(job.path(folder), {}, {"kind": "Row", "job": asdict(job), "row": row, "seconds": seconds})
+    return {"kind": "Row", "job": asdict(job), "row": row, "seconds": seconds}
 
 
-def make_all(folder: str | os.PathLike, *, workers: int = 1, tasks=TASKS) -> None:
-    """Make the rows that are missing in `folder`."""
-    from joblib import Parallel, delayed, parallel_config
-
-    asked = [job for task in tasks for job in jobs(task)]
+def make_all(folder: str | os.PathLike, *, jobs: int | str = 1, tasks=TASKS) -> None:
+    """Make the rows that are missing in `folder`; `jobs` as in `workers`."""
+    asked = [job for task in tasks for job in jobs_of(task)]
     missing = [job for job in asked if not job.path(folder).exists()]
-    with parallel_config("loky", inner_max_num_threads=1):
-        finished = Parallel(n_jobs=workers, return_as="generator_unordered")(
-            delayed(make_row)(job, folder) for job in missing
-        )
-        done = len(asked) - len(missing)
-        for _ in progress(finished, "beyond", total=len(asked), unit="rows", done=done):
-            pass
+    finished = workers.results(make_row, [(job,) for job in missing], jobs=jobs)
+    for i, about in progress(finished, "beyond", total=len(asked), unit="rows", done=len(asked) - len(missing)):
+        store.save(missing[i].path(folder), {}, about)
 
 
 def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """What came out for `task`, one row per job, and how long each took."""
-    found = [(job, store.load(job.path(folder), kind="Row")[1]) for job in jobs(task)]
+    found = [(job, store.load(job.path(folder), kind="Row")[1]) for job in jobs_of(task)]
     about = [{"method": job.method, "size": job.size, "seed": job.seed} for job, _ in found]
     frame = pd.DataFrame([{**what, **one["row"], "key": job.key} for what, (job, one) in zip(about, found)])
     return frame, pd.DataFrame(
@@ -208,7 +202,7 @@ def stale(folder: str | os.PathLike) -> list[str]:
         made = set(pd.read_csv(path, dtype={"key": str})["key"]) if path.exists() else None
         if made is None:
             found.append(f"data/results/{path.name} is missing: `make {target}` makes it")
-        elif made != {job.key for job in jobs(task)}:
+        elif made != {job.key for job in jobs_of(task)}:
             found.append(f"data/results/{path.name} was made with other settings or code: `make {target}` renews it")
     return found
 
@@ -218,12 +212,12 @@ def main() -> None:
     beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
-    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
     arguments = parser.parse_args()
     folder, results = Path(arguments.out) / "build" / "beyond", Path(arguments.out) / "data" / "results"
     tasks, end = (LONG, "_long") if arguments.long else (TASKS, "")
-    make_all(folder, workers=arguments.jobs, tasks=tasks)
+    make_all(folder, jobs=arguments.jobs, tasks=tasks)
     found = {task: rows(folder, task) for task in tasks}
     for task, (frame, _) in found.items():
         text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_info
 
-from . import store
+from . import store, workers
 from .config import Config, preset
 from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
@@ -122,37 +122,36 @@ def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
     return Experiment(task, config, load_teacher(task), QUICK_EPISODES if quick else N_EPISODES)
 
 
-def paper_runs(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = 1) -> list[Run]:
+def paper_runs(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = 1) -> list[Run]:
     """All runs of the paper's experiment on `task`, in the order of their seeds; those that are missing are made."""
     experiment = paper_experiment(task, quick=quick)
     n = QUICK_RUNS if quick else N_RUNS[experiment.task]
     return make_runs(experiment, range(n), runs=runs, jobs=jobs)
 
 
-def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int = 1) -> list[Run]:
-    """Distil once per seed with `jobs` workers, skip what is there, and return the runs in the order of `seeds`."""
+def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int | str = 1) -> list[Run]:
+    """Distil once per seed, skip what is there, and return the runs in the order of `seeds`; `jobs` as in `workers`."""
     seeds = list(seeds)
     make_all([(experiment, seed) for seed in seeds], runs=runs, jobs=jobs, label=experiment.task)
     return [load_run(run_path(experiment.folder(runs), seed), experiment) for seed in seeds]
 
 
-def make_all(work: Iterable[tuple[Experiment, int]], *, runs: str | os.PathLike, jobs: int = 1, label: str) -> None:
-    """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`, with `jobs` workers."""
-    asked = [(experiment, seed, experiment.folder(runs)) for experiment, seed in work]
-    missing = [one for one in asked if not run_path(one[2], one[1]).exists()]
+def make_all(
+    work: Iterable[tuple[Experiment, int]], *, runs: str | os.PathLike, jobs: int | str = 1, label: str
+) -> None:
+    """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
+    asked = [(run_path(experiment.folder(runs), seed), experiment, seed) for experiment, seed in work]
+    missing = [one for one in asked if not one[0].exists()]
     if not missing:
         return
-    from joblib import Parallel, delayed, parallel_config
-
-    with parallel_config("loky", inner_max_num_threads=1):
-        finished = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(make_run)(*one) for one in missing)
-        done = len(asked) - len(missing)
-        for _ in progress(finished, label, total=len(asked), unit="runs", done=done):
-            pass
+    finished = workers.results(make_run, [one for _, *one in missing], jobs=jobs)
+    done = len(asked) - len(missing)
+    for i, content in progress(finished, label, total=len(asked), unit="runs", done=done):
+        store.save(missing[i][0], *content)
 
 
-def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> None:
-    """One distillation, evaluated and written to its own sealed file."""
+def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], dict]:
+    """One distillation, evaluated: what its sealed file holds, arrays and about."""
     task, n = experiment.task, experiment.n_episodes
     policy, history = distill(experiment.teacher, task, experiment.config, seed=seed)
     result = outcomes(policy, task, n, seed=EVALUATION_SEED)
@@ -174,7 +173,7 @@ def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> No
         "splits": sum(event.kind == "split" for event in history.events),
         "merges": sum(event.kind == "merge" for event in history.events),
     }
-    store.save(run_path(folder, seed), arrays, about)
+    return arrays, about
 
 
 def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
@@ -250,7 +249,7 @@ class Results:
         return best(self.runs)
 
 
-def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = -1) -> Results:
+def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = -1) -> Results:
     """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
     experiment = paper_experiment(task, quick=quick)
     teacher = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
@@ -337,7 +336,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="runs go to OUT/data/runs")
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
-    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     arguments = parser.parse_args()
     for task in N_RUNS:
         made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)

@@ -138,7 +138,9 @@ def code() -> str:
 # The study
 
 
-def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS, tried: dict | None = None) -> pd.DataFrame:
+def study(
+    runs: str | os.PathLike, *, jobs: int | str = 1, tasks=paper.TASKS, tried: dict | None = None
+) -> pd.DataFrame:
     """Every variant with the seeds CHOOSING, and the nearest to the paper with the seeds CONFIRMING: a data frame.
 
     One row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
@@ -157,7 +159,7 @@ def ranking(frame: pd.DataFrame, task: str = "both") -> list[str]:
     return rows.sort_values("distance", kind="stable")["variant"].tolist()
 
 
-def _phase(phase: str, tried: dict, seeds, runs, jobs: int, tasks) -> pd.DataFrame:
+def _phase(phase: str, tried: dict, seeds, runs, jobs: int | str, tasks) -> pd.DataFrame:
     experiments = {(name, task): experiment(task, change) for name, change in tried.items() for task in tasks}
     make_all(list(itertools.product(experiments.values(), seeds)), runs=runs, jobs=jobs, label=f"readings, {phase}")
     teachers = {task: outcomes(paper_experiment(task).teacher, task, seed=EVALUATION_SEED) for task in tasks}

@@ -51,8 +51,8 @@ def run(
     """Run `notebook` with `parameters` and move what it made to `out`; returns the files that changed there.
 
     `expect` names files, relative to `out`, that the notebook must make; `timeout` is in seconds, for each cell. An
-    executed copy without anything that varies from run to run goes to figures/executed. Runs into one `out` wait for
-    each other. Raises NotebookError, with the earlier files of `out` left in place.
+    executed copy without anything that varies from run to run goes to figures/executed. Runs of one notebook into one
+    `out` wait for each other. Raises NotebookError, with the earlier files of `out` left in place.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
@@ -62,7 +62,7 @@ def run(
     if "runs" in declared:
         values.setdefault("runs", str(out / "data" / "runs"))
     _check_parameters(notebook, declared, values)
-    with _alone(out / "build" / "lock"):
+    with _alone(work.with_suffix(".lock")):
         shutil.rmtree(work, ignore_errors=True)  # of a run that was killed
         staging.mkdir(parents=True)
         try:
@@ -111,7 +111,7 @@ def _alone(lock: Path) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            print(f"another run writes into {lock.parents[1]}: waiting for it to end", file=sys.stderr, flush=True)
+            print(f"another run of {lock.stem} writes into {lock.parents[2]}: waiting for it to end", file=sys.stderr)
             fcntl.flock(file, fcntl.LOCK_EX)
         yield
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from . import paper, readings_study, store, teachers_study
+from . import paper, readings_study, store, teachers_study, workers
 
 RESULTS = store.ROOT / "data" / "results"
 STUDIES = {"readings": readings_study, "teachers": teachers_study}
@@ -48,7 +48,7 @@ def main() -> None:
     """Make the runs of both studies, or those that are missing, and write their results."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, runs to OUT/build/study")
-    parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
+    parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     parser.add_argument("--check", action="store_true", help="only say which results are stale")
     arguments = parser.parse_args()
     if arguments.check:

@@ -26,7 +26,7 @@ def teachers(task: str) -> dict[str, Path]:
     return {"shipped": SHIPPED / f"{task}.safetensors"} | {f"seed {path.stem.split('-')[-1]}": path for path in others}
 
 
-def study(runs: str | os.PathLike, *, jobs: int = 1, tasks=paper.TASKS) -> pd.DataFrame:
+def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=paper.TASKS) -> pd.DataFrame:
     """Distil every teacher with the seeds SEEDS: one row per run."""
     work = experiments(tasks)
     make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
