@@ -1,0 +1,227 @@
+"""How time and memory grow: with episodes, cells, dimensions of the state, runs and workers. A measurement.
+
+Codewords are uniform in the unit cube, where a made-up teacher walks along curves to the origin: `reach` is SimpleGoal
+without its pit, in d dimensions. The command writes data/results/scale.csv. Every measurement has a process of its own;
+times are by the clock, of the machine in the last column, and differ from run to run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from . import store
+from .config import preset
+from .distill import distill, merge_regions, split_regions
+from .envs import GOAL, GOAL_EDGE, RUNNING, STRIDE, Task, get_task
+from .evaluate import outcomes
+from .experiments import Experiment, cpu_type, load_runs, make_runs
+from .partition import Partition
+from .progress import progress
+from .rollouts import record
+from .teachers import Teacher
+
+TASK = "SimpleGoal-v0"
+EPISODES = tuple(round(10**e) for e in (3, 3.5, 4, 4.5, 5, 5.5, 6))
+CELLS = (10, 30, 100, 300, 1000)
+DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)
+RUNS = (1, 3, 10, 30, 100, 300, 1000)
+WORKERS = (1, 2, 4)
+LAYERS = (400, 300)  # of the teachers' networks
+N_CELLS = 30  # where dimensions vary
+N_RUNS = 40  # where workers vary
+PASSES = 3  # of which the median counts
+
+
+@dataclasses.dataclass(frozen=True)
+class Pursuit:
+    """A teacher without a network: to the origin, faster along some axes than along others."""
+
+    digest: str = "pursuit"
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions in [-1, 1] for observations (n, d)."""
+        states = np.asarray(obs, dtype=np.float64)
+        return np.clip(-4 * states * (1.5 - np.roll(states, 1, axis=-1)), -1, 1), None
+
+
+def reach(d: int) -> Task:
+    """SimpleGoal without its pit in the unit cube of d dimensions: walk to the corner at the origin."""
+    names = tuple(f"x{i + 1}" for i in range(d))
+    return Task(
+        name=f"Reach{d}",
+        inputs=names,
+        outputs=tuple(f"Δ{name}" for name in names),
+        input_labels=names,
+        low=np.zeros(d),
+        high=np.ones(d),
+        action_low=-np.ones(d),
+        action_high=np.ones(d),
+        max_steps=50,
+        start=lambda rng, n: rng.uniform(size=(n, d)),
+        step=_reach_step,
+    )
+
+
+def _reach_step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    moved = np.clip(states + STRIDE * np.clip(actions, -1, 1), 0, 1)
+    rewards = 10 * (np.linalg.norm(states, axis=1) - np.linalg.norm(moved, axis=1))
+    return moved, rewards, np.where((moved < GOAL_EDGE).all(axis=1), GOAL, RUNNING)
+
+
+# What is measured: each takes a size and returns seconds by what they were spent on
+
+
+def distillation(n: int) -> dict[str, float]:
+    """One run of the paper's method with n iterations, an episode in each."""
+    config = dataclasses.replace(preset(TASK), n_epochs=n, n_freeze=n // 5)
+    return {"distillation": _seconds(lambda: distill(Pursuit(), TASK, config, seed=0))}
+
+
+def evaluation(n: int) -> dict[str, float]:
+    """n episodes, all at once."""
+    return {"evaluation": _seconds(lambda: outcomes(Pursuit(), TASK, n, seed=0))}
+
+
+def passes(k: int, d: int) -> dict[str, float]:
+    """A pass of each part of Algorithm 1 over k cells in d dimensions that neither grow nor vanish; medians."""
+    rng, task = np.random.default_rng([k, d]), reach(d)
+    graph = "delaunay" if d <= 4 else "visited"  # Qhull needs minutes in more: see lookup_study.py
+    never = {"min_pol_distance": 10.0 * d, "min_param_distance": 1e-9, "neighbours": graph}
+    config = dataclasses.replace(preset(TASK), **never)
+    partition = Partition(task, config)
+    for codeword in rng.random((k, d)):
+        partition.add(codeword, rng)
+    episodes = record(Pursuit(), task, task.start(rng, 20 * k))
+    for episode in episodes:
+        partition.observe(episode)
+    work = {
+        "training": lambda: (partition.observe(episodes[0]), partition.train(rng)),
+        "splitting pass": lambda: split_regions(partition, episodes[0], config, rng),
+        "merging pass": lambda: merge_regions(partition, config),
+    }
+    return {name: float(np.median([_seconds(one) for _ in range(PASSES)])) for name, one in work.items()}
+
+
+def teacher(d: int) -> dict[str, float]:
+    """A thousand states through a network of the size that the paper's teachers have."""
+    rng, sizes = np.random.default_rng(d), (d, *LAYERS, d)
+    layers = [(f"mu.{2 * i}.weight", f"mu.{2 * i}.bias", *sizes[i : i + 2]) for i in range(len(sizes) - 1)]
+    weights = {weight: rng.normal(size=(m, n)).astype(np.float32) for weight, _, n, m in layers}
+    weights |= {bias: np.zeros(m, np.float32) for _, bias, _, m in layers}
+    network, states = Teacher(weights, reach(d)), rng.random((1000, d), dtype=np.float32)
+    network.predict(states)
+    return {"teacher, 1000 states": float(np.median([_seconds(lambda: network.predict(states)) for _ in range(9)]))}
+
+
+def physics(n: int) -> dict[str, float]:
+    """A thousand steps of a physics engine, LunarLander's, over n copies of it."""
+    task, rng = get_task("LunarLanderContinuous-v3"), np.random.default_rng(0)
+    states, actions = task.begin(task.start(rng, n)), np.zeros((n, 2))
+    steps = 20
+    return {
+        "physics, 1000 steps": _seconds(lambda: [task.step(states, actions) for _ in range(steps)]) * 1000 / (n * steps)
+    }
+
+
+def runs(n: int, *, jobs: int | str = -1) -> dict[str, float]:
+    """n short runs with their evaluation, made, written and read."""
+    experiment = Experiment(TASK, preset(TASK).quick(), Pursuit(), 100)
+    with tempfile.TemporaryDirectory() as folder:
+        taken = {"runs": _seconds(lambda: make_runs(experiment, range(n), runs=folder, jobs=jobs))}
+        return taken | {"reading runs": _seconds(lambda: load_runs(experiment, runs=folder))}
+
+
+def workers(n: int) -> dict[str, float]:
+    """`N_RUNS` short runs by n processes of this machine, and by n workers of a Dask cluster on it."""
+    from distributed import LocalCluster
+
+    here = runs(N_RUNS, jobs=n)["runs"]
+    with LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+        return {"processes": here, "Dask workers": runs(N_RUNS, jobs=cluster.scheduler_address)["runs"]}
+
+
+MEASURED = {
+    "distillation": distillation,
+    "evaluation": evaluation,
+    "passes": passes,
+    "teacher": teacher,
+    "physics": physics,
+    "runs": runs,
+    "workers": workers,
+}
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
+
+
+# Measuring
+
+
+def study(*, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, n_runs=RUNS, n_workers=WORKERS) -> pd.DataFrame:
+    """One row per thing and size: `what`, `over` (what the size counts), `size`, `seconds`, and `megabytes` at most."""
+    asked = [("episodes", n, what, n) for what in ("distillation", "evaluation") for n in episodes]
+    asked += [("cells", k, "passes", k, 2) for k in cells]
+    asked += [("dimensions", d, "passes", N_CELLS, d) for d in dimensions]
+    asked += [("dimensions", d, "teacher", d) for d in dimensions] + [("copies", 50, "physics", 50)]
+    asked += [("runs", n, "runs", n) for n in n_runs] + [("workers", n, "workers", n) for n in n_workers]
+    rows = []
+    for over, size, *work in progress(asked, "scale", total=len(asked), unit="measurements"):
+        found, megabytes = alone(*work)
+        about = {"over": over, "size": size, "megabytes": megabytes}
+        rows += [{"what": what, **about, "seconds": seconds} for what, seconds in found.items()]
+    return pd.DataFrame(rows).assign(machine=cpu_type())
+
+
+def alone(what: str, *sizes: int) -> tuple[dict[str, float], float]:
+    """What a function of `MEASURED` returns in a new process, and how many megabytes it holds at most in another call.
+
+    The second call is traced by `tracemalloc`, which slows it down and gives the same number each time.
+    """
+    command = [sys.executable, "-m", "vsp.scale_study", "--alone", what, *map(str, sizes)]
+    return json.loads(subprocess.run(command, stdout=subprocess.PIPE, cwd=store.ROOT, check=True).stdout)
+
+
+def _alone(what: str, *sizes: str) -> None:
+    """The process of `alone`."""
+    work = partial(MEASURED[what], *(int(size) for size in sizes))
+    with threadpool_limits(1):
+        found = work()
+        tracemalloc.start()
+        work()
+        print(json.dumps([found, tracemalloc.get_traced_memory()[1] / 1e6]))
+
+
+def main() -> None:
+    """Measure all of it, in about 40 minutes, and write OUT/data/results/scale.csv."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="the result goes to OUT/data/results")
+    parser.add_argument("--alone", nargs="+", metavar="WHAT", help="only one measurement, of this process")
+    arguments = parser.parse_args()
+    if arguments.alone:
+        _alone(*arguments.alone)
+        return
+    path = Path(arguments.out) / "data" / "results" / "scale.csv"
+    store.write_text(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
+
+
+if __name__ == "__main__":
+    from vsp.scale_study import main  # of the module by its name, under which workers find what it holds
+
+    main()
