@@ -30,6 +30,7 @@ from .envs import GOAL, GOAL_EDGE, RUNNING, STRIDE, Task, get_task
 from .evaluate import outcomes
 from .experiments import Experiment, cpu_type, load_runs, make_runs
 from .partition import Partition
+from .policy import VoronoiPolicy
 from .progress import progress
 from .rollouts import record
 from .teachers import Teacher
@@ -116,15 +117,19 @@ def passes(k: int, d: int) -> dict[str, float]:
     return {name: float(np.median([_seconds(one) for _ in range(PASSES)])) for name, one in work.items()}
 
 
-def teacher(d: int) -> dict[str, float]:
-    """A thousand states through a network of the size that the paper's teachers have."""
+def policies(d: int) -> dict[str, float]:
+    """A thousand states through a network of the size that the paper's teachers have, and through `N_CELLS` cells."""
     rng, sizes = np.random.default_rng(d), (d, *LAYERS, d)
     layers = [(f"mu.{2 * i}.weight", f"mu.{2 * i}.bias", *sizes[i : i + 2]) for i in range(len(sizes) - 1)]
     weights = {weight: rng.normal(size=(m, n)).astype(np.float32) for weight, _, n, m in layers}
     weights |= {bias: np.zeros(m, np.float32) for _, bias, _, m in layers}
     network, states = Teacher(weights, reach(d)), rng.random((1000, d), dtype=np.float32)
-    network.predict(states)
-    return {"teacher, 1000 states": float(np.median([_seconds(lambda: network.predict(states)) for _ in range(9)]))}
+    codewords, maps = rng.random((N_CELLS, d)), rng.normal(size=(N_CELLS, d + 1, d))
+    work = {"teacher": network, "cells": VoronoiPolicy(codewords, maps, task=reach(d))}
+    return {
+        f"{name}, 1000 states": float(np.median([_seconds(lambda: policy.predict(states)) for _ in range(9)]))
+        for name, policy in work.items()
+    }
 
 
 def physics(n: int) -> dict[str, float]:
@@ -158,7 +163,7 @@ MEASURED = {
     "distillation": distillation,
     "evaluation": evaluation,
     "passes": passes,
-    "teacher": teacher,
+    "policies": policies,
     "physics": physics,
     "runs": runs,
     "workers": workers,
@@ -179,7 +184,7 @@ def study(*, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, n_runs=RUNS,
     asked = [("episodes", n, what, n) for what in ("distillation", "evaluation") for n in episodes]
     asked += [("cells", k, "passes", k, 2) for k in cells]
     asked += [("dimensions", d, "passes", N_CELLS, d) for d in dimensions]
-    asked += [("dimensions", d, "teacher", d) for d in dimensions] + [("copies", 50, "physics", 50)]
+    asked += [("dimensions", d, "policies", d) for d in dimensions] + [("copies", 50, "physics", 50)]
     asked += [("runs", n, "runs", n) for n in n_runs] + [("workers", n, "workers", n) for n in n_workers]
     rows = []
     for over, size, *work in progress(asked, "scale", total=len(asked), unit="measurements"):

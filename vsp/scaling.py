@@ -1,0 +1,122 @@
+"""What the curves of `scale_study` say: how fast time and memory grow, and what many runs would cost on a cluster."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from .config import preset
+from .scale_study import N_CELLS, N_RUNS
+
+POINTS = 4  # sizes that a fit of three numbers needs at least
+
+
+class Environment(NamedTuple):
+    """What a run on a task costs by."""
+
+    name: str
+    d: int  # numbers in a state
+    m: int  # numbers in an action
+    steps: int  # in an episode: its limit, where we have not measured
+    engine: bool  # whether a physics engine plays it
+
+
+TEN_TASKS = (  # continuous tasks of Gymnasium, two of them the paper's; MuJoCo's as of version 5
+    Environment("SimpleGoal", 2, 2, 12, False),
+    Environment("MountainCarContinuous", 2, 1, 65, False),
+    Environment("Pendulum", 3, 1, 200, False),
+    Environment("LunarLanderContinuous", 8, 2, 250, True),
+    Environment("InvertedPendulum", 4, 1, 1000, True),
+    Environment("InvertedDoublePendulum", 9, 1, 1000, True),
+    Environment("Reacher", 10, 2, 50, True),
+    Environment("Swimmer", 8, 2, 1000, True),
+    Environment("Hopper", 11, 3, 1000, True),
+    Environment("HalfCheetah", 17, 6, 1000, True),
+)
+
+
+def exponents(frame: pd.DataFrame) -> pd.DataFrame:
+    """How everything measured in at least `POINTS` sizes grows: a row per thing and quantity, with 95 % intervals.
+
+    Columns: over (what the size counts), what, quantity ("seconds" or "megabytes"), exponent, low, high.
+    """
+    rows = []
+    for (over, what), part in frame.groupby(["over", "what"], sort=False):
+        for quantity in ("seconds", "megabytes") if len(part) >= POINTS else ():
+            _, exponent, half = power_law(part["size"].to_numpy(), part[quantity].to_numpy())
+            about = {"over": over, "what": what, "quantity": quantity}
+            rows.append({**about, "exponent": exponent, "low": exponent - half, "high": exponent + half})
+    return pd.DataFrame(rows)
+
+
+def power_law(sizes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Fit a + b·size^c, a and b not negative, to positive values (n,), by least squares of logarithms.
+
+    The constant is what a call costs however small it is. Returns the fitted values (n,), c, and half the width of its
+    95 % interval (from the curvature; Student's t with n - 3 degrees of freedom). Raises ValueError below `POINTS`.
+    """
+    from scipy.optimize import least_squares
+    from scipy.stats import t
+
+    if len(sizes) < POINTS:
+        raise ValueError(f"{len(sizes)} sizes, expected {POINTS} or more: three numbers are fitted to them")
+    x, y = np.log(sizes / sizes.max()), np.log(values)
+
+    def predicted(p: np.ndarray) -> np.ndarray:
+        return np.logaddexp(p[0], p[1] + p[2] * x)  # log(a + b·size^c)
+
+    starts = [(y.min() + low, y.max(), c) for low in (-3, -0.5) for c in (0.5, 1, 2)]
+    fits = [least_squares(lambda p: predicted(p) - y, start, loss="linear") for start in starts]
+    best = min(fits, key=lambda fit: fit.cost)
+    freedom = len(x) - 3
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2 * best.cost / freedom
+    return np.exp(predicted(best.x)), float(best.x[2]), float(t.ppf(0.975, freedom) * np.sqrt(covariance[2, 2]))
+
+
+def cost(frame: pd.DataFrame, *, n_runs: int = 1000, tasks=TEN_TASKS) -> pd.DataFrame:
+    """Core-hours of `n_runs` runs of the paper's method per task, a row each, from the measured curves.
+
+    A run has SimpleGoal's settings, `N_CELLS` cells throughout, the teacher's network of the paper, and two evaluations
+    of 1000 episodes. Between measured dimensions values are interpolated; a step of any physics engine costs what
+    LunarLander's does. Columns: task, d, steps, then core-hours: teacher, physics, distillation, evaluation, all; and
+    megabytes, of arrays in one run and on disk for all runs.
+    """
+    config = preset("SimpleGoal-v0")
+    rows = []
+    for task in tasks:
+        training, split, merge, teacher = (
+            _at(frame, what, task.d) for what in ("training", "splitting pass", "merging pass", "teacher, 1000 states")
+        )
+        played, judged = config.n_epochs * task.steps / 1000, 2 * task.steps  # thousands of steps
+        step = float(frame.loc[frame["what"] == "physics, 1000 steps", "seconds"].iloc[0]) if task.engine else 0.0
+        hours = {
+            "teacher": played * teacher,
+            "physics": played * step,
+            "distillation": config.n_epochs * (training + split / config.n_split + merge / config.n_merge),
+            "evaluation": judged * (step + _at(frame, "cells, 1000 states", task.d)),
+        }
+        hours = {name: n_runs * seconds / 3600 for name, seconds in hours.items()}
+        numbers = 3 * 1000 + config.n_epochs + N_CELLS * (task.d + (task.d + 1) * task.m)  # in the file of a run
+        size = {"MB in memory": _at(frame, "training", task.d, "megabytes"), "MB on disk": n_runs * numbers * 8 / 1e6}
+        rows.append({"task": task.name, "d": task.d, "steps": task.steps, **hours, "all": sum(hours.values()), **size})
+    return pd.DataFrame(rows)
+
+
+def _at(frame: pd.DataFrame, what: str, d: int, quantity: str = "seconds") -> float:
+    """What was measured in d dimensions, or between."""
+    part = frame[(frame["what"] == what) & (frame["over"] == "dimensions")].sort_values("size")
+    return float(np.interp(d, part["size"], part[quantity]))
+
+
+def efficiency(frame: pd.DataFrame, what: str = "Dask workers") -> float:
+    """The share of a second core that a second worker puts to use: half the speed-up of two over one."""
+    times = frame[frame["what"] == what].set_index("size")["seconds"]
+    return float(times[1] / times[2] / 2)
+
+
+def overhead(frame: pd.DataFrame) -> float:
+    """Seconds that a run through a Dask scheduler takes longer than in a process of this machine, one worker each."""
+    times = frame[(frame["over"] == "workers") & (frame["size"] == 1)].set_index("what")["seconds"]
+    return float((times["Dask workers"] - times["processes"]) / N_RUNS)
