@@ -59,7 +59,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site notebooks $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers manifest lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site notebooks $(NOTEBOOKS)
 
 help: ## this list
 	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
@@ -112,6 +112,9 @@ teachers: venv ## trains the TD3 teachers from scratch: 5 to 6 HOURS; resumes fr
 
 short-teachers: venv ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes likewise
 	$(PY) -m vsp.training --short --cache "$${VSP_CACHE:-$$HOME/.cache/vsp}" --out "$(OUT)/data/teachers"
+
+manifest: venv ## lists the files of data/ as they are, for somebody who changed one on purpose: at once
+	@$(PY) -m vsp.manifest
 
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks

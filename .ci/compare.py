@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from vsp import experiments
+from vsp import experiments, store
 from vsp.evaluate import outlier_numbers, spread
 from vsp.paper import PREFIX
 
@@ -70,7 +70,7 @@ def implausible(made: Path, task: str) -> list[str]:
 def main() -> None:
     made = Path(sys.argv[1])
     names = sorted(path.name for path in TABLES.iterdir())
-    if Path("data/results/made_on.txt").read_text(encoding="utf-8").strip() == experiments.cpu_type():
+    if store.read_listed("data/results/made_on.txt").decode().strip() == experiments.cpu_type():
         wrong, rule = different(made, names), "the same bytes, on the same CPU type"
     else:
         wrong = different(made, [name for name in names if name.startswith(FIXED)])

@@ -26,11 +26,11 @@ def _processor() -> str:
 
 def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: bool) -> None:
     """Put one row into the CSV at `path`, in the place of the one with the same `table` and `what`."""
-    from vsp.store import write_text
+    from vsp.store import read_table, write_listed
 
     row = dict(zip(COLUMNS, (table, what, to_hold, measured, "yes" if held else "no", machine())))
-    frame = pd.read_csv(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS)
+    frame = read_table(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS)
     same = (frame["table"] == table) & (frame["what"] == what)
     place = frame.index[same][0] if same.any() else len(frame)
     frame.loc[place] = row
-    write_text(path, frame.to_csv(index=False, lineterminator="\n"))
+    write_listed(path, frame.to_csv(index=False, lineterminator="\n"))

@@ -125,10 +125,13 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
     frame = pd.read_csv(results / "beyond_SimpleGoal-v0.csv")
     assert len(frame) == 5 and "seconds" not in frame and beyond.stale(results) == []
     assert comparison.read(SIMPLEGOAL, results).equals(frame)
-    store.write_text(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
+    store.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
     assert comparison.read("Pendulum-v1", results)["failing"].isna().all()
     assert len(pd.read_csv(results / "beyond_seconds.csv")) == 5
     assert (results / "beyond_race.csv").read_text() == "seconds\n0.500000\n"
+    (results / "beyond_Pendulum-v1.csv").write_text("x")
+    with pytest.raises(store.DamagedFile, match="`make beyond` makes it anew"):
+        comparison.read("Pendulum-v1", results)
     small.setattr(beyond, "SEEDS", range(3))
     assert "was made with other settings or code" in beyond.stale(results)[0]
 
@@ -142,6 +145,7 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     assert 1 <= len(policy) <= SMALL.n_cells
     assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 2 * 5 + 1  # few seeds
     assert not (results / "beyond_race.csv").exists()
+    store.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
 
 
 def test_the_simplified_policy_may_lose_its_share(small):

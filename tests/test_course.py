@@ -475,6 +475,16 @@ def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
     assert nbformat.read(copy, as_version=4).cells
 
 
+def test_where_nothing_is_known_of_the_last_time_all_is_kept(tmp_path):
+    build.build(tmp_path)
+    made = tmp_path / "build" / "course" / build.MADE
+    made.write_bytes(made.read_bytes()[:-1])
+    build.build(tmp_path)
+    assert len(list(tmp_path.rglob("*.kept-1.*"))) == 7 and not list(tmp_path.rglob("*.kept-2.*"))
+    build.build(tmp_path)
+    assert not list(tmp_path.rglob("*.kept-2.*"))
+
+
 def test_a_hand_out_stands_on_its_own(tmp_path):
     """Package and teachers are found where it was unpacked; the answers are not in it."""
     handout.write_handout(tmp_path / "handout.zip", {"lesson.ipynb": "{}"})
@@ -483,8 +493,10 @@ def test_a_hand_out_stands_on_its_own(tmp_path):
         archive.extractall(tmp_path)
     folder = tmp_path / handout.FOLDER
     code = (
-        "import vsp; from vsp.course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); vsp.load_teacher('{}')"
+        "import vsp; from vsp.course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); "
+        "vsp.load_teacher('{0}'); vsp.paper.spread('{0}')"
     )
+    assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))
     names = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(
         [sys.executable, "-c", code.format(SIMPLEGOAL)], cwd=folder, env=names, capture_output=True, text=True

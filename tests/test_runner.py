@@ -10,7 +10,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from vsp import runner
+from vsp import runner, store
 
 DRAW = """\
 from pathlib import Path
@@ -101,6 +101,32 @@ def test_of_an_explorer_its_strip_is_left_once(tmp_path):
     assert output.data["text/html"].endswith("<figcaption>on this page</figcaption></figure></div>")
     assert "widget" not in copy.read_text() and output.data["text/plain"] == "Small."
     assert runner.run(notebook, tmp_path) == []
+
+
+def test_results_are_listed_beside_those_of_others(tmp_path):
+    """Whether the notebook listed them in its staging folder or not; a line that a killed run lacks is made up for."""
+    results, staged = tmp_path / "data" / "results", tmp_path / "staging" / "data" / "results"
+
+    def publish():
+        store.write_listed(staged / "a.csv", "a")
+        store.write_text(staged / "b.csv", "b")
+        return runner._publish(tmp_path / "staging", tmp_path)
+
+    store.write_listed(results / "other.csv", "x")
+    assert publish() == ["data/results/a.csv", "data/results/b.csv"]
+    assert [store.read_listed(results / name) for name in ("a.csv", "b.csv", "other.csv")] == [b"a", b"b", b"x"]
+    (results / store.MANIFEST).write_text("")
+    assert publish() == []
+    assert store.read_listed(results / "a.csv") + store.read_listed(results / "b.csv") == b"ab"
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x80\x04N.", b"{}", b"[]", b"3", b'{"cells": 3}', b"!!python/name:os.system"]
+)
+def test_a_file_that_is_no_notebook(tmp_path, content):
+    (tmp_path / "x.ipynb").write_bytes(content)
+    with pytest.raises(runner.NotebookError, match="x.ipynb: "):
+        runner.run(tmp_path / "x.ipynb", tmp_path / "out")
 
 
 FAULTS = {

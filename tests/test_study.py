@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, TASKS
 
-from vsp import beyond, readings_study, study, teachers_study
+from vsp import beyond, readings_study, store, study, teachers_study
 from vsp.experiments import paper_experiment
 from vsp.readings_study import variants
 
@@ -107,6 +107,7 @@ def results(tmp_path, monkeypatch):
     """A copy of the committed results, to spoil."""
     for name in study.STUDIES:
         shutil.copy(study.RESULTS / f"{name}.csv", tmp_path)
+    store.list_folder(tmp_path)
     monkeypatch.setattr(study, "RESULTS", tmp_path)
     known = cache(paper_experiment)  # a teacher is read once
     for module in (readings_study, teachers_study):
@@ -116,13 +117,20 @@ def results(tmp_path, monkeypatch):
 
 def spoil(path, change):
     frame = pd.read_csv(path, dtype=str)
-    change(frame).to_csv(path, index=False)
+    store.write_listed(path, change(frame).to_csv(index=False))
 
 
 def test_a_missing_file_is_named(results):
     assert study.stale() == []
     (results / "teachers.csv").unlink()
     assert study.stale() == ["data/results/teachers.csv is missing: `make study` makes it"]
+
+
+def test_a_damaged_file_is_named(results):
+    with open(results / "teachers.csv", "ab") as file:
+        file.write(b"\n")
+    (found,) = study.stale()
+    assert found.startswith(f"{results / 'teachers.csv'}: SHA-256 is ")
 
 
 def says(name, what):
@@ -183,7 +191,7 @@ FRAME = pd.DataFrame({"settings": ["0123456789", "12345e6789"], "code": ["000000
 
 def test_settings_and_code_are_read_as_they_were_written(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "RESULTS", tmp_path)
-    FRAME.to_csv(tmp_path / "readings.csv", index=False)
+    store.write_listed(tmp_path / "readings.csv", FRAME.to_csv(index=False))
     assert study.read("readings").equals(FRAME)
 
 
@@ -200,7 +208,8 @@ def test_make_study_writes_what_was_found(tmp_path, monkeypatch):
     assert asked == dict.fromkeys(found, (tmp_path / "build" / "study", 3))
     text = (tmp_path / "data" / "results" / "readings.csv").read_bytes()
     assert text == b"settings,code,mean\n0123456789,0000000001,0.333333\n12345e6789,1e5,2.000000\n"
-    assert sorted(path.name for path in (tmp_path / "data" / "results").iterdir()) == ["readings.csv", "teachers.csv"]
+    names = [path.name for path in sorted((tmp_path / "data" / "results").iterdir())]
+    assert names == [store.MANIFEST, "readings.csv", "teachers.csv"]
 
 
 def test_a_check_says_what_is_stale_and_makes_nothing(results, tmp_path, monkeypatch, capsys):

@@ -100,9 +100,7 @@ def short(monkeypatch):
 
 
 def weights(path):
-    import torch
-
-    return {name: t.numpy() for name, t in torch.load(path, weights_only=True)["policy"].items()}
+    return {name: t.numpy() for name, t in training.read_checkpoint(path)["policy"].items()}
 
 
 def same(a, b):
@@ -139,6 +137,22 @@ def test_a_finished_training_is_not_done_again(short, tmp_path):
     assert again == first and not lines and again.read_bytes() == before
 
 
+def test_a_damaged_checkpoint_is_not_resumed(short, tmp_path, monkeypatch):
+    path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
+    content = path.read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr("torch.load", lambda *given: pytest.fail("parsed"))
+        for damaged in (content[:-1], content[:50], b"", content[:5000] + b"?" + content[5001:]):
+            path.write_bytes(damaged)
+            with pytest.raises(store.DamagedFile, match="SHA-256 is .*delete it and remake it"):
+                training.read_checkpoint(path)
+        with pytest.raises(store.DamagedFile):
+            training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
+    store.write_sealed(path, b"no tensors")
+    with pytest.raises(store.DamagedFile, match="sealed, but no checkpoint"):
+        training.read_checkpoint(path)
+
+
 def test_a_changed_recipe_or_seed_does_not_resume(short, tmp_path, monkeypatch):
     path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
     lines, changed = [], dataclasses.replace(SHORT, noise_std=0.2)
@@ -165,8 +179,6 @@ def test_export_writes_what_load_teacher_reads(short, tmp_path, monkeypatch):
 
 def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp_path, monkeypatch):
     """The curve is made up: the second of three points is the best."""
-    import torch
-
     monkeypatch.setattr(training, "BEST_OF_CURVE", (SIMPLEGOAL,))
     monkeypatch.setattr(training, "BARS", {SIMPLEGOAL: (-1000.0, 1.0)})
     means, seen = iter([1.0, 3.0, 2.0]), []
@@ -177,7 +189,7 @@ def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp
 
     monkeypatch.setattr(training, "_score", score)
     path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
-    snapshot = torch.load(path, weights_only=True)
+    snapshot = training.read_checkpoint(path)
     assert len(seen) == 3 and same({n: t.numpy() for n, t in snapshot["best"]["policy"].items()}, seen[1])
     assert same({n: t.numpy() for n, t in snapshot["policy"].items()}, seen[2]) and not same(seen[1], seen[2])
     assert training.export(SIMPLEGOAL, {0: path}, tmp_path / "out")
@@ -242,7 +254,7 @@ def test_the_short_recipe_is_that_of_the_shipped_teacher_with_fewer_steps(task):
 
 def test_the_short_teachers_are_shipped_and_no_others():
     names = [f"{task}-{seed}" for task, seed in SHIPPED_SHORT]
-    files = [path.name for path in (SHIPPED / "short").iterdir()]
+    files = [path.name for path in (SHIPPED / "short").iterdir() if path.name != store.MANIFEST]
     assert sorted(files) == sorted(f"{name}.{kind}" for name in names for kind in ("json", "safetensors"))
     digests = {load_teacher(SHIPPED / "short" / f"{name}.safetensors").digest for name in names}
     assert len(digests | {load_teacher(task).digest for task in TASKS}) == len(names) + len(TASKS)
@@ -266,9 +278,7 @@ def test_a_recipe_may_be_given(short, tmp_path):
     fewer = dataclasses.replace(SHORT, steps=40)
     paths = [training.train(SIMPLEGOAL, seed=0, cache=tmp_path, recipe=r, report=lambda _: None) for r in (fewer, None)]
     assert [path.name for path in paths] == [f"{SIMPLEGOAL}-{recipe.id}-0.pt" for recipe in (fewer, SHORT)]
-    import torch
-
-    curves = [torch.load(path, weights_only=True)["curve"] for path in paths]
+    curves = [training.read_checkpoint(path)["curve"] for path in paths]
     assert [[point["steps"] for point in curve] for curve in curves] == [[31, 40], [31, 62, 90]]
 
 
@@ -288,7 +298,8 @@ def test_the_export_of_a_short_training_is_an_actor_and_its_card(short, fewer_ep
     )
     assert training.export_short(SIMPLEGOAL, 6, checkpoint, tmp_path / "out") is None
     path = tmp_path / "out" / "short" / f"{SIMPLEGOAL}-6.safetensors"
-    assert sorted(tmp_path.glob("out/**/*.*")) == [path.with_suffix(".json"), path]
+    made = [path.with_name(store.MANIFEST), path.with_suffix(".json"), path]
+    assert sorted(file for file in tmp_path.glob("out/**/*") if file.is_file()) == made
     actor = {name: tensor for name, tensor in weights(checkpoint).items() if name.startswith("actor.")}
     assert same(load_file(path), actor) and len(actor) == 6
     teacher = load_teacher(path)

@@ -199,10 +199,15 @@ def stale(folder: str | os.PathLike) -> list[str]:
     found = []
     for task in (*TASKS, *LONG):
         path, target = Path(folder) / f"beyond_{task}.csv", "beyond-long" if task in LONG else "beyond"
-        made = set(pd.read_csv(path, dtype={"key": str})["key"]) if path.exists() else None
-        if made is None:
+        try:
+            made = set(store.read_table(path, dtype={"key": str})["key"])
+        except FileNotFoundError:
             found.append(f"data/results/{path.name} is missing: `make {target}` makes it")
-        elif made != {job.key for job in jobs_of(task)}:
+            continue
+        except store.DamagedFile as error:
+            found.append(str(error))
+            continue
+        if made != {job.key for job in jobs_of(task)}:
             found.append(f"data/results/{path.name} was made with other settings or code: `make {target}` renews it")
     return found
 
@@ -221,13 +226,14 @@ def main() -> None:
     found = {task: rows(folder, task) for task in tasks}
     for task, (frame, _) in found.items():
         text = frame.to_csv(index=False, float_format="%.6f", lineterminator="\n")
-        store.write_text(results / f"beyond_{task}.csv", text)
+        store.write_listed(results / f"beyond_{task}.csv", text)
     for task in tasks if arguments.long else ():
         simplest(task).save(results / f"beyond_{task}.policy")
+        store.list_file(results / f"beyond_{task}.policy")
     times = {f"seconds{end}": pd.concat([took for _, took in found.values()])}
     times |= {} if arguments.long else {"race": race()}
     for name, frame in times.items():
-        store.write_text(results / f"beyond_{name}.csv", frame.to_csv(index=False, float_format="%.6f"))
+        store.write_listed(results / f"beyond_{name}.csv", frame.to_csv(index=False, float_format="%.6f"))
 
 
 if __name__ == "__main__":

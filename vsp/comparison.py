@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from . import study
+from . import store, study
 from .beyond import ABLATION, METHODS
 from .config import preset
 from .evaluate import interval
@@ -22,7 +22,7 @@ INTERVAL = ("mean", "low", "high")
 
 def read(task: str, folder: str | os.PathLike = study.RESULTS) -> pd.DataFrame:
     """The committed rows of `task`; `failing` is NaN where no episode of any method can reach a goal."""
-    frame = pd.read_csv(Path(folder) / f"beyond_{task}.csv", dtype={"key": str})
+    frame = store.read_table(Path(folder) / f"beyond_{task}.csv", dtype={"key": str})
     return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame
 
 

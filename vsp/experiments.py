@@ -309,8 +309,8 @@ def write_summary(results: Results, *, out: str | os.PathLike) -> None:
     """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU type that they were made on beside it."""
     folder, task = Path(out) / "data" / "results", results.experiment.task
     text = summary(results.runs, results.experiment).to_csv(index=False, float_format="%.6f", lineterminator="\n")
-    store.write_text(folder / f"{task}.csv", text)
-    store.write_text(folder / "made_on.txt", cpu_type() + "\n")
+    store.write_listed(folder / f"{task}.csv", text)
+    store.write_listed(folder / "made_on.txt", cpu_type() + "\n")
 
 
 def cpu_type() -> str:

@@ -210,7 +210,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="the result goes to OUT/data/results")
     path = Path(parser.parse_args().out) / "data" / "results" / "lookup.csv"
-    store.write_text(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
+    store.write_listed(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
 
 
 if __name__ == "__main__":

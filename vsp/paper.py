@@ -1,7 +1,7 @@
 """What the paper (arXiv:2511.13322) prints: its tables, the numbers in its text, and its policies as runnable ones.
 
 The values stand in `data/paper/*.csv`, as printed; each row says `where` in the paper it was read. A file is read only
-if it is byte for byte the one that was checked against the paper.
+if it is byte for byte the one that its folder's manifest lists, as checked against the paper.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from .store import sha256
+from .store import read_table
 
 if TYPE_CHECKING:
     from .policy import VoronoiPolicy
@@ -25,14 +25,6 @@ PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids
 SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
 _POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
-_CHECKSUMS = {
-    "hyperparameters.csv": "44459d7b16ee35e0037a83bda80763a927d69dfa799694395c270806b4ff9bc8",
-    "mountaincar_linear_policies.csv": "0b91c2a7f72a416596747c37bc93470d7d05a44897538e1ba5cda8f48cb2a062",
-    "simplegoal_linear_policies.csv": "03f216ab6ba16a7501b9399210566913f98876fb0cdbbf23b3138e5f3c5dd618",
-    "spread.csv": "72af94b0ea650f9683157b790f9fa0954ed26bdaded0ab6df4948b45b0a59919",
-    "tdavq_comparison.csv": "09840d27a9798a76f33680b094f6102fc53b6056eba784680a5c91e90d376fc9",
-    "text_numbers.csv": "82411e4b47d010216504cadb694427dbeb4f11df801a86665a2cbeece33b6917",
-}
 
 
 def hyperparameters(task: str) -> dict[str, int | float | bool]:
@@ -150,12 +142,7 @@ def _check_task(task: str) -> str:
 
 def _read(file: str, numbers: list[str] | None = None) -> pd.DataFrame:
     """The rows of `file` as text, the columns `numbers` as float64 (NaN where empty)."""
-    path = FOLDER / file
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing: it comes with the repository, restore it from git")
-    if (found := sha256(path)) != _CHECKSUMS[file]:
-        raise ValueError(f"{path} was altered: SHA-256 {found}, expected {_CHECKSUMS[file]}; restore it from git")
-    frame = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
+    frame = read_table(FOLDER / file, dtype=str, keep_default_na=False, encoding="utf-8")
     for column in numbers or []:
         frame[column] = pd.to_numeric(frame[column]).astype(np.float64)
     return frame

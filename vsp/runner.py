@@ -27,7 +27,7 @@ from pathlib import Path
 
 import nbformat
 
-from .store import ROOT
+from .store import MANIFEST, ROOT, list_file
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
@@ -79,10 +79,14 @@ def _read(notebook: Path) -> tuple[nbformat.NotebookNode, dict[str, object]]:
     """The notebook and the defaults of its parameters."""
     if not notebook.is_file():
         raise NotebookError(f"{notebook}: no such notebook")
-    source = nbformat.read(notebook, as_version=4)
-    if any("id" not in cell for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]):
+    try:
+        source = nbformat.read(notebook, as_version=4)
+        cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+        tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
+    except (nbformat.ValidationError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise NotebookError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
+    if any("id" not in cell for cell in cells):
         raise NotebookError(f"{notebook.name}: has cells without an id, expected format 4.5: save it in JupyterLab")
-    tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
     if len(tagged) != 1:
         raise NotebookError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
     try:
@@ -244,16 +248,19 @@ def _check_files(notebook: Path, staging: Path, expect: Sequence[str]) -> None:
 
 
 def _publish(staging: Path, out: Path) -> list[str]:
-    """Move each staged file to its place in `out`; a file with the same bytes stays untouched."""
+    """Move each staged file to its place in `out`; a file with the same bytes stays untouched. Results are listed."""
     changed = []
     for path in sorted(path for path in staging.rglob("*") if path.is_file()):
         name = path.relative_to(staging).as_posix()
         target = out / name
-        if target.is_file() and filecmp.cmp(path, target, shallow=False):
+        if path.name == MANIFEST:
             continue
-        target.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(path, target)
-        changed.append(name)
+        if not target.is_file() or not filecmp.cmp(path, target, shallow=False):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(path, target)
+            changed.append(name)
+        if name.startswith("data/results/"):
+            list_file(target)  # also one that stays: a run may have been killed before this line
     return changed
 
 

@@ -223,7 +223,7 @@ def main() -> None:
         _alone(*arguments.alone)
         return
     path = Path(arguments.out) / "data" / "results" / "scale.csv"
-    store.write_text(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
+    store.write_listed(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
 
 
 if __name__ == "__main__":

@@ -1,18 +1,46 @@
-"""Files on disk: atomic writes, checksums. Nothing here ever unpickles."""
+"""Files on disk: atomic writes, and checksums that are compared before anything is parsed. Nothing here ever unpickles.
+
+A sealed file bears its checksum in its first line. Files that are to stay as others know them, such as CSV, are listed
+in the `MANIFEST.sha256` of their folder, which `sha256sum -c` reads too; `vsp.manifest` lists them anew.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import json
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 ROOT = Path(__file__).resolve().parents[1]  # the checkout: data/ lies beside vsp/
+MANIFEST = "MANIFEST.sha256"
+
+_LINE = re.compile(rb"([0-9a-f]{64})  ([^/\n]+)\n")
+_MADE_BY = {  # which target makes a file anew, by a part of its path; nothing makes data/paper
+    "data/teachers/short/": "short-teachers",
+    "data/teachers/": "teachers",
+    "data/results/readings": "study",
+    "data/results/teachers": "study",
+    "data/results/lookup": "lookup",
+    "data/results/trust": "bench torture",
+    "data/results/beyond_LunarLander": "beyond-long",
+    "data/results/beyond_seconds_long": "beyond-long",
+    "data/results/beyond": "beyond",
+    "data/results/": "paper-figures",
+    "data/runs/": "runs",
+    "build/beyond/": "beyond",
+    "build/study/": "study",
+}
 
 
 @contextlib.contextmanager
@@ -42,11 +70,6 @@ def write_text(path: str | os.PathLike, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def write_json(path: str | os.PathLike, value: object) -> None:
-    """Write `value` as indented JSON, atomically. NaN and infinity are refused: JSON has neither."""
-    write_text(path, json.dumps(value, indent=2, allow_nan=False) + "\n")
-
-
 def sha256(path: str | os.PathLike) -> str:
     """SHA-256 of the file at `path`, as 64 hexadecimal digits."""
     with open(path, "rb") as file:
@@ -57,59 +80,190 @@ class DamagedFile(ValueError):
     """A file whose content does not match its checksum, or that is not of the expected kind."""
 
 
-def save(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: dict) -> None:
-    """Write `arrays` and the JSON-able `about` to one sealed file, atomically.
-
-    A sealed file is one line with the SHA-256 of the rest, then the rest: the arrays as safetensors.
-    """
-    from safetensors.numpy import save as to_bytes
-
-    about_text = json.dumps(about, sort_keys=True, allow_nan=False)
-    payload = to_bytes({name: np.ascontiguousarray(a) for name, a in arrays.items()}, metadata={"about": about_text})
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload)
+def _content(path: Path) -> bytes:
+    """All bytes of a file. Raises FileNotFoundError, and `DamagedFile` for a folder or a device in its place."""
+    if path.exists() and not path.is_file():
+        raise DamagedFile(f"{path}: is a folder or a device, expected a file: move it away")
+    try:
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        link = f", but a link to {os.readlink(path)}" if path.is_symlink() else ""
+        raise FileNotFoundError(f"{path}: no such file{link}; {_remedy(path)}") from error
 
 
-def load(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.ndarray], dict]:
-    """Read a file that `save` wrote with `about["kind"] == kind`: its arrays and `about`.
+def _remedy(path: Path) -> str:
+    """How a file that is missing or altered comes back."""
+    place = path.absolute().as_posix()
+    made = next((f"`make {target}` makes it anew, " for part, target in _MADE_BY.items() if part in place), "")
+    return f"{made}`git checkout {path}` brings back a committed one"
 
-    The checksum is compared before anything is parsed. Raises FileNotFoundError or `DamagedFile`.
-    """
-    from safetensors.numpy import load as from_bytes
 
-    content = Path(path).read_bytes()
+# Sealed files
+
+
+def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
+    """Write one line with the SHA-256 of `payload`, then `payload`, atomically."""
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(hashlib.sha256(payload).hexdigest().encode() + b"\n")
+        file.write(payload)
+
+
+def read_sealed(path: str | os.PathLike) -> bytes:
+    """The payload of a file that `write_sealed` wrote. Raises FileNotFoundError or `DamagedFile`."""
+    content = _content(Path(path))
     seal, payload = content[:64], content[65:]
     found = hashlib.sha256(payload).hexdigest()
     if content[64:65] != b"\n" or seal != found.encode():
         raise DamagedFile(
             f"{path}: SHA-256 is {found}, expected {seal.decode(errors='replace')}: delete it and remake it"
         )
-    header = json.loads(payload[8 : 8 + int.from_bytes(payload[:8], "little")])
-    about = json.loads(header["__metadata__"]["about"])
-    if about.get("kind") != kind:
-        raise DamagedFile(f"{path}: holds a {about.get('kind')!r}, expected a {kind!r}")
-    return from_bytes(payload), about
+    return payload
+
+
+def save(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: dict) -> None:
+    """Write `arrays` and the JSON-able `about` to one sealed file, as safetensors."""
+    from safetensors.numpy import save as to_bytes
+
+    about_text = json.dumps(about, sort_keys=True, allow_nan=False)
+    contiguous = {name: np.ascontiguousarray(a) for name, a in arrays.items()}
+    write_sealed(path, to_bytes(contiguous, metadata={"about": about_text}))
+
+
+def load(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.ndarray], dict]:
+    """Read a file that `save` wrote with `about["kind"] == kind`: its arrays and `about`.
+
+    Raises FileNotFoundError or `DamagedFile`.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load as from_bytes
+
+    payload = read_sealed(path)
+    try:
+        arrays = from_bytes(payload)
+        header = json.loads(payload[8 : 8 + int.from_bytes(payload[:8], "little")])
+        about = json.loads(header["__metadata__"]["about"])
+        found = about.get("kind")
+    except (SafetensorError, ValueError, KeyError, AttributeError) as error:
+        raise DamagedFile(f"{path}: sealed, but not what `save` writes: {error!r:.300}: delete it") from error
+    if found != kind:
+        raise DamagedFile(f"{path}: holds a {found!r}, expected a {kind!r}")
+    return arrays, about
+
+
+# Listed files
+
+
+def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
+    """Write `content` (a string as UTF-8), atomically, then the file's line in the manifest of its folder.
+
+    Of several writers none loses another's line. Killed between the two, a writer leaves a file that readers refuse
+    until it is written again.
+    """
+    path, content = Path(path), content.encode() if isinstance(content, str) else content
+    with _held(path.parent):
+        listed = _listed(path.parent)
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(content)
+        _write_manifest(path.parent, {**listed, path.name: hashlib.sha256(content).hexdigest()})
+
+
+def list_file(path: str | os.PathLike) -> None:
+    """Put the file at `path`, as it is, into the manifest of its folder."""
+    path = Path(path)
+    with _held(path.parent):
+        _write_manifest(path.parent, {**_listed(path.parent), path.name: sha256(path)})
+
+
+def list_folder(folder: str | os.PathLike) -> None:
+    """Write the manifest of `folder` anew: all that lies there, as it is, but hidden files."""
+    folder = Path(folder)
+    with _held(folder):
+        names = (path.name for path in folder.iterdir() if path.is_file())
+        _write_manifest(folder, {n: sha256(folder / n) for n in names if n != MANIFEST and not n.startswith(".")})
+
+
+def read_listed(path: str | os.PathLike) -> bytes:
+    """The content of a file that the manifest of its folder lists. Raises FileNotFoundError or `DamagedFile`."""
+    path = Path(path)
+    content = _content(path)
+    found, expected = hashlib.sha256(content).hexdigest(), _listed(path.parent).get(path.name)
+    if found != expected:
+        raise DamagedFile(
+            f"{path}: SHA-256 is {found}, {MANIFEST} beside it has {expected or 'no such file'}: {_remedy(path)}; if "
+            f"it is as it should be, `make manifest` (or `python -m vsp.manifest {path.parent}`) lists it so"
+        )
+    return content
+
+
+def read_table(path: str | os.PathLike, **options) -> pd.DataFrame:
+    """The table in a listed CSV file, `options` as `pandas.read_csv` has them. Raises as `read_listed` does."""
+    import pandas as pd
+
+    return pd.read_csv(io.BytesIO(read_listed(path)), **options)
+
+
+def _listed(folder: Path) -> dict[str, str]:
+    """The SHA-256 of every file that the manifest of `folder` lists; none if there is no manifest."""
+    manifest = folder / MANIFEST
+    content = _content(manifest) if os.path.lexists(manifest) else b""
+    lines = _LINE.findall(content)
+    listed = {name.decode(errors="replace"): digest.decode() for digest, name in lines}
+    if _LINE.sub(b"", content) or len(listed) < len(lines):
+        raise DamagedFile(
+            f"{manifest}: expected lines of 64 hexadecimal digits, two spaces and a file's name, each name once: "
+            f"`git checkout {manifest}` brings it back, `make manifest` writes it anew"
+        )
+    return listed
+
+
+def _write_manifest(folder: Path, listed: dict[str, str]) -> None:
+    text = "".join(f"{digest}  {name}\n" for name, digest in sorted(listed.items()))
+    if _content(folder / MANIFEST) != text.encode():
+        write_text(folder / MANIFEST, text)
+
+
+@contextlib.contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold the manifest of `folder`, which is made if need be, against other writers."""
+    import fcntl  # here, since Windows, where students read files, has none
+
+    folder.mkdir(parents=True, exist_ok=True)
+    manifest, held = folder / MANIFEST, False
+    while not held:
+        with open(manifest, "ab") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            held = manifest.exists() and os.path.samestat(os.fstat(file.fileno()), manifest.stat())
+            if held:  # else another writer put a new one in its place while we waited
+                yield
+
+
+# Weights and their card
 
 
 def write_carded(path: str | os.PathLike, content: bytes, card: dict) -> None:
-    """Write `content` and, beside it as `.json`, its card with the SHA-256 added. The card comes last."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
-    write_json(Path(path).with_suffix(".json"), {**card, "sha256": hashlib.sha256(content).hexdigest()})
+    """Write `content` and, beside it as `.json`, its card with the SHA-256 added; both listed. The card comes last."""
+    card = {**card, "sha256": hashlib.sha256(content).hexdigest()}
+    text = json.dumps(card, indent=2, allow_nan=False) + "\n"
+    write_listed(path, content)
+    write_listed(Path(path).with_suffix(".json"), text)
 
 
 def read_carded(path: str | os.PathLike) -> tuple[bytes, dict]:
-    """A file that `write_carded` wrote and its card, the checksum compared. Raises as `load` does."""
-    path = Path(path)
-    for part in (path, path.with_suffix(".json")):
+    """A file that `write_carded` wrote and its card. Raises FileNotFoundError or `DamagedFile`.
+
+    Where the folder has no manifest, as somebody's own may, the file is compared with its card alone.
+    """
+    path, card_path = Path(path), Path(path).with_suffix(".json")
+    for part in (path, card_path):
         if not part.exists():
             raise FileNotFoundError(f"{part}: no such file, expected the weights and their card (.json) side by side")
-    content = path.read_bytes()
+    read = read_listed if os.path.lexists(path.parent / MANIFEST) else _content
+    content, text = read(path), read(card_path)
     try:
-        card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        card = json.loads(text)
         expected = card["sha256"]
     except (ValueError, KeyError, TypeError) as error:
-        raise DamagedFile(f"{path.with_suffix('.json')}: not a card with a sha256: {error}") from error
+        raise DamagedFile(f"{card_path}: not a card with a sha256: {error}") from error
     found = hashlib.sha256(content).hexdigest()
     if found != expected:
         raise DamagedFile(f"{path}: SHA-256 is {found}, its card says {expected}: fetch the file again")

@@ -18,7 +18,7 @@ STUDIES = {"readings": readings_study, "teachers": teachers_study}
 
 def read(name: str) -> pd.DataFrame:
     """The committed results called `name`: "readings", "teachers", or what other modules have put beside them."""
-    return pd.read_csv(RESULTS / f"{name}.csv", dtype={"settings": str, "code": str})
+    return store.read_table(RESULTS / f"{name}.csv", dtype={"settings": str, "code": str})
 
 
 def stale() -> list[str]:
@@ -34,7 +34,11 @@ def stale() -> list[str]:
         if not path.exists():
             found.append(f"data/results/{name}.csv is missing: `make study` makes it")
             continue
-        frame = read(name)
+        try:
+            frame = read(name)
+        except store.DamagedFile as error:
+            found.append(str(error))
+            continue
         parts = {
             "settings": set(frame["settings"].dropna()) != settings,
             "code": set(frame["code"].dropna()) != {STUDIES[name].code()},
@@ -60,7 +64,7 @@ def main() -> None:
     runs, results = Path(arguments.out) / "build" / "study", Path(arguments.out) / "data" / "results"
     for name, study in STUDIES.items():
         frame = study.study(runs, jobs=arguments.jobs)
-        store.write_text(results / f"{name}.csv", frame.to_csv(index=False, float_format="%.6f", lineterminator="\n"))
+        store.write_listed(results / f"{name}.csv", frame.to_csv(index=False, float_format="%.6f", lineterminator="\n"))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from .checks import check_finite, check_observations
 from .envs import Task, get_task, tasks
 
 SHIPPED = store.ROOT / "data" / "teachers"
+LARGEST = 2**28  # bytes that a part of an agent's zip may take, unpacked; TD3's networks take 2**22
 
 
 class Teacher:
@@ -151,8 +152,8 @@ def _read_zip(path: Path) -> dict[str, np.ndarray]:
         raise FileNotFoundError(f"{path}: no such file, expected a zip that Stable-Baselines3's `save` wrote")
     try:
         with zipfile.ZipFile(path) as archive:
-            about = json.loads(archive.read("data"))
-            tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True, map_location="cpu")
+            about = json.loads(_member(archive, "data"))
+            tensors = torch.load(io.BytesIO(_member(archive, "policy.pth")), weights_only=True, map_location="cpu")
         activation = about.get("policy_kwargs", {}).get("activation_fn", "ReLU")
         actor = {name: tensor.numpy() for name, tensor in part_of(tensors, "actor").items()}
     except _NO_AGENT as error:
@@ -161,6 +162,18 @@ def _read_zip(path: Path) -> dict[str, np.ndarray]:
     if "ReLU" not in str(activation):
         raise ValueError(f"{path}: the agent's activation is {activation}, expected ReLU")
     return actor
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> bytes:
+    """A member of a zip, unless it, or all that is zipped in it in turn, says or turns out to be above `LARGEST`."""
+    with archive.open(name) as file:
+        size, content = archive.getinfo(name).file_size, file.read(LARGEST + 1)
+    if zipfile.is_zipfile(io.BytesIO(content)):
+        with zipfile.ZipFile(io.BytesIO(content)) as inner:
+            size += sum(part.file_size for part in inner.infolist())
+    if max(size, len(content)) > LARGEST:
+        raise ValueError(f"{name} is {size} bytes unpacked, expected at most {LARGEST}")
+    return content
 
 
 # What reading a zip that holds something else ends in

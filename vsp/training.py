@@ -9,7 +9,9 @@ from __future__ import annotations
 import argparse
 import copy
 import hashlib
+import io
 import os
+import pickle
 import sys
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
@@ -112,7 +114,7 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
     path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
     model, curve, best = _new_model(task, recipe, seed), [], None
     if path.exists():
-        snapshot = torch.load(path, weights_only=True)
+        snapshot = read_checkpoint(path)
         curve, best = _restore(model, snapshot), snapshot.get("best")
     while model.num_timesteps < recipe.steps:
         chunk_seed = np.random.SeedSequence([seed, model.num_timesteps]).generate_state(1)[0]
@@ -127,9 +129,24 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
             if best is None or curve[-1]["mean"] > best["point"]["mean"]:
                 best = {"point": curve[-1], "policy": copy.deepcopy(snapshot["policy"])}
             snapshot["best"] = best
-        with store.atomic_path(path) as temporary:
-            torch.save(snapshot, temporary)
+        content = io.BytesIO()
+        torch.save(snapshot, content)
+        store.write_sealed(path, content.getvalue())
     return path
+
+
+def read_checkpoint(path: str | os.PathLike) -> dict:
+    """A checkpoint that `train` wrote. Raises FileNotFoundError or `store.DamagedFile`.
+
+    torch's `weights_only` loading runs no code from the file.
+    """
+    import torch
+
+    content = io.BytesIO(store.read_sealed(path))
+    try:
+        return torch.load(content, weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
+        raise store.DamagedFile(f"{path}: sealed, but no checkpoint of tensors and numbers: delete it") from error
 
 
 def _new_model(task: str, recipe: Recipe, seed: int):
@@ -205,9 +222,7 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
 
     Returns whether it does. All seeds in `checkpoints` go on the card; actor and critics are written, in float32.
     """
-    import torch
-
-    tried = {seed: torch.load(path, weights_only=True) for seed, path in checkpoints.items()}
+    tried = {seed: read_checkpoint(path) for seed, path in checkpoints.items()}
     seed, snapshot = list(tried.items())[-1]
     if not reaches_bar(score(_teacher(snapshot, task), task, seed=SELECTION_SEED), task):
         return False
@@ -221,9 +236,7 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
 
 def export_short(task: str, seed: int, checkpoint: Path, folder: str | os.PathLike = SHIPPED) -> None:
     """Write the actor of a shorter training with its card, whatever it scores."""
-    import torch
-
-    snapshot = torch.load(checkpoint, weights_only=True)
+    snapshot = read_checkpoint(checkpoint)
     path = Path(folder) / "short" / f"{task}-{seed}.safetensors"
     _write(task, snapshot, short_recipe(task), seed, path, ("actor.",), {})
 

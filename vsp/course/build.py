@@ -20,11 +20,11 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from ..store import ROOT, sha256, write_json, write_text
+from ..store import ROOT, DamagedFile, read_sealed, sha256, write_sealed, write_text
 from .handout import write_handout
 
 SOURCES = ROOT / "notebooks" / "course"
-MADE = ".made.json"  # the checksums of what was written
+MADE = ".made"  # the checksums of what was written
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
 _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
@@ -43,14 +43,18 @@ def build(out: str | os.PathLike) -> list[Path]:
     _keep_edited(folder, texts)
     for name, text in texts.items():
         write_text(folder / name, text)
-    write_json(folder / MADE, {name: sha256(folder / name) for name in texts})
+    made = {name: sha256(folder / name) for name in texts}
+    write_sealed(folder / MADE, json.dumps(made).encode())
     write_handout(folder / "handout.zip", students)
     return [folder / name for name in (*texts, "handout.zip")]
 
 
 def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
     """Rename the files that are about to be replaced and are not what was written here the last time."""
-    made = json.loads((folder / MADE).read_text(encoding="utf-8")) if (folder / MADE).exists() else {}
+    try:
+        made = json.loads(read_sealed(folder / MADE))
+    except (FileNotFoundError, DamagedFile):
+        made = {}  # nothing is known: all is kept
     for path in (folder / name for name in texts):
         if path.exists() and sha256(path) != made.get(path.relative_to(folder).as_posix()):
             names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
