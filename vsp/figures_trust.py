@@ -15,27 +15,42 @@ _PARTS = {"teacher": TEACHER, "physics": OTHER, "distillation": DISTILLED, "eval
 
 
 def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds") -> Axes:
-    """`quantity` over size on logarithmic axes: a mark per measurement, a line per thing, dashed the fitted law."""
+    """`quantity` over size on logarithmic axes: a mark per measurement, dashed the fitted law; the legend is below."""
     for (what, part), color, mark in zip(frame.groupby("what", sort=False), _LINES, _MARKS):
         sizes, values = part["size"].to_numpy(), part[quantity].to_numpy()
         label = what
         if len(part) >= POINTS:
-            fitted, exponent, _ = power_law(sizes, values)
-            ax.plot(sizes, fitted, color=color, ls="--", lw=0.8)
+            upper, fitted, exponent, _ = power_law(sizes, values)
+            ax.plot(upper, fitted, color=color, ls="--", lw=0.8)
             label = f"{what}, exponent {exponent:.1f}"
         ax.plot(sizes, values, mark, color=color, ms=3.5, ls="" if len(part) >= POINTS else "-", label=label)
     ax.set(xscale="log", yscale="log", xlabel=frame["over"].iloc[0], ylabel=quantity)
+    ax.legend(loc="upper left", bbox_to_anchor=(0, -0.3), frameon=False, borderaxespad=0)
     return ax
 
 
-def ratios(ax: Axes, names: list[str], found: np.ndarray, wanted: np.ndarray) -> Axes:
-    """How many times faster things are (n,), as bars on a logarithmic axis, beside what was to be reached, as ticks."""
-    rows = np.arange(len(names))
-    ax.barh(rows, found, color=DISTILLED, height=0.6, label="measured")
-    ax.plot(wanted, rows, "|", color="black", ms=14, mew=1.5, label="to reach")
-    for row, value in zip(rows, found):
-        ax.annotate(f"{value:.3g}×", (value, row), (3, 0), textcoords="offset points", va="center", fontsize=7)
-    ax.set(xscale="log", xlim=(1, 6 * max(found)), xlabel="times faster", yticks=rows, yticklabels=names)
+def told(frame: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table of trust.csv that tell how many times faster something is: what, times and wanted."""
+    rows = frame[frame["measured"].str.match(_TIMES) & frame["to hold"].str.match(_TIMES)]
+    first = {name: rows[column].str.extract(_TIMES)[0].astype(float) for name, column in _READ.items()}
+    return rows[["what"]].assign(**first)
+
+
+_TIMES = r"([\d.]+) times"
+_READ = {"times": "measured", "wanted": "to hold"}
+
+
+def ratios(ax: Axes, frame: pd.DataFrame) -> Axes:
+    """How many times faster the things of `told` are, as bars on a logarithmic axis; marks: what was to be reached."""
+    rows = np.arange(len(frame))
+    ax.barh(rows, frame["times"], color=DISTILLED, height=0.6, label="measured")
+    ax.plot(frame["wanted"], rows, "|", color="black", ms=11, mew=1.5, label="to reach")
+    for row, value in zip(rows, frame["times"]):
+        number = f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+        ax.annotate(f"{number}×", (value, row), (3, 0), textcoords="offset points", va="center", fontsize=7)
+    ax.set(xscale="log", xlim=(1, 8 * frame["times"].max()), xlabel="times faster", yticks=rows)
+    ax.set_yticklabels(frame["what"])
+    ax.legend(loc="lower right", frameon=False)
     ax.invert_yaxis()
     return ax
 

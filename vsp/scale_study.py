@@ -37,14 +37,14 @@ from .teachers import Teacher
 
 TASK = "SimpleGoal-v0"
 EPISODES = tuple(round(10**e) for e in (3, 3.5, 4, 4.5, 5, 5.5, 6))
-CELLS = (10, 30, 100, 300, 1000)
+CELLS = (10, 18, 32, 56, 100, 178, 316, 562, 1000)
 DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)
 RUNS = (1, 3, 10, 30, 100, 300, 1000)
 WORKERS = (1, 2, 4)
 LAYERS = (400, 300)  # of the teachers' networks
 N_CELLS = 30  # where dimensions vary
 N_RUNS = 40  # where workers vary
-PASSES = 3  # of which the median counts
+PASSES = 5  # of which the median counts
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ import pandas as pd
 from .config import preset
 from .scale_study import N_CELLS, N_RUNS
 
-POINTS = 4  # sizes that a fit of three numbers needs at least
+POINTS = 4  # sizes that a fit needs at least
 
 
 class Environment(NamedTuple):
@@ -45,34 +45,28 @@ def exponents(frame: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (over, what), part in frame.groupby(["over", "what"], sort=False):
         for quantity in ("seconds", "megabytes") if len(part) >= POINTS else ():
-            _, exponent, half = power_law(part["size"].to_numpy(), part[quantity].to_numpy())
+            _, _, exponent, half = power_law(part["size"].to_numpy(), part[quantity].to_numpy())
             about = {"over": over, "what": what, "quantity": quantity}
             rows.append({**about, "exponent": exponent, "low": exponent - half, "high": exponent + half})
     return pd.DataFrame(rows)
 
 
-def power_law(sizes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Fit a + b·size^c, a and b not negative, to positive values (n,), by least squares of logarithms.
+def power_law(sizes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Fit b·size^c to the upper half of the sizes, at least `POINTS`: below, what any call costs hides the growth.
 
-    The constant is what a call costs however small it is. Returns the fitted values (n,), c, and half the width of its
-    95 % interval (from the curvature; Student's t with n - 3 degrees of freedom). Raises ValueError below `POINTS`.
+    Least squares of logarithms. Returns those sizes and the fitted values (n,), c, and half the width of its 95 %
+    interval (Student's t). Raises ValueError for fewer sizes.
     """
-    from scipy.optimize import least_squares
-    from scipy.stats import t
+    from scipy.stats import linregress, t
 
     if len(sizes) < POINTS:
-        raise ValueError(f"{len(sizes)} sizes, expected {POINTS} or more: three numbers are fitted to them")
-    x, y = np.log(sizes / sizes.max()), np.log(values)
-
-    def predicted(p: np.ndarray) -> np.ndarray:
-        return np.logaddexp(p[0], p[1] + p[2] * x)  # log(a + b·size^c)
-
-    starts = [(y.min() + low, y.max(), c) for low in (-3, -0.5) for c in (0.5, 1, 2)]
-    fits = [least_squares(lambda p: predicted(p) - y, start, loss="linear") for start in starts]
-    best = min(fits, key=lambda fit: fit.cost)
-    freedom = len(x) - 3
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * 2 * best.cost / freedom
-    return np.exp(predicted(best.x)), float(best.x[2]), float(t.ppf(0.975, freedom) * np.sqrt(covariance[2, 2]))
+        raise ValueError(f"{len(sizes)} sizes, expected {POINTS} or more")
+    n = max(POINTS, (len(sizes) + 1) // 2)
+    upper = np.argsort(sizes)[-n:]
+    x, y = np.log(sizes[upper]), np.log(values[upper])
+    line = linregress(x, y)
+    fitted = np.exp(line.intercept + line.slope * x)
+    return sizes[upper], fitted, float(line.slope), float(t.ppf(0.975, n - 2) * line.stderr)
 
 
 def cost(frame: pd.DataFrame, *, n_runs: int = 1000, tasks=TEN_TASKS) -> pd.DataFrame:
@@ -120,3 +114,8 @@ def overhead(frame: pd.DataFrame) -> float:
     """Seconds that a run through a Dask scheduler takes longer than in a process of this machine, one worker each."""
     times = frame[(frame["over"] == "workers") & (frame["size"] == 1)].set_index("what")["seconds"]
     return float((times["Dask workers"] - times["processes"]) / N_RUNS)
+
+
+def part(frame: pd.DataFrame, table: str) -> pd.DataFrame:
+    """The rows of data/results/trust.csv that belong to a table, without machine and name of the table."""
+    return frame.loc[frame["table"] == table, ["what", "to hold", "measured", "held"]].reset_index(drop=True)

@@ -1,0 +1,75 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from vsp import scale_study, study
+from vsp.evaluate import outcomes
+from vsp.rollouts import record
+from vsp.scale_study import MEASURED, Pursuit, alone, reach
+
+
+@pytest.mark.parametrize("d", [2, 5, 17])
+def test_the_teacher_reaches_the_corner_on_curves(d):
+    task = reach(d)
+    played = outcomes(Pursuit(), task, 50, seed=0)
+    assert (played.codes == 1).mean() > 0.9 and played.lengths.max() <= task.max_steps
+    (episode,) = record(Pursuit(), task, np.full((1, d), 0.9))
+    actions = np.array([Pursuit().predict(state)[0] for state in episode.states])
+    assert actions == pytest.approx(episode.actions) and (np.abs(actions) <= 1).all()
+
+
+def test_a_step_by_hand():
+    states, actions = np.array([[0.3, 0.4], [0.15, 0.05]]), np.array([[-3.0, 0.0], [-1.0, 0.0]])
+    moved, rewards, ended = reach(2).step(states, actions)
+    assert moved == pytest.approx(np.array([[0.2, 0.4], [0.05, 0.05]]))
+    assert rewards == pytest.approx(10 * (np.hypot(*states.T) - np.hypot(*moved.T))) and ended.tolist() == [0, 1]
+
+
+SMALL = {"distillation": (20,), "evaluation": (50,), "passes": (5, 3), "policies": (3,), "physics": (2,), "runs": (2,)}
+
+
+@pytest.mark.parametrize("what", SMALL)
+def test_everything_is_timed(what):
+    found = MEASURED[what](*SMALL[what], **({"jobs": 1} if what == "runs" else {}))
+    assert found and all(seconds > 0 for seconds in found.values())
+
+
+def test_workers_are_timed_here_and_on_a_cluster(monkeypatch):
+    asked = []
+    monkeypatch.setattr(scale_study, "runs", lambda n, *, jobs: asked.append((n, jobs)) or {"runs": 1.0})
+    assert scale_study.workers(2) == {"processes": 1.0, "Dask workers": 1.0}
+    assert asked[0] == (scale_study.N_RUNS, 2) and asked[1][1].startswith("tcp://127.0.0.1:")
+
+
+def test_a_pass_neither_adds_nor_removes_cells(monkeypatch):
+    seen = []
+    for name in ("split_regions", "merge_regions"):
+        original = getattr(scale_study, name)
+        monkeypatch.setattr(
+            scale_study, name, lambda p, *rest, f=original: seen.append((f(p, *rest), len(p.codewords)))
+        )
+    scale_study.passes(7, 2)
+    assert len(seen) == 2 * scale_study.PASSES and all(changed == [] and k == 7 for changed, k in seen)
+
+
+def test_a_measurement_has_a_process_of_its_own_and_memory_that_is_the_same_each_time():
+    (found, first), (_, second) = alone("evaluation", 2000), alone("evaluation", 4000)
+    assert set(found) == {"evaluation"} and 1.5 < second / first < 2.5
+
+
+def test_the_study_has_a_row_per_thing_and_size(monkeypatch):
+    monkeypatch.setattr(scale_study, "alone", lambda what, *sizes: ({what: 1.0}, 2.0))
+    frame = scale_study.study(episodes=(10,), cells=(5,), dimensions=(2, 3), n_runs=(1,), n_workers=(1, 2))
+    assert frame.groupby("over")["size"].agg(list).to_dict() == {
+        "cells": [5], "copies": [50], "dimensions": [2, 3, 2, 3], "episodes": [10, 10], "runs": [1], "workers": [1, 2]
+    }  # fmt: skip
+    assert (frame["seconds"] == 1).all() and frame["machine"].nunique() == 1
+
+
+def test_the_command_writes_a_listed_table(monkeypatch, tmp_path):
+    frame = pd.DataFrame({"what": ["x"], "seconds": [1.5]})
+    monkeypatch.setattr(scale_study, "study", lambda: frame)
+    monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path)])
+    scale_study.main()
+    monkeypatch.setattr(study, "RESULTS", tmp_path / "data" / "results")
+    assert study.read("scale").equals(frame)

@@ -1,0 +1,101 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from vsp import scaling
+from vsp.config import preset
+from vsp.scaling import Environment, cost, exponents, power_law
+
+SIZES = np.array([1, 10, 100, 1000, 10_000, 100_000])
+
+
+def test_a_power_law_is_found_again_above_what_any_call_costs():
+    sizes, fitted, exponent, half = power_law(SIZES, 3.0 * SIZES**1.5)
+    assert sizes.tolist() == SIZES[2:].tolist() and fitted == pytest.approx(3.0 * sizes**1.5)
+    assert exponent == pytest.approx(1.5) and half == pytest.approx(0, abs=1e-6)
+    assert power_law(SIZES, 50.0 + 3.0 * SIZES**1.5)[2] == pytest.approx(1.5, abs=0.01)
+
+
+def test_sizes_in_any_order_are_the_same():
+    order = np.array([3, 0, 5, 1, 4, 2])
+    values = np.random.default_rng(0).lognormal(size=6) * SIZES
+    first, second = power_law(SIZES, values), power_law(SIZES[order], values[order])
+    assert first[2:] == pytest.approx(second[2:]) and np.array_equal(np.sort(first[1]), np.sort(second[1]))
+
+
+def test_the_interval_holds_the_exponent_nineteen_times_of_twenty():
+    rng, held = np.random.default_rng(0), 0
+    for _ in range(400):
+        _, _, exponent, half = power_law(SIZES, SIZES**0.7 * rng.lognormal(sigma=0.3, size=6))
+        held += abs(exponent - 0.7) <= half
+    assert 0.92 < held / 400 < 0.98
+
+
+def test_too_few_sizes_are_refused():
+    with pytest.raises(ValueError, match="3 sizes, expected 4 or more"):
+        power_law(SIZES[:3], SIZES[:3] * 1.0)
+
+
+def curves(**changes):
+    """Rows as scale_study writes them: everything takes a second, or what `changes` says, and a megabyte."""
+    what = ("training", "splitting pass", "merging pass", "teacher, 1000 states", "cells, 1000 states")
+    rows = [{"what": name, "over": "dimensions", "size": d} for name in what for d in (2, 4, 8, 17)]
+    rows += [{"what": "physics, 1000 steps", "over": "copies", "size": 50}]
+    rows += [{"what": name, "over": "workers", "size": n} for name in ("processes", "Dask workers") for n in (1, 2)]
+    frame = pd.DataFrame(rows).assign(seconds=1.0, megabytes=1.0)
+    for name, value in changes.items():
+        frame.loc[frame["what"].str.startswith(name), "seconds"] = value
+    return frame
+
+
+def test_exponents_are_of_what_has_sizes_enough():
+    frame = exponents(curves())
+    assert len(frame) == 10 and set(frame["quantity"]) == {"seconds", "megabytes"}
+    assert frame["exponent"].to_numpy() == pytest.approx(0) and set(frame["over"]) == {"dimensions"}
+
+
+def test_a_cost_by_hand():
+    config = preset("SimpleGoal-v0")
+    task = Environment("toy", 3, 1, 100, True)
+    frame = cost(curves(teacher=2.0, physics=3.0, training=0.5, cells=7.0), n_runs=36, tasks=[task])
+    (row,) = frame.to_dict("records")
+    passes = 0.5 + 1 / config.n_split + 1 / config.n_merge
+    assert row["teacher"] == pytest.approx(config.n_epochs * 0.1 * 2.0 / 100)
+    assert row["physics"] == pytest.approx(config.n_epochs * 0.1 * 3.0 / 100)
+    assert row["distillation"] == pytest.approx(config.n_epochs * passes / 100)
+    assert row["evaluation"] == pytest.approx(2 * 100 * (3.0 + 7.0) / 100)
+    parts = ("teacher", "physics", "distillation", "evaluation")
+    assert row["all"] == pytest.approx(sum(row[part] for part in parts))
+    numbers = 3000 + config.n_epochs + scaling.N_CELLS * (3 + 4)
+    assert row["MB on disk"] == pytest.approx(36 * numbers * 8e-6)
+
+
+def test_without_an_engine_a_step_is_free_and_dimensions_are_interpolated():
+    frame = curves(physics=1e9)
+    frame.loc[frame["what"] == "training", "seconds"] = frame["size"] * 1.0
+    task = Environment("toy", 6, 1, 100, False)
+    row = cost(frame, n_runs=1, tasks=[task]).iloc[0]
+    config = preset("SimpleGoal-v0")
+    assert row["physics"] == 0 and row["all"] < 1e3
+    assert row["distillation"] * 3600 == pytest.approx(config.n_epochs * (6 + 1 / config.n_split + 1 / config.n_merge))
+
+
+def test_ten_tasks_are_ten_within_the_measured_dimensions():
+    assert len({task.name for task in scaling.TEN_TASKS}) == 10
+    assert {task.d for task in scaling.TEN_TASKS} <= set(range(2, 18))
+
+
+def test_efficiency_and_overhead_by_hand():
+    frame = curves()
+    dask = frame["what"] == "Dask workers"
+    frame.loc[dask & (frame["size"] == 1), "seconds"] = 1.0 + 0.5 * scaling.N_RUNS
+    frame.loc[dask & (frame["size"] == 2), "seconds"] = (1.0 + 0.5 * scaling.N_RUNS) / 1.5
+    assert scaling.efficiency(frame) == pytest.approx(0.75) and scaling.overhead(frame) == pytest.approx(0.5)
+
+
+def test_a_part_of_the_measured_figures_is_one_table():
+    frame = pd.DataFrame(
+        {"table": ["a", "b", "a"], "what": [1, 2, 3], "to hold": "x", "measured": "y", "held": "yes", "machine": "m"}
+    )
+    assert scaling.part(frame, "a")["what"].tolist() == [1, 3]
+    assert list(scaling.part(frame, "a")) == ["what", "to hold", "measured", "held"]
