@@ -45,7 +45,7 @@ class Buffers:
         """A minibatch for each of `cells` (c,), with replacement: inputs (c, size, q + 1) and actions (c, size, m)."""
         slots = (rng.random((len(cells), size)) * self.counts[cells, None]).astype(np.intp)
         rows = self._table[cells[:, None], slots]
-        return self._inputs[rows], self._actions[rows]
+        return self._inputs.take(rows, axis=0), self._actions.take(rows, axis=0)
 
     def add(self) -> None:
         """Append the empty buffer of a new cell."""

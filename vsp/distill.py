@@ -100,13 +100,16 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
     parameters = partition.comparable_parameters()
     alive = np.ones(k, dtype=bool)
     visited = np.ones(k, dtype=bool) if config.merge_visits_removed else alive  # R6
+    known, graph = None, None  # neighbours among these cells; most cells remove none, and leave it as it is
     for i in range(k):  # l. 1
         if not visited[i]:
             continue
         members = alive.copy()
         members[i] = True
+        if not np.array_equal(members, known):
+            known, graph = members, partition.neighbours(members)
         near = np.zeros(k, dtype=bool)
-        near[members] = partition.neighbours(members)[np.flatnonzero(members) == i][0]  # l. 2
+        near[members] = graph[np.flatnonzero(members) == i][0]  # l. 2
         apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
         similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
         if not alive[i]:

@@ -57,7 +57,7 @@ class VoronoiPolicy:
         self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
         if metric not in geometry.METRICS:
             raise ValueError(f"metric is {metric!r}, expected one of {list(geometry.METRICS)}")
-        if not len(self.codewords) or len(np.unique(self.codewords, axis=0)) < len(self.codewords):
+        if not len(self.codewords) or not geometry.all_differ(self.codewords):
             raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
         if not (self.scale > 0).all():
             raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers")
