@@ -48,7 +48,7 @@ def distill(
 def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[VoronoiPolicy, History]:
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     episodes = teacher_episodes(teacher, task, config.n_iterations, starts)
-    partition, history = Partition(task, config), History()
+    partition, history = Partition(task, config), History(config.n_iterations)
     for n in range(config.n_iterations):
         episode = next(episodes)
         if n == 0:
@@ -88,7 +88,7 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
             near[i] |= config.split_reset == "cell_and_neighbours"  # R13
             partition.reset(near)  # l. 13-14
             losses = carry(losses)
-            added.append(state)
+            added.append(state.copy())  # a view would keep all episodes that were rolled out with its own
             if len(added) == most:
                 break
     return added
