@@ -8,18 +8,69 @@ first parameters and minibatches. Codewords in a line are not provided for.
 
 from __future__ import annotations
 
+import importlib
+
+import gymnasium
 import numpy as np
 import torch
 from scipy.spatial import Delaunay, KDTree
 from torch.nn.functional import mse_loss
 
 from vsp.config import Config
+from vsp.rollouts import Episode
 from vsp.teachers import SHIPPED
+
+
+def evaluate_directly(policy, task: str, n_episodes: int, *, seed: int) -> np.ndarray:
+    """Returns (n,) by Stable-Baselines3's `evaluate_policy`, from the starts that `vsp.evaluate` has for this seed."""
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.monitor import Monitor
+
+    env = gymnasium.make(task)
+    env.unwrapped.np_random = np.random.default_rng(np.random.SeedSequence(seed))
+    returns, _ = evaluate_policy(Model(policy), Monitor(env), n_episodes, return_episode_rewards=True)
+    return np.array(returns)
+
+
+class Model:
+    """A policy as `evaluate_policy` asks for it: with the arguments that recurrent and random ones need."""
+
+    def __init__(self, policy):
+        self.policy = policy
+
+    def predict(self, obs, state=None, episode_start=None, deterministic=True):
+        return self.policy.predict(obs)
+
+
+class OneByOne:
+    """An agent that is asked for one observation at a time, whoever asks: float32 rounds otherwise in a batch."""
+
+    def __init__(self, agent):
+        self.agent = agent
+
+    def predict(self, obs):
+        return np.array([self.agent.predict(one, deterministic=True)[0] for one in obs]), None
+
+
+def same_run(found, teacher, task: str, config: Config, seed: int, monkeypatch) -> bool:
+    """Whether `vsp.distill` does, with the episodes of the direct way's run `found`, what was done there."""
+    cells, events, losses, episodes = found
+    module = importlib.import_module("vsp.distill")  # `vsp.distill` is the function
+    played = [Episode(*map(np.array, zip(*episode))) for episode in episodes]
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "teacher_episodes", lambda *_: iter(played))
+        policy, history = module.distill(teacher, task, config, seed=seed)
+    own = [(event.iteration, event.kind, tuple(event.codeword)) for event in history.events]
+    return (
+        own == [(n, kind, tuple(codeword)) for n, kind, codeword in events]
+        and np.array_equal(policy.codewords, [cell.codeword for cell in cells])
+        and np.allclose(policy.coefficients, [cell.parameters() for cell in cells], rtol=0, atol=1e-9)
+        and np.allclose(history.losses, losses, rtol=0, atol=1e-9)
+    )
 
 
 def teacher_agent(task: str):
     """The shipped teacher as the agent of Stable-Baselines3 that it was."""
-    import gymnasium
     from safetensors.torch import load_file
     from stable_baselines3 import TD3
 

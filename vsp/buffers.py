@@ -14,8 +14,8 @@ import numpy as np
 class Buffers:
     """Growing per-cell buffers with uniform minibatches: one log of rows, and per cell a list of row numbers into it.
 
-    Rows live until `clear`, whose period bounds the memory: r rows between two take at most 16 (q + 1 + m) r bytes in the
-    log, which doubles as it grows, and 8 k r in the lists of k cells, if all of them lie in one.
+    Rows live until `clear`, whose period bounds the memory: r rows between two take at most 16 (q + 1 + m) r bytes in
+    the log, which doubles as it grows, and 8 k r in the lists of k cells, if all of them lie in one.
     """
 
     def __init__(self, q: int, m: int):
