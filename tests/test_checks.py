@@ -10,6 +10,15 @@ def test_numbers_become_float64(values):
     assert checked.dtype == np.float64 and checked.tolist() == [1, 2]
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_whose_squares_overflow_are_finite():
+    values = np.full((3, 4), 1e300)[:, ::2]
+    assert np.array_equal(check_finite("weights", values), values)
+    values[2, 1] = -np.inf
+    with pytest.raises(ValueError, match=r"weights hold -inf at index \(2, 1\)"):
+        check_finite("weights", values)
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

@@ -8,6 +8,7 @@ from vsp import geometry
 from vsp.geometry import (
     METRICS,
     WITNESSES,
+    all_differ,
     delaunay_neighbours,
     distances,
     grid,
@@ -120,6 +121,12 @@ def test_a_square_has_its_sides_and_at_most_one_diagonal():
     found = edges(delaunay_neighbours(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])))
     assert {(0, 1), (0, 2), (1, 3), (2, 3)} <= found <= {(0, 1), (0, 2), (1, 3), (2, 3), (0, 3), (1, 2)}
     assert len(found) == 5
+
+
+def test_all_differ():
+    points = np.array([[0.25, 0.5], [0.5, 0.25], [0.25, 0.75]])
+    assert all_differ(points) and all_differ(points[:1]) and all_differ(points[:0])
+    assert not all_differ(points[[0, 1, 0]]) and not all_differ(np.array([[0.0, 1.0], [-0.0, 1.0]]))
 
 
 def test_delaunay_refuses_duplicates_and_shows_them():

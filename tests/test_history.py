@@ -1,9 +1,12 @@
+import importlib
+import tracemalloc
+
 import numpy as np
 import pytest
 from support import SIMPLEGOAL, TINY, CurvedTeacher, partition_of, tiny
 
 from vsp.distill import distill
-from vsp.history import SNAPSHOT_EVERY, History
+from vsp.history import SNAPSHOT_EVERY, SNAPSHOTS, History
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +61,34 @@ def test_a_snapshot_is_at_most_so_many_iterations_old():
         history.observe(n, 0.0, partition)
     ages = [n - history.policy_at(n).coefficients[0, 0, 0] for n in range(35)]
     assert min(ages) == 0 and max(ages) == SNAPSHOT_EVERY - 1
+
+
+@pytest.mark.parametrize("n", [100, 5000, 5500, 80_000])
+def test_a_long_run_keeps_no_more_snapshots_than_a_short_one(n):
+    history, partition = History(n), partition_of([[0.5, 0.5]])
+    for i in range(n):
+        history.observe(i, 0.0, partition)
+    assert history.every == max(SNAPSHOT_EVERY, n // SNAPSHOTS)
+    assert len(history._snapshots) == -(-n // history.every) <= 1.1 * SNAPSHOTS
+    assert history.policy_at(n - 1) is history._snapshots[-1][1]
+
+
+def test_events_do_not_keep_the_episodes_that_they_come_from(run):
+    assert all(event.codeword.base is None or len(event.codeword.base) < 100 for event in run[1].events)
+
+
+def test_memory_of_a_run_grows_by_what_the_history_notes(run, monkeypatch):
+    """Two numbers an iteration, and less than a snapshot for each tenth; `make bench` measures whole runs."""
+    monkeypatch.setattr(importlib.import_module("vsp.distill"), "EPISODES_AHEAD", 25)
+    monkeypatch.setattr(importlib.import_module("vsp.history"), "SNAPSHOTS", 20)
+    peaks = {}
+    for n in (400, 1400):
+        config = tiny(n_epochs=n, n_freeze=n - 100)
+        tracemalloc.start()
+        distill(CurvedTeacher(), SIMPLEGOAL, config, seed=0)
+        peaks[n] = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peaks[1400] - peaks[400] < 150 * 1000
 
 
 def test_snapshots_do_not_change_afterwards(run):

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
 from vsp import store
 from vsp.baselines import refit
@@ -44,16 +44,18 @@ def test_predict_by_hand():
     assert TWO.predict(np.array([[0.5, 0.5]]))[0].tolist() == [[0.75, 0.5]]  # a tie goes to the lower index
 
 
-@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
+@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_a_batch_is_its_rows(task, dtype):
     policy, task = random_policy(20, task=task), get_task(task)
-    obs = np.random.default_rng(1).uniform(task.low, task.high, size=(300, 2)).astype(dtype)
+    obs = np.random.default_rng(1).uniform(task.low, task.high, size=(300, len(task.low))).astype(dtype)
     actions, _ = policy.predict(obs)
     assert actions.shape == (300, len(task.action_low)) and actions.dtype == np.float64
     single = [policy.predict(row)[0] for row in obs]
     assert single[0].shape == (len(task.action_low),) and np.array_equal(actions, single)
-    assert (actions >= task.action_low).all() and (actions <= task.action_high).all() and (np.abs(actions) == 1).any()
+    assert (actions >= task.action_low).all() and (actions <= task.action_high).all()
+    assert (actions == task.action_high).any() and (actions == task.action_low).any()
+    assert policy.cells(obs).tolist() == [policy.cells(row) for row in obs]
     assert np.array_equal(actions, np.clip(policy.linear(obs), task.action_low, task.action_high))
 
 

@@ -14,7 +14,8 @@ import numpy as np
 class Buffers:
     """Growing per-cell buffers with uniform minibatches: one log of rows, and per cell a list of row numbers into it.
 
-    Rows live until `clear`: its period bounds the memory.
+    Rows live until `clear`, whose period bounds the memory: r rows between two take at most 16 (q + 1 + m) r bytes in
+    the log, which doubles as it grows, and 8 k r in the lists of k cells, if all of them lie in one.
     """
 
     def __init__(self, q: int, m: int):
@@ -45,7 +46,7 @@ class Buffers:
         """A minibatch for each of `cells` (c,), with replacement: inputs (c, size, q + 1) and actions (c, size, m)."""
         slots = (rng.random((len(cells), size)) * self.counts[cells, None]).astype(np.intp)
         rows = self._table[cells[:, None], slots]
-        return self._inputs[rows], self._actions[rows]
+        return self._inputs.take(rows, axis=0), self._actions.take(rows, axis=0)
 
     def add(self) -> None:
         """Append the empty buffer of a new cell."""

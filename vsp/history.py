@@ -12,6 +12,7 @@ from .partition import Partition
 from .policy import VoronoiPolicy
 
 SNAPSHOT_EVERY = 10  # iterations between two stored copies of the parameters
+SNAPSHOTS = 500  # of a longer run, where more iterations lie between two of them: memory is bounded
 
 
 class Event(NamedTuple):
@@ -23,9 +24,14 @@ class Event(NamedTuple):
 
 
 class History:
-    """Cells, losses and events over the iterations of one run, and snapshots of the policy on the way."""
+    """Cells, losses and events over the iterations of one run, and snapshots of the policy on the way.
 
-    def __init__(self) -> None:
+    Snapshots are about `SNAPSHOTS` at most, and one per change of the codewords. What grows with the iterations is two
+    numbers for each, 40 bytes.
+    """
+
+    def __init__(self, n_iterations: int = 0) -> None:
+        self.every = max(SNAPSHOT_EVERY, n_iterations // SNAPSHOTS)  # iterations between two snapshots
         self.events: list[Event] = []
         self.cells: list[int] = []  # number of cells after each iteration
         self.losses: list[float] = []  # minibatch loss of each iteration before its step, averaged over cells
@@ -40,11 +46,11 @@ class History:
         self.cells.append(len(partition.codewords))
         self.losses.append(loss)
         changed = n and not np.array_equal(partition.codewords, self._snapshots[-1][1].codewords)
-        if changed or n % SNAPSHOT_EVERY == 0:
+        if changed or n % self.every == 0:
             self._snapshots.append((n, partition.policy()))
 
     def policy_at(self, n: int) -> VoronoiPolicy:
-        """The policy after iteration n, at most `SNAPSHOT_EVERY` iterations old. Raises ValueError outside the run."""
+        """The policy after iteration n, fewer than `every` iterations old. Raises ValueError outside the run."""
         if not 0 <= n < len(self.cells):
             raise ValueError(f"iteration {n}, expected 0 to {len(self.cells) - 1}")
         return self._snapshots[bisect_right(self._snapshots, n, key=lambda snapshot: snapshot[0]) - 1][1]

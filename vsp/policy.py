@@ -57,7 +57,7 @@ class VoronoiPolicy:
         self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
         if metric not in geometry.METRICS:
             raise ValueError(f"metric is {metric!r}, expected one of {list(geometry.METRICS)}")
-        if not len(self.codewords) or len(np.unique(self.codewords, axis=0)) < len(self.codewords):
+        if not len(self.codewords) or not geometry.all_differ(self.codewords):
             raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
         if not (self.scale > 0).all():
             raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers")
@@ -74,14 +74,12 @@ class VoronoiPolicy:
 
     def cells(self, obs: np.ndarray) -> np.ndarray:
         """Index of the cell of each observation (n, d), or of one (d,)."""
-        states = self._states(obs)
-        found = geometry.nearest(self._scaled, np.atleast_2d(states) / self.scale, self.metric)
-        return found.reshape(states.shape[:-1])
+        return self._cells(self._states(obs))
 
     def linear(self, obs: np.ndarray) -> np.ndarray:
         """Output of the sub-policies before it is limited to the action box: (n, m), or (m,) for one observation."""
         states = self._states(obs)
-        return self.form.outputs(self.form.features(states), self.coefficients[self.cells(states)])
+        return self.form.outputs(self.form.features(states), self.coefficients[self._cells(states)])
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions within the task's limits, in Stable-Baselines3's convention.
@@ -89,7 +87,7 @@ class VoronoiPolicy:
         `obs` is one observation (d,) or a batch (n, d); returns actions (m,) or (n, m) in float64, and None for the
         recurrent state that this policy does not have. Raises ValueError for a wrong shape or numbers not finite.
         """
-        return np.clip(self.linear(obs), self.task.action_low, self.task.action_high), None
+        return np.minimum(np.maximum(self.linear(obs), self.task.action_low), self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
         """Cell, equation, contribution of each feature, and how far the borders are, for one observation (d,).
@@ -188,6 +186,10 @@ class VoronoiPolicy:
         arrays, about = store.load(path, kind="VoronoiPolicy")
         about = {"sub_policy": "linear"} | about  # which older files do not name
         return cls(**arrays, task=about["task"], metric=about["metric"], sub_policy=about["sub_policy"])
+
+    def _cells(self, states: np.ndarray) -> np.ndarray:
+        found = geometry.nearest(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
+        return found.reshape(states.shape[:-1])[()]  # of one state a number, which is quicker to index with
 
     def _states(self, obs: np.ndarray) -> np.ndarray:
         return check_observations(obs, len(self.task.low), self.task.name)

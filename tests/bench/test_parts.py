@@ -1,4 +1,4 @@
-"""How long the parts take here: `make bench`. The bounds are those the README promises for a 2-core machine."""
+"""How long the parts take here: `make bench`; whole runs and episodes beside the direct way are in test_speed.py."""
 
 import statistics
 import time
@@ -9,10 +9,7 @@ import pytest
 
 import vsp
 from vsp import geometry
-from vsp.evaluate import outcomes
 from vsp.explorer import laboratory, replay
-
-DISTILLATION = {"SimpleGoal-v0": 3.0, "MountainCarContinuous-v0": 4.0}  # seconds
 
 
 def seconds(work, repeats: int = 5) -> float:
@@ -29,22 +26,6 @@ def seconds(work, repeats: int = 5) -> float:
 def report(capsys, what: str, value: float, unit: str) -> None:
     with capsys.disabled():
         print(f"\n{what:60s} {value:10.4g} {unit}", end="")
-
-
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
-def test_one_distillation(task, capsys):
-    teacher = vsp.load_teacher(task)
-    taken = seconds(lambda: vsp.distill(teacher, task, seed=0), repeats=3)
-    report(capsys, f"one distillation, {task}", taken, "s")
-    assert taken < DISTILLATION[task]
-
-
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
-def test_one_evaluation(task, capsys):
-    policy = vsp.paper.published_policy(task)
-    taken = seconds(lambda: outcomes(policy, task, 1000, seed=0))
-    report(capsys, f"1000 episodes of a distilled policy, {task}", taken, "s")
-    assert taken < 2
 
 
 @pytest.mark.parametrize("task", vsp.paper.TASKS)
