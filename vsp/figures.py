@@ -350,17 +350,21 @@ def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DIST
 
 def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
     """Edges of the outer pixels of a grid whose points are pixel centres, x and y (r, c) as of `geometry.grid`."""
-    x, y = check_array("x", x, (-1, -1)), check_array("y", y, np.shape(x))
-    if min(x.shape) < 2:
-        raise ValueError(f"the grid has shape {x.shape}, expected two points or more along each axis")
+    x, y = _grid(x, y)
     dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
     return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
 
 
+def _grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    x = check_array("x", x, (-1, -1))
+    if min(x.shape) < 2:
+        raise ValueError(f"the grid has shape {x.shape}, expected two points or more along each axis")
+    return x, check_array("y", y, x.shape)
+
+
 def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.ndarray:
     """`values`, one for each point of the grid, in its shape. Raises ValueError for another number of them."""
-    values = check_finite(what, values)
-    if values.size != np.size(x) or np.shape(x) != np.shape(y):
-        sizes = f"shape {values.shape} on a grid of {np.shape(x)} and {np.shape(y)}"
-        raise ValueError(f"{what} have {sizes}, expected one for each point")
-    return values.reshape(np.shape(x))
+    (x, _), values = _grid(x, y), check_finite(what, values)
+    if values.size != x.size:
+        raise ValueError(f"{what} have shape {values.shape}, expected one for each point of the grid {x.shape}")
+    return values.reshape(x.shape)

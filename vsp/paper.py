@@ -81,6 +81,7 @@ def value(id: str) -> float:
 
 def spread_id(task: str, subject: str, metric: str) -> str:
     """The id of a value of T5 or T6: spread_id("SimpleGoal-v0", "ours", "Median/Q2") is "sg_spread_ours_median"."""
+    check_choice("subject", subject, ("drl", "ours"))
     return f"{PREFIX[check_task(task)]}_spread_{subject}_{metric.lower().partition('/')[0]}"
 
 

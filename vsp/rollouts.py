@@ -69,9 +69,10 @@ def record(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode
 def visited(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:
     """All states (t, d) on the way from the start states (n, s), episode by episode. Raises ValueError as `play` does,
     and for no starts."""
-    if not np.size(starts):
-        raise ValueError(f"start states have shape {np.shape(starts)}, expected at least one")
-    return np.concatenate([episode.states for episode in record(policy, task, starts)])
+    episodes = record(policy, task, starts)
+    if not episodes:
+        raise ValueError("there are no start states, expected at least one")
+    return np.concatenate([episode.states for episode in episodes])
 
 
 def _advance(policy: Policy, task: str | Task, starts: np.ndarray, *, record: bool):
