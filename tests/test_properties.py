@@ -43,7 +43,7 @@ from vsp import (
     trees,
 )
 
-distill, evaluate, simplify = (importlib.import_module(f"vsp.{name}") for name in ("distill", "evaluate", "simplify"))
+distill, evaluate, simplify = map(importlib.import_module, ("vsp.distill", "vsp.evaluate", "vsp.simplify"))
 MODULES = (
     "agents", "baselines", "buffers", "config", "distill", "envs", "evaluate", "export", "figures", "geometry", "history",
     "lime", "moments", "moves", "paper", "partition", "policy", "readings", "refine", "regions", "rollouts", "simplify",
@@ -215,7 +215,10 @@ values_on_grid = numbers(np.arange(9.0) % 2, free=(), any_shape=True, also=[np.z
 RNG = np.random.default_rng
 
 CASES = {
-    "agents.agent": (agents.agent, {"source": Argument(TEACHER, st.sampled_from([None, 3, "TD3", np.zeros(2), np.nan]))}),
+    "agents.agent": (
+        agents.agent,
+        {"source": Argument(TEACHER, st.sampled_from([None, 3, "TD3", np.zeros(2), np.nan]))},
+    ),
     "baselines.Heuristic.predict": (baselines.Heuristic().predict, {"obs": numbers(np.ones((3, 8)) / 4)}),
     "baselines.PumpAndBalance.predict": (baselines.PumpAndBalance().predict, {"obs": numbers(np.ones((3, 3)) / 4)}),
     "baselines.Still.predict": (baselines.Still(TASK).predict, {"obs": states}),
@@ -224,7 +227,8 @@ CASES = {
         {"teacher": teacher, "task": task, "config": budget, "seed": seed},
     ),
     "baselines.kmeans_cells": (
-        baselines.kmeans_cells, pairs | {"cells": count(2, most=len(STATES)), "task": task, "seed": seed}
+        baselines.kmeans_cells,
+        pairs | {"cells": count(2, most=len(STATES)), "task": task, "seed": seed},
     ),
     "baselines.linear_map": (baselines.linear_map, pairs | {"task": task}),
     "baselines.refit": (functools.partial(baselines.refit, TWO), pairs),
@@ -233,7 +237,15 @@ CASES = {
     "config.Refinement": (config.Refinement, settings_of(config.Refinement, REFINEMENT)),
     "config.check_refinement": (config.check_refinement, {"config": budget}),
     "config.preset": (config.preset, {"task": task, "kind": choice("paper")}),
-    "distill.distill": (distill.distill, {"teacher": teacher, "task": task, "config": Argument(SHORT, budget.bad.filter(lambda c: c is not SHORT)), "seed": seed}),
+    "distill.distill": (
+        distill.distill,
+        {
+            "teacher": teacher,
+            "task": task,
+            "config": Argument(SHORT, budget.bad.filter(lambda c: c is not SHORT)),
+            "seed": seed,
+        },
+    ),
     "distill.teacher_episodes": (
         lambda **arguments: list(distill.teacher_episodes(task=TASK, rng=RNG(0), **arguments)),
         {"teacher": teacher, "n": count(2, least=0)},
@@ -241,17 +253,26 @@ CASES = {
     "envs.SimpleGoalEnv": (envs.SimpleGoalEnv, {"goal_reward": choice("add")}),
     "envs.SimpleGoalEnv.step": (envs.SimpleGoalEnv().step, {"action": numbers([0.5, 0.25], free=())}),
     "envs.get_task": (envs.get_task, {"name": task}),
-    "envs.gymnasium_task": (envs.gymnasium_task, {"name": Argument("Pendulum-v1", st.sampled_from(["CartPole-v1", "FrozenLake-v1", "Acrobot-v1"]))}),
+    "envs.gymnasium_task": (
+        envs.gymnasium_task,
+        {"name": Argument("Pendulum-v1", st.sampled_from(["CartPole-v1", "FrozenLake-v1", "Acrobot-v1"]))},
+    ),
     "envs.render": (envs.render, {"name": task, "state": numbers([0.5, 0.5], free=())}),
     "evaluate.evaluate": (evaluate.evaluate, player | {"n_episodes": count(3), "seed": seed}),
     "evaluate.interval": (
         functools.partial(evaluate.interval, statistic=np.mean),
-        {"returns": numbers(STATES, any_shape=True, some=True), "level": number(0.9, least=0, most=1), "n_resamples": count(5), "seed": seed},
+        {
+            "returns": numbers(STATES, any_shape=True, some=True),
+            "level": number(0.9, least=0, most=1),
+            "n_resamples": count(5),
+            "seed": seed,
+        },
     ),
     "evaluate.outcomes": (evaluate.outcomes, player | {"n_episodes": count(3), "seed": seed}),
     "evaluate.outlier_numbers": (evaluate.outlier_numbers, {"returns": numbers(STATES, any_shape=True, some=True)}),
     "evaluate.resample": (
-        evaluate.resample, {"returns": numbers(STATES, free=(0, 1), some=True), "n_resamples": count(5), "seed": seed}
+        evaluate.resample,
+        {"returns": numbers(STATES, free=(0, 1), some=True), "n_resamples": count(5), "seed": seed},
     ),
     "evaluate.spread": (evaluate.spread, {"returns": numbers(STATES, any_shape=True, some=True)}),
     "evaluate.start_states": (evaluate.start_states, {"task": task, "n_episodes": count(3), "seed": seed}),
@@ -260,28 +281,43 @@ CASES = {
     "export.to_latex": (functools.partial(export.to_latex, TWO), {"digits": digits}),
     "export.to_text": (functools.partial(export.to_text, TWO), {"digits": digits}),
     "figures.arrows": (of_ax(figures.arrows), pairs),
-    "figures.box_plot": (lambda returns: figures.box_plot(ax(figures.box_plot), {"teacher": returns}), {"returns": numbers(STATES[:, 0], any_shape=True)}),
+    "figures.box_plot": (
+        lambda returns: figures.box_plot(ax(figures.box_plot), {"teacher": returns}),
+        {"returns": numbers(STATES[:, 0], any_shape=True)},
+    ),
     "figures.cells": (of_ax(figures.cells), x_y | {"index": values_on_grid}),
     "figures.codewords": (of_ax(figures.codewords), {"points": states}),
     "figures.error_map": (of_ax(figures.error_map, label="error"), x_y | {"error": values_on_grid}),
     "figures.extent": (figures.extent, x_y),
     "figures.force_map": (of_ax(figures.force_map), x_y | {"force": values_on_grid}),
     "figures.histogram": (of_ax(figures.histogram), {"returns": numbers(STATES[:, 0])}),
-    "figures.learning_curve": (of_ax(figures.learning_curve), {"steps": numbers(STATES[:, 0], free=()), "means": numbers(STATES[:, 1], free=())}),
+    "figures.learning_curve": (
+        of_ax(figures.learning_curve),
+        {"steps": numbers(STATES[:, 0], free=()), "means": numbers(STATES[:, 1], free=())},
+    ),
     "figures.over_iterations": (of_ax(figures.over_iterations, ylabel="cells"), {"values": numbers(STATES[:, 0])}),
     "figures.run_means": (of_ax(figures.run_means, teacher=0.5), {"means": numbers(STATES[:, 0])}),
     "geometry.check_codewords": (geometry.check_codewords, {"codewords": points["codewords"]}),
     "geometry.delaunay_neighbours": (
         geometry.delaunay_neighbours,
-        {"codewords": Argument(STATES, points["codewords"].bad | st.integers(0, 11).map(lambda i: np.vstack([STATES, STATES[i]])))},
+        {
+            "codewords": Argument(
+                STATES, points["codewords"].bad | st.integers(0, 11).map(lambda i: np.vstack([STATES, STATES[i]]))
+            )
+        },
     ),
     "geometry.distances": (geometry.distances, lookup),
     "geometry.grid": (
-        geometry.grid, {"low": numbers(np.zeros(2), free=()), "high": numbers(np.ones(2), free=()), "resolution": count(3)}
+        geometry.grid,
+        {"low": numbers(np.zeros(2), free=()), "high": numbers(np.ones(2), free=()), "resolution": count(3)},
     ),
     "geometry.lookup_neighbours": (
         geometry.lookup_neighbours,
-        points | {"low": numbers(np.zeros(2), free=(), also=[np.ones(2), [0, 2]]), "high": numbers(np.ones(2), free=(), also=[-np.ones(2)])},
+        points
+        | {
+            "low": numbers(np.zeros(2), free=(), also=[np.ones(2), [0, 2]]),
+            "high": numbers(np.ones(2), free=(), also=[-np.ones(2)]),
+        },
     ),
     "geometry.nearest": (geometry.nearest, lookup),
     "geometry.nearest_brute": (geometry.nearest_brute, lookup),
@@ -298,7 +334,12 @@ CASES = {
     ),
     "lime.local_map": (
         lambda **arguments: lime.local_map(TEACHER, rng=RNG(0), **arguments),
-        {"task": task, "state": numbers(STATES[0], free=()), "scale": numbers([0.5, 0.25], free=(), also=[[1.0, 0.0]]), "n": count(9)},
+        {
+            "task": task,
+            "state": numbers(STATES[0], free=()),
+            "scale": numbers([0.5, 0.25], free=(), also=[[1.0, 0.0]]),
+            "n": count(9),
+        },
     ),
     "moments.rounds_to": (functools.partial(moments.rounds_to, 1.5), {"printed": number(1.5)}),
     "moves.closest": (moves.closest, {"teacher": teacher, "task": task, "config": budget, "seed": seed}),
@@ -309,7 +350,10 @@ CASES = {
     "paper.spread": (paper.spread, {"task": task}),
     "paper.spread_id": (functools.partial(paper.spread_id, metric="Mean"), {"task": task, "subject": choice("ours")}),
     "paper.spread_values": (paper.spread_values, {"task": task, "subject": choice("ours")}),
-    "paper.text_numbers": (paper.text_numbers, {"task": Argument(SIMPLEGOAL, task.bad.filter(lambda one: one is not None))}),
+    "paper.text_numbers": (
+        paper.text_numbers,
+        {"task": Argument(SIMPLEGOAL, task.bad.filter(lambda one: one is not None))},
+    ),
     "paper.value": (paper.value, {"id": choice("sg_drl_mean")}),
     "partition.Partition.add": (
         lambda state: partition().add(state, RNG(0)),
@@ -327,11 +371,18 @@ CASES = {
             "coefficients": numbers(TWO.coefficients, free=(), some=True),
             "task": task,
             "metric": choice("euclidean"),
-            "scale": Argument(np.ones(2), numbers(np.ones(2), free=(), also=[np.zeros(2), np.array([1.0, -1.0])]).bad.filter(lambda one: one is not None)),
+            "scale": Argument(
+                np.ones(2),
+                numbers(np.ones(2), free=(), also=[np.zeros(2), np.array([1.0, -1.0])]).bad.filter(
+                    lambda one: one is not None
+                ),
+            ),
             "sub_policy": choice("linear"),
         },
     ),
-    **{f"policy.VoronoiPolicy.{name}": (getattr(TWO, name), {"obs": states}) for name in ("cells", "linear", "predict")},
+    **{
+        f"policy.VoronoiPolicy.{name}": (getattr(TWO, name), {"obs": states}) for name in ("cells", "linear", "predict")
+    },
     "policy.VoronoiPolicy.explain": (TWO.explain, {"obs": numbers(STATES[0], free=())}),
     "policy.VoronoiPolicy.equations": (TWO.equations, {"cell": cell, "digits": digits}),
     "policy.VoronoiPolicy.to_latex": (TWO.to_latex, {"digits": digits}),
@@ -343,54 +394,101 @@ CASES = {
     **{
         f"regions.{function.__name__}": (
             functools.partial(function, TWO),
-            {"states": some_states, "unseen": some_states, "agreement": number(0.75, least=0, most=1), "leaves": count(4, least=2)},
+            {
+                "states": some_states,
+                "unseen": some_states,
+                "agreement": number(0.75, least=0, most=1),
+                "leaves": count(4, least=2),
+            },
         )
         for function in (regions.describe, regions.find_rules)
     },
-    "rollouts.Episode": (rollouts.Episode, {"states": numbers(STATES, free=(1,), some=True), "actions": numbers(ACTIONS, free=(1,), some=True)}),
+    "rollouts.Episode": (
+        rollouts.Episode,
+        {"states": numbers(STATES, free=(1,), some=True), "actions": numbers(ACTIONS, free=(1,), some=True)},
+    ),
     "rollouts.play": (rollouts.play, player | {"starts": starts}),
     "rollouts.record": (rollouts.record, player | {"starts": starts}),
-    "rollouts.visited": (rollouts.visited, player | {"starts": Argument(STATES, starts.bad | st.just(np.zeros((0, 2))))}),
+    "rollouts.visited": (
+        rollouts.visited,
+        player | {"starts": Argument(STATES, starts.bad | st.just(np.zeros((0, 2))))},
+    ),
     "simplify.gathered": (functools.partial(simplify.gathered, TWO), {"states": some_states}),
     "simplify.rounded": (functools.partial(simplify.rounded, TWO), {"digits": count(2)}),
     "simplify.simplify": (
-        simplify.simplify, {"teacher": teacher, "task": task, "config": budget, "tolerance": number(1.0, least=0), "seed": seed}
+        simplify.simplify,
+        {"teacher": teacher, "task": task, "config": budget, "tolerance": number(1.0, least=0), "seed": seed},
     ),
     "subpolicies.expression": (
-        subpolicies.expression, {"coefficients": numbers([0.5, -1.0, 2.0], free=()), "names": Argument(NAMES, st.sampled_from([(), ("x",), ("x", "y", "z")])), "digits": digits}
+        subpolicies.expression,
+        {
+            "coefficients": numbers([0.5, -1.0, 2.0], free=()),
+            "names": Argument(NAMES, st.sampled_from([(), ("x",), ("x", "y", "z")])),
+            "digits": digits,
+        },
     ),
-    "subpolicies.form_of": (functools.partial(subpolicies.form_of, task=TASK), {"sub_policy": Argument("linear", choice("linear").bad | st.just("pid"))}),
+    "subpolicies.form_of": (
+        functools.partial(subpolicies.form_of, task=TASK),
+        {"sub_policy": Argument("linear", choice("linear").bad | st.just("pid"))},
+    ),
     "subpolicies.number": (functools.partial(subpolicies.number, 0.5), {"digits": digits}),
     "tables.as_text": (functools.partial(tables.as_text, pd.DataFrame({"a": [0.5, 2.0]})), {"digits": digits}),
     "tables.equation_table": (functools.partial(tables.equation_table, TWO), {"digits": digits}),
     "tables.hyperparameters": (lambda task: tables.hyperparameters([task]), {"task": task}),
     "tables.readings": (tables.readings, {"task": task}),
     "tables.spread_table": (
-        tables.spread_table, {"task": task, "teacher": numbers(STATES[:, 0], free=(), some=True), "runs": numbers(STATES.T, free=(0,), some=True)}
+        tables.spread_table,
+        {
+            "task": task,
+            "teacher": numbers(STATES[:, 0], free=(), some=True),
+            "runs": numbers(STATES.T, free=(0,), some=True),
+        },
     ),
     "tables.text_numbers": (
         tables.text_numbers,
-        {"task": task, "teacher": numbers(STATES[:, 0], free=(), some=True), "runs": numbers(STATES.T, free=(0,), some=True), "cells": count(3)},
+        {
+            "task": task,
+            "teacher": numbers(STATES[:, 0], free=(), some=True),
+            "runs": numbers(STATES.T, free=(0,), some=True),
+            "cells": count(3),
+        },
     ),
-    "tdavq.DiscretePolicy.cells": (tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).cells, {"states": states}),
-    "tdavq.DiscretePolicy.predict": (tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).predict, {"obs": states}),
+    "tdavq.DiscretePolicy.cells": (
+        tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).cells,
+        {"states": states},
+    ),
+    "tdavq.DiscretePolicy.predict": (
+        tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).predict,
+        {"obs": states},
+    ),
     "tdavq.learn": (
         tdavq.learn,
-        {"task": task, "seed": seed, "n_steps": count(3)} | {name: number(0.5, least=0) for name in ("min_distance", "likeness", "discount")},
+        {"task": task, "seed": seed, "n_steps": count(3)}
+        | {name: number(0.5, least=0) for name in ("min_distance", "likeness", "discount")},
     ),
     "teachers.Teacher": (weights, {"weight": numbers(np.eye(2), free=()), "bias": numbers(np.zeros(2), free=())}),
     "teachers.Teacher.predict": (NET.predict, {"obs": states}),
     "teachers.Teacher.stakes": (with_critics().stakes, {"obs": numbers(STATES)}),
-    "teachers.load_teacher": (teachers.load_teacher, {"source": Argument(SIMPLEGOAL, st.sampled_from(["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"]))}),
+    "teachers.load_teacher": (
+        teachers.load_teacher,
+        {"source": Argument(SIMPLEGOAL, st.sampled_from(["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"]))},
+    ),
     "trees.LinearTree": (trees.LinearTree, pairs | {"leaves": leaves, "task": task}),
     "trees.LinearTree.predict": (trees.LinearTree(STATES, ACTIONS, leaves=2, task=SIMPLEGOAL).predict, {"obs": states}),
     "trees.ObliqueLinearTree": (trees.ObliqueLinearTree, pairs | {"leaves": leaves, "task": task, "seed": seed}),
-    "trees.SoftTree": (QuickSoftTree, {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()} | {"leaves": leaves, "seed": seed}),
+    "trees.SoftTree": (
+        QuickSoftTree,
+        {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()}
+        | {"leaves": leaves, "seed": seed},
+    ),
     "trees.SoftTree.predict": (lambda obs: soft_tree().predict(obs), {"obs": states}),
-    "trees.Tree": (trees.Tree, {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()} | {"leaves": leaves}),
+    "trees.Tree": (
+        trees.Tree,
+        {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()} | {"leaves": leaves},
+    ),
     "trees.Tree.predict": (trees.Tree(STATES, ACTIONS, leaves=3).predict, {"obs": states}),
     "trees.standard": (trees.standard, {"states": numbers(STATES, free=(0, 1), some=True)}),
-}  # fmt: skip
+}
 
 
 @functools.cache

@@ -83,8 +83,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
         order = points[:, 0].argsort()
         edges = np.column_stack([order[:-1], order[1:]])
     else:
-        starts, others = Delaunay(points).vertex_neighbor_vertices
-        edges = np.column_stack([np.repeat(np.arange(k), np.diff(starts)), others])
+        edges = _triangulated(points)
     return _adjacency(k, edges)
 
 
@@ -149,6 +148,20 @@ def _flatten(points: np.ndarray) -> np.ndarray:
     _, singular, axes = np.linalg.svd(centred, full_matrices=False)
     rank = max(1, int((singular > 1e-9 * max(singular[0], 1e-300)).sum()))
     return points if rank == points.shape[1] else centred @ axes[:rank].T
+
+
+def _triangulated(points: np.ndarray) -> np.ndarray:
+    """Pairs of `points` (k, r) that share an edge. (e, 2)
+
+    What Qhull leaves out because of rounding is looked at again from the middle, where there is less of it; what then
+    still lies on another point is the neighbour of that one.
+    """
+    found = Delaunay(points)
+    if len(found.coplanar):
+        found = Delaunay(points - points.mean(axis=0))
+    starts, others = found.vertex_neighbor_vertices
+    edges = np.column_stack([np.repeat(np.arange(len(points)), np.diff(starts)), others])
+    return np.concatenate([edges, found.coplanar[:, [0, 2]]])
 
 
 def _adjacency(k: int, edges: np.ndarray) -> np.ndarray:
