@@ -253,8 +253,23 @@ class Results:
 def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int = -1) -> Results:
     """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
     experiment = paper_experiment(task, quick=quick)
-    teacher = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
-    return Results(experiment, paper_runs(task, runs=runs, quick=quick, jobs=jobs), teacher)
+    made = paper_runs(task, runs=runs, quick=quick, jobs=jobs)
+    return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+
+
+def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
+    """The teacher's episodes from the shared start states, kept beside the runs.
+
+    On another CPU type a network's sums are rounded otherwise, and an episode may end elsewhere: tables that are made of
+    the same files are the same.
+    """
+    path = experiment.folder(runs) / "teacher.run"
+    if not path.exists():
+        own = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+        arrays = {"returns": own.returns, "lengths": own.lengths, "outcomes": own.codes}
+        store.save(path, arrays, {"kind": "Teacher"})
+    arrays, _ = store.load(path, kind="Teacher")
+    return Outcomes(arrays["returns"], arrays["lengths"], arrays["outcomes"])
 
 
 def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
@@ -340,7 +355,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
     arguments = parser.parse_args()
     for task in N_RUNS:
-        made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
+        runs = Path(arguments.out) / "data" / "runs"
+        made = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs).runs
         print(f"{task}: {len(made)} runs are there")
 
 
