@@ -260,8 +260,8 @@ def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jo
 def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
     """The teacher's episodes from the shared start states, kept beside the runs.
 
-    On another CPU type a network's sums are rounded otherwise, and an episode may end elsewhere: tables that are made of
-    the same files are the same.
+    On another CPU type a network's sums are rounded otherwise, and an episode may end elsewhere: tables made of the
+    same files are the same there.
     """
     path = experiment.folder(runs) / "teacher.run"
     if not path.exists():
