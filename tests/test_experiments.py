@@ -335,4 +335,4 @@ def test_the_command_makes_runs_in_several_processes(tmp_path):
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert ended.returncode == 0, ended.stderr
     assert len(list(tmp_path.rglob("[0-9]*.run"))) == len(TASKS) * experiments.QUICK_RUNS
-    assert len(list(tmp_path.rglob("teacher.run"))) == len(TASKS)
+    assert len(list(tmp_path.rglob("teacher.run"))) == len(list(tmp_path.rglob("baselines-2-*.run"))) == len(TASKS)

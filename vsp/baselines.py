@@ -7,25 +7,26 @@ for arrays of a wrong shape, numbers that are not finite, and a seed that is no 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
 
-from . import paper
+from . import paper, store
 from .checks import check_array, check_choice, check_count, check_data, check_seed
 from .config import Refinement, check_refinement
 from .distill import teacher_episodes
 from .envs import GOAL, Task, get_task
 from .evaluate import outcomes
-from .experiments import EVALUATION_SEED, Experiment, Results, Run
+from .experiments import EVALUATION_SEED, Experiment, Results, Run, code_id
 from .policy import VoronoiPolicy
 from .refine import worth
 from .rollouts import Outcomes, Policy, play, visited
 from .trees import Tree, standard
 
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
-N_RUNS = 20  # whose teacher episodes the baselines are fitted to
+N_RUNS, QUICK_RUNS = 20, 2  # whose teacher episodes the baselines are fitted to
 
 
 def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:
@@ -185,6 +186,18 @@ def compare(result: Results, n_runs: int = N_RUNS) -> pd.DataFrame:
     rows["distilled, all runs"] = _row(np.mean(cells), [run.outcomes for run in result.runs], own)
     rows["distilled, best run"] = _row(len(result.best.policy), [result.best.outcomes], own)
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("mean", ascending=False, kind="stable")
+
+
+def kept_comparison(result: Results, n_runs: int = N_RUNS, *, runs: str | os.PathLike) -> pd.DataFrame:
+    """`compare`, kept beside the runs as the teacher's episodes are: on another CPU type the fits would be others."""
+    name = f"baselines-{n_runs}-{code_id('baselines', 'trees')}.run"
+    path = result.experiment.folder(runs) / name
+    if not path.exists():
+        frame = compare(result, n_runs)
+        arrays = {name: frame[name].to_numpy() for name in frame}
+        store.save(path, arrays, {"kind": "Comparison", "policies": list(frame.index), "columns": list(frame)})
+    arrays, about = store.load(path, kind="Comparison")
+    return pd.DataFrame({name: arrays[name] for name in about["columns"]}, index=about["policies"])
 
 
 def _row(cells: float, played: list[Outcomes], own: np.ndarray) -> dict[str, float]:

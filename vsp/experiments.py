@@ -349,6 +349,8 @@ def run_path(folder: str | os.PathLike, seed: int) -> Path:
 
 def main() -> None:
     """Make the runs that the paper reports, or those of them that are missing."""
+    from . import baselines  # which takes runs itself
+
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="runs go to OUT/data/runs")
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
@@ -356,8 +358,9 @@ def main() -> None:
     arguments = parser.parse_args()
     for task in N_RUNS:
         runs = Path(arguments.out) / "data" / "runs"
-        made = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs).runs
-        print(f"{task}: {len(made)} runs are there")
+        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs)
+        baselines.kept_comparison(results, baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS, runs=runs)
+        print(f"{task}: {len(results.runs)} runs are there, and what stands beside them")
 
 
 if __name__ == "__main__":
