@@ -507,8 +507,8 @@ EXEMPT = {
         partition.Partition.reset partition.Partition.far partition.Partition.loss partition.Partition.neighbours""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
         envs.Task envs.Signals envs.SimpleGoalEnv.reset envs.simplegoal_start envs.simplegoal_step
-        envs.mountaincar_start envs.mountaincar_signals envs.mountaincar_step envs.pendulum_start envs.pendulum_see envs.pendulum_signals
-        envs.pendulum_step""",
+        envs.mountaincar_start envs.mountaincar_signals envs.mountaincar_step
+        envs.pendulum_start envs.pendulum_see envs.pendulum_signals envs.pendulum_step""",
     "the inside of `refine`, which checks what comes in": """
         refine.Frame refine.Cells refine.Labelled refine.Aim refine.Trials refine.worth refine.squared_error
         refine.squared_errors refine.closeness refine.line refine.beginning refine.anneal refine.expected_loss

@@ -99,8 +99,8 @@ def test_batched_or_one_by_one(record):
 
 
 def test_a_network_in_a_batch_and_alone(record, monkeypatch):
-    """Matrix products are summed in another order for another number of rows, and float32 has 24 bits: actions differ in
-    the last ones, hence codewords and coefficients too."""
+    """Matrix products are summed in another order for another number of rows: in float32 actions differ in the last
+    bits, hence codewords and coefficients too."""
     module, gaps, same = importlib.import_module("vsp.distill"), [], []
     for task, seed in itertools.product(TASKS, range(3)):
         teacher, known = vsp.load_teacher(task), vsp.get_task(task)
