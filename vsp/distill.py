@@ -23,7 +23,9 @@ from .policy import VoronoiPolicy
 from .refine import refine
 from .rollouts import Episode, Policy, record
 
-EPISODES_AHEAD = 500  # teacher episodes rolled out together
+# Teacher episodes rolled out together. Of a float32 network's actions the last bits depend on the batch, and what a run
+# becomes may hang on them: the number is part of what a seed stands for.
+EPISODES_AHEAD = 500
 
 
 def distill(
