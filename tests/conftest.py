@@ -6,6 +6,7 @@ import pytest
 from support import CurvedTeacher
 
 hypothesis.settings.register_profile("vsp", derandomize=True, database=None, deadline=None, max_examples=60)
+hypothesis.settings.register_profile("torture", parent=hypothesis.settings.get_profile("vsp"), max_examples=200)
 hypothesis.settings.load_profile("vsp")
 
 

@@ -2,6 +2,9 @@
 
 import dataclasses
 import hashlib
+import os
+import subprocess
+import sys
 
 import numpy as np
 
@@ -9,6 +12,7 @@ from vsp.config import Config
 from vsp.distill import Partition
 from vsp.envs import get_task
 from vsp.rollouts import Episode
+from vsp.store import ROOT
 from vsp.teachers import Teacher
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
@@ -119,3 +123,31 @@ def examples(task, n=300, seed=0):
     states = rng.uniform(task.low, task.high, (n, 2))
     maps = rng.normal(size=(2, len(task.action_low)))
     return states, states @ maps + 0.3 + 0.1 * rng.normal(size=(n, len(task.action_low)))
+
+
+_DISTIL = """
+import dataclasses, hashlib, importlib, sys
+import support, vsp
+task, teacher, config, seed, ahead = sys.argv[1:]
+importlib.import_module("vsp.distill").EPISODES_AHEAD = int(ahead)
+players = {"curved": support.CurvedTeacher, "pumping": support.PumpingTeacher}
+player = players[teacher]() if teacher in players else vsp.load_teacher(task)
+policy, _ = vsp.distill(player, task, support.TINY if config == "tiny" else vsp.preset(task), seed=int(seed))
+print(hashlib.sha256(policy.codewords.tobytes() + policy.coefficients.tobytes()).hexdigest())
+"""
+
+
+def distilled_elsewhere(task, *, teacher="shipped", config="paper", seed=0, ahead=500, **environment):
+    """SHA-256 of the codewords and coefficients that a fresh Python distils with these environment variables."""
+    arguments = [task, teacher, config, str(seed), str(ahead)]
+    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    done = subprocess.run(
+        [sys.executable, "-c", _DISTIL, *arguments],
+        env=os.environ | {"PYTHONPATH": paths} | environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.strip()
+
+
+def threads(n):
+    """The environment variables for n threads of everything that has any."""
+    return {f"{name}_NUM_THREADS": str(n) for name in ("OMP", "OPENBLAS", "MKL", "VECLIB", "NUMEXPR")}

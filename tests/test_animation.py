@@ -193,5 +193,5 @@ def test_what_cannot_be_drawn_is_named(run):
         Growth(history, teacher, PENDULUM)
     with pytest.raises(ValueError, match="history is a DataFrame, expected the History"):
         Growth(pd.DataFrame(), teacher, task)
-    with pytest.raises(ValueError, match="iteration 120, expected 0 to 119"):
+    with pytest.raises(ValueError, match="iteration is 120, expected an integer from 0 to 119"):
         Growth(history, teacher, task, dpi=40).shoot(120)

@@ -4,6 +4,7 @@ import importlib
 import types
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples, tiny
@@ -17,6 +18,7 @@ from vsp.baselines import (
     compare,
     dagger,
     fit,
+    kept_comparison,
     kmeans_cells,
     linear_map,
     refit,
@@ -391,3 +393,10 @@ def test_every_run_brings_one_policy_of_each_fitted_kind(compared, monkeypatch):
     many = dataclasses.replace(result, runs=[dataclasses.replace(result.runs[0], seed=seed) for seed in range(25)])
     asked.clear()
     assert compare(many).at["one linear map", "policies"] == 20 and asked == list(range(20))
+
+
+def test_a_comparison_is_kept_beside_the_runs(compared, tmp_path, monkeypatch):
+    result, frame = compared
+    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path), frame)
+    monkeypatch.setattr(baselines, "compare", None)  # what is kept is not made again
+    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path), frame)

@@ -14,9 +14,11 @@ from support import (
     Constant,
     CurvedTeacher,
     PumpingTeacher,
+    distilled_elsewhere,
     network_teacher,
     partition_of,
     same_arrays,
+    threads,
     tiny,
     walk,
 )
@@ -540,6 +542,11 @@ def test_how_many_episodes_are_rolled_out_together_has_no_say(ahead, task, monke
     assert usual == fingerprint(*distill(player, task, config, seed=4))
 
 
+def test_neither_hash_seed_nor_threads_of_a_process_have_a_say():
+    settings = [threads(1) | {"PYTHONHASHSEED": "0"}, threads(2) | {"PYTHONHASHSEED": "7"}]
+    assert len({distilled_elsewhere(SIMPLEGOAL, config="tiny", **one) for one in settings}) == 1
+
+
 def test_exactly_the_asked_number_of_episodes(teacher, monkeypatch):
     monkeypatch.setattr(module, "EPISODES_AHEAD", 7)
     assert [sum(1 for _ in teacher_episodes(teacher, get_task(SIMPLEGOAL), n, rng())) for n in (1, 7, 8, 20)] == [
@@ -551,18 +558,18 @@ def test_exactly_the_asked_number_of_episodes(teacher, monkeypatch):
 
 
 def test_threads_have_no_say():
-    player, config, threads = network_teacher(SIMPLEGOAL, width=(400, 300)), tiny(n_epochs=40, n_freeze=5), []
+    player, config, seen = network_teacher(SIMPLEGOAL, width=(400, 300)), tiny(n_epochs=40, n_freeze=5), []
 
     class Spy:
         def predict(self, obs):
-            threads.extend(pool["num_threads"] for pool in threadpool_info())
+            seen.extend(pool["num_threads"] for pool in threadpool_info())
             return player.predict(obs)
 
     runs = []
     for n in (1, 2):
         with threadpool_limits(n):
             runs.append(fingerprint(*distill(Spy(), SIMPLEGOAL, config, seed=0)))
-    assert runs[0] == runs[1] and set(threads) == {1}
+    assert runs[0] == runs[1] and set(seen) == {1}
 
 
 # The whole

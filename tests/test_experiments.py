@@ -283,6 +283,9 @@ def test_quick_results_of_the_paper(tmp_path, monkeypatch):
     found = experiments.paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1)
     again = outcomes(found.experiment.teacher, SIMPLEGOAL, 100, seed=EVALUATION_SEED)
     assert found.returns.shape == (1, 100) and np.array_equal(found.teacher_returns, again.returns)
+    monkeypatch.setattr(experiments, "outcomes", None)  # what is kept is not played again
+    kept = experiments.paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1).teacher_outcomes
+    assert same_arrays((kept.returns, again.returns), (kept.lengths, again.lengths), (kept.codes, again.codes))
 
 
 def test_overview_and_comparison_by_hand(results):
@@ -326,4 +329,5 @@ def test_the_command_makes_runs_in_several_processes(tmp_path):
     command = [sys.executable, "-m", "vsp.experiments", "--quick", "--jobs", "2", "--out", str(tmp_path)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert ended.returncode == 0, ended.stderr
-    assert len(list(tmp_path.rglob("*.run"))) == len(TASKS) * experiments.QUICK_RUNS
+    assert len(list(tmp_path.rglob("[0-9]*.run"))) == len(TASKS) * experiments.QUICK_RUNS
+    assert len(list(tmp_path.rglob("teacher.run"))) == len(list(tmp_path.rglob("baselines-2-*.run"))) == len(TASKS)

@@ -214,7 +214,7 @@ def test_grid():
 
 def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):
     monkeypatch.setattr(geometry, "KDTREE_FROM", 4)
-    monkeypatch.setattr(geometry, "nearest_kdtree", lambda *args: "tree")
+    monkeypatch.setattr(geometry, "_by_kdtree", lambda *args: "tree")
     assert nearest(np.zeros((4, 2)), np.zeros((1, 2))) == "tree" and nearest(
         np.ones((3, 2)), np.ones((1, 2))
     ).tolist() == [0]

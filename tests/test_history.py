@@ -101,7 +101,7 @@ def test_snapshots_do_not_change_afterwards(run):
 
 @pytest.mark.parametrize("n", [-1, 120, 1000])
 def test_an_iteration_outside_the_run_is_shown(run, n):
-    with pytest.raises(ValueError, match=f"iteration {n}, expected 0 to 119"):
+    with pytest.raises(ValueError, match=f"iteration is {n}, expected an integer from 0 to 119"):
         run[1].policy_at(n)
 
 

@@ -296,5 +296,5 @@ def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():
     }  # fmt: skip
     assert paper.spread_values(MOUNTAINCAR, "ours")["median"] == 93.476
     assert paper.spread_values(SIMPLEGOAL, "ours").keys() <= spread(np.arange(5.0)).keys()
-    with pytest.raises(KeyError, match="theirs"):
+    with pytest.raises(ValueError, match="subject is 'theirs', expected one of"):
         paper.spread_values(SIMPLEGOAL, "theirs")

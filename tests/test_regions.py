@@ -180,7 +180,7 @@ def test_rules_act_as_the_policy_where_they_agree(published):
         ({"states": np.zeros((0, 2))}, "0 states and 10 unseen ones, expected some of both"),
         ({"agreement": 95}, r"agreement is 95, expected a share above 0 and up to 1, such as 0.95"),
         ({"agreement": 0.0}, "agreement is 0.0, expected a share"),
-        ({"leaves": 1}, "leaves is 1, expected at least 2"),
+        ({"leaves": 1}, "leaves is 1, expected an integer from 2 on"),
     ],
 )
 def test_faults(options, message):

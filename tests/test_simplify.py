@@ -172,5 +172,5 @@ def test_the_tolerance_is_spent_once(monkeypatch):
 
 @pytest.mark.parametrize("tolerance", [-1.0, float("nan")])
 def test_a_tolerance_below_zero_is_refused(tolerance):
-    with pytest.raises(ValueError, match=f"tolerance is {tolerance}, expected a return of at least 0"):
+    with pytest.raises(ValueError, match=f"tolerance is {tolerance}, expected a finite number from 0"):
         simplify(PumpingTeacher(), MOUNTAINCAR, CONFIG, tolerance=tolerance, seed=0)

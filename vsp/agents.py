@@ -30,7 +30,7 @@ def agent(source: Policy | Callable[[np.ndarray], np.ndarray]) -> Agent:
     """
     if isinstance(source, Agent):
         return source
-    if predict := getattr(source, "predict", None):
+    if callable(predict := getattr(source, "predict", None)):
         dice = "deterministic" in inspect.signature(predict).parameters
         return Agent(lambda obs: predict(obs, **({"deterministic": True} if dice else {}))[0])
     if not callable(source):

@@ -1,35 +1,41 @@
 """Simpler policies to set beside the Voronoi partition, fitted on the teacher data that a distillation sees.
 
 One linear map for the whole space, cells of k-means, rules of thumb, and the trees of `trees.py`. A partition that does
-not beat them buys nothing with its cells. All act through the same `predict` as `VoronoiPolicy`.
+not beat them buys nothing with its cells. All act through the same `predict` as `VoronoiPolicy`, and raise ValueError
+for arrays of a wrong shape, numbers that are not finite, and a seed that is no integer from 0 on.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
 
-from . import paper
-from .config import Refinement
+from . import paper, store
+from .checks import check_array, check_choice, check_count, check_data, check_seed
+from .config import Refinement, check_refinement
 from .distill import teacher_episodes
 from .envs import GOAL, Task, get_task
 from .evaluate import outcomes
-from .experiments import EVALUATION_SEED, Experiment, Results, Run
+from .experiments import EVALUATION_SEED, Experiment, Results, Run, code_id
 from .policy import VoronoiPolicy
 from .refine import worth
 from .rollouts import Outcomes, Policy, play, visited
 from .trees import Tree, standard
 
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
-N_RUNS = 20  # whose teacher episodes the baselines are fitted to
+N_RUNS, QUICK_RUNS = 20, 2  # whose teacher episodes the baselines are fitted to
 
 
 def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:
     """Cells around the centres of k-means (scikit-learn) of the standardised states, and least squares in each."""
     from sklearn.cluster import KMeans
 
+    states, actions = check_data(states, actions)
+    check_count("cells", cells, most=len(states))
+    check_seed(seed)
     scale = standard(states)[1]
     centres = KMeans(cells, n_init=4, random_state=seed).fit(states / scale).cluster_centers_ * scale
     maps = np.zeros((cells, states.shape[1] + 1, actions.shape[1]))
@@ -45,6 +51,8 @@ def dagger(fits: Sequence[Fit], teacher: Policy, task: str, *, config: Refinemen
     Episodes, rounds, validation and the choice of the best are those of `config`, as `refine` has them. `fits` may be
     several, which differ in their random numbers: the one with the best first policy goes on.
     """
+    check_refinement(config)
+    check_seed(seed)
     task, streams = get_task(task), np.random.SeedSequence(seed).spawn(2)
     starts, checks = (np.random.default_rng(stream) for stream in streams)
     validation = task.start(checks, config.n_validation)
@@ -62,6 +70,7 @@ def dagger(fits: Sequence[Fit], teacher: Policy, task: str, *, config: Refinemen
 
 def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPolicy:
     """One linear map for the whole space, by least squares on `states` (n, d) and `actions` (n, m): a single cell."""
+    states, actions = check_data(states, actions)
     inputs = np.column_stack([states, np.ones(len(states))])
     coefficients = np.linalg.lstsq(inputs, actions, rcond=None)[0]
     return VoronoiPolicy(states.mean(axis=0)[None], coefficients[None], task=task)
@@ -72,6 +81,7 @@ def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, con
     the end would give. `constant`: a constant action per cell instead. A cell without states keeps its map. Raises
     ValueError unless the maps are linear."""
     policy.check_linear()
+    states, actions = check_data(states, actions, *np.subtract(policy.coefficients.shape[1:], (1, 0)))
     cells, coefficients = policy.cells(states), policy.coefficients.copy()
     inputs = np.column_stack([np.zeros_like(states) if constant else states, np.ones(len(states))])
     for i in np.unique(cells):
@@ -85,6 +95,7 @@ def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:
     SimpleGoal: walk diagonally towards the goal, pit or no pit. MountainCarContinuous: push the way the car moves,
     12 times the velocity, limited to [-1, 1].
     """
+    check_choice("task", task, paper.TASKS)
     names = {"SimpleGoal-v0": "always (−1, −1)", "MountainCarContinuous-v0": "12 · velocity"}
     maps = {"SimpleGoal-v0": [[0, 0], [0, 0], [-1, -1]], "MountainCarContinuous-v0": [[0], [12], [0]]}
     return names[task], VoronoiPolicy(np.zeros((1, 2)), np.array([maps[task]], dtype=float), task=task)
@@ -100,7 +111,7 @@ class Heuristic:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, 2), main and side engine, for observations (n, 8)."""
-        x, y, vx, vy, angle, spin, left, right = np.asarray(obs, dtype=np.float64).T
+        x, y, vx, vy, angle, spin, left, right = check_array("observations", obs, (-1, 8)).T
         down = (left != 0) | (right != 0)
         lean = np.clip(0.5 * x + 1.0 * vx, -0.4, 0.4)
         turn = np.where(down, 0.0, 0.5 * (lean - angle) - 1.0 * spin)
@@ -115,7 +126,7 @@ class PumpAndBalance:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Torques (n, 1) for cosine and sine of the angle and angular velocity (n, 3)."""
-        cosine, sine, velocity = np.asarray(obs, dtype=np.float64).T
+        cosine, sine, velocity = check_array("observations", obs, (-1, 3)).T
         missing = velocity**2 / 6 + 5.0 * (cosine - 1.0)  # energy of the rod, less that of standing still upright
         torque = np.where(cosine > 0.8, -10.0 * sine - 2.0 * velocity, -2.0 * missing * np.sign(velocity))
         return np.clip(torque, -2.0, 2.0)[:, None], None
@@ -125,15 +136,16 @@ class Still:
     """No teacher at all: it does nothing, whatever it sees."""
 
     def __init__(self, task: Task):
-        self._action = np.zeros(len(task.action_low))
+        self._d, self._action = len(task.low), np.zeros(len(task.action_low))
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Zeros (n, m) for observations (n, d)."""
-        return np.tile(self._action, (len(obs), 1)), None
+        return np.tile(self._action, (len(check_array("observations", obs, (-1, self._d))), 1)), None
 
 
 def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Every state (n, d) and action (n, m) that `distill` sees of its teacher under `seed`."""
+    check_seed(seed)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[0])
     task, n = get_task(experiment.task), experiment.config.n_iterations
     episodes = list(teacher_episodes(experiment.teacher, task, n, rng))
@@ -174,6 +186,18 @@ def compare(result: Results, n_runs: int = N_RUNS) -> pd.DataFrame:
     rows["distilled, all runs"] = _row(np.mean(cells), [run.outcomes for run in result.runs], own)
     rows["distilled, best run"] = _row(len(result.best.policy), [result.best.outcomes], own)
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("mean", ascending=False, kind="stable")
+
+
+def kept_comparison(result: Results, n_runs: int = N_RUNS, *, runs: str | os.PathLike) -> pd.DataFrame:
+    """`compare`, kept beside the runs as the teacher's episodes are: on another CPU type the fits would be others."""
+    name = f"baselines-{n_runs}-{code_id('baselines', 'trees')}.run"
+    path = result.experiment.folder(runs) / name
+    if not path.exists():
+        frame = compare(result, n_runs)
+        arrays = {name: frame[name].to_numpy() for name in frame}
+        store.save(path, arrays, {"kind": "Comparison", "policies": list(frame.index), "columns": list(frame)})
+    arrays, about = store.load(path, kind="Comparison")
+    return pd.DataFrame({name: arrays[name] for name in about["columns"]}, index=about["policies"])
 
 
 def _row(cells: float, played: list[Outcomes], own: np.ndarray) -> dict[str, float]:

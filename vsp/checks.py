@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 
 
 def check_finite(what: str, values: np.ndarray) -> np.ndarray:
     """`values` in float64. Raises ValueError, naming the first offender, for a wrong type, NaN or infinity."""
-    values = np.asarray(values)
+    try:
+        values = np.asarray(values)
+    except ValueError as error:  # rows of different lengths
+        raise ValueError(f"{what} are no array, expected numbers: {error}") from error
     if values.dtype.kind not in "fiu":
         raise ValueError(f"{what} have type {values.dtype}, expected numbers")
     values = values.astype(np.float64, copy=False)
@@ -21,7 +25,7 @@ def check_finite(what: str, values: np.ndarray) -> np.ndarray:
 
 def check_observations(observations: np.ndarray, d: int, task: str) -> np.ndarray:
     """`observations` in float64. Raises ValueError unless they are finite and of shape (d,) or (n, d)."""
-    observations = np.asarray(observations)
+    observations = observations if isinstance(observations, np.ndarray) else check_finite("observations", observations)
     if observations.ndim not in (1, 2) or observations.shape[-1] != d:
         raise ValueError(f"observations have shape {observations.shape}, expected ({d},) or (n, {d}) for {task}")
     return check_finite("observations", observations)
@@ -29,8 +33,28 @@ def check_observations(observations: np.ndarray, d: int, task: str) -> np.ndarra
 
 def check_seed(seed: int) -> None:
     """Raise ValueError unless `seed` is an integer from 0 on: None, for one, would give another result each time."""
-    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or seed < 0:
-        raise ValueError(f"seed is {seed!r}, expected an integer from 0 on")
+    check_count("seed", seed, least=0)
+
+
+def check_count(what: str, value: int, *, least: int = 1, most: int | None = None) -> None:
+    """Raise ValueError unless `value` is an integer from `least` on, up to `most` if that is given."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or value < least or (most is not None and value > most):
+        end = "on" if most is None else f"to {most}"
+        raise ValueError(f"{what} is {value!r}, expected an integer from {least} {end}")
+
+
+def check_number(what: str, value: float, *, least: float = -np.inf, most: float = np.inf) -> None:
+    """Raise ValueError unless `value` is a finite number from `least` to `most`."""
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not number or not np.isfinite(value) or not least <= value <= most:
+        raise ValueError(f"{what} is {value!r}, expected a finite number from {least} to {most}")
+
+
+def check_choice(what: str, value: str, known: Collection[str]) -> None:
+    """Raise ValueError unless `value` is one of the names `known`."""
+    if not isinstance(value, str) or value not in known:
+        raise ValueError(f"{what} is {value!r}, expected one of {list(known)}")
 
 
 def check_array(what: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -40,3 +64,12 @@ def check_array(what: str, values: np.ndarray, shape: tuple[int, ...]) -> np.nda
         wanted = str(shape).replace("-1", "n")
         raise ValueError(f"{what} have shape {values.shape}, expected {wanted}")
     return values
+
+
+def check_data(states: np.ndarray, actions: np.ndarray, d: int = -1, m: int = -1) -> tuple[np.ndarray, np.ndarray]:
+    """States (n, d) and actions (n, m) in float64. Raises ValueError unless they are finite, as many, and some."""
+    states = check_array("states", states, (-1, d))
+    actions = check_array("actions", actions, (len(states), m))
+    if not states.size:
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
+    return states, actions

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args, get_origin, get_type_hints
 
+from .checks import check_choice
 from .envs import get_task
 
 # Fields of `Config` that go beyond the paper, and their values at rest, which are the paper's method
@@ -196,9 +197,15 @@ class Refinement:
         return dataclasses.replace(self, **{name: value and max(1, value // 10) for name, value in values.items()})
 
 
+def check_refinement(config: Refinement) -> None:
+    """Raise ValueError for anything else, such as a `Config`."""
+    if not isinstance(config, Refinement):
+        raise ValueError(f"config is {config!r}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'best')")
+
+
 def _check(name: str, value: object, kind: object) -> None:
     if get_origin(kind) is Literal:
-        good, expected = value in get_args(kind), f"one of {list(get_args(kind))}"
+        good, expected = isinstance(value, str) and value in get_args(kind), f"one of {list(get_args(kind))}"
     elif kind is bool:
         good, expected = isinstance(value, bool), "True or False"
     elif kind is int:
@@ -260,8 +267,7 @@ def preset(task: str, kind: Literal["paper", "best"] = "paper") -> Config | Refi
     Raises ValueError for an unknown task or kind, and for one that the paper does not treat.
     """
     presets = {"paper": _PRESETS, "best": _BEST}
-    if kind not in presets:
-        raise ValueError(f"kind is {kind!r}, expected one of {list(presets)}")
+    check_choice("kind", kind, presets)
     name = get_task(task).name
     if name not in presets[kind]:
         own = "Config" if kind == "paper" else "Refinement"

@@ -14,7 +14,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from . import readings
-from .checks import check_seed
+from .checks import check_count, check_seed
 from .config import Config, Refinement, preset
 from .envs import Task, get_task
 from .history import History
@@ -23,7 +23,9 @@ from .policy import VoronoiPolicy
 from .refine import refine
 from .rollouts import Episode, Policy, record
 
-EPISODES_AHEAD = 500  # teacher episodes rolled out together
+# Teacher episodes rolled out together. Of a float32 network's actions the last bits depend on the batch, and what a run
+# becomes may hang on them: the number is part of what a seed stands for.
+EPISODES_AHEAD = 500
 
 
 def distill(
@@ -41,6 +43,8 @@ def distill(
     config = preset(task.name) if config is None else config
     if isinstance(config, Refinement):
         return refine(teacher, task, config, seed=seed)
+    if not isinstance(config, Config):
+        raise ValueError(f"config is {config!r}, expected a Config or a Refinement, such as vsp.preset({task.name!r})")
     with threadpool_limits(1):  # the same sums in the same order on any machine, and no threads to wait for
         return _distill(teacher, task, config, seed)
 
@@ -135,6 +139,7 @@ def due(n: int, every: int, config: Config) -> bool:
 
 def teacher_episodes(teacher: Policy, task: Task, n: int, rng: np.random.Generator) -> Iterator[Episode]:
     """Yield n episodes of the teacher from random starts, rolled out `EPISODES_AHEAD` at a time."""
+    check_count("n", n, least=0)
     while n > 0:
         batch = record(teacher, task, task.start(rng, EPISODES_AHEAD)[:n])
         yield from batch

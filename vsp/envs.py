@@ -16,7 +16,7 @@ from functools import cache, partial
 import gymnasium
 import numpy as np
 
-from .checks import check_array
+from .checks import check_array, check_choice
 
 RUNNING, GOAL, PIT, TRUNCATED = range(4)
 OUTCOMES = ("running", "goal", "pit", "truncated")
@@ -107,8 +107,7 @@ class SimpleGoalEnv(gymnasium.Env):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, render_mode: str | None = None, goal_reward: str = "replace"):
-        if goal_reward not in ("replace", "add"):
-            raise ValueError(f'goal_reward is {goal_reward!r}, expected "replace" or "add"')
+        check_choice("goal_reward", goal_reward, ("replace", "add"))
         self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (2,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.render_mode = render_mode
@@ -356,10 +355,10 @@ def get_task(name: str | Task) -> Task:
     """
     if isinstance(name, Task):
         return name
-    if name in _TASKS:
+    if isinstance(name, str) and name in _TASKS:
         return _TASKS[name]
     (near,) = difflib.get_close_matches(str(name), tasks(), n=1, cutoff=0.0)
-    if name not in gymnasium.registry:
+    if not isinstance(name, str) or name not in gymnasium.registry:
         raise ValueError(f"unknown task {name!r}, expected one of {tasks()}; did you mean {near!r}?")
     try:
         return _LATER.get(name, partial(gymnasium_task, name))()
@@ -368,11 +367,12 @@ def get_task(name: str | Task) -> Task:
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:
-    """A picture of the task in `state` (d,), as Gymnasium draws it. (height, width, 3) bytes"""
+    """A picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes"""
+    state = check_array("state", state, (get_task(name).start_size or len(get_task(name).low),))
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # pygame, which draws some tasks, needs no screen then
     env = gymnasium.make(get_task(name).name, render_mode="rgb_array")
     env.reset(seed=0)
-    env.unwrapped.state = np.asarray(state, dtype=np.float64)
+    env.unwrapped.state = state
     image = env.render()
     env.close()
     return image

@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from .checks import check_finite, check_seed
+from .checks import check_array, check_count, check_finite, check_number, check_seed
 from .envs import OUTCOMES, Task, get_task
 from .moments import fences
 from .rollouts import Outcomes, Policy, play
 
 
-def start_states(task: Task, n_episodes: int, seed: int) -> np.ndarray:
+def start_states(task: str | Task, n_episodes: int, seed: int) -> np.ndarray:
     """The start states that belong to `seed`, the same for every policy. (n, d)"""
     check_seed(seed)
-    if not isinstance(n_episodes, int | np.integer) or n_episodes < 1:
-        raise ValueError(f"n_episodes is {n_episodes!r}, expected an integer from 1 on")
-    return task.start(np.random.default_rng(np.random.SeedSequence(seed)), n_episodes)
+    check_count("n_episodes", n_episodes)
+    return get_task(task).start(np.random.default_rng(np.random.SeedSequence(seed)), n_episodes)
 
 
 def outcomes(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> Outcomes:
@@ -40,7 +39,7 @@ def spread(returns: np.ndarray) -> dict[str, float]:
     outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError for no returns
     or some that are not finite.
     """
-    returns = check_finite("returns", np.ravel(returns))
+    returns = check_finite("returns", returns).ravel()
     if not len(returns):
         raise ValueError("no returns, expected at least one")
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
@@ -66,10 +65,9 @@ def spread(returns: np.ndarray) -> dict[str, float]:
 def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     """What the paper's text says about outliers, under the names that end its ids in `data/paper/text_numbers.csv`.
 
-    Means, standard deviations and ranges of a set without members are NaN.
+    Means, standard deviations and ranges of a set without members are NaN. Raises ValueError as `spread` does.
     """
-    returns = np.ravel(returns)
-    facts = spread(returns)
+    facts, returns = spread(returns), np.ravel(returns)
     below = returns[returns < facts["lower_fence"]]
     above = returns[returns > facts["upper_fence"]]
     outside = np.concatenate([below, above])
@@ -100,7 +98,14 @@ def interval(
     """Percentile bootstrap interval of `statistic(returns)` that resamples policies, the rows of `returns` (p, n).
 
     All policies share start states, so single episodes are not independent and are never resampled on their own.
+    Raises ValueError for no returns or some that are not finite, and for a level outside (0, 1).
     """
+    returns = check_finite("returns", returns)
+    if not returns.size or not returns.ndim:
+        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
+    check_number("level", level, least=0, most=1)
+    check_count("n_resamples", n_resamples)
+    check_seed(seed)
     rng = np.random.default_rng(seed)
     draws = rng.integers(len(returns), size=(n_resamples, len(returns)))
     values = [statistic(returns[draw]) for draw in draws]
@@ -113,8 +118,13 @@ def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -
     """Bootstrap of everything that `spread` and `outlier_numbers` give: one row per resample, one column per statistic.
 
     Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
-    that a resample leaves empty is NaN.
+    that a resample leaves empty is NaN. Raises ValueError for no returns or some that are not finite.
     """
+    returns = check_array("returns", returns, (-1, -1))
+    if not returns.size:
+        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
+    check_count("n_resamples", n_resamples)
+    check_seed(seed)
     rng, (p, n) = np.random.default_rng(seed), returns.shape
     order = returns.ravel().argsort(kind="stable")
     values, owner = returns.ravel()[order], order // n

@@ -255,8 +255,23 @@ class Results:
 def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = -1) -> Results:
     """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
     experiment = paper_experiment(task, quick=quick)
-    teacher = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
-    return Results(experiment, paper_runs(task, runs=runs, quick=quick, jobs=jobs), teacher)
+    made = paper_runs(task, runs=runs, quick=quick, jobs=jobs)
+    return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+
+
+def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
+    """The teacher's episodes from the shared start states, kept beside the runs.
+
+    On another CPU type a network's sums are rounded otherwise, and an episode may end elsewhere: tables made of the
+    same files are the same there.
+    """
+    path = experiment.folder(runs) / "teacher.run"
+    if not path.exists():
+        own = outcomes(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+        arrays = {"returns": own.returns, "lengths": own.lengths, "outcomes": own.codes}
+        store.save(path, arrays, {"kind": "Teacher"})
+    arrays, _ = store.load(path, kind="Teacher")
+    return Outcomes(arrays["returns"], arrays["lengths"], arrays["outcomes"])
 
 
 def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
@@ -336,14 +351,18 @@ def run_path(folder: str | os.PathLike, seed: int) -> Path:
 
 def main() -> None:
     """Make the runs that the paper reports, or those of them that are missing."""
+    from . import baselines  # which takes runs itself
+
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="runs go to OUT/data/runs")
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
     parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     arguments = parser.parse_args()
     for task in N_RUNS:
-        made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
-        print(f"{task}: {len(made)} runs are there")
+        runs = Path(arguments.out) / "data" / "runs"
+        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs)
+        baselines.kept_comparison(results, baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS, runs=runs)
+        print(f"{task}: {len(results.runs)} runs are there, and what stands beside them")
 
 
 if __name__ == "__main__":

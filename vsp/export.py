@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .checks import check_count
 from .subpolicies import HIDDEN, number
 
 if TYPE_CHECKING:
@@ -211,11 +212,13 @@ def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> str:
     """The codeword of a cell between dollars."""
+    check_count("cell", cell, least=0, most=len(policy) - 1)
     return "$[" + ",\\ ".join(number(c, digits) for c in policy.codewords[cell]) + "]$"
 
 
 def equations_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> list[str]:
     """The right sides of the equations of a cell between dollars, one per action."""
+    check_count("cell", cell, least=0, most=len(policy) - 1)
     return [f"${policy.form.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
 
 

@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from . import envs, store
+from .checks import check_array, check_data, check_finite
 from .envs import Task
 from .moments import fences
 from .rollouts import Episode
@@ -119,7 +120,7 @@ def letter(axes: np.ndarray, titles: list[str]) -> None:
 
 def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6) -> Axes:
     """Borders of Voronoi cells, `width` points wide, from the cell of each grid point; `fill` colours the cells."""
-    index = index.reshape(x.shape)
+    index = _on_grid("cells", x, y, index).astype(int)
     if fill:
         colours = np.array(sns.color_palette("pastel").as_hex())
         shades = mpl.colors.to_rgba_array(colours)[index % len(colours)]
@@ -133,6 +134,7 @@ def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bo
 
 def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False) -> Axes:
     """Codewords (k, 2) as black dots with a white rim."""
+    points = check_array("codewords", points, (-1, 2))
     ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label, clip_on=False)
     if numbers:
         for i, point in enumerate(points):
@@ -152,6 +154,7 @@ def square(ax: Axes) -> Axes:
 
 def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
     """The direction and size of each action (n, 2) at its state (n, 2); a full diagonal step spans one grid step."""
+    states, actions = check_data(states, actions, 2, 2)
     step = np.diff(np.unique(states[:, 0]))[0]
     ax.quiver(
         *states.T, *actions.T, color=color, angles="xy", scale_units="xy", scale=1.4 / step, width=0.006, zorder=3
@@ -162,7 +165,13 @@ def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TE
 def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray):
     """Force in [-1, 1] over position and velocity. Returns the image, for `force_bar`."""
     image = ax.imshow(
-        force.reshape(x.shape), origin="lower", extent=extent(x, y), aspect="auto", cmap=FORCE_MAP, vmin=-1, vmax=1
+        _on_grid("force", x, y, force),
+        origin="lower",
+        extent=extent(x, y),
+        aspect="auto",
+        cmap=FORCE_MAP,
+        vmin=-1,
+        vmax=1,
     )
     ax.set(xlabel="position", ylabel="velocity (per step)")
     return image
@@ -176,13 +185,15 @@ def force_bar(fig: Figure, image, axes: np.ndarray) -> None:
 
 def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str):
     """A non-negative quantity over a two-dimensional state, dark where it is large, with its own colour bar."""
-    image = ax.imshow(error.reshape(x.shape), origin="lower", extent=extent(x, y), aspect="auto", cmap="Greys", vmin=0)
+    error = _on_grid("error", x, y, error)
+    image = ax.imshow(error, origin="lower", extent=extent(x, y), aspect="auto", cmap="Greys", vmin=0)
     ax.figure.colorbar(image, ax=ax, label=label)
     return image
 
 
 def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
     """Box plots of the returns of the teacher and of the distilled policies, in this order."""
+    returns = {name: check_finite(f"returns of {name}", values) for name, values in returns.items()}
     colours = dict(zip(returns, (TEACHER, DISTILLED)))
     sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=outliers, linewidth=0.8)
     ax.set(ylabel="return per episode")
@@ -201,6 +212,7 @@ def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | No
 
 def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> Axes:
     """One quantity over the iterations of a distillation."""
+    values = check_array("values", values, (-1,))
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
     if not log:
@@ -222,6 +234,7 @@ def phase(ax: Axes, begin: int, name: str) -> Axes:
 
 def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
     """Mean return of each run, sorted, against the teacher's."""
+    means = check_array("means", means, (-1,))
     ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
     ax.axhline(teacher, color=TEACHER, label="teacher")
     ax.set(xlabel="run, by mean return", ylabel="mean return")
@@ -231,6 +244,7 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
 
 def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER) -> Axes:
     """How the returns (n,) of one policy spread, with their mean as a line."""
+    returns = check_array("returns", returns, (-1,))
     sns.histplot(returns, ax=ax, color=color, bins=40, edgecolor="white", linewidth=0.3)
     ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}")
     ax.set(xlabel="return per episode", ylabel="episodes")
@@ -247,6 +261,8 @@ def upper_bound(ax: Axes, value: float) -> Axes:
 
 def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: str = "mean return") -> Axes:
     """Mean return of the teacher over its training steps."""
+    steps = check_array("steps", steps, (-1,))
+    means = check_array("means", means, steps.shape)
     ax.plot(steps / 1000, means, color=TEACHER)
     ax.set(xlabel="training steps (thousands)", ylabel=ylabel)
     return ax
@@ -333,6 +349,22 @@ def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DIST
 
 
 def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
-    """Edges of the outer pixels of a grid whose points are pixel centres."""
+    """Edges of the outer pixels of a grid whose points are pixel centres, x and y (r, c) as of `geometry.grid`."""
+    x, y = _grid(x, y)
     dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
     return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
+
+
+def _grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    x = check_array("x", x, (-1, -1))
+    if min(x.shape) < 2:
+        raise ValueError(f"the grid has shape {x.shape}, expected two points or more along each axis")
+    return x, check_array("y", y, x.shape)
+
+
+def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """`values`, one for each point of the grid, in its shape. Raises ValueError for another number of them."""
+    (x, _), values = _grid(x, y), check_finite(what, values)
+    if values.size != x.size:
+        raise ValueError(f"{what} have shape {values.shape}, expected one for each point of the grid {x.shape}")
+    return values.reshape(x.shape)

@@ -1,7 +1,8 @@
 """Distances, nearest codewords, neighbouring cells, and grids to draw them on.
 
 A metric is a name that `scipy.spatial.distance.cdist` knows; `METRICS` maps the names used here to SciPy's and to the
-order p of the kd-tree. All functions take codewords (k, d) already divided by the scale of the distance.
+order p of the kd-tree. All functions take codewords (k, d) already divided by the scale of the distance, and raise
+ValueError for arrays of a wrong shape, numbers that are not finite, no codewords, or a metric of another name.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 from scipy.spatial.distance import cdist
+
+from .checks import check_array, check_choice, check_count
 
 METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
 LOOKUP = "manhattan"  # the distance that finds a state's cell
@@ -18,6 +21,7 @@ WITNESSES = 4096  # points that look for touching cells
 
 def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Distance of every state (n, d) to every codeword (k, d). (n, k)"""
+    codewords, states = _checked(codewords, states, metric)
     return cdist(states, codewords, METRICS[metric][0])
 
 
@@ -27,24 +31,37 @@ def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> 
     Paper, Algorithm 1 line 6: kd-tree(C, s_t). For the few dozen codewords of the paper comparing with all of them is
     faster than a kd-tree and gives the same indices.
     """
-    lookup = nearest_kdtree if len(codewords) >= KDTREE_FROM else nearest_brute
+    return look_up(*_checked(codewords, states, metric), metric)
+
+
+def look_up(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
+    """`nearest` for arrays that were checked before: a distillation and a policy ask thousands of times."""
+    lookup = _by_kdtree if len(codewords) >= KDTREE_FROM else _by_brute
     return lookup(codewords, states, metric)
 
 
 def nearest_brute(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """`nearest`, by comparing with every codeword."""
-    return distances(states, codewords, metric).argmin(axis=1)
+    return _by_brute(*_checked(codewords, states, metric), metric)
+
+
+def _by_brute(codewords: np.ndarray, states: np.ndarray, metric: str) -> np.ndarray:
+    return cdist(states, codewords, METRICS[metric][0]).argmin(axis=1)
 
 
 def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """`nearest`, by kd-tree. The tree answers ties in any order, so states between two codewords are compared again."""
+    return _by_kdtree(*_checked(codewords, states, metric), metric)
+
+
+def _by_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str) -> np.ndarray:
     if len(codewords) == 1:
         return np.zeros(len(states), dtype=np.intp)
     found, index = cKDTree(codewords).query(states, k=2, p=METRICS[metric][1])
     index = index[:, 0]
     tied = np.isclose(found[:, 0], found[:, 1], rtol=1e-12, atol=0)
     if tied.any():
-        index[tied] = nearest_brute(codewords, states[tied], metric)
+        index[tied] = _by_brute(codewords, states[tied], metric)
     return index
 
 
@@ -59,6 +76,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
     Qhull refuses points in a line or plane, so they are first projected onto the flat they span; up to r + 1 points in
     r dimensions are all neighbours. Raises ValueError for duplicate codewords: Qhull leaves them without neighbours.
     """
+    codewords = check_codewords(codewords)
     k = len(codewords)
     if not all_differ(codewords):
         raise ValueError(f"{k} codewords, expected all to differ: {codewords.tolist()}")
@@ -70,8 +88,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
         order = points[:, 0].argsort()
         edges = np.column_stack([order[:-1], order[1:]])
     else:
-        starts, others = Delaunay(points).vertex_neighbor_vertices
-        edges = np.column_stack([np.repeat(np.arange(k), np.diff(starts)), others])
+        edges = _triangulated(points)
     return _adjacency(k, edges)
 
 
@@ -83,6 +100,10 @@ def lookup_neighbours(codewords: np.ndarray, low: np.ndarray, high: np.ndarray, 
     """
     from scipy.stats import qmc
 
+    d = check_codewords(codewords).shape[1]
+    low, high = check_array("low", low, (d,)), check_array("high", high, (d,))
+    if not (low < high).all():
+        raise ValueError(f"the box is {low.tolist()} to {high.tolist()}, expected each low below its high")
     points = qmc.scale(qmc.Halton(len(low), scramble=False).random(WITNESSES), low, high)
     return visited_neighbours(codewords, points, metric)
 
@@ -97,6 +118,7 @@ def visited_neighbours(codewords: np.ndarray, witnesses: np.ndarray, metric: str
     which cells touch where the policy is asked to act. A border that none of them is near is missed; up to two
     codewords are neighbours.
     """
+    codewords, witnesses = _checked(codewords, witnesses, metric)
     k = len(codewords)
     if k <= 2:
         return ~np.eye(k, dtype=bool)
@@ -105,8 +127,24 @@ def visited_neighbours(codewords: np.ndarray, witnesses: np.ndarray, metric: str
 
 def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A grid over a two-dimensional box, for drawing: x (r, r), y (r, r), and the same as states (r * r, 2)."""
+    low, high = check_array("low", low, (2,)), check_array("high", high, (2,))
+    check_count("resolution", resolution)
     x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))
     return x, y, np.column_stack([x.ravel(), y.ravel()])
+
+
+def check_codewords(codewords: np.ndarray) -> np.ndarray:
+    """`codewords` (k, d) in float64. Raises ValueError unless they are finite and there is at least one."""
+    codewords = check_array("codewords", codewords, (-1, -1))
+    if not codewords.size:
+        raise ValueError(f"codewords have shape {codewords.shape}, expected at least one codeword")
+    return codewords
+
+
+def _checked(codewords: np.ndarray, states: np.ndarray, metric: str) -> tuple[np.ndarray, np.ndarray]:
+    check_choice("metric", metric, METRICS)
+    codewords = check_codewords(codewords)
+    return codewords, check_array("states", states, (-1, codewords.shape[1]))
 
 
 def _flatten(points: np.ndarray) -> np.ndarray:
@@ -115,6 +153,20 @@ def _flatten(points: np.ndarray) -> np.ndarray:
     _, singular, axes = np.linalg.svd(centred, full_matrices=False)
     rank = max(1, int((singular > 1e-9 * max(singular[0], 1e-300)).sum()))
     return points if rank == points.shape[1] else centred @ axes[:rank].T
+
+
+def _triangulated(points: np.ndarray) -> np.ndarray:
+    """Pairs of `points` (k, r) that share an edge. (e, 2)
+
+    What Qhull leaves out because of rounding is looked at again from the middle, where there is less of it; what then
+    still lies on another point is the neighbour of that one.
+    """
+    found = Delaunay(points)
+    if len(found.coplanar):
+        found = Delaunay(points - points.mean(axis=0))
+    starts, others = found.vertex_neighbor_vertices
+    edges = np.column_stack([np.repeat(np.arange(len(points)), np.diff(starts)), others])
+    return np.concatenate([edges, found.coplanar[:, [0, 2]]])
 
 
 def _adjacency(k: int, edges: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from .checks import check_count
 from .partition import Partition
 from .policy import VoronoiPolicy
 
@@ -51,8 +52,7 @@ class History:
 
     def policy_at(self, n: int) -> VoronoiPolicy:
         """The policy after iteration n, fewer than `every` iterations old. Raises ValueError outside the run."""
-        if not 0 <= n < len(self.cells):
-            raise ValueError(f"iteration {n}, expected 0 to {len(self.cells) - 1}")
+        check_count("iteration", n, least=0, most=len(self.cells) - 1)
         return self._snapshots[bisect_right(self._snapshots, n, key=lambda snapshot: snapshot[0]) - 1][1]
 
     def to_frame(self) -> pd.DataFrame:

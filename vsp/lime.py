@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from .checks import check_array, check_count
 from .envs import Task, get_task
 from .policy import VoronoiPolicy
 from .rollouts import Policy
@@ -27,10 +28,13 @@ def local_map(
     sample around the mean of all data): `n` normal perturbations with the data's standard deviation `scale` (d,),
     weights from an exponential kernel of the standardised distance, ridge regression of penalty 1. The authors' library
     takes the square root of the kernel, and so does this. Perturbed states may leave the box of the task, as theirs do.
+    Raises ValueError for a state or scale of a wrong shape or not finite, and for a scale not above 0.
     """
     from sklearn.linear_model import Ridge
 
-    d, m = len(state), len(get_task(task).action_low)
+    d, m = len(get_task(task).low), len(get_task(task).action_low)
+    state, scale = _checked(state, scale, (d,))
+    check_count("n", n)
     moves = np.vstack([np.zeros(d), rng.normal(size=(n - 1, d))])
     actions = np.asarray(policy.predict(state + moves * scale)[0], dtype=np.float64).reshape(n, m)
     closeness = np.sqrt(np.exp(-np.square(moves).sum(axis=1) / (WIDTH**2 * d)))
@@ -40,7 +44,11 @@ def local_map(
 
 
 def gradient_map(policy: Policy, state: np.ndarray, *, scale: np.ndarray) -> np.ndarray:
-    """The map that touches `policy` in `state` (d,), by central differences: weights, then bias. (d + 1, m)"""
+    """The map that touches `policy` in `state` (d,), by central differences: weights, then bias. (d + 1, m)
+
+    Raises ValueError as `local_map` does.
+    """
+    state, scale = _checked(state, scale, (-1,))
     moves = STEP * np.diag(scale)
     ahead, behind, here = (
         np.asarray(policy.predict(states)[0], dtype=np.float64)
@@ -57,11 +65,12 @@ def compare_maps(
 
     One row per state, action and map. Columns: the weight of every input and the bias, and error, the root mean square
     difference (in units of the action) between the map, limited to the action box, and the teacher at 1000 states
-    around, normal with `NEAR` times `scale` and kept in the box of the task.
+    around, normal with `NEAR` times `scale` and kept in the box of the task. Raises ValueError as `local_map` does.
     """
     policy.check_linear()
     task, rows = policy.task, []
-    for i, state in enumerate(np.asarray(states, dtype=np.float64)):
+    states, scale = _checked(states, scale, (-1, len(task.low)))
+    for i, state in enumerate(states):
         maps = {
             "gradient": gradient_map(teacher, state, scale=scale),
             "LIME": local_map(teacher, task, state, scale=scale, rng=rng),
@@ -76,3 +85,12 @@ def compare_maps(
                 weights = dict(zip([*task.inputs, "bias"], coefficients))
                 rows.append({"state": i, "action": output, "map": name, **weights, "error": error})
     return pd.DataFrame(rows)
+
+
+def _checked(states: np.ndarray, scale: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Both in float64, as `local_map` says."""
+    states = check_array("states", states, shape)
+    scale = check_array("scale", scale, states.shape[-1:])
+    if not (scale > 0).all():
+        raise ValueError(f"scale is {scale.tolist()}, expected positive numbers")
+    return states, scale

@@ -1,6 +1,6 @@
 """What summary numbers say about each other: fences and quartiles, means and deviations of a part and of the rest.
 
-Standard deviations divide by n.
+Standard deviations divide by n. What is not a number stays so: NaN in, NaN out.
 """
 
 from __future__ import annotations
@@ -9,6 +9,10 @@ import math
 from collections import namedtuple
 from collections.abc import Sequence
 from decimal import Decimal
+
+import numpy as np
+
+from .checks import check_number
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): so many values lie in [low, high]
 Part = namedtuple("Part", "size mean std low high")  # some of the returns, and the range that they lie in
@@ -53,7 +57,7 @@ def mean_range(groups: Groups) -> tuple[float, float]:
 
 def least_std(mean: float, groups: Groups) -> float:
     """A lower bound on the standard deviation of such values: each is at least as far from their mean as its range."""
-    squares = sum(count * max(low - mean, mean - high, 0) ** 2 for count, low, high in groups)
+    squares = sum(count * float(np.max((low - mean, mean - high, 0))) ** 2 for count, low, high in groups)
     return math.sqrt(squares / sum(count for count, _, _ in groups))
 
 
@@ -63,6 +67,7 @@ def greatest_std(mean: float, low: float, high: float) -> float:
 
 
 def rounds_to(number: float, printed: float) -> bool:
-    """Whether `number` may be printed as `printed`, to the last decimal of this."""
+    """Whether `number` may be printed as `printed`, to the last decimal of this; NaN may not."""
+    check_number("printed", printed)
     decimals = max(0, -Decimal(repr(float(printed))).normalize().as_tuple().exponent)
     return bool(abs(number - printed) <= 0.5 / 10**decimals + 1e-9)

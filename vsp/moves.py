@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from .checks import check_seed
-from .config import Refinement
+from .config import Refinement, check_refinement
 from .envs import Task, get_task
 from .policy import VoronoiPolicy
 from .refine import WARM, Cells, Frame, Labelled, anneal, beginning, closeness, squared_error, squared_errors
@@ -29,6 +29,7 @@ def closest(teacher: Policy, task: str | Task, config: Refinement, *, seed: int)
     ValueError for a bad seed, and where `config.n_cells` is below 2: there is nothing to move.
     """
     check_seed(seed)
+    check_refinement(config)
     if config.n_cells < 2:
         raise ValueError(f"n_cells is {config.n_cells}, expected at least 2: `refine` fits one cell")
     task = get_task(task)

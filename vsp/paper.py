@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from .checks import check_choice
 from .store import read_table
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_line
 
 def hyperparameters(task: str) -> dict[str, int | float | bool]:
     """The hyperparameters of `task`, by the name that the paper gives them (appendix, first table)."""
-    column = _check_task(task)
+    column = check_task(task)
     frame = _read("hyperparameters.csv")
     return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
 
@@ -40,11 +41,12 @@ def spread(task: str) -> pd.DataFrame:
     Coverage, the share of episodes that are no outliers, is in percent; all else is in units of return.
     """
     frame = _read("spread.csv", numbers=["drl", "ours"])
-    return frame[frame["task"] == _check_task(task)].drop(columns="task").set_index("metric")
+    return frame[frame["task"] == check_task(task)].drop(columns="task").set_index("metric")
 
 
 def spread_values(task: str, subject: str) -> dict[str, float]:
     """A column of T5 or T6, "drl" or "ours", under the names of `evaluate.spread`; coverage in percent."""
+    check_choice("subject", subject, ("drl", "ours"))
     return {metric.lower().partition("/")[0]: value for metric, value in spread(task)[subject].items()}
 
 
@@ -55,13 +57,13 @@ def text_numbers(task: str | None = None) -> pd.DataFrame:
     (NaN for a version or a name), unit, printed (the paper's spelling), where. With `task`, its rows and those of both.
     """
     frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
-    return frame if task is None else frame[frame["task"].isin([_check_task(task), "both"])]
+    return frame if task is None else frame[frame["task"].isin([check_task(task), "both"])]
 
 
 def value(id: str) -> float:
     """The number called `id` in `text_numbers()`; shares are in percent."""
     frame = text_numbers()
-    if id not in frame.index:
+    if not isinstance(id, str) or id not in frame.index:
         raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
     number = float(frame.at[id, "value"])
     if np.isnan(number):
@@ -71,7 +73,8 @@ def value(id: str) -> float:
 
 def spread_id(task: str, subject: str, metric: str) -> str:
     """The id of a value of T5 or T6: spread_id("SimpleGoal-v0", "ours", "Median/Q2") is "sg_spread_ours_median"."""
-    return f"{PREFIX[_check_task(task)]}_spread_{subject}_{metric.lower().partition('/')[0]}"
+    check_choice("subject", subject, ("drl", "ours"))
+    return f"{PREFIX[check_task(task)]}_spread_{subject}_{metric.lower().partition('/')[0]}"
 
 
 def printed_values() -> pd.DataFrame:
@@ -109,7 +112,7 @@ def linear_policies(task: str) -> pd.DataFrame:
     Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
     such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
     """
-    file = _POLICIES[_check_task(task)]
+    file = _POLICIES[check_task(task)]
     frame = _read(file)
     numbers = _numbers(frame.columns)
     frame[numbers] = frame[numbers].astype(np.float64)
@@ -134,8 +137,9 @@ def _numbers(columns: Iterable[str]) -> list[str]:
     return [name for name in columns if not name.endswith(("_printed", "colour", "where"))]
 
 
-def _check_task(task: str) -> str:
-    if task not in TASKS:
+def check_task(task: str) -> str:
+    """`task`. Raises ValueError unless the paper treats it."""
+    if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no other")
     return task
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import geometry, readings
 from .buffers import Buffers, Recent, Sums
+from .checks import check_array
 from .config import Config
 from .envs import Task
 from .policy import VoronoiPolicy
@@ -16,7 +17,11 @@ from .subpolicies import SubPolicies, form_of
 
 
 class Partition:
-    """The state of a distillation: codewords, the cells' models, their buffers."""
+    """The state of a distillation: codewords, the cells' models, their buffers.
+
+    What goes in is checked: `add`, `observe` and `locate` raise ValueError for states that do not fit the task or are
+    not finite. The rest works on what is there, thousands of times a run.
+    """
 
     def __init__(self, task: Task, config: Config):
         d, m = len(task.low), len(task.action_low)
@@ -33,8 +38,16 @@ class Partition:
         self._compared = readings.MERGE_PARAMETERS[config.merge_parameters]
 
     def observe(self, episode: Episode) -> None:
-        """Put each state and action into the buffer of its cell."""
-        cells = geometry.nearest(self.codewords / self.scale, episode.states / self.scale)
+        """Put each state and action into the buffer of its cell. Raises ValueError for an episode of another task."""
+        found, wanted = (
+            (episode.states.shape[1], episode.actions.shape[1]),
+            (len(self.task.low), len(self.task.action_low)),
+        )
+        if found != wanted:
+            raise ValueError(
+                f"the episode has states and actions of {found} numbers, expected {wanted}: {self.task.name}"
+            )
+        cells = geometry.look_up(self.codewords / self.scale, episode.states / self.scale)
         self.buffers.append(cells, self.models.form.features(episode.states), episode.actions)
         self._recent.append(episode.states)
 
@@ -56,7 +69,13 @@ class Partition:
         return losses
 
     def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
-        """Make `state` (d,) the codeword of a new, untrained cell; returns its index."""
+        """Make `state` (d,) the codeword of a new, untrained cell; returns its index.
+
+        Raises ValueError for one that is a codeword already.
+        """
+        state = check_array("state", state, (len(self.task.low),))
+        if (self.codewords == state).all(axis=1).any():
+            raise ValueError(f"state {state.tolist()} is a codeword already, expected another")
         self.codewords = np.concatenate([self.codewords, state[None]])
         self.models.add(rng)
         self.buffers.add()
@@ -80,12 +99,12 @@ class Partition:
 
     def locate(self, state: np.ndarray) -> int:
         """Cell of one state (d,)."""
-        return self.snapshot()(state)
+        return self.snapshot()(check_array("state", state, (len(self.task.low),)))
 
     def snapshot(self) -> Callable[[np.ndarray], int]:
         """The look-up among the codewords of this moment, as a function of one state."""
         codewords = self.codewords / self.scale
-        return lambda state: int(geometry.nearest(codewords, (state / self.scale)[None])[0])
+        return lambda state: int(geometry.look_up(codewords, (state / self.scale)[None])[0])
 
     def far(self, i: int, state: np.ndarray) -> bool:
         """Whether `state` is far enough from codeword i to become one, and is not a codeword already."""

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from . import export, geometry, store
-from .checks import check_array, check_observations
+from .checks import check_array, check_choice, check_count, check_observations
 from .envs import Task, get_task
 from .subpolicies import form_of
 
@@ -55,8 +55,7 @@ class VoronoiPolicy:
         self.codewords = check_array("codewords", codewords, (-1, d)).copy()
         self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), p, m)).copy()
         self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
-        if metric not in geometry.METRICS:
-            raise ValueError(f"metric is {metric!r}, expected one of {list(geometry.METRICS)}")
+        check_choice("metric", metric, geometry.METRICS)
         if not len(self.codewords) or not geometry.all_differ(self.codewords):
             raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
         if not (self.scale > 0).all():
@@ -140,7 +139,9 @@ class VoronoiPolicy:
         """The sub-policy of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
 
         `digits` are decimals; None: each number exactly, and no term that is zero, as `simplify` leaves policies.
+        Raises ValueError for a cell that is not there.
         """
+        check_count("cell", cell, least=0, most=len(self) - 1)
         return tuple(
             f"{output} = {self.form.expression(self.coefficients[cell, :, j], digits)}"
             for j, output in enumerate(self.task.outputs)
@@ -188,7 +189,7 @@ class VoronoiPolicy:
         return cls(**arrays, task=about["task"], metric=about["metric"], sub_policy=about["sub_policy"])
 
     def _cells(self, states: np.ndarray) -> np.ndarray:
-        found = geometry.nearest(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
+        found = geometry.look_up(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
         return found.reshape(states.shape[:-1])[()]  # of one state a number, which is quicker to index with
 
     def _states(self, obs: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from .checks import check_seed
-from .config import Refinement
+from .config import Refinement, check_refinement
 from .crowd import play_all
 from .envs import GOAL, Task, get_task
 from .policy import VoronoiPolicy
@@ -129,6 +129,7 @@ def refine(
     task, and for `stakes` of a teacher without critics.
     """
     check_seed(seed)
+    check_refinement(config)
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from .checks import check_array
+from .checks import check_array, check_count, check_number
 from .export import symbol
 from .policy import VoronoiPolicy
 from .subpolicies import number
@@ -32,6 +32,7 @@ class Rule:
 
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Which of the states (n, d) lie in the box. (n,) bool"""
+        states = check_array("states", states, (-1, len(self.low)))
         return ((states > self.low) & (states <= self.high)).all(axis=1)
 
     def text(self, names: tuple[str, ...]) -> str:
@@ -88,10 +89,10 @@ def find_rules(
     )
     if not (len(states) and len(unseen)):
         raise ValueError(f"{len(states)} states and {len(unseen)} unseen ones, expected some of both")
+    check_number("agreement", agreement)
     if not 0 < agreement <= 1:
         raise ValueError(f"agreement is {agreement}, expected a share above 0 and up to 1, such as 0.95")
-    if not leaves >= 2:
-        raise ValueError(f"leaves is {leaves}, expected at least 2")
+    check_count("leaves", leaves, least=2)
     cells = policy.cells(unseen)
     rules, found = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
     places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimals that hardly tell
@@ -122,7 +123,9 @@ class RulePolicy:
 
 
 def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
-    """The cell of the rule that holds in each state (n, d). (n,)"""
+    """The cell of the rule that holds in each state (n, d). (n,) Raises ValueError for no rules."""
+    if not rules:
+        raise ValueError(f"rules are {rules!r}, expected at least one")
     held = np.array([rule.holds(states) for rule in rules])
     return np.array([rule.cell for rule in rules])[held.argmax(axis=0)]
 

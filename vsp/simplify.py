@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pandas as pd
 
-from .checks import check_seed
-from .config import Refinement
+from .checks import check_array, check_count, check_number, check_seed
+from .config import Refinement, check_refinement
 from .envs import GOAL, Task, get_task
 from .evaluate import start_states
 from .policy import VoronoiPolicy
@@ -33,8 +33,8 @@ def simplify(
     0.
     """
     check_seed(seed)
-    if not tolerance >= 0:
-        raise ValueError(f"tolerance is {tolerance}, expected a return of at least 0")
+    check_refinement(config)
+    check_number("tolerance", tolerance, least=0)
     task = get_task(task)
     starts = start_states(task, config.n_validation, seed)
     own = play(teacher, task, starts)
@@ -65,7 +65,11 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
 
     The borders of up to d + 1 Euclidean cells have a point in common, as far from one codeword as from the others;
     codewords may come nearer to it, all in one proportion, and no border moves. Other policies stay as they are.
+    Raises ValueError for no states, or some that do not fit or are not finite.
     """
+    states = check_array("states", states, (-1, len(policy.task.low)))
+    if not len(states):
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
     points = policy.codewords / policy.scale
     k, d = points.shape
     if policy.metric != "euclidean" or not 1 < k <= d + 1:
@@ -103,6 +107,7 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
 
 def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     """The policy with all its numbers rounded to so many significant digits; None if two codewords become equal."""
+    check_count("digits", digits)
     codewords, coefficients, scale = (
         _significant(values, digits) for values in (policy.codewords, policy.coefficients, policy.scale)
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from .checks import check_array, check_choice, check_count
 from .envs import Task
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam (Kingma & Ba 2015), its published constants
@@ -141,8 +142,7 @@ class Network(Form):
 def form_of(sub_policy: str, task: Task) -> Form:
     """The class of sub-policy of that name, for `task`. Raises ValueError for an unknown name, and for "pid" where the
     task has no signals."""
-    if sub_policy not in FORMS:
-        raise ValueError(f"sub_policy is {sub_policy!r}, expected one of {list(FORMS)}")
+    check_choice("sub_policy", sub_policy, FORMS)
     return FORMS[sub_policy](task)
 
 
@@ -275,6 +275,7 @@ def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | N
 
     `digits` are decimals; None: each number exactly, as short as it can be written, and no term that is zero.
     """
+    coefficients = check_array("coefficients", coefficients, (len(names) + 1,))
     terms = [(c, name) for c, name in zip(coefficients, [*names, ""]) if c or digits is not None]
     parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
     text = " ".join(parts)
@@ -283,4 +284,6 @@ def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | N
 
 def number(value: float, digits: int | None) -> str:
     """A number with so many decimals; None: exactly, as short as it can be written."""
+    if digits is not None:
+        check_count("digits", digits, least=0)
     return np.format_float_positional(value, trim="-") if digits is None else f"{value:.{digits}f}"

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from . import paper, store
+from .checks import check_array, check_count
 from .config import EXTENSIONS, preset
 from .evaluate import outlier_numbers, spread
 from .export import codeword_latex, equations_latex, symbol
@@ -88,6 +89,7 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: boo
 def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
     """T5 and T6: the paper's columns beside ours; `teacher` (n,) and `runs` (p, n) are returns. Coverage in percent."""
     printed, columns = paper.spread(task), {}
+    teacher, runs = _returns(teacher, runs)
     for name, values in (("drl", teacher), ("ours", runs)):
         here = spread(values) | {"median/q2": spread(values)["median"]}
         found = [here[metric.lower()] * (100 if metric == "Coverage" else 1) for metric in printed.index]
@@ -101,7 +103,9 @@ def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
-    known, rows = paper.text_numbers(task), []
+    known, rows = paper.text_numbers(paper.check_task(task)), []
+    teacher, runs = _returns(teacher, runs)
+    check_count("cells", cells)
     printed = known["value"]
     for subject, values in (("drl", teacher), ("ours", runs)):
         numbers = outlier_numbers(values)
@@ -118,6 +122,11 @@ def text_numbers(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int
     return frame
 
 
+def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns of the teacher (n,) and of the runs (p, n), checked. Raises ValueError."""
+    return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
+
+
 def _like(printed: float, here: float) -> float | int:
     """The paper's value as an integer where ours is one (a count)."""
     return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
@@ -125,6 +134,7 @@ def _like(printed: float, here: float) -> float | int:
 
 def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
     """The frame as text: floats with `digits` decimals, or none in a column of whole numbers; all else as it is."""
+    check_count("digits", digits, least=0)
     return frame.apply(lambda column: column.map(lambda value: _text(value, 0 if _whole(column) else digits)))
 
 

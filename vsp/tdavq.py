@@ -15,7 +15,7 @@ from itertools import product
 import numpy as np
 
 from . import geometry
-from .checks import check_seed
+from .checks import check_count, check_number, check_seed
 from .envs import RUNNING, Task, get_task
 
 METRIC = "euclidean"
@@ -39,7 +39,7 @@ class DiscretePolicy:
 
     def cells(self, states: np.ndarray) -> np.ndarray:
         """Index of the nearest codeword of each state (n, d). (n,)"""
-        return geometry.nearest(self.codewords, np.asarray(states, dtype=np.float64), METRIC)
+        return geometry.nearest(self.codewords, states, METRIC)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d)."""
@@ -62,6 +62,9 @@ def learn(
     policies that walk in circles between cells. Raises ValueError for a task whose episodes cannot go side by side.
     """
     check_seed(seed)
+    check_count("n_steps", n_steps)
+    for name, value in (("min_distance", min_distance), ("likeness", likeness), ("discount", discount)):
+        check_number(name, value, least=0)
     task, rng = get_task(task), np.random.default_rng(seed)
     walkers, actions = Walkers(task, rng), _actions(task)
     policy = DiscretePolicy(walkers.seen[:1], np.zeros((1, len(actions))), actions)

@@ -100,15 +100,24 @@ def _layers(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray,
     """Weight and bias of every layer of the network called `name`; none if there is no such network."""
     found = (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors)
     indices = sorted(int(match[1]) for match in found if match)
-    return [
+    layers = [
         (_tensor(tensors, f"{name}.{i}.weight", 2).T.copy(), _tensor(tensors, f"{name}.{i}.bias", 1)) for i in indices
     ]
+    shapes, biases = [weight.shape for weight, _ in layers], [len(bias) for _, bias in layers]
+    given, taken = [out for _, out in shapes], [width for width, _ in shapes]
+    if biases != given or given[:-1] != taken[1:]:
+        raise ValueError(
+            f"the layers of {name} are {shapes} (inputs, outputs) with {biases} biases, expected one for each output, "
+            "and as many inputs as the layer before has outputs"
+        )
+    return layers
 
 
 def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
-    if name not in weights or weights[name].ndim != ndim:
+    values = check_finite(name, weights[name]) if name in weights else np.zeros(())
+    if values.ndim != ndim:
         raise ValueError(f"expected a tensor {name} of {ndim} dimensions among {sorted(weights)[:6]}")
-    return check_finite(name, weights[name]).astype(np.float32)
+    return values.astype(np.float32)
 
 
 def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:

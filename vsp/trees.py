@@ -1,6 +1,7 @@
 """Trees to set beside the Voronoi partition: CART, and trees with linear leaves, oblique splits, or soft ones.
 
 All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
+They raise ValueError for arrays of a wrong shape, numbers that are not finite, and fewer than one leaf.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .checks import check_array, check_count, check_data, check_seed
 from .envs import get_task
 
 
@@ -19,15 +21,18 @@ class Tree:
     """
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int):
+        states, actions = check_data(states, actions)
+        check_count("leaves", leaves)
         self.model = _grow(states, actions, leaves)
-        self._m = actions.shape[1]
+        self._d, self._m = states.shape[1], actions.shape[1]
 
     def __len__(self) -> int:
         return self.model.get_n_leaves()
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d): means of the teacher's, so they stay inside the action box."""
-        return self.model.predict(obs).reshape(len(obs), self._m), None
+        obs = check_array("observations", obs, (-1, self._d))
+        return (self.model.predict(obs) if len(obs) else np.zeros(0)).reshape(len(obs), self._m), None
 
 
 def _grow(states: np.ndarray, actions: np.ndarray, leaves: int):
@@ -72,6 +77,8 @@ class LinearTree:
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str):
         self.task = get_task(task)
+        states, actions = check_data(states, actions, len(self.task.low), len(self.task.action_low))
+        check_count("leaves", leaves)
         self.centre, self.scale = standard(states)
         inputs, self.nodes = self.inputs(states), [Node(np.arange(len(states)), 0)]
         least = 1e-9 * np.square(actions).sum()  # below, it is rounding that a split explains
@@ -115,7 +122,7 @@ class LinearTree:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
-        inputs = self.inputs(obs)
+        inputs = self.inputs(check_array("observations", obs, (-1, len(self.centre))))
         maps = self.maps[self.apply(inputs)]
         raw = np.einsum("nd,ndm->nm", inputs, maps[:, :-1]) + maps[:, -1]
         return np.clip(raw, self.task.action_low, self.task.action_high), None
@@ -159,6 +166,7 @@ class ObliqueLinearTree(LinearTree):
     """
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int):
+        check_seed(seed)
         self._rng = np.random.default_rng(seed)
         super().__init__(states, actions, leaves=leaves, task=task)
 
@@ -203,6 +211,9 @@ def _unit(directions: np.ndarray) -> np.ndarray:
 
 def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean and deviation of `states` (n, d); a variable that never varies keeps its unit."""
+    states = check_array("states", states, (-1, -1))
+    if not states.size:
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
     scale = states.std(axis=0)
     return states.mean(axis=0), np.where(scale > 0, scale, 1.0)
 
@@ -221,6 +232,9 @@ class SoftTree:
     BALANCE = 0.03  # weight of what uneven nodes cost; halves with every level, and falls to 0 in the end
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, seed: int):
+        states, actions = check_data(states, actions)
+        check_count("leaves", leaves)
+        check_seed(seed)
         self.depth = int(np.log2(leaves))
         self.centre, self.scale = standard(states)
         rng = np.random.default_rng(seed)
@@ -236,6 +250,7 @@ class SoftTree:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d)."""
+        obs = check_array("observations", obs, (-1, len(self.centre)))
         return self.values[self._leaf(self._inputs(obs))], None
 
     def _leaf(self, inputs: np.ndarray) -> np.ndarray:

@@ -1,0 +1,177 @@
+"""Codewords in every position, one, two, in a row, nearly equal, on a grid, in 1 to 8 dimensions; and in any order."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import partition_of, tiny
+
+from vsp.distill import merge_regions
+from vsp.envs import Task
+from vsp.geometry import (
+    METRICS,
+    delaunay_neighbours,
+    distances,
+    lookup_neighbours,
+    nearest_brute,
+    nearest_kdtree,
+    visited_neighbours,
+)
+from vsp.partition import Partition
+from vsp.policy import VoronoiPolicy
+from vsp.readings import NEIGHBOURS
+
+KINDS = {
+    "one": lambda rng, d: rng.random((1, d)),
+    "two": lambda rng, d: rng.random((2, d)),
+    "scattered": lambda rng, d: rng.random((int(rng.integers(3, 16)), d)),
+    "in a row": lambda rng, d: rng.random(d) + rng.permutation(7)[:, None] * rng.normal(size=d) / 7,
+    "in a plane": lambda rng, d: rng.random((9, min(d, 2))) @ rng.normal(size=(min(d, 2), d)),
+    "on a grid": lambda rng, d: rng.permutation(
+        list(itertools.islice(itertools.product((0.0, 0.5, 1.0), repeat=d), 27))
+    ),
+    "on a sphere": lambda rng, d: (
+        (lambda x: x / np.linalg.norm(x, axis=1)[:, None] + x * 0)(rng.normal(size=(9, d)))
+        if d > 1
+        else rng.random((3, 1))
+    ),
+    "nearly equal": lambda rng, d: (
+        np.repeat(rng.random((3, d)) + 0.5, 2, axis=0)
+        + np.tile([[0.0], [1.0]], (3, 1)) * 10.0 ** -rng.integers(3, 16) * rng.uniform(0.5, 1, d)
+    ),
+    "far off": lambda rng, d: 1e6 + rng.random((6, d)),
+    "tiny": lambda rng, d: 1e-9 * rng.random((6, d)),
+}
+given_codewords = given(st.sampled_from(sorted(KINDS)), st.integers(1, 8), st.integers(0, 2**32))
+
+
+def codewords_of(kind, d, seed):
+    """Such codewords (k, d), all different, and states (200, d) around them."""
+    rng = np.random.default_rng(seed)
+    codewords = np.unique(KINDS[kind](rng, d), axis=0)
+    codewords = rng.permutation(codewords)
+    low, high = codewords.min(axis=0), codewords.max(axis=0)
+    room = np.maximum(0.2 * (high - low), 1e-3 * np.maximum(1e-6, np.abs(high).max()))
+    return codewords, rng.uniform(low - room, high + room, (200, d))
+
+
+def graphs(codewords, states, metric):
+    """The graph of every kind of neighbours."""
+    low, high = states.min(axis=0), states.max(axis=0)
+    return {
+        "delaunay": delaunay_neighbours(codewords),
+        "lookup": lookup_neighbours(codewords, low, high, metric),
+        "visited": visited_neighbours(codewords, states, metric),
+    }
+
+
+def box(d):
+    """A task of d inputs that nobody plays."""
+    names = tuple(f"s{i}" for i in range(d))
+    ends = {"low": np.full(d, -2e6), "high": np.full(d, 2e6), "action_low": -np.ones(1), "action_high": np.ones(1)}
+    return Task("box", names, ("a",), names, **ends, max_steps=1, start=None, step=None)
+
+
+def policy_of(codewords, metric="manhattan", *, seed=0):
+    k, d = codewords.shape
+    return VoronoiPolicy(codewords, np.random.default_rng(seed).normal(size=(k, d + 1, 1)), task=box(d), metric=metric)
+
+
+# No position breaks anything
+
+
+def test_every_kind_of_neighbours_is_tried():
+    assert graphs(*codewords_of("two", 2, 0), "manhattan").keys() == NEIGHBOURS.keys()
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given_codewords
+def test_neighbours_are_symmetric_and_nobody_is_his_own(metric, kind, d, seed):
+    codewords, states = codewords_of(kind, d, seed)
+    for name, graph in graphs(codewords, states, metric).items():
+        assert graph.shape == (len(codewords),) * 2 and graph.dtype == bool
+        assert np.array_equal(graph, graph.T) and not graph.diagonal().any()
+        if name == "delaunay" and len(codewords) > 1:
+            assert graph.any(axis=1).all(), "one without neighbours could never be merged"
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given_codewords
+def test_both_look_ups_find_the_nearest_and_a_codeword_its_own_cell(metric, kind, d, seed):
+    codewords, states = codewords_of(kind, d, seed)
+    found = nearest_brute(codewords, states, metric)
+    gaps = distances(states, codewords, metric)
+    assert np.array_equal(gaps[np.arange(len(states)), found], gaps.min(axis=1))
+    assert np.array_equal(nearest_kdtree(codewords, states, metric), found)
+    assert np.array_equal(nearest_brute(codewords, codewords, metric), np.arange(len(codewords)))
+    assert np.array_equal(nearest_kdtree(codewords, codewords, metric), np.arange(len(codewords)))
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given_codewords
+def test_a_policy_acts_and_explains_itself_there(metric, kind, d, seed):
+    codewords, states = codewords_of(kind, d, seed)
+    policy = policy_of(codewords, metric)
+    actions, _ = policy.predict(states)
+    assert np.isfinite(actions).all() and np.array_equal(actions[0], policy.predict(states[0])[0])
+    why = policy.explain(states[0])
+    assert why.margin >= 0 and why.cell == policy.cells(states[0]) != why.next_cell
+    assert len(policy.to_frame()) == len(codewords) and policy.to_c() and policy.to_python() and policy.to_text(None)
+
+
+@given_codewords
+def test_what_is_a_codeword_already_is_refused(kind, d, seed):
+    codewords, _ = codewords_of(kind, d, seed)
+    again = codewords[[seed % len(codewords)]]
+    twice, partition = np.concatenate([codewords, again]), Partition(box(d), tiny())
+    for codeword in codewords:
+        partition.add(codeword, np.random.default_rng(0))
+    refused = (lambda: policy_of(twice), lambda: delaunay_neighbours(twice), lambda: partition.add(again[0], None))
+    for call in refused:
+        with pytest.raises(ValueError, match="expected .*(differ|different|another)"):
+            call()
+
+
+# The order of the codewords is a matter of labels
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@given(st.sampled_from(["one", "two", "scattered", "in a row", "tiny"]), st.integers(1, 8), st.integers(0, 2**32))
+def test_in_another_order_it_is_the_same_partition(metric, kind, d, seed):
+    """But for what is on a border to the last bit: ties go to the lowest index, and Qhull cuts a square as it comes."""
+    codewords, states = codewords_of(kind, d, seed)
+    order = np.random.default_rng(seed).permutation(len(codewords))
+    here, there = policy_of(codewords, metric), policy_of(codewords, metric)
+    there = VoronoiPolicy(codewords[order], here.coefficients[order], task=here.task, metric=metric)
+    assert np.array_equal(order[there.cells(states)], here.cells(states))
+    assert np.array_equal(there.predict(states)[0], here.predict(states)[0])
+    one, other = graphs(codewords, states, metric), graphs(codewords[order], states, metric)
+    for name in one:
+        assert np.array_equal(other[name], one[name][np.ix_(order, order)]), name
+
+
+def survivors(places, biases, order, **settings):
+    """Codewords and actions that a merge leaves, sorted: cells in a row at `places`, with `biases`, in this order."""
+    points = np.column_stack([np.asarray(places)[order], np.full(len(places), 0.5)])
+    partition = partition_of(points, np.asarray(biases)[order], config=tiny(**settings))
+    merge_regions(partition, partition.config)
+    return sorted(partition.codewords[:, 0]), sorted(partition.models.parameters[:, -1, 0])
+
+
+@given(st.permutations(range(6)))
+def test_a_merge_of_pairs_leaves_one_of_each_in_any_order(order):
+    """Which one, the order decides: Algorithm 3 visits cells by their index, and who is visited first stays."""
+    places, biases = [0.05, 0.15, 0.4, 0.5, 0.8, 0.9], [0.0, 0.0, 2.0, 2.0, -2.0, -2.0]
+    left, actions = survivors(places, biases, list(order), min_param_distance=0.5)
+    assert actions == [-2.0, 0.0, 2.0]
+    firsts = {min(pair, key=order.index) for pair in ((0, 1), (2, 3), (4, 5))}
+    assert left == sorted(places[i] for i in firsts)
+
+
+def test_a_merge_along_a_chain_depends_on_the_order():
+    """A is like B and B like C, but A is not like C: from an end Algorithm 3 leaves two, from the middle one."""
+    places, biases = [0.1, 0.5, 0.9], [0.0, 0.4, 0.8]
+    assert survivors(places, biases, [0, 1, 2], min_param_distance=0.5)[0] == [0.1, 0.9]
+    assert survivors(places, biases, [1, 0, 2], min_param_distance=0.5)[0] == [0.5]
