@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pandas as pd
 
-from . import paper, store
+from . import paper, store, workers
 from .checks import check_array, check_choice, check_count, check_data, check_seed
 from .config import Refinement, check_refinement
 from .distill import teacher_episodes
@@ -164,36 +164,49 @@ def fit(experiment: Experiment, run: Run) -> dict[str, Policy]:
     }
 
 
-def compare(result: Results, n_runs: int = N_RUNS) -> pd.DataFrame:
+def compare(result: Results, n_runs: int = N_RUNS, *, jobs: int | str = 1) -> pd.DataFrame:
     """What stands beside the distilled policies: one row per kind of policy (the index), best mean return first.
 
     Columns: policies (how many), cells (or leaves, their mean), mean return, gap (to the teacher's, from the same
     starts), low and high (95 %, of the gap), std of all returns, failing (share of episodes without the goal).
-    Intervals resample policies and start states together. Baselines are fitted to the data of the first `n_runs` runs.
+    Intervals resample policies and start states together. Baselines are fitted to the data of the first `n_runs` runs,
+    by `jobs` as in `workers`.
     """
     experiment, task = result.experiment, result.experiment.task
     name, rule = rule_of_thumb(task)
-    kinds = {name: [rule], "published policy": [paper.published_policy(task)]}
-    for run in result.runs[:n_runs]:
-        for kind, policy in fit(experiment, run).items():
-            kinds.setdefault(kind, []).append(policy)
+    asked = [(experiment, run) for run in result.runs[:n_runs]]
+    fitted = dict(workers.results(_fitted, asked, jobs=jobs))
+    found = [_played(experiment, {name: rule, "published policy": paper.published_policy(task)})]
+    found += [fitted[i] for i in range(len(asked))]
     own = result.teacher_returns
     rows = {"teacher (TD3)": _row(np.nan, [result.teacher_outcomes], own)}
-    for kind, policies in kinds.items():
-        played = [outcomes(policy, task, experiment.n_episodes, seed=EVALUATION_SEED) for policy in policies]
-        rows[kind] = _row(np.mean([len(policy) for policy in policies]), played, own)
+    for kind in {kind: None for one in found for kind in one}:  # in their order
+        cells, played = zip(*(one[kind] for one in found if kind in one))
+        rows[kind] = _row(np.mean(cells), played, own)
     cells = [len(run.policy) for run in result.runs]
     rows["distilled, all runs"] = _row(np.mean(cells), [run.outcomes for run in result.runs], own)
     rows["distilled, best run"] = _row(len(result.best.policy), [result.best.outcomes], own)
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("mean", ascending=False, kind="stable")
 
 
-def kept_comparison(result: Results, n_runs: int = N_RUNS, *, runs: str | os.PathLike) -> pd.DataFrame:
+def _fitted(experiment: Experiment, run: Run) -> dict[str, tuple[int, Outcomes]]:
+    return _played(experiment, fit(experiment, run))
+
+
+def _played(experiment: Experiment, policies: dict[str, Policy]) -> dict[str, tuple[int, Outcomes]]:
+    """Cells and evaluated episodes of each policy."""
+    n = experiment.n_episodes
+    return {kind: (len(p), outcomes(p, experiment.task, n, seed=EVALUATION_SEED)) for kind, p in policies.items()}
+
+
+def kept_comparison(
+    result: Results, n_runs: int = N_RUNS, *, runs: str | os.PathLike, jobs: int | str = -1
+) -> pd.DataFrame:
     """`compare`, kept beside the runs as the teacher's episodes are: on another CPU type the fits would be others."""
     name = f"baselines-{n_runs}-{code_id('baselines', 'trees')}.run"
     path = result.experiment.folder(runs) / name
     if not path.exists():
-        frame = compare(result, n_runs)
+        frame = compare(result, n_runs, jobs=jobs)
         arrays = {name: frame[name].to_numpy() for name in frame}
         store.save(path, arrays, {"kind": "Comparison", "policies": list(frame.index), "columns": list(frame)})
     arrays, about = store.load(path, kind="Comparison")

@@ -358,10 +358,11 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
     parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     arguments = parser.parse_args()
+    runs, jobs = Path(arguments.out) / "data" / "runs", arguments.jobs
     for task in N_RUNS:
-        runs = Path(arguments.out) / "data" / "runs"
-        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs)
-        baselines.kept_comparison(results, baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS, runs=runs)
+        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
+        n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS
+        baselines.kept_comparison(results, n_runs, runs=runs, jobs=jobs)
         print(f"{task}: {len(results.runs)} runs are there, and what stands beside them")
 
 
