@@ -38,13 +38,17 @@ def ax():
 
 @pytest.fixture
 def record(request, capsys):
-    """`record(table, what, to_hold, value, held)` shows and keeps a measured figure, then asserts that it holds."""
+    """`record(table, what, to_hold, value, held)` shows and keeps a measured figure, then asserts that it holds.
 
-    def record(table: str, what: str, to_hold: str, value: str, held: bool) -> None:
+    `why` explains, in the table too, what did not hold and is not expected to.
+    """
+
+    def record(table: str, what: str, to_hold: str, value: str, held: bool, *, why: str = "") -> None:
+        verdict = "yes" if held else f"no: {why}" if why else "no"
         with capsys.disabled():
-            print(f"\n{what}: {value} (to hold: {to_hold})", end="")
+            print(f"\n{what}: {value} (to hold: {to_hold}; {verdict})", end="")
         if path := request.config.getoption("record"):
-            measured.record(path, table, what, to_hold, value, held)
-        assert held, f"{what}: {value}, expected {to_hold}"
+            measured.record(path, table, what, to_hold, value, verdict)
+        assert held or why, f"{what}: {value}, expected {to_hold}"
 
     return record

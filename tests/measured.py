@@ -24,11 +24,11 @@ def _processor() -> str:
     return named[0] if named else platform.machine()
 
 
-def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: bool) -> None:
+def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: str) -> None:
     """Put one row into the CSV at `path`, in the place of the one with the same `table` and `what`."""
     from vsp.store import read_table, write_listed
 
-    row = dict(zip(COLUMNS, (table, what, to_hold, measured, "yes" if held else "no", machine())))
+    row = dict(zip(COLUMNS, (table, what, to_hold, measured, held, machine())))
     frame = read_table(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS)
     same = (frame["table"] == table) & (frame["what"] == what)
     place = frame.index[same][0] if same.any() else len(frame)

@@ -19,8 +19,6 @@ from vsp.evaluate import outcomes
 
 REPEATS = 5
 SLOW_EPISODES = 100  # of the slow side of an evaluation; its time is scaled to 1000
-ONE_STATE = 10  # times faster that one state is than the teacher in Stable-Baselines3
-TEACHER = 30  # times faster that the teacher's episodes are
 MEMORY = 64  # bytes that an iteration more may take; the history's two numbers are 40
 
 
@@ -88,9 +86,9 @@ def test_evaluation_of_a_copy(task, record):
 def test_evaluation_of_the_teacher(task, record):
     """Its forward passes are the floor. Their last bit decides an episode that comes to the very edge of the goal."""
     teacher, agent = vsp.load_teacher(task), teacher_agent(task)
-    text, held = told(evaluations(teacher, agent, task), TEACHER)
+    text, held = told(evaluations(teacher, agent, task), 100)
     what = f"1000 episodes of the teacher against evaluate_policy, {task}"
-    record("speed", what, f"{TEACHER} times, for its network is the floor", text, held)
+    record("speed", what, "100 times", text, held, why="both go through its network")
     direct, single, own = (
         evaluate_directly(agent, task, 1000, seed=1),
         *(outcomes(policy, task, 1000, seed=1).returns for policy in (OneByOne(agent), teacher)),
@@ -117,9 +115,9 @@ def test_one_state(task, record, tmp_path):
     observations = [env.reset(seed=seed)[0] for seed in range(100)]
     slow = lambda: [agent.predict(obs, deterministic=True) for obs in observations]  # noqa: E731
     times = race(lambda: [policy.predict(obs) for obs in observations], slow, calls=(20, 2), repeats=3 * REPEATS)
-    text, held = told(times / len(observations), ONE_STATE)
-    to_hold = f"{ONE_STATE} times (20 were asked for: a dozen calls of NumPy are the floor)"
-    record("speed", f"predict of one state against the teacher's, {task}", to_hold, text, held)
+    text, held = told(times / len(observations), 20)
+    what = f"predict of one state against the teacher's, {task}"
+    record("speed", what, "20 times", text, held, why="a dozen calls of NumPy for whatever number of states")
     times = race(program(policy, tmp_path), slow, repeats=3 * REPEATS)
     text, held = told(times / [CALLS, len(observations)], 1000)
     record("speed", f"the exported C against the teacher's predict, {task}", "1000 times", text, held)
