@@ -27,11 +27,11 @@ from .experiments import code_id
 from .measure import measure
 from .methods import Budget
 from .policy import VoronoiPolicy
-from .progress import progress
 from .race import race
 from .rollouts import Policy, play
 from .simplify import simplify
 from .teachers import load_teacher
+from .workers import each, in_one_line
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
@@ -169,17 +169,9 @@ def make_row(job: Job, folder: str | os.PathLike) -> None:
 
 def make_all(folder: str | os.PathLike, *, workers: int = 1, tasks=TASKS) -> None:
     """Make the rows that are missing in `folder`."""
-    from joblib import Parallel, delayed, parallel_config
-
     asked = [job for task in tasks for job in jobs(task)]
-    missing = [job for job in asked if not job.path(folder).exists()]
-    with parallel_config("loky", inner_max_num_threads=1):
-        finished = Parallel(n_jobs=workers, return_as="generator_unordered")(
-            delayed(make_row)(job, folder) for job in missing
-        )
-        done = len(asked) - len(missing)
-        for _ in progress(finished, "beyond", total=len(asked), unit="rows", done=done):
-            pass
+    missing = [(job, folder) for job in asked if not job.path(folder).exists()]
+    each(make_row, missing, "beyond", jobs=workers, total=len(asked), unit="rows")
 
 
 def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -239,4 +231,5 @@ def main() -> None:
 if __name__ == "__main__":
     from vsp.beyond import main  # of the module by its name, under which workers find what it holds
 
-    main()
+    with in_one_line():
+        main()

@@ -28,9 +28,9 @@ from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
 from .evaluate import interval, outcomes, spread
 from .policy import VoronoiPolicy
-from .progress import progress
 from .rollouts import Outcomes
 from .teachers import Teacher, load_teacher
+from .workers import each, in_one_line
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
 N_EPISODES = 1000
@@ -140,15 +140,8 @@ def make_all(work: Iterable[tuple[Experiment, int]], *, runs: str | os.PathLike,
     """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`, with `jobs` workers."""
     asked = [(experiment, seed, experiment.folder(runs)) for experiment, seed in work]
     missing = [one for one in asked if not run_path(one[2], one[1]).exists()]
-    if not missing:
-        return
-    from joblib import Parallel, delayed, parallel_config
-
-    with parallel_config("loky", inner_max_num_threads=1):
-        finished = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(make_run)(*one) for one in missing)
-        done = len(asked) - len(missing)
-        for _ in progress(finished, label, total=len(asked), unit="runs", done=done):
-            pass
+    if missing:
+        each(make_run, missing, label, jobs=jobs, total=len(asked), unit="runs")
 
 
 def make_run(experiment: Experiment, seed: int, folder: str | os.PathLike) -> None:
@@ -339,12 +332,17 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
     parser.add_argument("--jobs", type=int, default=-1, help="worker processes; -1: one per core")
     arguments = parser.parse_args()
-    for task in N_RUNS:
-        made = paper_runs(task, runs=Path(arguments.out) / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
-        print(f"{task}: {len(made)} runs are there")
+    out = Path(arguments.out)
+    with store.alone(out / "build" / "runs.lock", f"makes runs in {out}"):
+        for left in (out / "data" / "runs").rglob(store.TEMPORARY):
+            left.unlink()  # of a process that was killed
+        for task in N_RUNS:
+            made = paper_runs(task, runs=out / "data" / "runs", quick=arguments.quick, jobs=arguments.jobs)
+            print(f"{task}: {len(made)} runs are there", flush=True)
 
 
 if __name__ == "__main__":
     from vsp.experiments import main  # of the module by its name, under which workers find what it holds
 
-    main()
+    with in_one_line():
+        main()
