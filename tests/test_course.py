@@ -475,6 +475,16 @@ def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
     assert nbformat.read(copy, as_version=4).cells
 
 
+def test_what_was_written_before_a_kill_is_nobodys_work(tmp_path):
+    """The checksums of what was written come last: without them, a file as it is to be is not taken for edited."""
+    copies = [*build.build(tmp_path)]
+    before = {path: path.read_bytes() for path in copies}
+    (tmp_path / "build/course" / build.MADE).unlink()
+    copies[1].unlink()
+    build.build(tmp_path)
+    assert {path: path.read_bytes() for path in copies} == before and not list(tmp_path.rglob("*.kept-*"))
+
+
 def test_a_hand_out_stands_on_its_own(tmp_path):
     """Package and teachers are found where it was unpacked; the answers are not in it."""
     handout.write_handout(tmp_path / "handout.zip", {"lesson.ipynb": "{}"})
