@@ -76,7 +76,8 @@ help: ## this list
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
 paper-figures: venv ## every figure and table of the paper, at the paper's scale: about 3 minutes
-	@mkdir -p "$(STATE)"; : > "$(STATE)/made"
+	@mkdir -p "$(STATE)" && : > "$(STATE)/made" || { \
+	  echo 'error: $(OUT) cannot be written: make it writable, or name another folder: `make OUT=folder`' >&2; exit 1; }
 	@$(MAKE) --no-print-directory -j $(JOBS) notebooks
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
 	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
@@ -179,15 +180,16 @@ test-site: site ## looks at the site and at JupyterLab in a browser, which needs
 
 # Set-up
 
-# .venv/built-from holds the checksum of the lock and the folder that .venv was built in. It is written last, so that an
-# unfinished environment is never taken for a whole one.
+# vsp/environment.py says what in .venv is not as it was when its set-up ended; this, where not even that runs.
+AS_BUILT = $(PY) -X utf8 -I vsp/environment.py
+
 venv:
-	@{ cksum environment.lock; pwd; } | cmp -s - .venv/built-from && $(PY) -c '' 2>/dev/null \
-	  || exec $(MAKE) --no-print-directory new-venv
+	@$(AS_BUILT) 2>/dev/null || exec $(MAKE) --no-print-directory new-venv
 
 # torch first, and by itself: pip takes the CPU build where it is pointed to one, else the registry's; the lock knows
 # the checksums of both. Only the GPU libraries that the registry's Linux builds ask for come without a checksum, in the
-# versions that torch asks for. vsp itself is found through a path file, so that edits count at once.
+# versions that torch asks for. vsp itself is found through a path file, so that edits count at once; Python reads such
+# files in the locale's encoding, hence a relative path.
 new-venv:
 	@python=; for p in $(if $(PYTHON),"$(PYTHON)",python3.11 python3); do \
 	  if "$$p" -c 'import ensurepip, sys; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null; then \
@@ -196,10 +198,15 @@ new-venv:
 	  echo 'error: tried $(if $(PYTHON),$(PYTHON),python3.11 and python3), expected Python 3.11 with venv' >&2; \
 	  echo '  (Debian: apt install python3.11-venv). To say where it is: make PYTHON=/path/to/python3.11' >&2; \
 	  exit 1; fi; \
-	if ! mkdir .venv-lock 2>/dev/null; then \
-	  echo 'error: another make is setting up .venv: wait for it. If none is, remove the folder .venv-lock' >&2; \
-	  exit 1; fi; \
-	trap 'rmdir .venv-lock' EXIT; trap 'exit 1' HUP INT TERM; set -e; \
+	exec 9> .venv.lock; lock() { "$$python" -c "import fcntl; fcntl.flock(9, fcntl.LOCK_EX | $$1)" 2>/dev/null; }; \
+	if ! lock fcntl.LOCK_NB; then \
+	  echo 'another make is setting up .venv: waiting for it to end' >&2; lock 0; fi; \
+	if [ -e .venv ]; then \
+	  if why=$$($(AS_BUILT) 2>&1); then exit 0; fi; \
+	  if $(PY) -c '' 2>/dev/null; then :; else why='its Python does not run'; fi; \
+	  echo ".venv is not what environment.lock says: $$why"; fi; \
+	trap 'test $$? -eq 0 || echo "$$advice" >&2' EXIT; trap 'exit 1' HUP INT TERM; set -e; \
+	advice='error: .venv is not whole, and the next make begins anew; after edits, `git checkout environment.lock`'; \
 	echo "Setting up .venv from environment.lock with $$python; this happens once and takes about 2 minutes,"; \
 	echo "longer where torch brings GPU libraries along (Linux, 2.5 GB of downloads)."; \
 	rm -rf .venv; "$$python" -m venv .venv; \
@@ -214,10 +221,11 @@ new-venv:
 	$(PIP) install -qq --no-deps --require-hashes --requirement environment.lock; \
 	echo "3/4 what torch needs on this machine"; \
 	$(PIP) install -qq "$$torch"; \
-	pwd > "$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/vsp.pth"; \
+	echo ../../../.. > "$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/vsp.pth"; \
 	echo "4/4 check"; \
 	$(PIP) check; \
-	{ cksum environment.lock; pwd; } > .venv/built-from
+	$(PY) -c 'import matplotlib.font_manager'; \
+	$(AS_BUILT) --built
 
 # What only the site and its tests need goes into the same .venv when it is first asked for; a new .venv forgets it.
 venv-site: venv

@@ -331,3 +331,18 @@ def test_the_command_makes_runs_in_several_processes(tmp_path):
     assert ended.returncode == 0, ended.stderr
     assert len(list(tmp_path.rglob("[0-9]*.run"))) == len(TASKS) * experiments.QUICK_RUNS
     assert len(list(tmp_path.rglob("teacher.run"))) == len(list(tmp_path.rglob("baselines-2-*.run"))) == len(TASKS)
+
+
+# The command
+
+
+def test_the_command_clears_away_what_a_kill_left(made, tmp_path, monkeypatch):
+    """And nothing else."""
+    folder = SMALL.folder(tmp_path / "data" / "runs")
+    shutil.copytree(made[0], tmp_path / "data" / "runs")
+    before = files(tmp_path / "data" / "runs")
+    (folder / ".0001-a1b2c3d_.run").write_text("torn")
+    monkeypatch.setattr(experiments, "N_RUNS", {})
+    monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path)])
+    experiments.main()
+    assert files(tmp_path / "data" / "runs") == before

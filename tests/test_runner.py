@@ -1,10 +1,13 @@
 """vsp.runner: a notebook succeeds as a whole or changes nothing, and says which cell was at fault."""
 
+import errno
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import nbformat
@@ -75,7 +78,7 @@ def test_success_twice(tmp_path):
     assert runner.run(notebook, out) == []
     assert tree(out) == first
     assert runner.run(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
-    assert not (out / "build" / "running" / "story").exists()
+    assert not list((out / "build" / "running").iterdir())
 
 
 def test_of_a_widget_its_still_picture_is_left(tmp_path):
@@ -145,6 +148,10 @@ FAULTS = {
     ),
     "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
     "missing": (["2"], "did not make figures/c.pdf"),
+    "full disk": (
+        ["raise OSError(28, 'No space left on device', 'a.pdf')"],
+        "failed: OSError: [Errno 28] No space left on device: 'a.pdf': free some space, or name another folder",
+    ),
 }
 
 
@@ -162,6 +169,60 @@ def test_fault_leaves_previous_figures(tmp_path, capsys, fault):
     error = capsys.readouterr().err
     assert error.startswith("error: story.ipynb") and message in error
     assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "cell", ["open(out + '/large', 'w').write('x' * 100_000)", "print('x' * 100_000)"], ids=["cell", "copy"]
+)
+def test_limit_on_the_size_of_files(tmp_path, cell):
+    """In a cell and where the runner writes: one line, and the earlier files stay."""
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "a.txt").write_text("from an earlier run")
+    command = [sys.executable, "-m", "vsp.runner", str(write(tmp_path, cell)), "--out", str(tmp_path)]
+    small = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (50_000, 50_000))
+    before, done = tree(tmp_path), subprocess.run(command, preexec_fn=small, capture_output=True, text=True)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 1 and line.startswith("error: story.ipynb") and "File too large" in line
+    assert "ulimit -f" in line and tree(tmp_path) == before
+
+
+def test_all_or_nothing_where_one_folder_is_closed(tmp_path, monkeypatch, capsys):
+    """figures/ comes after data/, yet data/ stays as it was."""
+    both = (
+        DRAW + "\n(Path(out) / 'data' / 'results').mkdir(parents=True)\n(Path(out) / 'data/results/c').write_text('c')"
+    )
+    notebook = write(tmp_path, both)
+    before, access = tree(tmp_path), os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "figures" and access(path, mode))
+    assert runner.main([str(notebook), "--out", str(tmp_path)]) == 1
+    error = capsys.readouterr().err
+    assert "figures: Permission denied: make it writable" in error and "nothing was changed" in error
+    assert tree(tmp_path) == before
+
+
+def test_figures_on_another_disk(tmp_path, monkeypatch):
+    """A file cannot be renamed from one disk to another: it is copied, whole or not at all."""
+    replace = os.replace
+
+    def within(path, target):
+        if Path(path).parent != Path(target).parent:
+            raise OSError(errno.EXDEV, "Invalid cross-device link")
+        replace(path, target)
+
+    monkeypatch.setattr(os, "replace", within)
+    runner._publish(write(tmp_path).parent, out := tmp_path / "out")
+    assert (out / "story.ipynb").read_bytes() == (tmp_path / "story.ipynb").read_bytes()
+    assert [path.name for path in out.iterdir()] == ["story.ipynb"]
+
+
+def test_nothing_comes_from_a_run_that_was_killed(tmp_path):
+    """What it left is removed, and an orphaned kernel that writes on does not write into the staging of the next."""
+    left = tmp_path / "build" / "running" / "story-left" / "out" / "figures"
+    left.mkdir(parents=True)
+    (left / ".a-12345678.txt").write_text("torn")
+    write_on = f"import os\nassert not os.path.exists({str(left)!r})\nos.makedirs({str(left)!r})"
+    assert runner.run(write(tmp_path, write_on), tmp_path) == ["figures/executed/story.ipynb"]
+    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["executed"]
 
 
 @pytest.mark.parametrize(
@@ -197,7 +258,7 @@ def test_end_by_signal_ends_kernel(tmp_path):
     assert "story.ipynb: interrupted" in process.communicate(timeout=30)[1]
     assert process.returncode == 130
     until(lambda: not alive(int(pid.read_text())))
-    assert not (tmp_path / "figures").exists() and not (tmp_path / "build" / "running" / "story").exists()
+    assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
 
 
 def alive(pid: int) -> bool:

@@ -1,7 +1,10 @@
+import errno
 import os
+import signal
 import stat
 import subprocess
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -336,3 +339,44 @@ def test_where_there_is_a_manifest_the_card_is_listed_too(tmp_path):
         read_carded(path)
     (tmp_path / MANIFEST).unlink()
     assert read_carded(path)[1]["score"] == 16.7  # nothing says otherwise
+
+
+# Full and closed disks, and two processes at once
+
+
+def test_a_full_disk_is_told_of_with_the_file_and_the_fix(tmp_path):
+    path = tmp_path / "figure.pdf"
+    path.write_bytes(b"before")
+    with pytest.raises(OSError) as error, store.atomic_path(path) as temporary:
+        temporary.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+    said = store.reason(error.value)
+    assert said == f"{path}: No space left on device: free some space, or name another folder: `make OUT=folder`"
+    assert path.read_bytes() == b"before" and list(tmp_path.iterdir()) == [path]
+
+
+def test_an_error_without_a_fix_is_raised_again():
+    bug = FileNotFoundError(errno.ENOENT, "No such file", "x")
+    with pytest.raises(FileNotFoundError) as error:
+        store.reason(bug)
+    assert error.value is bug and store.fix(None) is None
+
+
+def test_what_a_kill_leaves_has_a_name_that_is_known(tmp_path):
+    with store.atomic_path(tmp_path / "0001.run") as temporary:
+        assert temporary.match(store.TEMPORARY) and list(tmp_path.rglob(store.TEMPORARY)) == [temporary]
+    assert not (tmp_path / "0001.run").match(store.TEMPORARY)
+
+
+def test_one_after_the_other(tmp_path, capfd):
+    """The second waits, says so, and comes in when the first is killed."""
+    lock = tmp_path / "build" / "lock"
+    hold = f"from vsp.store import alone\nwith alone({str(lock)!r}, 'x'):\n  print(1, flush=True)\n  input()"
+    first = subprocess.Popen([sys.executable, "-c", hold], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    first.stdout.readline()
+    threading.Timer(0.3, first.kill).start()
+    with store.alone(lock, "writes here"):
+        assert first.wait() == -signal.SIGKILL
+    assert capfd.readouterr().err == "another run writes here: waiting for it to end\n"
+    with store.alone(lock, "writes here"):
+        assert capfd.readouterr().err == ""

@@ -1,5 +1,6 @@
 """Jobs on this machine and on a Dask cluster: the same results, whoever dies on the way."""
 
+import errno
 import os
 import signal
 import time
@@ -19,6 +20,12 @@ def power(base, exponent):
     return base**exponent
 
 
+def die(n):
+    if n == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return n
+
+
 def threads():
     return {library["num_threads"] for library in threadpool_info()}
 
@@ -35,36 +42,75 @@ def files(folder):
     return {path.name: path.read_bytes() for path in folder.rglob("*.run")}
 
 
+def ask(work, arguments, jobs, *, done=0):
+    return dict(workers.results(work, arguments, "a study", jobs=jobs, total=done + len(arguments), unit="rows"))
+
+
 @pytest.mark.parametrize("jobs", [1, 2, -1])
 def test_every_result_comes_with_its_number(jobs):
     asked = [(2, n) for n in range(7)]
-    assert dict(workers.results(power, asked, jobs=jobs)) == {n: 2**n for n in range(7)}
-    assert dict(workers.results(power, [], jobs=jobs)) == {}
+    assert ask(power, asked, jobs) == {n: 2**n for n in range(7)}
+    assert ask(power, [], jobs) == {}
+
+
+def test_the_way_is_told(capsys):
+    ask(power, [(2, n) for n in range(4)], 1, done=3)
+    assert "a study: 7 of 7 rows" in capsys.readouterr().err
+    ask(power, [], 1, done=3)
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_job_has_one_thread(jobs):
     np.ones((2, 2)) @ np.ones((2, 2))  # BLAS is there
-    assert dict(workers.results(threads, [(), ()], jobs=jobs)) == {0: {1}, 1: {1}}
+    assert ask(threads, [(), ()], jobs) == {0: {1}, 1: {1}}
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_an_error_of_a_job_is_that_of_the_call(jobs):
     with pytest.raises(ZeroDivisionError):
-        dict(workers.results(power, [(0, -1)], jobs=jobs))
+        ask(power, [(0, -1)], jobs)
+
+
+def test_a_killed_worker_is_named():
+    """Nothing waits for it in vain; the message says how far the work came and that it goes on from there."""
+    told = r"a study: a worker process was killed \(.*SIGKILL.*\) with [345] of 6 rows done.*kept"
+    with pytest.raises(workers.WorkerDied, match=told):
+        ask(die, [(n,) for n in range(3)], 2, done=3)
+    assert ask(die, [(3,), (4,)], 2) == {0: 3, 1: 4}  # and the pool is as good as new
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (workers.WorkerDied("a worker"), "error: a worker"),
+        (workers.NoScheduler("no one"), "error: no one"),
+        (OSError(errno.ENOSPC, "No space", "a.run"), "error: a.run: No space: free some space, or name another folder"),
+    ],
+)
+def test_in_one_line(error, line):
+    with pytest.raises(SystemExit) as end, workers.in_one_line():
+        raise error
+    assert str(end.value).startswith(line) and end.value.__suppress_context__ is False
+
+
+def test_a_bug_keeps_its_traceback():
+    for bug in (FileNotFoundError(errno.ENOENT, "No such file", "x"), ValueError("x"), TimeoutError("x")):
+        with pytest.raises(type(bug)), workers.in_one_line():
+            raise bug
 
 
 def test_a_worker_with_other_code_is_refused(monkeypatch):
     call = workers._call
     monkeypatch.setattr(workers, "_call", lambda expected, *rest: call({**expected, "numpy": "1.0"}, *rest))
     with pytest.raises(workers.UnlikeWorker, match="expected .*'numpy': '1.0'.*same checkout"):
-        dict(workers.results(power, [(1, 1)], jobs=1))
+        ask(power, [(1, 1)], 1)
 
 
 def test_an_address_without_a_scheduler_is_one_clear_error(monkeypatch):
     monkeypatch.setattr(workers, "ANSWER", 0.5)
-    with pytest.raises(OSError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
-        dict(workers.results(power, [(1, 1)], jobs="tcp://127.0.0.1:9"))
+    with pytest.raises(workers.NoScheduler, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
+        ask(power, [(1, 1)], "tcp://127.0.0.1:9")
 
 
 @pytest.mark.parametrize(("text", "value"), [("3", 3), ("-1", -1), ("tcp://10.0.0.1:8786", "tcp://10.0.0.1:8786")])

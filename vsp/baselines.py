@@ -175,7 +175,8 @@ def compare(result: Results, n_runs: int = N_RUNS, *, jobs: int | str = 1) -> pd
     experiment, task = result.experiment, result.experiment.task
     name, rule = rule_of_thumb(task)
     asked = [(experiment, run) for run in result.runs[:n_runs]]
-    fitted = dict(workers.results(_fitted, asked, jobs=jobs))
+    label = f"{task}, beside the runs"
+    fitted = dict(workers.results(_fitted, asked, label, jobs=jobs, total=len(asked), unit="fits"))
     found = [_played(experiment, {name: rule, "published policy": paper.published_policy(task)})]
     found += [fitted[i] for i in range(len(asked))]
     own = result.teacher_returns

@@ -27,11 +27,11 @@ from .experiments import code_id
 from .measure import measure
 from .methods import Budget
 from .policy import VoronoiPolicy
-from .progress import progress
 from .race import race
 from .rollouts import Policy, play
 from .simplify import simplify
 from .teachers import load_teacher
+from .workers import in_one_line
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
@@ -171,8 +171,8 @@ def make_all(folder: str | os.PathLike, *, jobs: int | str = 1, tasks=TASKS) -> 
     """Make the rows that are missing in `folder`; `jobs` as in `workers`."""
     asked = [job for task in tasks for job in jobs_of(task)]
     missing = [job for job in asked if not job.path(folder).exists()]
-    finished = workers.results(make_row, [(job,) for job in missing], jobs=jobs)
-    for i, about in progress(finished, "beyond", total=len(asked), unit="rows", done=len(asked) - len(missing)):
+    made = workers.results(make_row, [(job,) for job in missing], "beyond", jobs=jobs, total=len(asked), unit="rows")
+    for i, about in made:
         store.save(missing[i].path(folder), {}, about)
 
 
@@ -239,4 +239,5 @@ def main() -> None:
 if __name__ == "__main__":
     from vsp.beyond import main  # of the module by its name, under which workers find what it holds
 
-    main()
+    with in_one_line():
+        main()

@@ -28,9 +28,9 @@ from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
 from .evaluate import interval, outcomes, spread
 from .policy import VoronoiPolicy
-from .progress import progress
 from .rollouts import Outcomes
 from .teachers import Teacher, load_teacher
+from .workers import in_one_line
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
 N_EPISODES = 1000
@@ -145,11 +145,8 @@ def make_all(
     """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
     asked = [(run_path(experiment.folder(runs), seed), experiment, seed) for experiment, seed in work]
     missing = [one for one in asked if not one[0].exists()]
-    if not missing:
-        return
-    finished = workers.results(make_run, [one for _, *one in missing], jobs=jobs)
-    done = len(asked) - len(missing)
-    for i, content in progress(finished, label, total=len(asked), unit="runs", done=done):
+    made = workers.results(make_run, [one for _, *one in missing], label, jobs=jobs, total=len(asked), unit="runs")
+    for i, content in made:
         store.save(missing[i][0], *content)
 
 
@@ -358,15 +355,20 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
     parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     arguments = parser.parse_args()
-    runs, jobs = Path(arguments.out) / "data" / "runs", arguments.jobs
-    for task in N_RUNS:
-        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
-        n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS
-        baselines.kept_comparison(results, n_runs, runs=runs, jobs=jobs)
-        print(f"{task}: {len(results.runs)} runs are there, and what stands beside them")
+    out, jobs = Path(arguments.out), arguments.jobs
+    runs = out / "data" / "runs"
+    with store.alone(out / "build" / "runs.lock", f"makes runs in {out}"):
+        for left in runs.rglob(store.TEMPORARY):
+            left.unlink()  # of a process that was killed
+        for task in N_RUNS:
+            results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
+            n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS
+            baselines.kept_comparison(results, n_runs, runs=runs, jobs=jobs)
+            print(f"{task}: {len(results.runs)} runs are there, and what stands beside them", flush=True)
 
 
 if __name__ == "__main__":
     from vsp.experiments import main  # of the module by its name, under which workers find what it holds
 
-    main()
+    with in_one_line():
+        main()

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import argparse
 import ast
-import contextlib
 import copy
-import fcntl
+import errno
 import filecmp
 import json
 import os
@@ -21,16 +20,18 @@ import re
 import shutil
 import signal
 import sys
+import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import nbformat
 
-from .store import MANIFEST, ROOT, list_file
+from .store import MANIFEST, ROOT, alone, fix, list_file, reason
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
+_SYSTEM_ERROR = re.compile(r"\[Errno (\d+)\] ")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 _WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
@@ -52,20 +53,24 @@ def run(
 
     `expect` names files, relative to `out`, that the notebook must make; `timeout` is in seconds, for each cell. An
     executed copy without anything that varies from run to run goes to figures/executed. Runs of one notebook into one
-    `out` wait for each other. Raises NotebookError, with the earlier files of `out` left in place.
+    `out` wait for each other. Raises NotebookError, or OSError for a disk that is full or closed; the earlier files of
+    `out` stay.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
-    work = out / "build" / "running" / notebook.stem
-    staging = work / "out"
-    values = {**(parameters or {}), "out": str(staging)}
+    values = {**(parameters or {}), "out": str(out)}
     if "runs" in declared:
         values.setdefault("runs", str(out / "data" / "runs"))
     _check_parameters(notebook, declared, values)
-    with _alone(work.with_suffix(".lock")):
-        shutil.rmtree(work, ignore_errors=True)  # of a run that was killed
-        staging.mkdir(parents=True)
+    running = out / "build" / "running"
+    with alone(running / f"{notebook.stem}.lock", f"of {notebook.stem} writes into {out}"):
+        for left in running.glob(f"{notebook.stem}-*"):
+            shutil.rmtree(left, ignore_errors=True)  # of a run that was killed
+        work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))  # not where an orphaned kernel may write
+        staging = work / "out"
         try:
+            staging.mkdir()
+            values["out"] = str(staging)
             cells = _execute(notebook, work / notebook.name, values, timeout)
             _check_outputs(notebook, cells, out)
             _write_copy(source, cells, staging / "figures" / "executed" / notebook.name)
@@ -107,29 +112,9 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
             )
 
 
-@contextlib.contextmanager
-def _alone(lock: Path) -> Iterator[None]:
-    """Hold `lock`; the system frees it when this process ends, however it ends."""
-    lock.parent.mkdir(parents=True, exist_ok=True)
-    with open(lock, "w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            print(f"another run of {lock.stem} writes into {lock.parents[2]}: waiting for it to end", file=sys.stderr)
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
 def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> list[nbformat.NotebookNode]:
     """The code cells of `notebook` after its run, without the one that papermill injects."""
-    for name in ("MPLBACKEND", "JUPYTER_PATH"):  # pictures go into the notebook; the kernel is this Python
-        os.environ.pop(name, None)
-    os.environ["JUPYTER_PREFER_ENV_PATH"] = "1"
-    os.environ["IPYTHONDIR"] = str(copy_path.parent / "ipython")  # nobody's start-up files
-    os.environ["SDL_VIDEODRIVER"] = "dummy"  # no search for a screen, nor words about it on standard error
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
-        os.environ[name] = "1"  # the same sums in the same order, also without make
-    os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # no note of the debugger's on standard error
+    _set_environment(copy_path.parent)
     import papermill
 
     stopped = None
@@ -146,6 +131,9 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
             extra_arguments=["--log-level=CRITICAL"],  # the kernel's own chatter on standard error
         )
     except Exception as error:  # whatever it was, the copy tells how far the notebook came
+        if fix(getattr(error, "errno", None)):  # unless there is no room for the copy
+            error.filename = error.filename or str(copy_path)
+            raise
         stopped = error
     executed = nbformat.read(copy_path, as_version=4) if copy_path.exists() else nbformat.v4.new_notebook()
     code = [cell for cell in executed.cells if cell.cell_type == "code"]
@@ -153,6 +141,23 @@ def _execute(notebook: Path, copy_path: Path, values: dict, timeout: int) -> lis
     _check_cells(notebook, cells, stopped)
     _check_widgets(notebook, executed.metadata)
     return cells
+
+
+def _set_environment(work: Path) -> None:
+    """For the kernel: nobody's settings, nothing written outside `work`, the same sums; also without make."""
+    for name in ("MPLBACKEND", "JUPYTER_PATH"):  # pictures go into the notebook; the kernel is this Python
+        os.environ.pop(name, None)
+    os.environ["JUPYTER_PREFER_ENV_PATH"] = "1"
+    os.environ["JUPYTER_RUNTIME_DIR"] = str(work / "jupyter")
+    os.environ["IPYTHONDIR"] = str(work / "ipython")  # nobody's start-up files
+    os.environ["MPLCONFIGDIR"] = str(work / "matplotlib")
+    (work / "matplotlib").mkdir()
+    for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # which the set-up made
+        shutil.copy(fonts, work / "matplotlib")
+    os.environ["SDL_VIDEODRIVER"] = "dummy"  # no search for a screen, nor words about it on standard error
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        os.environ[name] = "1"  # the same sums in the same order, also without make
+    os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # no note of the debugger's on standard error
 
 
 def _check_cells(notebook: Path, cells: list[nbformat.NotebookNode], stopped: Exception | None) -> None:
@@ -166,8 +171,10 @@ def _check_cells(notebook: Path, cells: list[nbformat.NotebookNode], stopped: Ex
     for name, cell in zip(names, cells):
         for output in cell.outputs:
             if output.output_type == "error":
-                trace = _COLOUR.sub("", "\n".join(output.traceback))
-                raise NotebookError(f"{name} failed: {output.ename}: {output.evalue}\n{trace}")
+                number = _SYSTEM_ERROR.match(output.evalue)
+                remedy = number and fix(int(number[1]))
+                end = f": {remedy}" if remedy else "\n" + _COLOUR.sub("", "\n".join(output.traceback))
+                raise NotebookError(f"{name} failed: {output.ename}: {output.evalue}{end}")
         if cell.source.strip() and (cell.execution_count or 0) <= count:
             raise NotebookError(f"{name} never ran")
         count = cell.execution_count or count
@@ -249,19 +256,31 @@ def _check_files(notebook: Path, staging: Path, expect: Sequence[str]) -> None:
 
 def _publish(staging: Path, out: Path) -> list[str]:
     """Move each staged file to its place in `out`; a file with the same bytes stays untouched. Results are listed."""
-    changed = []
-    for path in sorted(path for path in staging.rglob("*") if path.is_file()):
-        name = path.relative_to(staging).as_posix()
-        target = out / name
-        if path.name == MANIFEST:
-            continue
-        if not target.is_file() or not filecmp.cmp(path, target, shallow=False):
-            target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, target)
-            changed.append(name)
+    found = (path.relative_to(staging).as_posix() for path in staging.rglob("*") if path.is_file())
+    names = sorted(name for name in found if Path(name).name != MANIFEST)
+    same = {name for name in names if (out / name).is_file() and filecmp.cmp(staging / name, out / name, shallow=False)}
+    changed = [name for name in names if name not in same]
+    for folder in {(out / name).parent for name in changed}:  # all of them before the first file: all or nothing
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    for name in changed:
+        _move(staging / name, out / name)
+    for name in names:
         if name.startswith("data/results/"):
-            list_file(target)  # also one that stays: a run may have been killed before this line
+            list_file(out / name)  # also one that stays: a run may have been killed before this line
     return changed
+
+
+def _move(path: Path, target: Path) -> None:
+    try:
+        os.replace(path, target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        beside = target.with_name(f".{target.name}")  # figures/ or data/ lie on another disk
+        shutil.copyfile(path, beside)
+        os.replace(beside, target)
 
 
 def _value(text: str) -> object:
@@ -293,6 +312,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         changed = run(given.notebook, given.out, parameters=parameters, expect=given.expect, timeout=given.timeout)
     except NotebookError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"error: {name}: {reason(error)}; nothing was changed", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(f"error: {name}: interrupted; nothing was changed", file=sys.stderr)

@@ -7,11 +7,13 @@ in the `MANIFEST.sha256` of their folder, which `sha256sum -c` reads too; `vsp.m
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import io
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,6 +44,17 @@ _MADE_BY = {  # which target makes a file anew, by a part of its path; nothing m
     "build/study/": "study",
 }
 
+TEMPORARY = ".?*-????????.*"  # what `atomic_path` leaves behind when it is killed
+_ROOM, _LEAVE = "free some space", "make it writable"
+_FIXES = {
+    errno.ENOSPC: _ROOM,
+    errno.EDQUOT: _ROOM,
+    errno.EFBIG: "raise the limit on the size of files, `ulimit -f unlimited`",
+    errno.EROFS: _LEAVE,
+    errno.EACCES: _LEAVE,
+    errno.EPERM: _LEAVE,
+}
+
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
@@ -60,8 +73,38 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
             os.fsync(written.fileno())  # the rename must not reach the disk before the content
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk is told of without a name
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def fix(number: int | None) -> str | None:
+    """What to do about a system's error of this number, if it is one of disks that are full or closed."""
+    return f"{_FIXES[number]}, or name another folder: `make OUT=folder`" if number in _FIXES else None
+
+
+def reason(error: OSError) -> str:
+    """The file, what the system said of it, and what to do, in one line. An error without a fix is raised again."""
+    if not (remedy := fix(error.errno)):
+        raise error
+    return f"{error.filename2 or error.filename or 'a file'}: {error.strerror}: {remedy}"
+
+
+@contextlib.contextmanager
+def alone(lock: str | os.PathLike, what: str) -> Iterator[None]:
+    """Hold `lock`, or wait and say that another process does `what`; the system frees it however this process ends."""
+    import fcntl  # here, since Windows, where students read files, has none
+
+    Path(lock).parent.mkdir(parents=True, exist_ok=True)
+    with open(lock, "w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            print(f"another run {what}: waiting for it to end", file=sys.stderr, flush=True)
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:
@@ -225,7 +268,7 @@ def _write_manifest(folder: Path, listed: dict[str, str]) -> None:
 @contextlib.contextmanager
 def _held(folder: Path) -> Iterator[None]:
     """Hold the manifest of `folder`, which is made if need be, against other writers."""
-    import fcntl  # here, since Windows, where students read files, has none
+    import fcntl
 
     folder.mkdir(parents=True, exist_ok=True)
     manifest, held = folder / MANIFEST, False

@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from . import paper, readings_study, store, teachers_study, workers
+from .workers import in_one_line
 
 RESULTS = store.ROOT / "data" / "results"
 STUDIES = {"readings": readings_study, "teachers": teachers_study}
@@ -68,4 +69,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line():
+        main()

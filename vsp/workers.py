@@ -5,8 +5,11 @@ Workers write nothing: a cluster needs no common folder, and what is on disk was
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import platform
+import re
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
@@ -15,7 +18,11 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from .progress import progress
+from .store import reason
+
 JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # words for --jobs
+ANSWER = 10  # seconds within which a scheduler answers
 
 
 def jobs(text: str) -> int | str:
@@ -23,34 +30,56 @@ def jobs(text: str) -> int | str:
     return text if "://" in text else int(text)
 
 
-ANSWER = 10  # seconds within which a scheduler answers
-
-
 class UnlikeWorker(RuntimeError):
     """A worker of a cluster whose code or libraries are not those of the one who asks."""
 
 
-def results(work: Callable, arguments: Sequence[tuple], *, jobs: int | str) -> Iterator[tuple[int, object]]:
-    """Yield (i, work(*arguments[i])) for every i, in the order in which they end.
+class WorkerDied(RuntimeError):
+    """A worker process was killed; the message says how far the work had come."""
 
-    `jobs` is the number of worker processes (-1: one per core) or the address of a Dask scheduler, such as
-    "tcp://127.0.0.1:8786"; whoever it belongs to can run code here and on the workers. Every job runs with one thread.
-    Raises what `work` raises, UnlikeWorker, and OSError for an address where no scheduler answers.
+
+class NoScheduler(RuntimeError):
+    """An address where no Dask scheduler answers."""
+
+
+def results(
+    work: Callable, arguments: Sequence[tuple], label: str, *, jobs: int | str, total: int, unit: str
+) -> Iterator[tuple[int, object]]:
+    """Yield (i, work(*arguments[i])) for every i, in the order in which they end, and show how many are done.
+
+    What `arguments` lack to `total` was done before. `jobs` is the number of worker processes (-1: one per core) or the
+    address of a Dask scheduler, such as "tcp://127.0.0.1:8786"; whoever it belongs to can run code here and on the
+    workers. Every job runs with one thread. Raises what `work` raises, WorkerDied (on a cluster others take over, until
+    one job took four workers with it), UnlikeWorker and NoScheduler.
     """
+    if not arguments:
+        return
+    done = total - len(arguments)
+    try:
+        for result in progress(_finished(work, arguments, jobs), label, total=total, unit=unit, done=done):
+            yield result
+            done += 1
+    except Exception as error:
+        if type(error).__name__ not in ("TerminatedWorkerError", "KilledWorker"):  # loky's and Dask's
+            raise
+        how = re.search(r"\{(.*)\}", str(error))
+        raise WorkerDied(
+            f"{label}: a worker process was killed{f' ({how[1]})' if how else ''} with {done} of {total} {unit} done. "
+            "They are kept: the same command goes on from there. Where memory ran out, use fewer workers: make JOBS=1"
+        ) from error
+
+
+def _finished(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> Iterator[tuple[int, object]]:
     from joblib import Parallel, delayed, parallel_config
 
     calls = [delayed(_call)(identity(), work, i, *one) for i, one in enumerate(arguments)]
-    if isinstance(jobs, str):
-        where = {"backend": "dask", "client": _client(jobs), "scatter": _shared(arguments)}
-        n_jobs = -1  # all that the cluster has
-    else:
-        where, n_jobs = {"backend": "loky", "inner_max_num_threads": 1}, jobs
-    try:
-        with parallel_config(**where):
-            yield from Parallel(n_jobs=n_jobs, return_as="generator_unordered")(calls)
-    finally:
+    with contextlib.ExitStack() as stack:
         if isinstance(jobs, str):
-            where["client"].close()
+            client = stack.enter_context(_client(jobs))
+            stack.enter_context(parallel_config("dask", client=client, scatter=_shared(arguments), n_jobs=-1))
+        else:
+            stack.enter_context(parallel_config("loky", inner_max_num_threads=1, n_jobs=jobs))
+        yield from Parallel(return_as="generator_unordered")(calls)
 
 
 def _call(expected: dict[str, str], work: Callable, i: int, *one) -> tuple[int, object]:
@@ -76,7 +105,7 @@ def _client(address: str):
     try:
         return Client(address, timeout=ANSWER, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise OSError(
+        raise NoScheduler(
             f"no Dask scheduler answers at {address!r}, expected one as in tcp://host:8786: {error}"
         ) from error
 
@@ -86,3 +115,14 @@ def _shared(arguments: Sequence[tuple]) -> list:
     objects = {id(part): part for one in arguments for part in one if not isinstance(part, int | str)}
     counts = Counter(id(part) for one in arguments for part in one)
     return [part for key, part in objects.items() if counts[key] > 1]
+
+
+@contextlib.contextmanager
+def in_one_line() -> Iterator[None]:
+    """A killed worker, a full disk and the like end a command with one line and status 1, without a traceback."""
+    try:
+        yield
+    except (WorkerDied, UnlikeWorker, NoScheduler) as error:
+        sys.exit(f"error: {error}")
+    except OSError as error:
+        sys.exit(f"error: {reason(error)}")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import hashlib
 import itertools
 import json
 import os
@@ -20,7 +21,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from ..store import ROOT, DamagedFile, read_sealed, sha256, write_sealed, write_text
+from ..store import ROOT, DamagedFile, alone, read_sealed, sha256, write_sealed, write_text
 from .handout import write_handout
 
 SOURCES = ROOT / "notebooks" / "course"
@@ -40,23 +41,25 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts = {f"student/{name}": text for name, text in students.items()}
     texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
     texts["guide.md"] = guide(lessons)
-    _keep_edited(folder, texts)
-    for name, text in texts.items():
-        write_text(folder / name, text)
-    made = {name: sha256(folder / name) for name in texts}
-    write_sealed(folder / MADE, json.dumps(made).encode())
-    write_handout(folder / "handout.zip", students)
+    with alone(folder.parent / "course.lock", f"writes into {folder}"):
+        _keep_edited(folder, texts)
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        made = {name: sha256(folder / name) for name in texts}
+        write_sealed(folder / MADE, json.dumps(made).encode())
+        write_handout(folder / "handout.zip", students)
     return [folder / name for name in (*texts, "handout.zip")]
 
 
 def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
-    """Rename the files that are about to be replaced and are not what was written here the last time."""
+    """Rename the files that are about to be replaced and are not what was written here, the last time or just now."""
     try:
         made = json.loads(read_sealed(folder / MADE))
     except (FileNotFoundError, DamagedFile):
-        made = {}  # nothing is known: all is kept
-    for path in (folder / name for name in texts):
-        if path.exists() and sha256(path) != made.get(path.relative_to(folder).as_posix()):
+        made = {}  # nothing is known of the last time
+    for path, text in ((folder / name, text) for name, text in texts.items()):
+        ours = (made.get(path.relative_to(folder).as_posix()), hashlib.sha256(text.encode()).hexdigest())
+        if path.exists() and sha256(path) not in ours:
             names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
             kept = next(name for name in names if not name.exists())
             path.rename(kept)

@@ -1,0 +1,448 @@
+"""Kills, full and closed disks, two makes at once, odd places, spoilt environments: `make torture`, hours.
+
+After each fault, a re-run must end with the bytes of an undisturbed run. FAULTS=5 tries the first 5 of each row; the
+50 kills of whole groups go on where an earlier call stopped. Both the reference and what is done so far lie in
+build/torture, by the state of the code.
+"""
+
+import json
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import makes
+import numpy as np
+import pytest
+from makes import FIGURES, ROOT, Make, Reference, difference, figures, processes, tree, until
+
+from vsp.store import alone
+
+PER_ROW = int(os.environ.get("FAULTS", 1000))  # at most so many of each row
+WITHIN = 60  # seconds for make to notice a killed child
+GONE = 30  # seconds for orphans to go
+NAMESPACE = ("unshare", "--mount", "--map-root-user")
+
+
+@pytest.fixture(scope="module")
+def folder():
+    path = ROOT / "build" / "torture" / makes.state_of_code()
+    with alone(path / "lock", "breaks things here"):
+        yield path
+
+
+@pytest.fixture(scope="module")
+def reference(folder):
+    return Reference(folder)
+
+
+def wrong_after(out, reference, log, *, env=None) -> str:
+    """What is wrong after one more `make paper-figures`, in words; empty if nothing."""
+    make = figures(out, log, env=env)
+    try:
+        status = make.wait(300 + 5 * reference.seconds)
+    except subprocess.TimeoutExpired:
+        return "the re-run hangs"
+    if status:
+        return f"the re-run ends with {status}: {make.said[-500:]}"
+    return difference(tree(out), reference.tree)
+
+
+def tell(record, what: str, wrong: dict[str, str], tried: int, *, of: int, more: str = "") -> None:
+    """Record a row of several trials: how many held, and of the others what was wrong."""
+    value = f"{tried - len(wrong)} of {tried}{more}" + "".join(f"; {name}: {why}" for name, why in wrong.items())
+    record("faults", what, f"{of} of {of}", value, not wrong)
+
+
+# Kills
+
+
+def test_kill_of_the_process_group(folder, reference, record):
+    """At a moment drawn from each fiftieth of the undisturbed run's time, in random order."""
+    rng = np.random.default_rng(0)
+    shares = ((np.arange(50) + rng.uniform(size=50)) / 50)[rng.permutation(50)]
+    note = folder / "kills.json"
+    done = json.loads(note.read_text()) if note.exists() else {}
+    for share in map("{:.4f}".format, shares[:PER_ROW]):
+        if share not in done:
+            done[share] = killed_at(float(share) * reference.seconds, reference)
+            note.write_text(json.dumps(done, indent=2))
+            print(f"killed after {share} of the time: {done[share] or 'held'}", file=sys.__stderr__, flush=True)
+    wrong = {share: why for share, why in done.items() if why}
+    tell(record, "SIGKILL of the process group, at random moments", wrong, len(done), of=50)
+
+
+def killed_at(seconds: float, reference: Reference) -> str:
+    """What is wrong after a kill so many seconds after the start, in words; empty if nothing."""
+    out = reference.out
+    shutil.rmtree(out, ignore_errors=True)
+    make = figures(out)
+    try:
+        make.process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        pass
+    orphans = processes(out)
+    make.kill()
+    killed = time.monotonic()
+    wrong = wrong_after(out, reference, f"{out}-again.log")
+    until(lambda: not orphans.keys() & processes(out).keys(), killed + GONE - time.monotonic())
+    left = [f"still there: {command[:200]}" for pid, command in processes(out).items() if pid in orphans]
+    return " ".join([wrong or difference(tree(out), reference.tree), *left]).strip()
+
+
+def test_kill_of_a_kernel(folder, reference, record):
+    rng, wrong, slowest = np.random.default_rng(1), {}, 0.0
+    tried = min(10, PER_ROW)
+    for number in range(tried):
+        name = str(rng.choice(list(reference.notebooks)))
+        out = reference.again(without=[name])
+        when, took, said = kill_one(out, "ipykernel_launcher", lambda: rng.uniform(0, 0.8) * reference.notebooks[name])
+        slowest = max(slowest, took)
+        problems = [] if f"error: {name}.ipynb" in said and "did not end" in said else [f"says {said[-300:]}"]
+        problems += [f"took {took:.0f} s"] if took > WITHIN else []
+        if problems := [*problems, *filter(None, [wrong_after(out, reference, f"{out}-again.log")])]:
+            wrong[f"{name} after {when:.1f} s"] = " ".join(problems)
+    tell(record, "SIGKILL of a kernel", wrong, tried, of=10, more=f", make ended within {slowest:.0f} s")
+
+
+def test_kill_of_a_worker(folder, reference, record):
+    rng, wrong, slowest = np.random.default_rng(2), {}, 0.0
+    tried = min(10, PER_ROW)
+    for number in range(tried):
+        out = reference.again()
+        shutil.rmtree(out / "data" / "runs")
+        when, took, said = kill_one(out, "loky.backend.popen_loky_posix", lambda: rng.uniform(0, 2.5), "JOBS=2")
+        slowest = max(slowest, took)
+        named = re.search(r"error: [\w-]+: a worker process was killed.* \d of 4 runs done.*goes on from there", said)
+        problems = [] if named else [f"says {said[-300:]}"]
+        problems += [f"took {took:.0f} s"] if took > WITHIN else []
+        if problems := [*problems, *filter(None, [wrong_after(out, reference, f"{out}-again.log")])]:
+            wrong[f"number {number}, after {when:.1f} s"] = " ".join(problems)
+    tell(record, "SIGKILL of a pool worker", wrong, tried, of=10, more=f", make ended within {slowest:.0f} s")
+
+
+def kill_one(out: Path, what: str, moment, *more) -> tuple[float, float, str]:
+    """Kill a process whose command line has `what`: when after its start, how long make then took, and what it said.
+
+    Where the process has ended before, it was too late: the same again at another moment.
+    """
+    before = tree(out)
+    for _ in range(10):
+        make, when = Make(*FIGURES, *more, f"OUT={out}", log=f"{out}.log"), moment()
+        mine = partial(_with, out, what)
+        until(lambda: mine() or make.process.poll() is not None, 120)
+        time.sleep(when)
+        there = mine()
+        if there and make.process.poll() is None:
+            os.kill(there[0], signal.SIGKILL)
+            killed = time.monotonic()
+            if make.wait(WITHIN * 5) != 0:
+                return when, time.monotonic() - killed, make.said
+        make.wait()
+        for name in tree(out).keys() - before.keys():  # as it was
+            (out / name).unlink()
+    raise AssertionError(f"no {what} could be killed in time: {make.said}")
+
+
+def _with(out: Path, what: str) -> list[int]:
+    return [pid for pid, command in processes(out).items() if what in command]
+
+
+# Disks
+
+# The folder $1 read-only for the command that follows
+CLOSED = """
+  set -e; closed=$1; shift
+  mount --bind "$closed" "$closed"; mount -o remount,ro,bind "$closed"
+  if touch "$closed/x" 2>/dev/null; then exit 9; fi
+  cd "$PWD"; "$@" """  # anew, to come into the mounted folder
+FULL = """
+  set -e; out=$1; disk=$2; after=$3; room=$4; shift 4
+  mount -t tmpfs -o size=500m tmpfs "$disk"; cp -a "$out/." "$disk"
+  used=$(df --output=used "$disk" | tail -n 1); mount -o remount,size=$((used + room))k "$disk"
+  status=0; "$@" || status=$?; mkdir "$after"; cp -a "$disk/figures" "$disk/data" "$after"; exit $status"""
+
+
+def mounting(script: str, *arguments) -> tuple:
+    """What runs a command behind `script`, whose mounts go with its process. Skips where nothing may be mounted."""
+    if subprocess.run([*NAMESPACE, "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True).returncode:
+        pytest.skip("nothing may be mounted here")
+    return (*NAMESPACE, "sh", "-c", script, "-", *map(str, arguments))
+
+
+def outdated(out: Path) -> dict[str, str]:
+    """The files in `out` after some of one notebook were made to differ from what make would make."""
+    for name in ("executed/02_distillation.ipynb", "voronoi_example.pdf", "growth_simplegoal.gif"):
+        path = out / "figures" / name
+        path.write_bytes(path.read_bytes() + b"\n")
+    return tree(out)
+
+
+def refused(make: Make, *words: str) -> str:
+    """What is wrong with the way in which `make` failed, in words; empty if nothing."""
+    status, lines = make.wait(), make.said.splitlines()
+    problems = [] if status else ["it ends with 0"]
+    problems += [f"{word!r} is not said: {make.said[-600:]}" for word in words if word not in make.said]
+    return " ".join([*problems, *([f"{len(lines)} lines"] if len(lines) > 20 else [])])
+
+
+def torn(before: dict, after: dict, reference: Reference) -> str:
+    """The files that are neither as they were nor as they are to be."""
+    new = {name: sum for name, sum in after.items() if sum == reference.tree.get(name)}
+    return difference(before | new, after)
+
+
+@pytest.mark.parametrize("room", [0, 20, 200, 1500])  # kB
+def test_full_disk(folder, reference, record, room):
+    out, disk, after = reference.again(), folder / "disk", folder / "after"
+    before = outdated(out)
+    shutil.rmtree(after, ignore_errors=True)
+    disk.mkdir(exist_ok=True)
+    make = figures(disk, before=mounting(FULL, out, disk, after, room))
+    wrong = refused(make, "No space left on device", "free some space") or torn(before, tree(after), reference)
+    record("faults", f"full disk, {room} kB left", "clear error, outputs untouched", wrong or "held", not wrong)
+
+
+@pytest.mark.parametrize("how", ["mounted", "immutable", "by rights"])
+def test_read_only_figures(folder, reference, record, how):
+    out = reference.again()
+    before, words = outdated(out), ("figures", "make it writable", "OUT=folder")
+    if how == "by rights" and os.geteuid() == 0:
+        pytest.skip("root writes anywhere")
+    if how == "mounted":
+        wrong = refused(figures(out, before=mounting(CLOSED, out / "figures")), *words)
+    else:
+        close, unclose = {"immutable": ("chattr +i", "chattr -i"), "by rights": ("chmod a-w", "chmod u+w")}[how]
+        places = [out / "figures", out / "figures" / "tables", out / "figures" / "executed"]
+        if subprocess.run([*close.split(), *places]).returncode:
+            pytest.skip(f"{close} does not work here")
+        try:
+            wrong = refused(figures(out), *words)
+        finally:
+            subprocess.run([*unclose.split(), *places], check=True)
+    wrong = wrong or difference(before, tree(out)) or wrong_after(out, reference, f"{out}-again.log")
+    record("faults", f"read-only figures/, {how}", "clear error, outputs untouched", wrong or "held", not wrong)
+
+
+@pytest.mark.parametrize("limit", [10, 60, 250])  # kB
+def test_limit_on_the_size_of_files(folder, reference, record, limit):
+    out = reference.again()
+    before = outdated(out)
+    small = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (1000 * limit, 1000 * limit))
+    wrong = refused(figures(out, preexec_fn=small), "File too large", "ulimit -f")
+    wrong = wrong or torn(before, tree(out), reference) or wrong_after(out, reference, f"{out}-again.log")
+    record("faults", f"files of at most {limit} kB", "clear error, outputs untouched", wrong or "held", not wrong)
+
+
+# Two at once
+
+
+def test_two_makes_at_once(folder, reference, record):
+    """Mostly with one notebook to run; the last two of twenty from nothing."""
+    rng, wrong, waited = np.random.default_rng(3), {}, 0
+    for number in range(tried := min(20, PER_ROW)):
+        if number < 18:
+            name = str(rng.choice(list(reference.notebooks)))
+            out, longest = reference.again(without=[name]), reference.notebooks[name] + 3
+        else:
+            name, out, longest = "all", reference.out, reference.seconds
+            shutil.rmtree(out)
+        first = figures(out)
+        time.sleep(rng.uniform(0, longest))
+        second = figures(out, f"{out}-second.log")
+        statuses = [make.wait(300 + 5 * reference.seconds) for make in (first, second)]
+        waited += "waiting for it to end" in first.said + second.said
+        problems = [f"ends with {statuses}: {first.said[-300:]} {second.said[-300:]}"] if any(statuses) else []
+        problems += [difference(tree(out), reference.tree) or wrong_after(out, reference, f"{out}-again.log")]
+        if any(problems):
+            wrong[f"{number}, {name}"] = " ".join(problems)
+    more = f", {waited} times one waited for the other"
+    tell(record, "two makes at once, results as serial", wrong, tried, of=20, more=more)
+
+
+def test_two_courses_at_once(folder, record):
+    def files(out):
+        course = out / "build" / "course"
+        return {p.relative_to(course): p.read_bytes() for p in course.rglob("*") if p.is_file()}
+
+    places = [folder / f"course-{n}" for n in range(1 + min(5, PER_ROW))]
+    for place in places:
+        shutil.rmtree(place, ignore_errors=True)
+    assert Make("course", f"OUT={places[0]}", log=f"{places[0]}.log").wait() == 0
+    wrong = {}
+    for number, out in enumerate(places[1:]):
+        two = [Make("course", f"OUT={out}", log=f"{out}-{n}.log") for n in range(2)]
+        if any(make.wait() for make in two) or files(out) != files(places[0]):
+            wrong[str(number)] = " ".join(make.said[-300:] for make in two)
+    tell(record, "two makes of the course at once", wrong, len(places) - 1, of=5)
+
+
+# Odd places
+
+
+@pytest.fixture(scope="module")
+def elsewhere(folder):
+    """A copy of the checkout in a folder with a space and letters beyond ASCII."""
+    place = folder / "größe und äpfel" / "vsp"
+    shutil.rmtree(place.parent, ignore_errors=True)
+    makes.copy_checkout(place)
+    makes.lend_environment(place)
+    return place
+
+
+def test_spaces_and_letters_beyond_ascii(elsewhere, reference, record):
+    out = elsewhere.parent / "aus gäbe"
+    make = figures(out, elsewhere.parent / "log", cwd=elsewhere, env={"LC_ALL": "C"})
+    wrong = difference(tree(out), reference.tree) if make.wait() == 0 else make.said[-500:]
+    record("faults", "checkout and OUT with spaces and non-ASCII letters", "same bytes", wrong or "held", not wrong)
+
+
+def test_read_only_checkout(tmp_path, reference, record):
+    """Nor is there a home."""
+    out = tmp_path / "out"
+    make = figures(out, before=mounting(CLOSED, ROOT), env={"HOME": f"{ROOT}/nobody"})
+    wrong = difference(tree(out), reference.tree) if make.wait() == 0 else make.said[-500:]
+    record("faults", "read-only checkout, outputs elsewhere", "same bytes", wrong or "held", not wrong)
+
+
+# Environments
+
+BROKEN = f"""#!/bin/sh
+if [ "$2" = venv ]; then echo "no room for a new one" >&2; exit 1; fi
+exec "{sys.executable}" "$@"
+"""
+OTHER = "#!/bin/sh\ncase $* in *version_info*) exit 1;; esac\nexit 0\n"  # says that it is not 3.11
+
+
+def script(path: Path, text: str) -> Path:
+    path.write_text(text)
+    path.chmod(0o755)
+    return path
+
+
+def package(checkout: Path, name: str) -> Path:
+    """A package in the environment that was lent to `checkout`, as files of its own."""
+    (link,) = checkout.glob(f".venv/lib/python3*/site-packages/{name}")
+    original = link.resolve()
+    link.unlink()
+    return Path(shutil.copytree(original, link))
+
+
+def lock_changed(checkout: Path) -> None:
+    with open(checkout / "environment.lock", "a") as lock:
+        lock.write("# edited\n")
+
+
+def gone(checkout: Path) -> None:
+    for name in ("tqdm", "tqdm-*.dist-info"):
+        shutil.rmtree(package(checkout, name))
+
+
+def of_another_version(checkout: Path) -> None:
+    card = package(checkout, "tqdm-*.dist-info") / "METADATA"
+    card.write_text(re.sub("^Version: .*", "Version: 0.1", card.read_text(), flags=re.M))
+
+
+def damaged(checkout: Path) -> None:
+    (package(checkout, "tqdm") / "std.py").write_text("")
+
+
+def without_python(checkout: Path) -> None:
+    (checkout / ".venv" / "bin" / "python").unlink()
+
+
+def unfinished(checkout: Path) -> None:
+    (checkout / ".venv" / "built-from").unlink()
+
+
+STALE = {
+    lock_changed: "environment.lock has changed",
+    gone: "tqdm is missing",
+    of_another_version: "tqdm is 0.1, not",
+    damaged: "tqdm/std.py is damaged",
+    without_python: "its Python does not run",
+    unfinished: "its set-up did not end",
+}
+
+
+@pytest.mark.parametrize("fault", [*STALE, "moved"])
+def test_stale_environment(elsewhere, record, fault):
+    """make says what it is and begins a new one; where that fails, it says so, and nothing runs."""
+    shutil.rmtree(elsewhere / ".venv", ignore_errors=True)
+    lock = (ROOT / "environment.lock").read_bytes()
+    (elsewhere / "environment.lock").write_bytes(lock)
+    makes.lend_environment(elsewhere)
+    if fault == "moved":
+        here, said = elsewhere.rename(elsewhere.parent / "moved"), f"it was set up in {elsewhere}"
+    else:
+        here, said = elsewhere, STALE[fault]
+        fault(here)
+    try:
+        python = script(here.parent / "broken", BROKEN)
+        make = Make(*FIGURES, "OUT=../out", f"PYTHON={python}", log=here.parent / "stale.log", cwd=here)
+        wrong = refused(make, said, "no room for a new one", "error: .venv is not whole")
+        wrong += " it goes on" * ("running" in make.said)
+    finally:
+        here.rename(elsewhere)
+    name = fault if fault == "moved" else fault.__name__.replace("_", " ")
+    record("faults", f"environment: {name}", "says so and what to do", wrong or "held", not wrong)
+
+
+def test_python_of_another_version(elsewhere, record):
+    shutil.rmtree(elsewhere / ".venv", ignore_errors=True)
+    python = script(elsewhere.parent / "python3.12", OTHER)
+    make = Make("venv", f"PYTHON={python}", log=elsewhere.parent / "other.log", cwd=elsewhere)
+    wrong = refused(make, f"tried {python}, expected Python 3.11", "make PYTHON=")
+    record("faults", "Python of another version", "says so and what to do", wrong or "held", not wrong)
+
+
+def of(name: str, lock: str) -> str:
+    """The lines of `lock` for the package `name`."""
+    return re.search(rf"^{name}==.*\n( .*\n)*", lock, re.M)[0]
+
+
+EDITS = {
+    "a wrong checksum": (lambda six: re.sub("sha256:....", "sha256:beef", six), "six", "THESE PACKAGES DO NOT MATCH"),
+    "no such version": (lambda six: re.sub("==[0-9.]*", "==99.0", six, count=1), "six", "six==99.0"),
+    "a package removed": (lambda six: "", "six", "requires six, which is not installed"),
+    "one of ours removed": (lambda cma: "", "cma", "environment.lock lacks cma"),
+    "a wrong checksum of torch": (
+        lambda torch: re.sub("sha256:....", "sha256:beef", torch),
+        "torch",
+        "SHA-256 of torch",
+    ),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_edited_lock(elsewhere, record, edit):
+    change, name, said = EDITS[edit]
+    lock = (ROOT / "environment.lock").read_text()
+    (elsewhere / "environment.lock").write_text(lock.replace(of(name, lock), change(of(name, lock))))
+    make = Make(*FIGURES, "OUT=../out", log=elsewhere.parent / "edited.log", cwd=elsewhere)
+    wrong = refused(make, said, "error: .venv is not whole", "git checkout environment.lock")
+    wrong += " taken for whole" * (elsewhere / ".venv" / "built-from").exists()
+    (elsewhere / "environment.lock").write_text(lock)
+    record("faults", f"lock edited: {edit}", "says so and what to do", wrong or "held", not wrong)
+
+
+def test_killed_set_up(elsewhere, record):
+    """The next make is not blocked and begins anew; two of them at once: one waits for the other."""
+    rng, wrong = np.random.default_rng(4), {}
+    for number in range(tried := min(3, PER_ROW)):
+        shutil.rmtree(elsewhere / ".venv", ignore_errors=True)
+        make = Make("venv", log=elsewhere.parent / "killed.log", cwd=elsewhere)
+        time.sleep(when := rng.uniform(1, 60))
+        make.kill()
+        two = [Make("venv", log=elsewhere.parent / f"venv-{n}.log", cwd=elsewhere) for n in range(2)]
+        statuses, said = [make.wait() for make in two], "".join(make.said for make in two)
+        whole = Make("venv", log=elsewhere.parent / "whole.log", cwd=elsewhere)
+        if any(statuses) or said.count("1/4") != 1 or "waiting for it" not in said or whole.wait() or whole.said:
+            wrong[f"after {when:.0f} s"] = f"{statuses} {said[-500:]} {whole.said}"
+    tell(record, "set-up killed, then two set-ups at once", wrong, tried, of=3)
