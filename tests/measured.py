@@ -1,12 +1,21 @@
-"""The figures that `make bench` and `make torture` measure, in one table: data/results/trust.csv."""
+"""The figures that `make bench` and `make torture` measure, in one table: data/results/trust.csv.
+
+    python tests/measured.py data/results/trust.csv
+
+prints them as the README shows them.
+"""
 
 import os
 import platform
+import sys
 from pathlib import Path
 
 import pandas as pd
 
 COLUMNS = ["table", "what", "to hold", "measured", "held", "machine"]
+
+
+TABLES = {"faults": "Faults", "input": "Bad input", "same": "The same everywhere", "speed": "Speed"}
 
 
 def machine() -> str:
@@ -34,3 +43,19 @@ def record(path: Path, table: str, what: str, to_hold: str, measured: str, held:
     place = frame.index[same][0] if same.any() else len(frame)
     frame.loc[place] = row
     write_listed(path, frame.to_csv(index=False, lineterminator="\n"))
+
+
+def markdown(path: Path) -> str:
+    """The rows of the CSV at `path` for the README, with the machines that they were measured on."""
+    from vsp.store import read_table
+
+    frame = read_table(path, dtype=str)
+    lines = ["| what | to hold | measured | held |", "|---|---|---|---|"]
+    for table, title in TABLES.items():
+        rows = frame[frame["table"] == table].drop(columns=["table", "machine"])
+        lines += [f"| **{title}** | | | |"] + [f"| {' | '.join(row)} |" for row in rows.itertuples(index=False)]
+    return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}."])
+
+
+if __name__ == "__main__":
+    print(markdown(Path(sys.argv[1])))

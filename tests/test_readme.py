@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import measured
 import nbformat
 import pandas as pd
 
@@ -24,7 +25,7 @@ def test_artefacts_and_cells_exist():
         for path in (ROOT / "notebooks").glob("*.ipynb")
     }
     rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", README, flags=re.M)
-    assert len(rows) == 26
+    assert len(rows) == 30
     for artefacts, notebook, names in rows:
         assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
         for artefact in re.findall(r"`([a-z_/]+)`", artefacts):
@@ -104,3 +105,8 @@ def test_what_cells_buy_is_that_of_the_table():
     for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
         kinds = kinds.to_dict("records")
         assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}
+
+
+def test_measured_figures_are_those_of_the_table():
+    """Else: `python tests/measured.py data/results/trust.csv` prints what belongs there."""
+    assert measured.markdown(ROOT / "data" / "results" / "trust.csv") in README

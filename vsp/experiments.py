@@ -357,7 +357,7 @@ def main() -> None:
     arguments = parser.parse_args()
     out, jobs = Path(arguments.out), arguments.jobs
     runs = out / "data" / "runs"
-    with store.alone(out / "build" / "runs.lock", f"makes runs in {out}"):
+    with store.alone(out / "build" / "locks" / "runs", f"makes runs in {out}"):
         for left in runs.rglob(store.TEMPORARY):
             left.unlink()  # of a process that was killed
         for task in N_RUNS:

@@ -63,9 +63,10 @@ def run(
         values.setdefault("runs", str(out / "data" / "runs"))
     _check_parameters(notebook, declared, values)
     running = out / "build" / "running"
-    with alone(running / f"{notebook.stem}.lock", f"of {notebook.stem} writes into {out}"):
+    with alone(out / "build" / "locks" / notebook.stem, f"of {notebook.stem} writes into {out}"):
         for left in running.glob(f"{notebook.stem}-*"):
             shutil.rmtree(left, ignore_errors=True)  # of a run that was killed
+        running.mkdir(exist_ok=True)
         work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))  # not where an orphaned kernel may write
         staging = work / "out"
         try:

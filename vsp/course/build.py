@@ -41,7 +41,7 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts = {f"student/{name}": text for name, text in students.items()}
     texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
     texts["guide.md"] = guide(lessons)
-    with alone(folder.parent / "course.lock", f"writes into {folder}"):
+    with alone(folder.parent / "locks" / "course", f"writes into {folder}"):
         _keep_edited(folder, texts)
         for name, text in texts.items():
             write_text(folder / name, text)
