@@ -62,7 +62,7 @@ export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
 unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 
-.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers manifest lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site notebooks $(NOTEBOOKS)
+.PHONY: help paper-figures quick runs study beyond beyond-long lookup teachers short-teachers manifest lab test bench torture clean course lock lock-site venv new-venv venv-site site test-site begin notebooks $(NOTEBOOKS)
 
 help: ## this list
 	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
@@ -78,13 +78,15 @@ help: ## this list
 	  $(foreach t,$(TABLES_$(n)),echo '    figures/tables/$(t).tex .csv';) \
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
-paper-figures: venv ## every figure and table of the paper, at the paper's scale: about 3 minutes
-	@mkdir -p "$(STATE)" && : > "$(STATE)/made" || { \
-	  echo 'error: $(OUT) cannot be written: make it writable, or name another folder: `make OUT=folder`' >&2; exit 1; }
+paper-figures: begin ## every figure and table of the paper, at the paper's scale: about 3 minutes
 	@$(MAKE) --no-print-directory -j $(JOBS) notebooks
 	@if [ -s "$(STATE)/made" ]; then echo "made" $$(cat "$(STATE)/made")": see $(OUT)/figures"; \
 	  $(PY) -m vsp.study --check > "$(STATE)/stale" || exit 1; \
 	else echo "everything is up to date: see $(OUT)/figures"; fi; test ! -s "$(STATE)/stale" || cat "$(STATE)/stale"
+
+begin:
+	@mkdir -p "$(STATE)" && : > "$(STATE)/made" || { \
+	  echo 'error: $(OUT) cannot be written: make it writable, or name another folder: `make OUT=folder`' >&2; exit 1; }
 
 # The longest first, so that no core waits at the end.
 notebooks: runs 06_beyond $(NOTEBOOKS)

@@ -74,7 +74,8 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk is told of without a name
+        if error.errno:
+            error.filename = error.filename or str(path)  # a full disk is told of without a name
         raise
     finally:
         temporary.unlink(missing_ok=True)
