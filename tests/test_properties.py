@@ -502,8 +502,8 @@ EXEMPT = {
     "the inner loop of a distillation: a Partition puts in what it has checked": """
         buffers subpolicies.SubPolicies subpolicies.Form subpolicies.Network geometry.look_up geometry.all_differ""",
     "a line or a pass of the paper's algorithms, on a Partition and an Episode, which are good by construction": """
-        distill.split_regions distill.merge_regions distill.may_alter distill.due history.History history.History.add_events
-        history.History.observe partition.Partition partition.Partition.train partition.Partition.keep
+        distill.split_regions distill.merge_regions distill.may_alter distill.due history.History
+        history.History.add_events history.History.observe partition.Partition partition.Partition.train partition.Partition.keep
         partition.Partition.reset partition.Partition.far partition.Partition.loss partition.Partition.neighbours""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
         envs.Task envs.Signals envs.SimpleGoalEnv.reset envs.simplegoal_start envs.simplegoal_step
