@@ -504,7 +504,8 @@ EXEMPT = {
     "a line or a pass of the paper's algorithms, on a Partition and an Episode, which are good by construction": """
         distill.split_regions distill.merge_regions distill.may_alter distill.due history.History
         history.History.add_events history.History.observe partition.Partition partition.Partition.train
-        partition.Partition.keep partition.Partition.reset partition.Partition.far partition.Partition.loss partition.Partition.neighbours""",
+        partition.Partition.keep partition.Partition.reset partition.Partition.far partition.Partition.loss
+        partition.Partition.neighbours""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
         envs.Task envs.Signals envs.SimpleGoalEnv.reset envs.simplegoal_start envs.simplegoal_step
         envs.mountaincar_start envs.mountaincar_signals envs.mountaincar_step
