@@ -5,7 +5,7 @@
 
 # What each notebook makes: figures/ (PDF and PNG; of animations GIF, and PNG in its stead), figures/tables/ (TEX and
 # CSV) and data/results/.
-NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond 07_trust
+NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
 ANIMATIONS_02_distillation := growth_simplegoal growth_mountaincar
@@ -19,14 +19,14 @@ FIGURES_06_beyond := beyond_partitions beyond_simplify beyond_simplegoal beyond_
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
 TABLES_06_beyond := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
-FIGURES_07_trust := trust_speed scale_time scale_dimensions scale_memory scale_workers cluster_cost
+FIGURES_07_trust := kills trust_speed scale_time scale_dimensions scale_memory scale_workers cluster_cost
 TABLES_07_trust := trust_faults trust_input trust_same trust_speed scale_exponents cluster_cost
 # The notebooks that read data/runs, and what else they read: results of `make study`, `beyond`, `bench`, `torture`.
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv
 READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous-v0 beyond_Pendulum-v1 beyond_race \
   beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) data/results/beyond_LunarLanderContinuous-v3.policy
-READS_07_trust := data/results/trust.csv data/results/scale.csv
+READS_07_trust := $(foreach n,trust kills scale,data/results/$(n).csv)
 
 OUT ?= .
 # How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
@@ -35,6 +35,9 @@ QUICK ?=
 DASK ?=
 PYTHON ?=
 
+ifneq ($(filter-out 0%,$(JOBS)),$(shell expr "$(JOBS)" : '\([0-9]*\)$$'))
+$(error JOBS is $(JOBS), expected a number from 1 on)
+endif
 ifeq ($(strip $(OUT)),)
 $(error OUT is empty, expected a folder, as in `make paper-figures OUT=scratch`)
 endif
@@ -128,14 +131,17 @@ lab: venv ## opens JupyterLab on the notebooks
 test: venv ## runs the tests, several at a time: 2 to 4 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
-bench: venv ## measures speed and scale, into data/results/: about an HOUR on a machine that does nothing else
-	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(OUT)/data/results/trust.csv"
-	$(PY) -m vsp.scale_study --out "$(OUT)"
-	@$(PY) tests/measured.py "$(OUT)/data/results/trust.csv"
+# Figures go to data/results/ and the README when all is measured, for notebook 07 shows them and tests look at notebooks.
+MEASURED = $(OUT)/build/measured
+PUBLISH = $(PY) tests/measured.py "$(MEASURED)" "$(OUT)/data/results" README.md
 
-torture: venv ## breaks it in every way we know, into data/results/trust.csv: 2 to 3 HOURS, resumable
-	@MPLBACKEND=Agg $(PY) -m pytest -q tests/torture --record "$(OUT)/data/results/trust.csv"
-	@$(PY) tests/measured.py "$(OUT)/data/results/trust.csv"
+bench: venv ## measures speed and scale, into data/results/: an HOUR, on a machine that does nothing else
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(MEASURED)"
+	$(PY) -m vsp.scale_study --out "$(OUT)"
+	@$(PUBLISH)
+
+torture: venv ## breaks it in every way we know, into data/results/: 2 to 3 HOURS; kills resume
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/torture --record "$(MEASURED)"; status=$$?; $(PUBLISH) && exit $$status
 
 clean: ## removes build/ (but build/course, where somebody may have written) and data/runs/: at once
 	@test ! -d "$(OUT)/build" || find "$(OUT)/build" -mindepth 1 -maxdepth 1 ! -name course -exec rm -rf {} +

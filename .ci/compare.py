@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from vsp import experiments, store
 from vsp.evaluate import outlier_numbers, spread
+from vsp.machine import cpu_type
 from vsp.paper import PREFIX
 
 TABLES = Path("figures/tables")
@@ -67,7 +68,7 @@ def implausible(made: Path, task: str) -> list[str]:
 def main() -> None:
     made = Path(sys.argv[1])
     names = sorted(path.name for path in TABLES.iterdir())
-    if store.read_listed("data/results/made_on.txt").decode().strip() == experiments.cpu_type():
+    if store.read_listed("data/results/made_on.txt").decode().strip() == cpu_type():
         wrong, rule = different(made, names), "the same bytes, on the same CPU type"
     else:
         wrong = different(made, [name for name in names if name.startswith(FIXED)])

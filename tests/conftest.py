@@ -2,8 +2,11 @@ from pathlib import Path
 
 import hypothesis
 import measured
+import pandas as pd
 import pytest
 from support import CurvedTeacher
+
+from vsp import store
 
 hypothesis.settings.register_profile("vsp", derandomize=True, database=None, deadline=None, max_examples=60)
 hypothesis.settings.register_profile("torture", parent=hypothesis.settings.get_profile("vsp"), max_examples=200)
@@ -15,7 +18,7 @@ def pytest_addoption(parser):
         "--remake-golden", action="store_true", help="write tests/golden/*.json anew from the present code"
     )
     parser.addoption(
-        "--record", type=Path, help="the CSV that figures go into, see measured.py; else they are only shown"
+        "--record", type=Path, help="the folder that figures go into, see measured.py; else they are only shown"
     )
 
 
@@ -47,8 +50,20 @@ def record(request, capsys):
         verdict = "yes" if held else f"no: {why}" if why else "no"
         with capsys.disabled():
             print(f"\n{what}: {value} (to hold: {to_hold}; {verdict})", end="")
-        if path := request.config.getoption("record"):
-            measured.record(path, table, what, to_hold, value, verdict)
+        if folder := request.config.getoption("record"):
+            measured.record(folder / "trust.csv", table, what, to_hold, value, verdict)
         assert held or why, f"{what}: {value}, expected {to_hold}"
 
     return record
+
+
+@pytest.fixture
+def keep(request):
+    """`keep(name, frame)` writes a whole table beside the one of `record`."""
+
+    def keep(name: str, frame: pd.DataFrame) -> None:
+        if folder := request.config.getoption("record"):
+            text = frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
+            store.write_listed(folder / f"{name}.csv", text)
+
+    return keep

@@ -1,21 +1,24 @@
-"""The figures that `make bench` and `make torture` measure, in one table: data/results/trust.csv.
+"""The figures that `make bench` and `make torture` measure, in one table: trust.csv.
 
-    python tests/measured.py data/results/trust.csv
+    python tests/measured.py build/measured data/results README.md
 
-prints them as the README shows them.
+puts the tables in the first folder, where the tests write as they go, into the second, and the figures into the README,
+between two lines that say so. Not before: a notebook shows them, and tests compare what notebooks make.
 """
 
 import os
 import platform
+import re
 import sys
 from pathlib import Path
 
 import pandas as pd
 
+from vsp import store
+
 COLUMNS = ["table", "what", "to hold", "measured", "held", "machine"]
-
-
 TABLES = {"faults": "Faults", "input": "Bad input", "same": "The same everywhere", "speed": "Speed"}
+BLOCK = re.compile(r"(<!-- measured -->\n).*(<!-- end of what was measured -->)", re.DOTALL)
 
 
 def machine() -> str:
@@ -35,27 +38,46 @@ def _processor() -> str:
 
 def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: str) -> None:
     """Put one row into the CSV at `path`, in the place of the one with the same `table` and `what`."""
-    from vsp.store import read_table, write_listed
-
     row = dict(zip(COLUMNS, (table, what, to_hold, measured, held, machine())))
-    frame = read_table(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS)
-    same = (frame["table"] == table) & (frame["what"] == what)
-    place = frame.index[same][0] if same.any() else len(frame)
-    frame.loc[place] = row
-    write_listed(path, frame.to_csv(index=False, lineterminator="\n"))
+    write(path, merged(read(path), pd.DataFrame([row])))
+
+
+def read(path: Path) -> pd.DataFrame:
+    """The table at `path`, empty if there is none."""
+    return store.read_table(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS, dtype=str)
+
+
+def write(path: Path, frame: pd.DataFrame) -> None:
+    store.write_listed(path, frame.to_csv(index=False, lineterminator="\n"))
+
+
+def merged(old: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
+    """The rows of both, the new one in the place of an old one; by table, in the order of `TABLES`."""
+    frame = pd.concat([old, new]).groupby(["table", "what"], sort=False, as_index=False).last()[COLUMNS]
+    return frame.sort_values("table", key=lambda names: names.map(list(TABLES).index), kind="stable", ignore_index=True)
 
 
 def markdown(path: Path) -> str:
     """The rows of the CSV at `path` for the README, with the machines that they were measured on."""
-    from vsp.store import read_table
-
-    frame = read_table(path, dtype=str)
+    frame = read(path)
     lines = ["| what | to hold | measured | held |", "|---|---|---|---|"]
     for table, title in TABLES.items():
         rows = frame[frame["table"] == table].drop(columns=["table", "machine"])
-        lines += [f"| **{title}** | | | |"] + [f"| {' | '.join(row)} |" for row in rows.itertuples(index=False)]
-    return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}."])
+        lines += [f"| **{title}** | | | |"] * bool(len(rows))
+        lines += [f"| {' | '.join(row)} |" for row in rows.itertuples(index=False)]
+    return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}.\n"])
+
+
+def main() -> None:
+    source, results, readme = map(Path, sys.argv[1:])
+    for path in source.glob("*.csv"):
+        if path.name == "trust.csv":
+            write(results / path.name, merged(read(results / path.name), read(path)))
+        else:
+            store.write_listed(results / path.name, store.read_listed(path))
+    text = markdown(results / "trust.csv")
+    store.write_text(readme, BLOCK.sub(lambda block: block[1] + text + block[2], readme.read_text(encoding="utf-8")))
 
 
 if __name__ == "__main__":
-    print(markdown(Path(sys.argv[1])))
+    main()

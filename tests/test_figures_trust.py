@@ -25,6 +25,18 @@ def test_few_sizes_are_joined_and_not_fitted(ax):
     assert len(ax.lines) == 2 and ax.get_ylabel() == "megabytes"
 
 
+def test_kills_that_held_and_others(ax):
+    frame = pd.DataFrame(
+        {"moment": [1.0, 2.0, 3.0], "again": [9.0, 8.0, 7.0], "undisturbed": 10.0, "wrong": [None, "x", None]}
+    )
+    figures_trust.kills(ax, frame)
+    line, held, other = ax.lines
+    assert held.get_xydata().tolist() == [[1, 9], [3, 7]] and other.get_xydata().tolist() == [[2, 8]]
+    assert set(line.get_ydata()) == {10} and ax.get_ylim()[0] == 0
+    ax.clear()
+    assert len(figures_trust.kills(ax, frame.assign(wrong=None)).lines) == 2
+
+
 ROWS = pd.DataFrame(
     {
         "what": ["C", "memory", "evaluation"],

@@ -433,7 +433,7 @@ def run(seed, returns, *, codes=None, cells=1, validation=0.0):
     codewords = np.linspace(0.0, 0.9, cells)[:, None] * np.ones(2)
     policy = VoronoiPolicy(codewords, np.zeros((cells, 3, 2)), task=SIMPLEGOAL)
     played = Outcomes(returns, np.ones(len(returns), dtype=int), codes)
-    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0)
+    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0, "a processor")
 
 
 TEACHER = Outcomes(np.array([5.0, 5.0, 5.0, 1.0]), np.ones(4, dtype=int), np.array([GOAL, GOAL, GOAL, TRUNCATED]))

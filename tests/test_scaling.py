@@ -32,8 +32,11 @@ def test_the_interval_holds_the_exponent_nineteen_times_of_twenty():
 
 
 def test_too_few_sizes_are_refused():
-    with pytest.raises(ValueError, match="3 sizes, expected 4 or more"):
+    with pytest.raises(ValueError, match="expected 4 or more, all positive"):
         power_law(SIZES[:3], SIZES[:3] * 1.0)
+    for bad in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="expected"):
+            power_law(SIZES, np.append(SIZES[:5] * 1.0, bad))
 
 
 def curves(**changes):

@@ -237,7 +237,9 @@ def test_the_words_for_an_altered_file_name_the_ways_out(table, tmp_path):
     ("path", "target"),
     [
         ("data/teachers/short/x.json", "short-teachers"), ("data/teachers/x.json", "teachers"),
-        ("data/results/teachers.csv", "study"), ("data/results/SimpleGoal-v0.csv", "paper-figures"),
+        ("data/results/teachers.csv", "study"), ("data/results/scale.csv", "bench"),
+        ("data/results/kills.csv", "torture"),
+        ("data/results/trust.csv", "bench torture"), ("data/results/SimpleGoal-v0.csv", "paper-figures"),
         ("data/results/beyond_LunarLanderContinuous-v3.csv", "beyond-long"), ("data/results/beyond_race.csv", "beyond"),
     ],
 )  # fmt: skip

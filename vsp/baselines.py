@@ -7,8 +7,11 @@ for arrays of a wrong shape, numbers that are not finite, and a seed that is no 
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 
 import numpy as np
 import pandas as pd
@@ -204,7 +207,13 @@ def kept_comparison(
     result: Results, n_runs: int = N_RUNS, *, runs: str | os.PathLike, jobs: int | str = -1
 ) -> pd.DataFrame:
     """`compare`, kept beside the runs as the teacher's episodes are: on another CPU type the fits would be others."""
-    name = f"baselines-{n_runs}-{code_id('baselines', 'trees')}.run"
+    about = [
+        code_id("baselines", "trees", "paper"),
+        store.sha256(paper.FOLDER / store.MANIFEST),
+        version("scikit-learn"),
+    ]
+    key = hashlib.sha256(json.dumps(about).encode()).hexdigest()[:10]
+    name = f"baselines-{n_runs}-{key}.run"
     path = result.experiment.folder(runs) / name
     if not path.exists():
         frame = compare(result, n_runs, jobs=jobs)

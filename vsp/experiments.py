@@ -11,7 +11,6 @@ import ast
 import hashlib
 import json
 import os
-import platform
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
@@ -20,13 +19,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_info
 
 from . import store, workers
 from .config import Config, preset
 from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
 from .evaluate import interval, outcomes, spread
+from .machine import cpu_type
 from .policy import VoronoiPolicy
 from .rollouts import Outcomes
 from .teachers import Teacher, load_teacher
@@ -65,6 +64,7 @@ class Run:
     cells: np.ndarray  # number of cells after each iteration
     splits: int
     merges: int
+    cpu: str  # the type of processor that it was made on
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,7 @@ def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], 
         "validation_mean": float(validation.returns.mean()),
         "splits": sum(event.kind == "split" for event in history.events),
         "merges": sum(event.kind == "merge" for event in history.events),
+        "cpu": cpu_type(),
     }
     return arrays, about
 
@@ -198,6 +199,7 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
         cells=a["cells"],
         splits=about["splits"],
         merges=about["merges"],
+        cpu=about["cpu"],
     )
 
 
@@ -321,21 +323,11 @@ def comparison(results: Results) -> dict[str, float]:
 
 
 def write_summary(results: Results, *, out: str | os.PathLike) -> None:
-    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU type that they were made on beside it."""
+    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them beside it."""
     folder, task = Path(out) / "data" / "results", results.experiment.task
     text = summary(results.runs, results.experiment).to_csv(index=False, float_format="%.6f", lineterminator="\n")
     store.write_listed(folder / f"{task}.csv", text)
-    store.write_listed(folder / "made_on.txt", cpu_type() + "\n")
-
-
-def cpu_type() -> str:
-    """What decides how sums are rounded here: system, processor family, and the instructions NumPy and BLAS use.
-
-    On one type the same command gives the same bytes; on another, runs may part ways.
-    """
-    blas = sorted({f"{lib['internal_api']} {lib.get('architecture')}" for lib in threadpool_info()})
-    simd = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])
-    return " · ".join([platform.system(), platform.machine(), *blas, *simd])
+    store.write_listed(folder / "made_on.txt", "".join(f"{cpu}\n" for cpu in sorted({run.cpu for run in results.runs})))
 
 
 SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
@@ -359,7 +351,7 @@ def main() -> None:
     runs = out / "data" / "runs"
     with store.alone(out / "build" / "locks" / "runs", f"makes runs in {out}"):
         for left in runs.rglob(store.TEMPORARY):
-            left.unlink()  # of a process that was killed
+            left.unlink(missing_ok=True)  # of a process that was killed
         for task in N_RUNS:
             results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
             n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -16,7 +18,9 @@ _PARTS = {"teacher": TEACHER, "physics": OTHER, "distillation": DISTILLED, "eval
 
 def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds") -> Axes:
     """`quantity` over size on logarithmic axes: a mark per measurement, dashed the fitted law; the legend is below."""
-    for (what, part), color, mark in zip(frame.groupby("what", sort=False), _LINES, _MARKS):
+    for (what, part), color, mark in zip(
+        frame.groupby("what", sort=False), itertools.cycle(_LINES), itertools.cycle(_MARKS)
+    ):
         sizes, values = part["size"].to_numpy(), part[quantity].to_numpy()
         label = what
         if len(part) >= POINTS:
@@ -26,6 +30,18 @@ def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds") -> Axes:
         ax.plot(sizes, values, mark, color=color, ms=3.5, ls="" if len(part) >= POINTS else "-", label=label)
     ax.set(xscale="log", yscale="log", xlabel=frame["over"].iloc[0], ylabel=quantity)
     ax.legend(loc="upper left", bbox_to_anchor=(0, -0.3), frameon=False, borderaxespad=0)
+    return ax
+
+
+def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
+    """Seconds that the re-run took over the moment of the kill; the line is a run that nobody disturbed."""
+    held = frame["wrong"].isna()
+    ax.axhline(frame["undisturbed"].iloc[0], color=TEACHER, lw=0.8, label="undisturbed, from nothing")
+    ax.plot(frame["moment"][held], frame["again"][held], "o", color=DISTILLED, ms=3, label="the same bytes")
+    if not held.all():
+        ax.plot(frame["moment"][~held], frame["again"][~held], "X", color=COLOURS[3], ms=5, label="other bytes")
+    ax.set(xlabel="seconds from the start to the kill", ylabel="seconds of the re-run", ylim=(0, None))
+    ax.legend(loc="lower left", frameon=False)
     return ax
 
 

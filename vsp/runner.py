@@ -27,7 +27,7 @@ from pathlib import Path
 
 import nbformat
 
-from .store import MANIFEST, ROOT, alone, fix, list_file, reason
+from .store import MANIFEST, ROOT, alone, atomic_path, fix, list_file, reason
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
@@ -279,9 +279,8 @@ def _move(path: Path, target: Path) -> None:
     except OSError as error:
         if error.errno != errno.EXDEV:
             raise
-        beside = target.with_name(f".{target.name}")  # figures/ or data/ lie on another disk
-        shutil.copyfile(path, beside)
-        os.replace(beside, target)
+        with atomic_path(target) as beside:  # figures/ or data/ lie on another disk
+            shutil.copyfile(path, beside)
 
 
 def _value(text: str) -> object:
@@ -315,7 +314,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except OSError as error:
-        print(f"error: {name}: {reason(error)}; nothing was changed", file=sys.stderr)
+        print(f"error: {name}: {reason(error)}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(f"error: {name}: interrupted; nothing was changed", file=sys.stderr)

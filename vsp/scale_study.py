@@ -28,7 +28,8 @@ from .config import preset
 from .distill import distill, merge_regions, split_regions
 from .envs import GOAL, GOAL_EDGE, RUNNING, STRIDE, Task, get_task
 from .evaluate import outcomes
-from .experiments import Experiment, cpu_type, load_runs, make_runs
+from .experiments import Experiment, load_runs, make_runs
+from .machine import cpu_type
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .progress import progress
@@ -40,7 +41,7 @@ EPISODES = tuple(round(10**e) for e in (3, 3.5, 4, 4.5, 5, 5.5, 6))
 CELLS = (10, 18, 32, 56, 100, 178, 316, 562, 1000)
 DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)
 RUNS = (1, 3, 10, 30, 100, 300, 1000)
-WORKERS = (1, 2, 4)
+WORKERS = (1, 2, 3, 4)
 LAYERS = (400, 300)  # of the teachers' networks
 N_CELLS = 30  # where dimensions vary
 N_RUNS = 40  # where workers vary
@@ -154,8 +155,10 @@ def workers(n: int) -> dict[str, float]:
     """`N_RUNS` short runs by n processes of this machine, and by n workers of a Dask cluster on it."""
     from distributed import LocalCluster
 
+    runs(n, jobs=n)  # so that workers are there and have imported what they need
     here = runs(N_RUNS, jobs=n)["runs"]
     with LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
+        runs(n, jobs=cluster.scheduler_address)
         return {"processes": here, "Dask workers": runs(N_RUNS, jobs=cluster.scheduler_address)["runs"]}
 
 
@@ -189,6 +192,7 @@ def study(*, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, n_runs=RUNS,
     rows = []
     for over, size, *work in progress(asked, "scale", total=len(asked), unit="measurements"):
         found, megabytes = alone(*work)
+        megabytes = np.nan if over in ("runs", "workers") else megabytes  # which other processes hold
         about = {"over": over, "size": size, "megabytes": megabytes}
         rows += [{"what": what, **about, "seconds": seconds} for what, seconds in found.items()]
     return pd.DataFrame(rows).assign(machine=cpu_type())

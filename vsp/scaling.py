@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from .checks import check_array
 from .config import preset
 from .scale_study import N_CELLS, N_RUNS
 
@@ -44,7 +45,8 @@ def exponents(frame: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for (over, what), part in frame.groupby(["over", "what"], sort=False):
-        for quantity in ("seconds", "megabytes") if len(part) >= POINTS else ():
+        enough = [name for name in ("seconds", "megabytes") if part[name].notna().sum() >= POINTS]
+        for quantity in enough:
             _, _, exponent, half = power_law(part["size"].to_numpy(), part[quantity].to_numpy())
             about = {"over": over, "what": what, "quantity": quantity}
             rows.append({**about, "exponent": exponent, "low": exponent - half, "high": exponent + half})
@@ -55,12 +57,13 @@ def power_law(sizes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.nda
     """Fit b·size^c to the upper half of the sizes, at least `POINTS`: below, what any call costs hides the growth.
 
     Least squares of logarithms. Returns those sizes and the fitted values (n,), c, and half the width of its 95 %
-    interval (Student's t). Raises ValueError for fewer sizes.
+    interval (Student's t). Raises ValueError for fewer sizes and for numbers that are not positive.
     """
     from scipy.stats import linregress, t
 
-    if len(sizes) < POINTS:
-        raise ValueError(f"{len(sizes)} sizes, expected {POINTS} or more")
+    sizes, values = check_array("sizes", sizes, (-1,)), check_array("values", values, (len(sizes),))
+    if len(sizes) < POINTS or min(sizes.min(), values.min()) <= 0:
+        raise ValueError(f"sizes are {sizes}, values {values}, expected {POINTS} or more, all positive")
     n = max(POINTS, (len(sizes) + 1) // 2)
     upper = np.argsort(sizes)[-n:]
     x, y = np.log(sizes[upper]), np.log(values[upper])

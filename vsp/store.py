@@ -35,6 +35,8 @@ _MADE_BY = {  # which target makes a file anew, by a part of its path; nothing m
     "data/results/teachers": "study",
     "data/results/lookup": "lookup",
     "data/results/trust": "bench torture",
+    "data/results/kills": "torture",
+    "data/results/scale": "bench",
     "data/results/beyond_LunarLander": "beyond-long",
     "data/results/beyond_seconds_long": "beyond-long",
     "data/results/beyond": "beyond",

@@ -18,8 +18,9 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from .machine import cpu_type
 from .progress import progress
-from .store import reason
+from .store import MANIFEST, ROOT, reason
 
 JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # words for --jobs
 ANSWER = 10  # seconds within which a scheduler answers
@@ -60,12 +61,16 @@ def results(
             yield result
             done += 1
     except Exception as error:
+        if type(error).__name__ == "TimeoutError" and isinstance(jobs, str):
+            raise NoScheduler(
+                f"the Dask scheduler at {jobs!r} has no workers, expected one or more: start some"
+            ) from error
         if type(error).__name__ not in ("TerminatedWorkerError", "KilledWorker"):  # loky's and Dask's
             raise
         how = re.search(r"\{(.*)\}", str(error))
         raise WorkerDied(
             f"{label}: a worker process was killed{f' ({how[1]})' if how else ''} with {done} of {total} {unit} done. "
-            "They are kept: the same command goes on from there. Where memory ran out, use fewer workers: make JOBS=1"
+            "What is on disk stays: the same command goes on from there. Where memory ran out, use fewer: make JOBS=1"
         ) from error
 
 
@@ -93,10 +98,12 @@ def _call(expected: dict[str, str], work: Callable, i: int, *one) -> tuple[int, 
 
 @cache
 def identity() -> dict[str, str]:
-    """What decides a result beside its arguments: the code of vsp, and the versions that round and draw."""
-    code = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))))
-    versions = {name: version(name) for name in ("numpy", "scipy", "scikit-learn", "torch")}
-    return {"vsp": code.hexdigest()[:10], "python": platform.python_version(), **versions}
+    """What decides a result beside its arguments: code, teachers, type of processor, and the versions of packages."""
+    teachers = sorted((ROOT / "data" / "teachers").rglob(MANIFEST))
+    files = [*sorted(Path(__file__).parent.glob("*.py")), *teachers]
+    code = hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:10]
+    versions = {name: version(name) for name in ("numpy", "scipy", "scikit-learn", "torch", "gymnasium", "cma")}
+    return {"code": code, "processor": cpu_type(), "python": platform.python_version(), **versions}
 
 
 def _client(address: str):

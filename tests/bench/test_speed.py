@@ -76,7 +76,13 @@ def test_one_distillation(task, record, monkeypatch):
 def test_evaluation_of_a_copy(task, record):
     policy = vsp.distill(vsp.load_teacher(task), task, seed=0)[0]
     text, held = told(evaluations(policy, policy, task), 100)
-    record("speed", f"1000 episodes of a copy against evaluate_policy, {task}", "100 times", text, held)
+    record(
+        "speed",
+        f"1000 episodes of a copy against evaluate_policy ({SLOW_EPISODES}, scaled), {task}",
+        "100 times",
+        text,
+        held,
+    )
     gap = np.abs(evaluate_directly(policy, task, 1000, seed=1) - outcomes(policy, task, 1000, seed=1).returns).max()
     text = f"largest difference {gap:.1g}"
     record("speed", f"the same 1000 returns of a copy, {task}", "within 1e-6", text, gap <= 1e-6)
@@ -86,9 +92,11 @@ def test_evaluation_of_a_copy(task, record):
 def test_evaluation_of_the_teacher(task, record):
     """Its forward passes are the floor. Their last bit decides an episode that comes to the very edge of the goal."""
     teacher, agent = vsp.load_teacher(task), teacher_agent(task)
-    text, held = told(evaluations(teacher, agent, task), 100)
-    what = f"1000 episodes of the teacher against evaluate_policy, {task}"
+    times = evaluations(teacher, agent, task)
+    text, held = told(times, 100)
+    what = f"1000 episodes of the teacher against evaluate_policy ({SLOW_EPISODES}, scaled), {task}"
     record("speed", what, "100 times", text, held, why="both go through its network")
+    assert np.median(times[:, 1] / times[:, 0]) > 25
     direct, single, own = (
         evaluate_directly(agent, task, 1000, seed=1),
         *(outcomes(policy, task, 1000, seed=1).returns for policy in (OneByOne(agent), teacher)),
@@ -118,6 +126,7 @@ def test_one_state(task, record, tmp_path):
     text, held = told(times / len(observations), 20)
     what = f"predict of one state against the teacher's, {task}"
     record("speed", what, "20 times", text, held, why="a dozen calls of NumPy for whatever number of states")
+    assert np.median(times[:, 1] / times[:, 0]) > 8
     times = race(program(policy, tmp_path), slow, repeats=3 * REPEATS)
     text, held = told(times / [CALLS, len(observations)], 1000)
     record("speed", f"the exported C against the teacher's predict, {task}", "1000 times", text, held)

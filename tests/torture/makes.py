@@ -90,7 +90,8 @@ def until(condition, limit=60):
 
 def state_of_code() -> str:
     """Ten hexadecimal digits for all tracked files that decide the outputs, so that no result outlives its code."""
-    paths = [*ROOT.glob("vsp/*.py"), *ROOT.glob("notebooks/*.ipynb"), ROOT / "Makefile", ROOT / "environment.lock"]
+    paths = [*ROOT.glob("vsp/*.py"), *ROOT.glob("notebooks/*.ipynb"), *ROOT.glob("data/[pt]*/**/MANIFEST.sha256")]
+    paths += [ROOT / "Makefile", ROOT / "environment.lock"]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(paths))).hexdigest()[:10]
 
 
@@ -102,7 +103,8 @@ class Reference:
 
     def __init__(self, folder: Path):
         self.out, self.kept, self.note = folder / "out", folder / "reference", folder / "reference.json"
-        if not self.note.exists():
+        shown = hashlib.sha256((ROOT / "data" / "results" / "MANIFEST.sha256").read_bytes()).hexdigest()
+        if not self.note.exists() or json.loads(self.note.read_text())["shown"] != shown:
             for left in (self.out, self.kept):
                 shutil.rmtree(left, ignore_errors=True)
             make = figures(self.out)
@@ -110,7 +112,7 @@ class Reference:
             self.out.rename(self.kept)
             seconds = time.monotonic() - make.began
             took = {name: int(s) for name, s in re.findall(r"^(\w+)\.ipynb: done in (\d+) s", make.said, re.M)}
-            self.note.write_text(json.dumps({"seconds": seconds, "notebooks": took}))
+            self.note.write_text(json.dumps({"seconds": seconds, "notebooks": took, "shown": shown}))
         noted = json.loads(self.note.read_text())
         self.seconds, self.notebooks, self.tree = noted["seconds"], noted["notebooks"], tree(self.kept)
 

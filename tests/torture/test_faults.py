@@ -19,6 +19,7 @@ from pathlib import Path
 
 import makes
 import numpy as np
+import pandas as pd
 import pytest
 from makes import FIGURES, ROOT, Make, Reference, difference, figures, processes, tree, until
 
@@ -57,13 +58,13 @@ def wrong_after(out, reference, log, *, env=None) -> str:
 def tell(record, what: str, wrong: dict[str, str], tried: int, *, of: int, more: str = "") -> None:
     """Record a row of several trials: how many held, and of the others what was wrong."""
     value = f"{tried - len(wrong)} of {tried}{more}" + "".join(f"; {name}: {why}" for name, why in wrong.items())
-    record("faults", what, f"{of} of {of}", value, not wrong)
+    record("faults", what, f"{of} of {of}", value, not wrong and tried >= of)
 
 
 # Kills
 
 
-def test_kill_of_the_process_group(folder, reference, record):
+def test_kill_of_the_process_group(folder, reference, record, keep):
     """At a moment drawn from each fiftieth of the undisturbed run's time, in random order."""
     rng = np.random.default_rng(0)
     shares = ((np.arange(50) + rng.uniform(size=50)) / 50)[rng.permutation(50)]
@@ -71,15 +72,18 @@ def test_kill_of_the_process_group(folder, reference, record):
     done = json.loads(note.read_text()) if note.exists() else {}
     for share in map("{:.4f}".format, shares[:PER_ROW]):
         if share not in done:
-            done[share] = killed_at(float(share) * reference.seconds, reference)
+            moment = float(share) * reference.seconds
+            wrong, again = killed_at(moment, reference)
+            done[share] = {"moment": moment, "again": again, "undisturbed": reference.seconds, "wrong": wrong}
             note.write_text(json.dumps(done, indent=2))
-            print(f"killed after {share} of the time: {done[share] or 'held'}", file=sys.__stderr__, flush=True)
-    wrong = {share: why for share, why in done.items() if why}
+            print(f"killed after {moment:.0f} s: {wrong or 'held'}", file=sys.__stderr__, flush=True)
+    keep("kills", pd.DataFrame(done.values()))
+    wrong = {share: one["wrong"] for share, one in done.items() if one["wrong"]}
     tell(record, "SIGKILL of the process group, at random moments", wrong, len(done), of=50)
 
 
-def killed_at(seconds: float, reference: Reference) -> str:
-    """What is wrong after a kill so many seconds after the start, in words; empty if nothing."""
+def killed_at(seconds: float, reference: Reference) -> tuple[str, float]:
+    """What is wrong after a kill so many seconds after the start, empty if nothing; and the seconds of the re-run."""
     out = reference.out
     shutil.rmtree(out, ignore_errors=True)
     make = figures(out)
@@ -91,9 +95,10 @@ def killed_at(seconds: float, reference: Reference) -> str:
     make.kill()
     killed = time.monotonic()
     wrong = wrong_after(out, reference, f"{out}-again.log")
+    again = time.monotonic() - killed
     until(lambda: not orphans.keys() & processes(out).keys(), killed + GONE - time.monotonic())
     left = [f"still there: {command[:200]}" for pid, command in processes(out).items() if pid in orphans]
-    return " ".join([wrong or difference(tree(out), reference.tree), *left]).strip()
+    return " ".join([wrong or difference(tree(out), reference.tree), *left]).strip(), again
 
 
 def test_kill_of_a_kernel(folder, reference, record):
@@ -101,7 +106,7 @@ def test_kill_of_a_kernel(folder, reference, record):
     tried = min(10, PER_ROW)
     for number in range(tried):
         name = str(rng.choice(list(reference.notebooks)))
-        out = reference.again(without=[name])
+        out = reference.again(without=reference.notebooks)  # others are under way when this one dies
         when, took, said = kill_one(out, "ipykernel_launcher", lambda: rng.uniform(0, 0.8) * reference.notebooks[name])
         slowest = max(slowest, took)
         problems = [] if f"error: {name}.ipynb" in said and "did not end" in said else [f"says {said[-300:]}"]

@@ -143,7 +143,7 @@ def draw(out, **environment):
 @pytest.mark.parametrize("core", ["Prescott", "SkylakeX"])
 def test_tables_of_the_same_runs_on_another_cpu_type(core, made, tmp_path, record):
     limits = cpu(core, without=found() if core == "Prescott" else [])
-    probe = "from vsp import experiments; print(experiments.cpu_type())"
+    probe = "from vsp import machine; print(machine.cpu_type())"
     assert python("-c", probe, **limits) != python("-c", probe), "the limits have no effect here"
     shutil.copytree(made / "data" / "runs", tmp_path / "data" / "runs")
     draw(tmp_path, **limits)
