@@ -49,7 +49,7 @@ def results(
     """Yield (i, work(*arguments[i])) for every i, in the order in which they end, and show how many are done.
 
     What `arguments` lack to `total` was done before. `jobs` is the number of worker processes (-1: one per core) or the
-    address of a Dask scheduler, such as "tcp://127.0.0.1:8786"; whoever it belongs to can run code here and on the
+    address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; whoever it belongs to can run code here and on the
     workers. Every job runs with one thread. Raises what `work` raises, WorkerDied (on a cluster others take over, until
     one job took four workers with it), UnlikeWorker and NoScheduler.
     """
