@@ -94,7 +94,7 @@ begin:
 # The longest first, so that no core waits at the end.
 notebooks: runs 06_beyond $(NOTEBOOKS)
 
-quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about 2 minutes
+quick: ## the same path with tiny runs, figures watermarked, into build/quick/: about a minute
 	@$(MAKE) --no-print-directory paper-figures QUICK=1 OUT="$(OUT)/build/quick"
 
 runs: venv ## the 85 + 40 distillations and their evaluation, into data/runs/: about 45 s, resumable
@@ -128,7 +128,7 @@ manifest: venv ## lists the files of data/ as they are, for somebody who changed
 lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
-test: venv ## runs the tests, several at a time: 2 to 4 minutes
+test: venv ## runs the tests, several at a time: about 3 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
 # Figures go to data/results/ and the README when all is measured, for notebook 07 shows them and tests look at notebooks.
