@@ -3,7 +3,7 @@
     python tests/measured.py build/measured data/results README.md
 
 puts the tables in the first folder, where the tests write as they go, into the second, and the figures into the README,
-between two lines that say so. Not before: a notebook shows them, and tests compare what notebooks make.
+between two lines that say so. Not before: what a test compares must not change under it.
 """
 
 import os

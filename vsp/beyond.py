@@ -31,7 +31,6 @@ from .race import race
 from .rollouts import Policy, play
 from .simplify import simplify
 from .teachers import load_teacher
-from .workers import in_one_line
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
@@ -239,5 +238,5 @@ def main() -> None:
 if __name__ == "__main__":
     from vsp.beyond import main  # of the module by its name, under which workers find what it holds
 
-    with in_one_line():
+    with workers.in_one_line():
         main()

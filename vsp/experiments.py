@@ -29,7 +29,6 @@ from .machine import cpu_type
 from .policy import VoronoiPolicy
 from .rollouts import Outcomes
 from .teachers import Teacher, load_teacher
-from .workers import in_one_line
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
 N_EPISODES = 1000
@@ -362,5 +361,5 @@ def main() -> None:
 if __name__ == "__main__":
     from vsp.experiments import main  # of the module by its name, under which workers find what it holds
 
-    with in_one_line():
+    with workers.in_one_line():
         main()

@@ -11,7 +11,6 @@ from pathlib import Path
 import pandas as pd
 
 from . import paper, readings_study, store, teachers_study, workers
-from .workers import in_one_line
 
 RESULTS = store.ROOT / "data" / "results"
 STUDIES = {"readings": readings_study, "teachers": teachers_study}
@@ -69,5 +68,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with in_one_line():
+    with workers.in_one_line():
         main()
