@@ -1,8 +1,10 @@
+import numpy as np
 import pandas as pd
 import pytest
 from support import SIMPLEGOAL
 
-from vsp.comparison import AS_GOOD, ablation, headline, reached, rivals, summary
+from vsp.comparison import AS_GOOD, _interval_of_mean, ablation, headline, reached, rivals, summary
+from vsp.evaluate import interval
 
 ROWS = pd.DataFrame(
     [("refined", 2, seed, mean, failing, 2) for seed, mean, failing in [(0, 9.0, 0.0), (1, 9.2, 0.0), (2, 7.0, 0.1)]]
@@ -71,3 +73,9 @@ def test_an_ablation_is_that_of_the_size_of_the_preset():
 def test_a_task_without_an_ablation_has_none():
     with pytest.raises(ValueError, match="is an ablation"):
         ablation(ROWS[ROWS["method"].isin(["refined", "teacher"])])
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 20])
+def test_its_intervals_are_those_of_the_bootstrap(n):
+    values = np.random.default_rng(n).normal(size=n)
+    assert _interval_of_mean(values) == pytest.approx(interval(values, np.mean), rel=1e-12)
