@@ -54,17 +54,28 @@ def test_a_pass_neither_adds_nor_removes_cells(monkeypatch):
 
 
 def test_a_measurement_has_a_process_of_its_own_and_memory_that_is_the_same_each_time():
-    (found, first), (_, second) = alone("evaluation", 2000), alone("evaluation", 4000)
-    assert set(found) == {"evaluation"} and 1.5 < second / first < 2.5
+    first, again, second = (alone("megabytes", "evaluation", n) for n in (2000, 2000, 4000))
+    assert first == pytest.approx(again, rel=0.01) and 1.5 < second / first < 2.5
+    assert set(alone("seconds", "evaluation", 50)) == {"evaluation"}
 
 
 def test_the_study_has_a_row_per_thing_and_size(monkeypatch):
-    monkeypatch.setattr(scale_study, "alone", lambda what, *sizes: ({what: 1.0}, 2.0))
+    found = {"seconds": lambda what, n, *_: {what: float(n)}, "megabytes": lambda what, n, *_: 10.0 * n}
+    seen = []
+
+    def one_by_one(work, arguments, *_, **__):
+        seen.extend(arguments)
+        return enumerate(work(*each) for each in arguments)
+
+    monkeypatch.setattr(scale_study, "alone", lambda quantity, *work: found[quantity](*work))
+    monkeypatch.setattr(scale_study, "results", one_by_one)
     frame = scale_study.study(episodes=(10,), cells=(5,), dimensions=(2, 3), n_runs=(1,), n_workers=(1, 2))
     assert frame.groupby("over")["size"].agg(list).to_dict() == {
         "cells": [5], "copies": [50], "dimensions": [2, 3, 2, 3], "episodes": [10, 10], "runs": [1], "workers": [1, 2]
     }  # fmt: skip
-    assert (frame["seconds"] == 1).all() and frame["machine"].nunique() == 1
+    counted = frame[~frame["over"].isin(["runs", "workers"])]
+    assert (counted["megabytes"] == 10 * counted["seconds"]).all() and frame["megabytes"].count() == len(counted)
+    assert seen[0] == ("megabytes", "physics", 50) and frame["machine"].nunique() == 1  # the longest first
 
 
 def test_the_command_writes_a_listed_table(monkeypatch, tmp_path):

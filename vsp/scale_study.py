@@ -16,7 +16,6 @@ import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +34,7 @@ from .policy import VoronoiPolicy
 from .progress import progress
 from .rollouts import record
 from .teachers import Teacher
+from .workers import results
 
 TASK = "SimpleGoal-v0"
 EPISODES = tuple(round(10**e) for e in (3, 3.5, 4, 4.5, 5, 5.5, 6))
@@ -183,48 +183,59 @@ def _seconds(work: Callable[[], object]) -> float:
 
 
 def study(*, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, n_runs=RUNS, n_workers=WORKERS) -> pd.DataFrame:
-    """One row per thing and size: `what`, `over` (what the size counts), `size`, `seconds`, and `megabytes` at most."""
+    """One row per thing and size: `what`, `over` (what the size counts), `size`, `seconds`, and `megabytes` at most.
+
+    Times are taken one after the other; memory, which does not depend on what else goes on, then on all cores. Memory
+    is NaN where other processes hold it.
+    """
     asked = [("episodes", n, what, n) for what in ("distillation", "evaluation") for n in episodes]
     asked += [("cells", k, "passes", k, 2) for k in cells]
     asked += [("dimensions", d, "passes", N_CELLS, d) for d in dimensions]
     asked += [("dimensions", d, "policies", d) for d in dimensions] + [("copies", 50, "physics", 50)]
     asked += [("runs", n, "runs", n) for n in n_runs] + [("workers", n, "workers", n) for n in n_workers]
     rows = []
-    for over, size, *work in progress(asked, "scale", total=len(asked), unit="measurements"):
-        found, megabytes = alone(*work)
-        megabytes = np.nan if over in ("runs", "workers") else megabytes  # which other processes hold
-        about = {"over": over, "size": size, "megabytes": megabytes}
-        rows += [{"what": what, **about, "seconds": seconds} for what, seconds in found.items()]
-    return pd.DataFrame(rows).assign(machine=cpu_type())
+    for over, size, *work in progress(asked, "times", total=len(asked), unit="measurements"):
+        about = {"work": tuple(work), "over": over, "size": size}
+        rows += [{"what": what, **about, "seconds": taken} for what, taken in alone("seconds", *work).items()]
+    frame = pd.DataFrame(rows)
+    traced = frame.loc[~frame["over"].isin(["runs", "workers"]), "work"].unique()
+    longest = sorted(traced, key=lambda work: -frame.loc[frame["work"] == work, "seconds"].sum())
+    jobs = [("megabytes", *work) for work in longest]
+    found = results(alone, jobs, "memory", jobs=-1, total=len(jobs), unit="measurements")
+    peaks = {longest[i]: peak for i, peak in found}
+    return frame.assign(megabytes=frame.pop("work").map(peaks), machine=cpu_type())
 
 
-def alone(what: str, *sizes: int) -> tuple[dict[str, float], float]:
-    """What a function of `MEASURED` returns in a new process, and how many megabytes it holds at most in another call.
+def alone(quantity: str, what: str, *sizes: int) -> dict[str, float] | float:
+    """What a function of `MEASURED` returns in a new process, or how many megabytes its arrays and objects take there.
 
-    The second call is traced by `tracemalloc`, which slows it down and gives the same number each time.
+    `quantity` is "seconds" or "megabytes". `tracemalloc` counts the megabytes, which slows everything down and gives
+    the same number each time.
     """
-    command = [sys.executable, "-m", "vsp.scale_study", "--alone", what, *map(str, sizes)]
+    command = [sys.executable, "-m", "vsp.scale_study", "--alone", quantity, what, *map(str, sizes)]
     return json.loads(subprocess.run(command, stdout=subprocess.PIPE, cwd=store.ROOT, check=True).stdout)
 
 
-def _alone(what: str, *sizes: str) -> None:
-    """The process of `alone`."""
-    work = partial(MEASURED[what], *(int(size) for size in sizes))
+def _alone(quantity: str, what: str, *sizes: int) -> dict[str, float] | float:
+    """What `alone` returns, in its process."""
     with threadpool_limits(1):
-        found = work()
+        if quantity == "seconds":
+            return MEASURED[what](*sizes)
+        MEASURED[what](min(sizes[0], 20), *sizes[1:])  # a small one first, which imports what it needs
         tracemalloc.start()
-        work()
-        print(json.dumps([found, tracemalloc.get_traced_memory()[1] / 1e6]))
+        MEASURED[what](*sizes)
+        return tracemalloc.get_traced_memory()[1] / 1e6
 
 
 def main() -> None:
-    """Measure all of it, in about 40 minutes, and write OUT/data/results/scale.csv."""
+    """Measure all of it, in about half an hour, and write OUT/data/results/scale.csv."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="the result goes to OUT/data/results")
-    parser.add_argument("--alone", nargs="+", metavar="WHAT", help="only one measurement, of this process")
+    parser.add_argument("--alone", nargs="+", metavar="WHAT", help="one measurement, in this process")
     arguments = parser.parse_args()
     if arguments.alone:
-        _alone(*arguments.alone)
+        quantity, what, *sizes = arguments.alone
+        print(json.dumps(_alone(quantity, what, *map(int, sizes))))
         return
     path = Path(arguments.out) / "data" / "results" / "scale.csv"
     store.write_listed(path, study().to_csv(index=False, float_format="%.4g", lineterminator="\n"))
