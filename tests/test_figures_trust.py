@@ -16,8 +16,17 @@ def test_growth_has_marks_and_a_fitted_line_for_each_thing(ax):
     figures_trust.growth(ax, measured())
     marks = [line for line in ax.lines if line.get_marker() not in ("", "None")]
     assert [line.get_ydata().tolist() for line in marks] == [[2, 20, 200, 2000, 20000], [3.0] * 5]
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a, exponent 1.0", "b, exponent 0.0"]
-    assert (ax.get_xscale(), ax.get_yscale(), ax.get_xlabel()) == ("log", "log", "cells") and len(ax.lines) == 4
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a, $n^{1.0}$", "b, $n^{0.0}$"]
+    assert (ax.get_xscale(), ax.get_yscale(), ax.get_xlabel()) == ("log", "log", "$n$ = cells") and len(ax.lines) == 4
+
+
+def test_an_axis_of_few_decades_has_numbers_between_them(ax):
+    frame = measured(5)
+    figures_trust.growth(ax, frame[frame["size"] < 100])
+    ax.figure.canvas.draw()
+    for axis, label in ((ax.xaxis, "5"), (ax.yaxis, "20")):
+        shown = [text.get_text() for text in axis.get_ticklabels(which="both")]
+        assert label in shown and not any("times" in text for text in shown)
 
 
 def test_few_sizes_are_joined_and_not_fitted(ax):
@@ -39,7 +48,7 @@ def test_kills_that_held_and_others(ax):
 
 ROWS = pd.DataFrame(
     {
-        "what": ["C", "memory", "evaluation"],
+        "what": ["C against the teacher's, here, MountainCarContinuous-v0", "memory", "evaluation"],
         "to hold": ["1000 times", "bounded", "100 times"],
         "measured": ["5400 times (5000 to 6000): 1 s against 2 s", "2 MB", "72.5 times (70 to 80)"],
         "held": ["yes", "yes", "no"],
@@ -50,6 +59,7 @@ ROWS = pd.DataFrame(
 def test_ratios_are_read_where_both_columns_tell_one(ax):
     frame = figures_trust.told(ROWS)
     assert frame["times"].tolist() == [5400, 72.5] and frame["wanted"].tolist() == [1000, 100]
+    assert frame["what"].tolist() == ["C, MountainCar", "evaluation"]
     figures_trust.ratios(ax, frame)
     assert [patch.get_width() for patch in ax.patches] == [5400, 72.5] and ax.get_xscale() == "log"
     assert ax.lines[0].get_xdata().tolist() == [1000, 100]

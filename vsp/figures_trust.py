@@ -7,6 +7,8 @@ import itertools
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from .figures import COLOURS, DISTILLED, GOAL, OTHER, TEACHER
 from .scaling import POINTS, power_law
@@ -17,20 +19,32 @@ _PARTS = {"teacher": TEACHER, "physics": OTHER, "distillation": DISTILLED, "eval
 
 
 def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds") -> Axes:
-    """`quantity` over size on logarithmic axes: a mark per measurement, dashed the fitted law; the legend is below."""
+    """`quantity` over size n, logarithmic: a mark per measurement, dashed the fitted law; the legend is below."""
     for (what, part), color, mark in zip(
         frame.groupby("what", sort=False), itertools.cycle(_LINES), itertools.cycle(_MARKS)
     ):
         sizes, values = part["size"].to_numpy(), part[quantity].to_numpy()
-        label = what
+        label = what.partition(",")[0]
         if len(part) >= POINTS:
             upper, fitted, exponent, _ = power_law(sizes, values)
             ax.plot(upper, fitted, color=color, ls="--", lw=0.8)
-            label = f"{what}, exponent {exponent:.1f}"
+            label += f", $n^{{{exponent:.1f}}}$"
         ax.plot(sizes, values, mark, color=color, ms=3.5, ls="" if len(part) >= POINTS else "-", label=label)
-    ax.set(xscale="log", yscale="log", xlabel=frame["over"].iloc[0], ylabel=quantity)
-    ax.legend(loc="upper left", bbox_to_anchor=(0, -0.3), frameon=False, borderaxespad=0)
+    ax.set(xscale="log", yscale="log", xlabel=f"$n$ = {frame['over'].iloc[0]}", ylabel=quantity)
+    _few_numbers(ax.xaxis, frame["size"])
+    _few_numbers(ax.yaxis, frame[quantity])
+    ax.legend(
+        loc="upper left", bbox_to_anchor=(-0.35, -0.28), frameon=False, borderaxespad=0, handletextpad=0, fontsize=6
+    )
     return ax
+
+
+def _few_numbers(axis: Axis, values: pd.Series) -> None:
+    """Numbers along a logarithmic axis: at 1, 2 and 5 where `values` span less than two decades, else at decades."""
+    if values.max() < 100 * values.min():
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
@@ -46,10 +60,14 @@ def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
 
 
 def told(frame: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a table of trust.csv that tell how many times faster something is: what, times and wanted."""
+    """The rows of a table of trust.csv that tell how many times faster something is: what, times and wanted.
+
+    What it is faster than, and the version of a task, are left out of `what`: there is little room beside a bar.
+    """
     rows = frame[frame["measured"].str.match(_TIMES) & frame["to hold"].str.match(_TIMES)]
     first = {name: rows[column].str.extract(_TIMES)[0].astype(float) for name, column in _READ.items()}
-    return rows[["what"]].assign(**first)
+    short = rows["what"].replace({r" against .*, ": ", ", r"(Continuous)?-v\d+$": ""}, regex=True)
+    return rows.assign(what=short, **first)[["what", *first]]
 
 
 _TIMES = r"([\d.]+) times"
@@ -61,12 +79,14 @@ def ratios(ax: Axes, frame: pd.DataFrame) -> Axes:
     rows = np.arange(len(frame))
     ax.barh(rows, frame["times"], color=DISTILLED, height=0.6, label="measured")
     ax.plot(frame["wanted"], rows, "|", color="black", ms=11, mew=1.5, label="to reach")
-    for row, value in zip(rows, frame["times"]):
+    for row, value, wanted in zip(rows, frame["times"], frame["wanted"]):
         number = f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
-        ax.annotate(f"{number}×", (value, row), (3, 0), textcoords="offset points", va="center", fontsize=7)
+        ax.annotate(
+            f"{number}×", (max(value, wanted), row), (4, 0), textcoords="offset points", va="center", fontsize=7
+        )
     ax.set(xscale="log", xlim=(1, 8 * frame["times"].max()), xlabel="times faster", yticks=rows)
     ax.set_yticklabels(frame["what"])
-    ax.legend(loc="lower right", frameon=False)
+    ax.legend(loc="upper right", frameon=False)
     ax.invert_yaxis()
     return ax
 

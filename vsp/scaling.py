@@ -53,6 +53,17 @@ def exponents(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def in_words(frame: pd.DataFrame, quantity: str = "seconds") -> str:
+    """The `exponents` of one quantity, for somebody who cannot see the curves."""
+    rows = exponents(frame)
+    rows = rows[rows["quantity"] == quantity]
+    parts = [
+        f"over {over} " + ", ".join(f"{row.exponent:.1f} for {row.what}" for row in part.itertuples())
+        for over, part in rows.groupby("over", sort=False)
+    ]
+    return f"with these exponents: {'; '.join(parts)}."
+
+
 def power_law(sizes: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Fit b·size^c to the upper half of the sizes, at least `POINTS`: below, what any call costs hides the growth.
 
