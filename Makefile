@@ -5,7 +5,7 @@
 
 # What each notebook makes: figures/ (PDF and PNG; of animations GIF, and PNG in its stead), figures/tables/ (TEX and
 # CSV) and data/results/.
-NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond
+NOTEBOOKS := 01_teacher 02_distillation 03_evaluation 04_appendix_tables 05_ledger 06_beyond 07_trust
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
 ANIMATIONS_02_distillation := growth_simplegoal growth_mountaincar
@@ -19,11 +19,14 @@ FIGURES_06_beyond := beyond_partitions beyond_simplify beyond_simplegoal beyond_
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
 TABLES_06_beyond := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
-# The notebooks that read data/runs, and what else they read: results that `make study` and `make beyond` make.
+FIGURES_07_trust := kills trust_speed scale_time scale_dimensions scale_memory scale_workers cluster_cost
+TABLES_07_trust := trust_faults trust_input trust_same trust_speed scale_exponents cluster_cost
+# The notebooks that read data/runs, and what else they read: results of `make study`, `beyond`, `bench`, `torture`.
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv
 READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous-v0 beyond_Pendulum-v1 beyond_race \
   beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) data/results/beyond_LunarLanderContinuous-v3.policy
+READS_07_trust := $(foreach n,trust kills scale,data/results/$(n).csv)
 
 OUT ?= .
 # How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
@@ -32,7 +35,7 @@ QUICK ?=
 DASK ?=
 PYTHON ?=
 
-ifneq ($(filter-out 0%,$(JOBS)),$(shell expr "$(JOBS)" : '\([0-9]*\)$$'))
+ifneq ($(or $(JOBS),nothing),$(shell expr "$(JOBS)" : '\([1-9][0-9]*\)$$'))
 $(error JOBS is $(JOBS), expected a number from 1 on)
 endif
 ifeq ($(strip $(OUT)),)
@@ -128,7 +131,7 @@ lab: venv ## opens JupyterLab on the notebooks
 test: venv ## runs the tests, several at a time: about 3 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
-# Figures go to data/results/ and the README when all is measured: what a test compares must not change under it.
+# Figures go to data/results/ and the README when all is measured, for notebook 07 shows them and tests look at notebooks.
 MEASURED = $(OUT)/build/measured
 PUBLISH = $(PY) tests/measured.py "$(MEASURED)" "$(OUT)/data/results" README.md
 
@@ -153,7 +156,7 @@ define notebook-rules
 $(call outputs,$(1)): $(1) ;
 $(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@mkdir -p "$$(STATE)"; for file in $$(READS_$(1)); do test -f "$$$$file" || { \
-	  echo "error: $$$$file is missing: \`git checkout $$$$file\` brings it back; \`make study beyond lookup\` makes all such files" >&2; exit 1; }; done; \
+	  echo "error: $$$$file is missing: \`git checkout $$$$file\` brings it back; \`make study beyond lookup bench torture\` makes all such files" >&2; exit 1; }; done; \
 	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$(QUICK)"; (cd "$$(OUT)" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$(STATE)/$(1)"; then \

@@ -3,7 +3,7 @@
     python tests/measured.py build/measured data/results README.md
 
 puts the tables in the first folder, where the tests write as they go, into the second, and the figures into the README,
-between two lines that say so. Not before: what a test compares must not change under it.
+between two lines that say so. Not before: a notebook shows them, and tests compare what notebooks make.
 """
 
 import os
@@ -15,6 +15,7 @@ from pathlib import Path
 import pandas as pd
 
 from vsp import store
+from vsp.machine import cpu_type
 
 COLUMNS = ["table", "what", "to hold", "measured", "held", "machine"]
 TABLES = {"faults": "Faults", "input": "Bad input", "same": "The same everywhere", "speed": "Speed"}
@@ -22,9 +23,9 @@ BLOCK = re.compile(r"(<!-- measured -->\n).*(<!-- end of what was measured -->)"
 
 
 def machine() -> str:
-    """Processor, cores, memory and system of this machine, in words."""
+    """Processor, cores, memory and type of this machine, in words."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
-    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB, {platform.system()}"
+    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({cpu_type()})"
 
 
 def _processor() -> str:
@@ -64,7 +65,9 @@ def markdown(path: Path) -> str:
     for table, title in TABLES.items():
         rows = frame[frame["table"] == table].drop(columns=["table", "machine"])
         lines += [f"| **{title}** | | | |"] * bool(len(rows))
-        lines += [f"| {' | '.join(row)} |" for row in rows.itertuples(index=False)]
+        lines += [
+            f"| {' | '.join(' '.join(text.split()).replace('|', '/') for text in row)} |" for row in rows.to_numpy()
+        ]
     return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}.\n"])
 
 
@@ -75,6 +78,8 @@ def main() -> None:
             write(results / path.name, merged(read(results / path.name), read(path)))
         else:
             store.write_listed(results / path.name, store.read_listed(path))
+    if results.resolve() != store.ROOT / "data" / "results":
+        return  # the README tells what is committed
     text = markdown(results / "trust.csv")
     store.write_text(readme, BLOCK.sub(lambda block: block[1] + text + block[2], readme.read_text(encoding="utf-8")))
 

@@ -32,6 +32,14 @@ def test_an_axis_of_few_decades_has_numbers_between_them(ax):
 def test_few_sizes_are_joined_and_not_fitted(ax):
     figures_trust.growth(ax, measured(2), "megabytes")
     assert len(ax.lines) == 2 and ax.get_ylabel() == "megabytes"
+    ax.clear()
+    figures_trust.growth(ax, measured(), law=False)
+    assert len(ax.lines) == 2 and ax.lines[0].get_linestyle() == "-"
+
+
+def test_what_has_no_such_quantity_is_not_drawn(ax):
+    figures_trust.growth(ax, pd.concat([measured(), measured().assign(what="c", seconds=np.nan)]))
+    assert len(ax.get_legend().get_texts()) == 2
 
 
 def test_kills_that_held_and_others(ax):
@@ -40,8 +48,8 @@ def test_kills_that_held_and_others(ax):
     )
     figures_trust.kills(ax, frame)
     line, held, other = ax.lines
-    assert held.get_xydata().tolist() == [[1, 9], [3, 7]] and other.get_xydata().tolist() == [[2, 8]]
-    assert set(line.get_ydata()) == {10} and ax.get_ylim()[0] == 0
+    assert held.get_xydata().tolist() == [[0.1, 0.9], [0.3, 0.7]] and other.get_xydata().tolist() == [[0.2, 0.8]]
+    assert set(line.get_ydata()) == {1} and ax.get_ylim()[0] == 0
     ax.clear()
     assert len(figures_trust.kills(ax, frame.assign(wrong=None)).lines) == 2
 

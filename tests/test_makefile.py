@@ -93,3 +93,9 @@ def test_a_closed_output_folder_is_named(checkout):
     (checkout / "out").write_text("a file")
     done = subprocess.run(["make", "begin", "OUT=out"], cwd=checkout, capture_output=True, text=True)
     assert done.returncode and "error: out cannot be written: make it writable, or name another folder" in done.stderr
+
+
+@pytest.mark.parametrize("jobs", ["", "0", "03", "two", "2 3"])
+def test_a_number_of_jobs_that_is_none_is_named(checkout, jobs):
+    done = subprocess.run(["make", "help", f"JOBS={jobs}"], cwd=checkout, capture_output=True, text=True)
+    assert done.returncode and f"JOBS is {jobs}, expected a number from 1 on" in done.stderr

@@ -25,7 +25,7 @@ def test_artefacts_and_cells_exist():
         for path in (ROOT / "notebooks").glob("*.ipynb")
     }
     rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", README, flags=re.M)
-    assert len(rows) == 26
+    assert len(rows) == 30
     for artefacts, notebook, names in rows:
         assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
         for artefact in re.findall(r"`([a-z_/]+)`", artefacts):

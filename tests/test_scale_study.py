@@ -35,11 +35,11 @@ def test_everything_is_timed(what):
 
 
 def test_workers_are_timed_here_and_on_a_cluster(monkeypatch):
-    asked = []
-    monkeypatch.setattr(scale_study, "runs", lambda n, *, jobs: asked.append((n, jobs)) or {"runs": 1.0})
-    assert scale_study.workers(2) == {"processes": 1.0, "Dask workers": 1.0}
-    assert [n for n, _ in asked] == [2, scale_study.N_RUNS] * 2 and asked[1][1] == 2  # the first ones warm them up
-    assert asked[3][1].startswith("tcp://127.0.0.1:")
+    asked, seconds = [], iter([9.0, 5.0, 1.0, 2.0, 3.0, 4.0, 9.0, 2.0, 2.0, 2.0, 8.0, 9.0])
+    monkeypatch.setattr(scale_study, "runs", lambda n, *, jobs: asked.append((n, jobs)) or {"runs": next(seconds)})
+    assert scale_study.workers(2) == {"processes": 3.0, "Dask workers": 2.0}  # the first calls warm them up
+    assert [n for n, _ in asked] == [2, *[scale_study.N_RUNS] * 5] * 2 and {jobs for _, jobs in asked[:6]} == {2}
+    assert asked[6][1].startswith("tcp://127.0.0.1:") and len({jobs for _, jobs in asked[6:]}) == 1
 
 
 def test_a_pass_neither_adds_nor_removes_cells(monkeypatch):
@@ -50,7 +50,27 @@ def test_a_pass_neither_adds_nor_removes_cells(monkeypatch):
             scale_study, name, lambda p, *rest, f=original: seen.append((f(p, *rest), len(p.codewords)))
         )
     scale_study.passes(7, 2)
-    assert len(seen) == 2 * scale_study.PASSES and all(changed == [] and k == 7 for changed, k in seen)
+    assert len(seen) == 2 * scale_study.REPEATS and all(changed == [] and k == 7 for changed, k in seen)
+
+
+@pytest.mark.parametrize("steps", [3, 100])
+def test_an_episode_has_as_many_steps_as_asked(monkeypatch, steps):
+    seen = []
+    monkeypatch.setattr(scale_study, "split_regions", lambda _, episode, *__: seen.append(episode))
+    scale_study.passes(5, 3, steps)
+    (_, recorded, _) = scale_study._partition(5, 3)
+    assert len(seen[0].states) == len(seen[0].actions) == steps
+    assert (seen[0].states[[0, -1]] == recorded[0].states[[0, -1]]).all()
+    ends = np.flatnonzero(np.any(np.diff(seen[0].states, axis=0), axis=1))
+    assert len(ends) == min(steps, len(recorded[0].states)) - 1  # slower, not further
+
+
+def test_the_noise_flies_whole_episodes(monkeypatch):
+    monkeypatch.setattr(scale_study, "REPEATS", 1)
+    played, original = [], scale_study.play
+    monkeypatch.setattr(scale_study, "play", lambda *given: played.append(original(*given)) or played[-1])
+    (taken,) = scale_study.physics(3).values()
+    assert taken > 0 and len(played[0].lengths) == 3 and (played[0].lengths > 30).all()
 
 
 def test_a_measurement_has_a_process_of_its_own_and_memory_that_is_the_same_each_time():
@@ -63,19 +83,25 @@ def test_the_study_has_a_row_per_thing_and_size(monkeypatch):
     found = {"seconds": lambda what, n, *_: {what: float(n)}, "megabytes": lambda what, n, *_: 10.0 * n}
     seen = []
 
-    def one_by_one(work, arguments, *_, **__):
+    def backwards(work, arguments, *_, **__):
         seen.extend(arguments)
-        return enumerate(work(*each) for each in arguments)
+        return ((i, work(*arguments[i])) for i in reversed(range(len(arguments))))
 
     monkeypatch.setattr(scale_study, "alone", lambda quantity, *work: found[quantity](*work))
-    monkeypatch.setattr(scale_study, "results", one_by_one)
-    frame = scale_study.study(episodes=(10,), cells=(5,), dimensions=(2, 3), n_runs=(1,), n_workers=(1, 2))
-    assert frame.groupby("over")["size"].agg(list).to_dict() == {
-        "cells": [5], "copies": [50], "dimensions": [2, 3, 2, 3], "episodes": [10, 10], "runs": [1], "workers": [1, 2]
+    monkeypatch.setattr(scale_study, "results", backwards)
+    sizes = {"episodes": (10,), "cells": (5,), "dimensions": (2, 3), "steps": (7,), "n_runs": (1,), "n_workers": (1, 2)}
+    frame = scale_study.study(**sizes)
+    timed, held = frame[frame["seconds"].notna()], frame[frame["megabytes"].notna()]
+    assert timed.groupby("over")["size"].agg(list).to_dict() == {
+        "cells": [5], "copies": [50], "dimensions": [2, 3, 2, 3], "episodes": [10, 10], "runs": [1], "steps": [7],
+        "workers": [1, 2],
     }  # fmt: skip
-    counted = frame[~frame["over"].isin(["runs", "workers"])]
-    assert (counted["megabytes"] == 10 * counted["seconds"]).all() and frame["megabytes"].count() == len(counted)
-    assert seen[0] == ("megabytes", "physics", 50) and frame["machine"].nunique() == 1  # the longest first
+    assert held.groupby("what")["size"].agg(sorted).to_dict() == {
+        "a partition": [2, 3, 5], "distillation": [10], "evaluation": [10]
+    }  # fmt: skip
+    sized = held[held["over"] != "dimensions"]
+    assert (sized["megabytes"] == 10 * sized["size"]).all() and len(timed) + len(held) == len(frame)
+    assert seen[0] == ("megabytes", "distillation", 10) and frame["machine"].nunique() == 1  # the largest first
 
 
 def test_the_command_writes_a_listed_table(monkeypatch, tmp_path):

@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from vsp import scaling
+from vsp import scaling, study
 from vsp.config import preset
 from vsp.scaling import Environment, cost, exponents, power_law
 
@@ -43,6 +43,7 @@ def curves(**changes):
     """Rows as scale_study writes them: everything takes a second, or what `changes` says, and a megabyte."""
     what = ("training", "splitting pass", "merging pass", "teacher, 1000 states", "cells, 1000 states")
     rows = [{"what": name, "over": "dimensions", "size": d} for name in what for d in (2, 4, 8, 17)]
+    rows += [{"what": name, "over": "steps", "size": n} for name in what[:3] for n in (10, 100, 1000)]
     rows += [{"what": "physics, 1000 steps", "over": "copies", "size": 50}]
     rows += [{"what": name, "over": "workers", "size": n} for name in ("processes", "Dask workers") for n in (1, 2)]
     frame = pd.DataFrame(rows).assign(seconds=1.0, megabytes=1.0)
@@ -75,7 +76,7 @@ def test_a_cost_by_hand():
 
 def test_without_an_engine_a_step_is_free_and_dimensions_are_interpolated():
     frame = curves(physics=1e9)
-    frame.loc[frame["what"] == "training", "seconds"] = frame["size"] * 1.0
+    frame.loc[(frame["what"] == "training") & (frame["over"] == "dimensions"), "seconds"] = frame["size"] * 1.0
     task = Environment("toy", 6, 1, 100, False)
     row = cost(frame, n_runs=1, tasks=[task]).iloc[0]
     config = preset("SimpleGoal-v0")
@@ -83,17 +84,54 @@ def test_without_an_engine_a_step_is_free_and_dimensions_are_interpolated():
     assert row["distillation"] * 3600 == pytest.approx(config.n_epochs * (6 + 1 / config.n_split + 1 / config.n_merge))
 
 
+def test_a_longer_episode_costs_what_its_steps_do():
+    frame = curves()
+    frame.loc[(frame["what"] == "splitting pass") & (frame["over"] == "steps"), "seconds"] = frame["size"] / 50.0
+    config = preset("SimpleGoal-v0")
+    for steps, times in ((100, 1), (1000, 10), (250, 2.5)):
+        row = cost(frame, n_runs=1, tasks=[Environment("toy", 4, 1, steps, False)]).iloc[0]
+        expected = config.n_epochs * (1 + times / config.n_split + 1 / config.n_merge)
+        assert row["distillation"] * 3600 == pytest.approx(expected)
+
+
+def test_memory_is_the_bound_of_the_buffers_by_hand():
+    config = preset("SimpleGoal-v0")
+    row = cost(curves(), tasks=[Environment("toy", 3, 1, 100, False)]).iloc[0]
+    rows = config.n_reset * 100
+    expected = rows * 16 * 5 + rows * 8 * scaling.N_CELLS + 500 * 100 * 8 * 4 + 40 * config.n_epochs
+    assert row["MB in memory"] == pytest.approx(expected / 1e6)
+
+
+@pytest.mark.parametrize(("d", "steps"), [(1, 100), (18, 100), (4, 5), (4, 2000)])
+def test_a_task_outside_what_was_measured_is_refused(d, steps):
+    with pytest.raises(ValueError, match="(dimensions|steps) are .*, as was measured"):
+        cost(curves(), tasks=[Environment("toy", d, 1, steps, False)])
+
+
+def test_the_cost_of_a_run_is_near_what_a_run_took():
+    """The made-up teacher's run has fewer cells than `N_CELLS`, and its time is measured in another way."""
+    frame = study.read("scale")
+    taken = frame[frame["what"] == "distillation"].dropna(subset=["seconds"]).sort_values("size")
+    seconds = np.interp(preset("SimpleGoal-v0").n_epochs, taken["size"], taken["seconds"])
+    row = cost(frame, n_runs=1, tasks=scaling.TEN_TASKS[:1]).iloc[0]
+    assert 1 / 3 < row["distillation"] * 3600 / seconds < 3
+
+
 def test_ten_tasks_are_ten_within_the_measured_dimensions():
     assert len({task.name for task in scaling.TEN_TASKS}) == 10
     assert {task.d for task in scaling.TEN_TASKS} <= set(range(2, 18))
 
 
-def test_efficiency_and_overhead_by_hand():
+def test_what_a_second_worker_adds_by_hand():
     frame = curves()
-    dask = frame["what"] == "Dask workers"
-    frame.loc[dask & (frame["size"] == 1), "seconds"] = 1.0 + 0.5 * scaling.N_RUNS
-    frame.loc[dask & (frame["size"] == 2), "seconds"] = (1.0 + 0.5 * scaling.N_RUNS) / 1.5
-    assert scaling.efficiency(frame) == pytest.approx(0.75) and scaling.overhead(frame) == pytest.approx(0.5)
+    frame.loc[(frame["what"] == "Dask workers") & (frame["size"] == 2), "seconds"] = 1 / 1.75
+    assert scaling.second_worker(frame) == pytest.approx(0.75)
+    assert scaling.second_worker(frame, "processes") == 0
+
+
+def test_exponents_in_words():
+    text = scaling.in_words(curves())
+    assert text.startswith("with these exponents: over dimensions ") and "0.0 for training" in text and text[-1] == "."
 
 
 def test_a_part_of_the_measured_figures_is_one_table():

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, PercentFormatter
 
 from .figures import COLOURS, DISTILLED, GOAL, OTHER, TEACHER
 from .scaling import POINTS, power_law
@@ -18,18 +18,22 @@ _MARKS = "osD^"
 _PARTS = {"teacher": TEACHER, "physics": OTHER, "distillation": DISTILLED, "evaluation": GOAL}
 
 
-def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds") -> Axes:
-    """`quantity` over size n, logarithmic: a mark per measurement, dashed the fitted law; the legend is below."""
+def growth(ax: Axes, frame: pd.DataFrame, quantity: str = "seconds", *, law: bool = True) -> Axes:
+    """`quantity` over size n, logarithmic: a mark per measurement, dashed the fitted law; the legend is below.
+
+    Without a `law`, or with fewer sizes than it needs, marks are joined.
+    """
+    frame = frame.dropna(subset=[quantity])
     for (what, part), color, mark in zip(
         frame.groupby("what", sort=False), itertools.cycle(_LINES), itertools.cycle(_MARKS)
     ):
         sizes, values = part["size"].to_numpy(), part[quantity].to_numpy()
-        label = what.partition(",")[0]
-        if len(part) >= POINTS:
+        label, fits = what.partition(",")[0], law and len(part) >= POINTS
+        if fits:
             upper, fitted, exponent, _ = power_law(sizes, values)
             ax.plot(upper, fitted, color=color, ls="--", lw=0.8)
             label += f", $n^{{{exponent:.1f}}}$"
-        ax.plot(sizes, values, mark, color=color, ms=3.5, ls="" if len(part) >= POINTS else "-", label=label)
+        ax.plot(sizes, values, mark, color=color, ms=3.5, ls="" if fits else "-", label=label)
     ax.set(xscale="log", yscale="log", xlabel=f"$n$ = {frame['over'].iloc[0]}", ylabel=quantity)
     _few_numbers(ax.xaxis, frame["size"])
     _few_numbers(ax.yaxis, frame[quantity])
@@ -48,13 +52,16 @@ def _few_numbers(axis: Axis, values: pd.Series) -> None:
 
 
 def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
-    """Seconds that the re-run took over the moment of the kill; the line is a run that nobody disturbed."""
+    """How long the re-run took over the moment of the kill, both as shares of the time of a run nobody disturbed."""
+    moment, again = frame["moment"] / frame["undisturbed"], frame["again"] / frame["undisturbed"]
     held = frame["wrong"].isna()
-    ax.axhline(frame["undisturbed"].iloc[0], color=TEACHER, lw=0.8, label="undisturbed, from nothing")
-    ax.plot(frame["moment"][held], frame["again"][held], "o", color=DISTILLED, ms=3, label="the same bytes")
+    ax.axhline(1, color=TEACHER, lw=0.8, label="undisturbed, from nothing")
+    ax.plot(moment[held], again[held], "o", color=DISTILLED, ms=3, label="the same bytes")
     if not held.all():
-        ax.plot(frame["moment"][~held], frame["again"][~held], "X", color=COLOURS[3], ms=5, label="other bytes")
-    ax.set(xlabel="seconds from the start to the kill", ylabel="seconds of the re-run", ylim=(0, None))
+        ax.plot(moment[~held], again[~held], "X", color=COLOURS[3], ms=5, label="other bytes")
+    ax.set(xlabel="moment of the kill", ylabel="time of the re-run", xlim=(0, 1), ylim=(0, None))
+    ax.xaxis.set_major_formatter(PercentFormatter(1))
+    ax.yaxis.set_major_formatter(PercentFormatter(1))
     ax.legend(loc="lower left", frameon=False)
     return ax
 

@@ -32,7 +32,7 @@ from .machine import cpu_type
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .progress import progress
-from .rollouts import record
+from .rollouts import Episode, play, record
 from .teachers import Teacher
 from .workers import results
 
@@ -40,12 +40,13 @@ TASK = "SimpleGoal-v0"
 EPISODES = tuple(round(10**e) for e in (3, 3.5, 4, 4.5, 5, 5.5, 6))
 CELLS = (10, 18, 32, 56, 100, 178, 316, 562, 1000)
 DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)
+STEPS = (10, 30, 100, 300, 1000)
 RUNS = (1, 3, 10, 30, 100, 300, 1000)
 WORKERS = (1, 2, 3, 4)
 LAYERS = (400, 300)  # of the teachers' networks
-N_CELLS = 30  # where dimensions vary
+N_CELLS, N_STEPS, D = 30, 100, 8  # where something else varies
 N_RUNS = 40  # where workers vary
-PASSES = 5  # of which the median counts
+REPEATS = 25  # of which the median counts, where one takes less than a second
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,6 +59,17 @@ class Pursuit:
         """Actions in [-1, 1] for observations (n, d)."""
         states = np.asarray(obs, dtype=np.float64)
         return np.clip(-4 * states * (1.5 - np.roll(states, 1, axis=-1)), -1, 1), None
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """An agent for LunarLander that acts at random."""
+
+    rng: np.random.Generator
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions in [-1, 1] for observations (n, d)."""
+        return self.rng.uniform(-1, 1, size=(len(obs), 2)), None
 
 
 def reach(d: int) -> Task:
@@ -98,24 +110,36 @@ def evaluation(n: int) -> dict[str, float]:
     return {"evaluation": _seconds(lambda: outcomes(Pursuit(), TASK, n, seed=0))}
 
 
-def passes(k: int, d: int) -> dict[str, float]:
-    """A pass of each part of Algorithm 1 over k cells in d dimensions that neither grow nor vanish; medians."""
+def passes(k: int, d: int, steps: int = N_STEPS) -> dict[str, float]:
+    """A pass of each part of Algorithm 1 over k cells in d dimensions that neither grow nor vanish; medians.
+
+    The episode has so many steps, and stays in a cell for as much longer. Beyond 4 dimensions neighbours are those that
+    visited states show, for the Delaunay graph of the paper takes minutes there (`lookup_study`).
+    """
+    partition, episodes, rng = _partition(k, d)
+    config = partition.config
+    slower = np.linspace(0, len(episodes[0].states) - 1, steps).round().astype(int)
+    episode = Episode(episodes[0].states[slower], episodes[0].actions[slower])
+    work = {
+        "training": lambda: (partition.observe(episode), partition.train(rng)),
+        "splitting pass": lambda: split_regions(partition, episode, config, rng),
+        "merging pass": lambda: merge_regions(partition, config),
+    }
+    return {name: _median(lambda: _seconds(one)) for name, one in work.items()}
+
+
+def _partition(k: int, d: int) -> tuple[Partition, list[Episode], np.random.Generator]:
+    """k cells that are never split or merged, and the 20 episodes a cell that they have seen."""
     rng, task = np.random.default_rng([k, d]), reach(d)
-    graph = "delaunay" if d <= 4 else "visited"  # Qhull needs minutes in more: see lookup_study.py
+    graph = "delaunay" if d <= 4 else "visited"
     never = {"min_pol_distance": 10.0 * d, "min_param_distance": 1e-9, "neighbours": graph}
-    config = dataclasses.replace(preset(TASK), **never)
-    partition = Partition(task, config)
+    partition = Partition(task, dataclasses.replace(preset(TASK), **never))
     for codeword in rng.random((k, d)):
         partition.add(codeword, rng)
     episodes = record(Pursuit(), task, task.start(rng, 20 * k))
     for episode in episodes:
         partition.observe(episode)
-    work = {
-        "training": lambda: (partition.observe(episodes[0]), partition.train(rng)),
-        "splitting pass": lambda: split_regions(partition, episodes[0], config, rng),
-        "merging pass": lambda: merge_regions(partition, config),
-    }
-    return {name: float(np.median([_seconds(one) for _ in range(PASSES)])) for name, one in work.items()}
+    return partition, episodes, rng
 
 
 def policies(d: int) -> dict[str, float]:
@@ -128,19 +152,21 @@ def policies(d: int) -> dict[str, float]:
     codewords, maps = rng.random((N_CELLS, d)), rng.normal(size=(N_CELLS, d + 1, d))
     work = {"teacher": network, "cells": VoronoiPolicy(codewords, maps, task=reach(d))}
     return {
-        f"{name}, 1000 states": float(np.median([_seconds(lambda: policy.predict(states)) for _ in range(9)]))
+        f"{name}, 1000 states": _median(lambda: _seconds(lambda: policy.predict(states)))
         for name, policy in work.items()
     }
 
 
 def physics(n: int) -> dict[str, float]:
-    """A thousand steps of a physics engine, LunarLander's, over n copies of it."""
+    """A thousand steps of a physics engine, LunarLander's, in n episodes at a time of an agent that acts at random."""
     task, rng = get_task("LunarLanderContinuous-v3"), np.random.default_rng(0)
-    states, actions = task.begin(task.start(rng, n)), np.zeros((n, 2))
-    steps = 20
-    return {
-        "physics, 1000 steps": _seconds(lambda: [task.step(states, actions) for _ in range(steps)]) * 1000 / (n * steps)
-    }
+
+    def each() -> float:
+        found = []
+        taken = _seconds(lambda: found.append(play(Noise(rng), task, task.start(rng, n))))
+        return 1000 * taken / found[0].lengths.sum()
+
+    return {"physics, 1000 steps": _median(each)}
 
 
 def runs(n: int, *, jobs: int | str = -1) -> dict[str, float]:
@@ -152,14 +178,16 @@ def runs(n: int, *, jobs: int | str = -1) -> dict[str, float]:
 
 
 def workers(n: int) -> dict[str, float]:
-    """`N_RUNS` short runs by n processes of this machine, and by n workers of a Dask cluster on it."""
+    """`N_RUNS` short runs by n processes of this machine, and by n workers of a Dask cluster on it; medians of five."""
     from distributed import LocalCluster
 
-    runs(n, jobs=n)  # so that workers are there and have imported what they need
-    here = runs(N_RUNS, jobs=n)["runs"]
+    def median(jobs: int | str) -> float:
+        runs(n, jobs=jobs)  # so that workers are there and have imported what they need
+        return float(np.median([runs(N_RUNS, jobs=jobs)["runs"] for _ in range(5)]))
+
+    here = median(n)
     with LocalCluster(n_workers=n, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL") as cluster:
-        runs(n, jobs=cluster.scheduler_address)
-        return {"processes": here, "Dask workers": runs(N_RUNS, jobs=cluster.scheduler_address)["runs"]}
+        return {"processes": here, "Dask workers": median(cluster.scheduler_address)}
 
 
 MEASURED = {
@@ -173,6 +201,14 @@ MEASURED = {
 }
 
 
+# What is counted of each, and under which name; of others memory is that of other processes, or small
+HOLDS = {"distillation": "distillation", "evaluation": "evaluation", "passes": "a partition"}
+
+
+def _median(measure: Callable[[], float]) -> float:
+    return float(np.median([measure() for _ in range(REPEATS)]))
+
+
 def _seconds(work: Callable[[], object]) -> float:
     begin = time.perf_counter()
     work()
@@ -182,28 +218,30 @@ def _seconds(work: Callable[[], object]) -> float:
 # Measuring
 
 
-def study(*, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, n_runs=RUNS, n_workers=WORKERS) -> pd.DataFrame:
-    """One row per thing and size: `what`, `over` (what the size counts), `size`, `seconds`, and `megabytes` at most.
+def study(
+    *, episodes=EPISODES, cells=CELLS, dimensions=DIMENSIONS, steps=STEPS, n_runs=RUNS, n_workers=WORKERS
+) -> pd.DataFrame:
+    """One row per thing and size: `what`, `over` (what the size counts), `size`, and `seconds` or `megabytes`.
 
-    Times are taken one after the other; memory, which does not depend on what else goes on, then on all cores. Memory
-    is NaN where other processes hold it.
+    Times are taken one after the other; memory, which does not depend on what else goes on, then on all cores.
     """
     asked = [("episodes", n, what, n) for what in ("distillation", "evaluation") for n in episodes]
     asked += [("cells", k, "passes", k, 2) for k in cells]
     asked += [("dimensions", d, "passes", N_CELLS, d) for d in dimensions]
+    asked += [("steps", n, "passes", N_CELLS, D, n) for n in steps]
     asked += [("dimensions", d, "policies", d) for d in dimensions] + [("copies", 50, "physics", 50)]
     asked += [("runs", n, "runs", n) for n in n_runs] + [("workers", n, "workers", n) for n in n_workers]
     rows = []
     for over, size, *work in progress(asked, "times", total=len(asked), unit="measurements"):
-        about = {"work": tuple(work), "over": over, "size": size}
-        rows += [{"what": what, **about, "seconds": taken} for what, taken in alone("seconds", *work).items()]
-    frame = pd.DataFrame(rows)
-    traced = frame.loc[~frame["over"].isin(["runs", "workers"]), "work"].unique()
-    longest = sorted(traced, key=lambda work: -frame.loc[frame["work"] == work, "seconds"].sum())
-    jobs = [("megabytes", *work) for work in longest]
-    found = results(alone, jobs, "memory", jobs=-1, total=len(jobs), unit="measurements")
-    peaks = {longest[i]: peak for i, peak in found}
-    return frame.assign(megabytes=frame.pop("work").map(peaks), machine=cpu_type())
+        found = alone("seconds", *work)
+        rows += [{"what": what, "over": over, "size": size, "seconds": taken} for what, taken in found.items()]
+    counted = [one for one in asked if one[2] in HOLDS and one[0] != "steps"]
+    counted.sort(key=lambda one: one[1], reverse=True)  # the largest takes longest
+    jobs = [("megabytes", *work) for _, _, *work in counted]
+    peaks = dict(results(alone, jobs, "memory", jobs=-1, total=len(jobs), unit="measurements"))
+    for i, (over, size, what, *_) in enumerate(counted):
+        rows.append({"what": HOLDS[what], "over": over, "size": size, "megabytes": peaks[i]})
+    return pd.DataFrame(rows).assign(machine=cpu_type())
 
 
 def alone(quantity: str, what: str, *sizes: int) -> dict[str, float] | float:

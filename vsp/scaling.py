@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 
 from .checks import check_array
-from .config import preset
-from .scale_study import N_CELLS, N_RUNS
+from .config import Config, preset
+from .distill import EPISODES_AHEAD
+from .scale_study import N_CELLS, N_STEPS
 
 POINTS = 4  # sizes that a fit needs at least
 
@@ -45,9 +46,11 @@ def exponents(frame: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for (over, what), part in frame.groupby(["over", "what"], sort=False):
-        enough = [name for name in ("seconds", "megabytes") if part[name].notna().sum() >= POINTS]
-        for quantity in enough:
-            _, _, exponent, half = power_law(part["size"].to_numpy(), part[quantity].to_numpy())
+        for quantity in ("seconds", "megabytes"):
+            measured = part.dropna(subset=[quantity])
+            if len(measured) < POINTS:
+                continue
+            _, _, exponent, half = power_law(measured["size"].to_numpy(), measured[quantity].to_numpy())
             about = {"over": over, "what": what, "quantity": quantity}
             rows.append({**about, "exponent": exponent, "low": exponent - half, "high": exponent + half})
     return pd.DataFrame(rows)
@@ -87,47 +90,57 @@ def cost(frame: pd.DataFrame, *, n_runs: int = 1000, tasks=TEN_TASKS) -> pd.Data
     """Core-hours of `n_runs` runs of the paper's method per task, a row each, from the measured curves.
 
     A run has SimpleGoal's settings, `N_CELLS` cells throughout, the teacher's network of the paper, and two evaluations
-    of 1000 episodes. Between measured dimensions values are interpolated; a step of any physics engine costs what
-    LunarLander's does. Columns: task, d, steps, then core-hours: teacher, physics, distillation, evaluation, all; and
-    megabytes, of arrays in one run and on disk for all runs.
+    of 1000 episodes. A pass costs what it does in d dimensions, times what the steps of an episode make of it; a step
+    of any physics engine, what LunarLander's does. Columns: task, d, steps, then core-hours: teacher, physics,
+    distillation, evaluation, all; then megabytes: of one run at most, by what its buffers promise, and on disk for all
+    runs. Raises ValueError for a task outside what was measured.
     """
     config = preset("SimpleGoal-v0")
     rows = []
     for task in tasks:
-        training, split, merge, teacher = (
-            _at(frame, what, task.d) for what in ("training", "splitting pass", "merging pass", "teacher, 1000 states")
+        training, split, merge = (
+            _at(frame, what, "dimensions", task.d)
+            * (_at(frame, what, "steps", task.steps) / _at(frame, what, "steps", N_STEPS))
+            for what in ("training", "splitting pass", "merging pass")
         )
         played, judged = config.n_epochs * task.steps / 1000, 2 * task.steps  # thousands of steps
         step = float(frame.loc[frame["what"] == "physics, 1000 steps", "seconds"].iloc[0]) if task.engine else 0.0
         hours = {
-            "teacher": played * teacher,
+            "teacher": played * _at(frame, "teacher, 1000 states", "dimensions", task.d),
             "physics": played * step,
             "distillation": config.n_epochs * (training + split / config.n_split + merge / config.n_merge),
-            "evaluation": judged * (step + _at(frame, "cells, 1000 states", task.d)),
+            "evaluation": judged * (step + _at(frame, "cells, 1000 states", "dimensions", task.d)),
         }
         hours = {name: n_runs * seconds / 3600 for name, seconds in hours.items()}
-        numbers = 3 * 1000 + config.n_epochs + N_CELLS * (task.d + (task.d + 1) * task.m)  # in the file of a run
-        size = {"MB in memory": _at(frame, "training", task.d, "megabytes"), "MB on disk": n_runs * numbers * 8 / 1e6}
+        size = {"MB in memory": _bytes(task, config) / 1e6, "MB on disk": n_runs * _bytes_on_disk(task, config) / 1e6}
         rows.append({"task": task.name, "d": task.d, "steps": task.steps, **hours, "all": sum(hours.values()), **size})
     return pd.DataFrame(rows)
 
 
-def _at(frame: pd.DataFrame, what: str, d: int, quantity: str = "seconds") -> float:
-    """What was measured in d dimensions, or between."""
-    part = frame[(frame["what"] == what) & (frame["over"] == "dimensions")].sort_values("size")
-    return float(np.interp(d, part["size"], part[quantity]))
+def _at(frame: pd.DataFrame, what: str, over: str, size: float) -> float:
+    """Seconds measured at a size, or between two, where logarithms are interpolated."""
+    part = frame[(frame["what"] == what) & (frame["over"] == over)].dropna(subset=["seconds"]).sort_values("size")
+    if not part["size"].min() <= size <= part["size"].max():
+        raise ValueError(f"{over} are {size}, expected {part['size'].min()} to {part['size'].max()}, as was measured")
+    return float(np.exp(np.interp(np.log(size), np.log(part["size"]), np.log(part["seconds"]))))
 
 
-def efficiency(frame: pd.DataFrame, what: str = "Dask workers") -> float:
-    """The share of a second core that a second worker puts to use: half the speed-up of two over one."""
+def _bytes(task: Environment, config: Config) -> float:
+    """What a run holds at most: the bound of `Buffers`, the episodes that are played ahead, the history."""
+    rows = config.n_reset * task.steps
+    buffers = rows * (16 * (task.d + 1 + task.m) + 8 * N_CELLS)
+    return buffers + EPISODES_AHEAD * task.steps * 8 * (task.d + task.m) + 40 * config.n_epochs
+
+
+def _bytes_on_disk(task: Environment, config: Config) -> float:
+    """The file of a run: returns, lengths and ends of 1000 episodes, the history, the policy."""
+    return 8 * (3 * 1000 + config.n_epochs + N_CELLS * (task.d + (task.d + 1) * task.m))
+
+
+def second_worker(frame: pd.DataFrame, what: str = "Dask workers") -> float:
+    """What a second worker adds, as a share of what the first one does."""
     times = frame[frame["what"] == what].set_index("size")["seconds"]
-    return float(times[1] / times[2] / 2)
-
-
-def overhead(frame: pd.DataFrame) -> float:
-    """Seconds that a run through a Dask scheduler takes longer than in a process of this machine, one worker each."""
-    times = frame[(frame["over"] == "workers") & (frame["size"] == 1)].set_index("what")["seconds"]
-    return float((times["Dask workers"] - times["processes"]) / N_RUNS)
+    return float(times[1] / times[2] - 1)
 
 
 def part(frame: pd.DataFrame, table: str) -> pd.DataFrame:

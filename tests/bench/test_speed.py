@@ -102,12 +102,13 @@ def test_evaluation_of_the_teacher(task, record):
         *(outcomes(policy, task, 1000, seed=1).returns for policy in (OneByOne(agent), teacher)),
     )
     gap, others = np.abs(direct - single).max(), int((np.abs(direct - own) > 1e-5).sum())
-    text = (
-        f"largest difference {gap:.1g}; with our own forward pass {others} of 1000 differ by more than 1e-5, "
-        f"the mean by {abs(direct.mean() - own.mean()):.1g}"
-    )
     what = f"the same 1000 returns of the teacher, {task}"
-    record("speed", what, "within 1e-5 with the agent's own actions", text, gap <= 1e-5)
+    text = f"largest difference {gap:.1g}"
+    record("speed", f"{what}, with the agent's actions", "within 1e-5", text, gap <= 1e-5)
+    text = f"{others} of 1000 differ by more, the mean by {abs(direct.mean() - own.mean()):.1g}"
+    why = "a float32 sum in another order decides an episode at the very edge of the goal"
+    record("speed", f"{what}, with our forward pass", "within 1e-5", text, others == 0, why=why)
+    assert abs(direct.mean() - own.mean()) < 0.1
 
 
 def evaluations(ours, theirs, task: str) -> np.ndarray:

@@ -95,6 +95,13 @@ def state_of_code() -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(paths))).hexdigest()[:10]
 
 
+def state_of_machinery() -> str:
+    """Ten hexadecimal digits for what decides what a kill leaves behind and what the next make does with it."""
+    names = ("store", "runner", "workers", "experiments", "environment", "manifest", "progress")
+    paths = [ROOT / "Makefile", ROOT / "environment.lock", *(ROOT / "vsp" / f"{name}.py" for name in names)]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:10]
+
+
 class Reference:
     """An undisturbed run: its files, how long it took, and how long each notebook did (seconds).
 

@@ -3,7 +3,7 @@
 import os
 import signal
 
-from makes import difference, figures, tree, until
+from makes import difference, figures, processes, tree, until
 
 
 def test_a_cluster_makes_the_same_figures_and_tables_although_a_worker_dies(tmp_path, record):
@@ -16,10 +16,13 @@ def test_a_cluster_makes_the_same_figures_and_tables_although_a_worker_dies(tmp_
         make = figures(there, env={"DASK": cluster.scheduler_address})
         victim = next(iter(cluster.workers.values())).pid
         done = len(until(lambda: list(there.rglob("[0-9]*.run")), 300))
+        assert done and not [one for one in processes(there).values() if "popen_loky" in one], "the cluster has no work"
         os.kill(victim, signal.SIGKILL)
         assert make.wait() == 0, make.said
+    total = len(list(there.rglob("[0-9]*.run")))
+    assert done < total, "no run was left when the worker died"
     wrong = difference(tree(here), tree(there))
-    text = f"{wrong or 'all the same'}, a worker killed after {done} of {len(list(there.rglob('[0-9]*.run')))} runs"
+    text = f"{wrong or 'all the same'}, a worker killed after {done} of {total} runs"
     record(
         "faults", "figures and tables from a Dask cluster of two workers, one killed", "the same files", text, not wrong
     )

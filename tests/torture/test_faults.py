@@ -1,10 +1,11 @@
 """Kills, full and closed disks, two makes at once, odd places, spoilt environments: `make torture`, hours.
 
 After each fault, a re-run must end with the bytes of an undisturbed run. FAULTS=5 tries the first 5 of each row; the
-50 kills of whole groups go on where an earlier call stopped. Both the reference and what is done so far lie in
-build/torture, by the state of the code.
+50 kills of whole groups go on where an earlier call stopped, also one whose rows are committed. Both the reference and
+what is done so far lie in build/torture, by the state of the code.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -23,7 +24,7 @@ import pandas as pd
 import pytest
 from makes import FIGURES, ROOT, Make, Reference, difference, figures, processes, tree, until
 
-from vsp.store import alone
+from vsp.store import alone, read_table
 
 PER_ROW = int(os.environ.get("FAULTS", 1000))  # at most so many of each row
 WITHIN = 60  # seconds for make to notice a killed child
@@ -58,7 +59,8 @@ def wrong_after(out, reference, log, *, env=None) -> str:
 def tell(record, what: str, wrong: dict[str, str], tried: int, *, of: int, more: str = "") -> None:
     """Record a row of several trials: how many held, and of the others what was wrong."""
     value = f"{tried - len(wrong)} of {tried}{more}" + "".join(f"; {name}: {why}" for name, why in wrong.items())
-    record("faults", what, f"{of} of {of}", value, not wrong and tried >= of)
+    why = "" if wrong or tried >= of else "more are still to be tried"
+    record("faults", what, f"{of} of {of}", value, not wrong and tried >= of, why=why)
 
 
 # Kills
@@ -66,15 +68,15 @@ def tell(record, what: str, wrong: dict[str, str], tried: int, *, of: int, more:
 
 def test_kill_of_the_process_group(folder, reference, record, keep):
     """At a moment drawn from each fiftieth of the undisturbed run's time, in random order."""
-    rng = np.random.default_rng(0)
+    rng, state = np.random.default_rng(0), makes.state_of_machinery()
     shares = ((np.arange(50) + rng.uniform(size=50)) / 50)[rng.permutation(50)]
     note = folder / "kills.json"
-    done = json.loads(note.read_text()) if note.exists() else {}
+    done = json.loads(note.read_text()) if note.exists() else committed(state)
     for share in map("{:.4f}".format, shares[:PER_ROW]):
         if share not in done:
-            moment = float(share) * reference.seconds
-            wrong, again = killed_at(moment, reference)
-            done[share] = {"moment": moment, "again": again, "undisturbed": reference.seconds, "wrong": wrong}
+            wrong, moment, again = killed_at(float(share) * reference.seconds, reference)
+            about = {"share": share, "moment": moment, "again": again, "undisturbed": reference.seconds}
+            done[share] = {**about, "wrong": wrong, "state": state}
             note.write_text(json.dumps(done, indent=2))
             print(f"killed after {moment:.0f} s: {wrong or 'held'}", file=sys.__stderr__, flush=True)
     keep("kills", pd.DataFrame(done.values()))
@@ -82,15 +84,25 @@ def test_kill_of_the_process_group(folder, reference, record, keep):
     tell(record, "SIGKILL of the process group, at random moments", wrong, len(done), of=50)
 
 
-def killed_at(seconds: float, reference: Reference) -> tuple[str, float]:
-    """What is wrong after a kill so many seconds after the start, empty if nothing; and the seconds of the re-run."""
+def committed(state: str) -> dict[str, dict]:
+    """The kills in data/results, where the code was as it is now: they may be another machine's, or another day's."""
+    path = ROOT / "data" / "results" / "kills.csv"
+    rows = read_table(path, dtype=str, keep_default_na=False).to_dict("records") if path.exists() else []
+    numbers = ("moment", "again", "undisturbed")
+    return {row["share"]: row | {name: float(row[name]) for name in numbers} for row in rows if row["state"] == state}
+
+
+def killed_at(seconds: float, reference: Reference) -> tuple[str, float, float]:
+    """What is wrong after a kill so many seconds after the start, empty if nothing; that moment; seconds of the re-run.
+
+    Where make had ended by then, for it was quicker than the undisturbed one, the same again a tenth earlier.
+    """
     out = reference.out
     shutil.rmtree(out, ignore_errors=True)
     make = figures(out)
-    try:
+    with contextlib.suppress(subprocess.TimeoutExpired):
         make.process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        pass
+        return killed_at(0.9 * seconds, reference)
     orphans = processes(out)
     make.kill()
     killed = time.monotonic()
@@ -98,7 +110,7 @@ def killed_at(seconds: float, reference: Reference) -> tuple[str, float]:
     again = time.monotonic() - killed
     until(lambda: not orphans.keys() & processes(out).keys(), killed + GONE - time.monotonic())
     left = [f"still there: {command[:200]}" for pid, command in processes(out).items() if pid in orphans]
-    return " ".join([wrong or difference(tree(out), reference.tree), *left]).strip(), again
+    return " ".join([wrong or difference(tree(out), reference.tree), *left]).strip(), seconds, again
 
 
 def test_kill_of_a_kernel(folder, reference, record):
@@ -107,7 +119,9 @@ def test_kill_of_a_kernel(folder, reference, record):
     for number in range(tried):
         name = str(rng.choice(list(reference.notebooks)))
         out = reference.again(without=reference.notebooks)  # others are under way when this one dies
-        when, took, said = kill_one(out, "ipykernel_launcher", lambda: rng.uniform(0, 0.8) * reference.notebooks[name])
+        place = f"{out}/build/running/{name}-"  # its kernel's working folder is there
+        moment = partial(rng.uniform, 0, 0.8 * reference.notebooks[name])
+        when, took, said = kill_one(out, "ipykernel_launcher", moment, place=place)
         slowest = max(slowest, took)
         problems = [] if f"error: {name}.ipynb" in said and "did not end" in said else [f"says {said[-300:]}"]
         problems += [f"took {took:.0f} s"] if took > WITHIN else []
@@ -122,7 +136,7 @@ def test_kill_of_a_worker(folder, reference, record):
     for number in range(tried):
         out = reference.again()
         shutil.rmtree(out / "data" / "runs")
-        when, took, said = kill_one(out, "loky.backend.popen_loky_posix", lambda: rng.uniform(0, 2.5), "JOBS=2")
+        when, took, said = kill_one(out, "loky.backend.popen_loky_posix", partial(rng.uniform, 0, 2.5), "JOBS=2")
         slowest = max(slowest, took)
         named = re.search(r"error: [\w-]+: a worker process was killed.* \d of 4 runs done.*goes on from there", said)
         problems = [] if named else [f"says {said[-300:]}"]
@@ -132,15 +146,16 @@ def test_kill_of_a_worker(folder, reference, record):
     tell(record, "SIGKILL of a pool worker", wrong, tried, of=10, more=f", make ended within {slowest:.0f} s")
 
 
-def kill_one(out: Path, what: str, moment, *more) -> tuple[float, float, str]:
-    """Kill a process whose command line has `what`: when after its start, how long make then took, and what it said.
+def kill_one(out: Path, what: str, moment, *more, place=None) -> tuple[float, float, str]:
+    """Kill a process at `place`, else `out`, whose command line has `what`.
 
-    Where the process has ended before, it was too late: the same again at another moment.
+    Returns when after its start, how long make then took, and what it said. Where the process has ended before, it was
+    too late: the same again at another moment.
     """
     before = tree(out)
     for _ in range(10):
         make, when = Make(*FIGURES, *more, f"OUT={out}", log=f"{out}.log"), moment()
-        mine = partial(_with, out, what)
+        mine = partial(_with, place or out, what)
         until(lambda: mine() or make.process.poll() is not None, 120)
         time.sleep(when)
         there = mine()
@@ -155,8 +170,8 @@ def kill_one(out: Path, what: str, moment, *more) -> tuple[float, float, str]:
     raise AssertionError(f"no {what} could be killed in time: {make.said}")
 
 
-def _with(out: Path, what: str) -> list[int]:
-    return [pid for pid, command in processes(out).items() if what in command]
+def _with(place, what: str) -> list[int]:
+    return [pid for pid, command in processes(place).items() if what in command]
 
 
 # Disks

@@ -1,4 +1,4 @@
-"""The properties of tests/test_properties.py and tests/test_codewords.py with 200 cases each."""
+"""The properties of tests/test_properties.py and tests/test_codewords.py with up to 200 cases each."""
 
 import os
 import re
@@ -22,8 +22,14 @@ def test_properties_of_public_functions(record):
     from test_properties import CASES, MOMENTS
 
     passed, last = with_many_cases("test_properties.py")
-    what = f"{len(CASES) + len(MOMENTS)} functions, 200 cases each" if passed else last
-    record("input", "bad arguments of public functions", "a typed error, never a silent result", what, passed > 0)
+    what = f"{len(CASES) + len(MOMENTS)} functions, up to 200 cases each" if passed else last
+    record(
+        "input",
+        "bad arguments of the public functions of a reader",
+        "a typed error, never a silent result",
+        what,
+        passed > 0,
+    )
 
 
 def test_codewords(record):
