@@ -136,9 +136,8 @@ MEASURED = $(OUT)/build/measured
 PUBLISH = $(PY) tests/measured.py "$(MEASURED)" "$(OUT)/data/results" README.md
 
 bench: venv ## measures speed and scale, into data/results/: an HOUR, on a machine that does nothing else
-	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(MEASURED)"
-	$(PY) -m vsp.scale_study --out "$(OUT)"
-	@$(PUBLISH)
+	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(MEASURED)"; status=$$?; \
+	  $(PY) -m vsp.scale_study --out "$(OUT)" && $(PUBLISH) && exit $$status
 
 torture: venv ## breaks it in every way we know, into data/results/: 2 to 3 HOURS; kills resume
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/torture --record "$(MEASURED)"; status=$$?; $(PUBLISH) && exit $$status

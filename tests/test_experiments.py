@@ -9,8 +9,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, same_arrays, tiny
 
 from vsp import experiments, store
-from vsp.envs import GOAL, PIT, TRUNCATED
-from vsp.evaluate import outcomes, spread
+from vsp.evaluate import outcomes
 from vsp.experiments import (
     EVALUATION_SEED,
     N_RUNS,
@@ -25,7 +24,6 @@ from vsp.experiments import (
     paper_experiment,
     paper_runs,
     returns,
-    summary,
 )
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)
@@ -286,32 +284,6 @@ def test_quick_results_of_the_paper(tmp_path, monkeypatch):
     monkeypatch.setattr(experiments, "outcomes", None)  # what is kept is not played again
     kept = experiments.paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1).teacher_outcomes
     assert same_arrays((kept.returns, again.returns), (kept.lengths, again.lengths), (kept.codes, again.codes))
-
-
-def test_overview_and_comparison_by_hand(results):
-    table = experiments.overview(results)
-    cells = [len(run.policy) for run in results.runs]
-    assert table.loc["cells"].tolist() == [np.mean(cells), min(cells), max(cells)]
-    facts = experiments.comparison(results)
-    means = results.returns.mean(axis=1)
-    assert facts["TD3, mean"] == results.teacher_returns.mean() and facts["lowest run"] == means.min()
-    assert facts["95 % interval from"] <= facts["distilled, mean"] <= facts["to"]
-    gap = facts["distilled, mean"] - facts["TD3, mean"]
-    assert facts["difference, from"] <= gap <= facts["difference, to"]
-    assert facts["runs above TD3"] == np.mean([mean > facts["TD3, mean"] for mean in means])
-    independent = 1.96 * results.returns.std(ddof=1) / np.sqrt(60)
-    assert facts["± if independent"] == pytest.approx(independent)
-
-
-def test_summary_tells_each_run(made):
-    frame = summary(made[1], SMALL)
-    assert frame["seed"].tolist() == [0, 1, 2] and set(frame["settings"]) == {SMALL.id}
-    assert np.allclose(frame[["goal", "pit", "truncated"]].sum(axis=1), 1)
-    for row, run in zip(frame.to_dict("records"), made[1]):
-        assert row["cells"] == len(run.policy) == 1 + row["splits"] - row["merges"]
-        assert {name: row[name] for name in spread(run.outcomes.returns)} == spread(run.outcomes.returns)
-        assert row["pit"] == np.mean(run.outcomes.codes == PIT) and row["goal"] == np.mean(run.outcomes.codes == GOAL)
-        assert row["truncated"] == np.mean(run.outcomes.codes == TRUNCATED)
 
 
 @pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])

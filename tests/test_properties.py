@@ -47,7 +47,7 @@ distill, evaluate, simplify = map(importlib.import_module, ("vsp.distill", "vsp.
 OUTSIDE = {
     "commands and studies, and what reads the tables that they write: their arguments are ours": """
         audit beyond comparison crowd experiments ledger lookup_study measure methods race readings_study scale_study
-        scaling study teachers_study training""",
+        scaling study summaries teachers_study training""",
     "draw such tables, and histories": "animation explorer figures_beyond figures_explorer figures_trust",
     "machinery around the method, each with tests of its own faults": """
         environment machine manifest progress runner store workers""",

@@ -90,8 +90,8 @@ MODULES = (
     "agents", "animation", "baselines", "beyond", "buffers", "checks", "config", "distill", "envs", "evaluate",
     "experiments", "explorer", "export", "figures", "figures_beyond", "figures_explorer", "geometry", "history",
     "ledger", "lime", "lookup_study", "measure", "methods", "moments", "paper", "partition", "policy", "race",
-    "readings", "refine", "regions", "rollouts", "runner", "simplify", "store", "study", "subpolicies", "tables",
-    "tdavq", "teachers", "training", "trees",
+    "readings", "refine", "regions", "rollouts", "runner", "simplify", "store", "study", "subpolicies",
+    "summaries", "tables", "tdavq", "teachers", "training", "trees",
 )  # fmt: skip
 
 

@@ -18,13 +18,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from . import store, workers
 from .config import Config, preset
 from .distill import distill
 from .envs import GOAL, PIT, TRUNCATED, get_task
-from .evaluate import interval, outcomes, spread
+from .evaluate import outcomes
 from .machine import cpu_type
 from .policy import VoronoiPolicy
 from .rollouts import Outcomes
@@ -34,6 +33,7 @@ N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section
 N_EPISODES = 1000
 EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states to report on, and to choose the best run on
 QUICK_RUNS, QUICK_EPISODES = 4, 100
+SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}  # the outcomes of episodes whose shares tables show
 _CODE = (
     "buffers",
     "checks",
@@ -270,66 +270,6 @@ def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outc
         store.save(path, arrays, {"kind": "Teacher"})
     arrays, _ = store.load(path, kind="Teacher")
     return Outcomes(arrays["returns"], arrays["lengths"], arrays["outcomes"])
-
-
-def summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
-    """One row per run: seed, cells, splits, merges, spread of the returns and shares of the outcomes."""
-    return pd.DataFrame(
-        {
-            "settings": experiment.id,
-            "seed": run.seed,
-            "cells": len(run.policy),
-            "splits": run.splits,
-            "merges": run.merges,
-            "validation_mean": run.validation_mean,
-            **spread(run.outcomes.returns),
-            **{name: np.mean(run.outcomes.codes == code) for name, code in SHARES.items()},
-        }
-        for run in runs
-    )
-
-
-def overview(results: Results) -> pd.DataFrame:
-    """Mean, lowest and highest value over the runs, one row per property of a run."""
-    frame = summary(results.runs, results.experiment)
-    return frame[["cells", "splits", "merges", "mean", *SHARES]].agg(["mean", "min", "max"]).T
-
-
-def comparison(results: Results) -> dict[str, float]:
-    """Teacher against distilled policies: means, and 95 % intervals that resample policies.
-
-    The difference is taken start by start. "± if independent" is what the half-width would be if all episodes were
-    independent of each other, which they are not.
-    """
-    teacher, runs = results.teacher_returns, results.returns
-    means = runs.mean(axis=1)
-    low, high = interval(runs, np.mean)
-    gap_low, gap_high = interval(runs - teacher, np.mean)
-    return {
-        "TD3, mean": teacher.mean(),
-        "distilled, mean": runs.mean(),
-        "95 % interval from": low,
-        "to": high,
-        "± of it": (high - low) / 2,
-        "± if independent": 1.96 * runs.std(ddof=1) / np.sqrt(runs.size),
-        "difference, from": gap_low,
-        "difference, to": gap_high,
-        "runs above TD3": np.mean(means > teacher.mean()),
-        "lowest run": means.min(),
-        "median run": np.median(means),
-        "highest run": means.max(),
-    }
-
-
-def write_summary(results: Results, *, out: str | os.PathLike) -> None:
-    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them beside it."""
-    folder, task = Path(out) / "data" / "results", results.experiment.task
-    text = summary(results.runs, results.experiment).to_csv(index=False, float_format="%.6f", lineterminator="\n")
-    store.write_listed(folder / f"{task}.csv", text)
-    store.write_listed(folder / "made_on.txt", "".join(f"{cpu}\n" for cpu in sorted({run.cpu for run in results.runs})))
-
-
-SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}
 
 
 def run_path(folder: str | os.PathLike, seed: int) -> Path:

@@ -48,24 +48,27 @@ def test_look_up(k, capsys):
 
 
 @pytest.mark.parametrize("task", vsp.paper.TASKS)
-def test_a_slider_answers_at_once(task, capsys):
+def test_a_slider_answers_at_once(task, record):
     teacher = vsp.load_teacher(task)
     shown = replay(teacher, task, vsp.distill(teacher, task, seed=0)[1])
     moments = iter(range(0, 2000, 100))
     taken = seconds(lambda: setattr(shown.iteration, "value", next(moments)), repeats=15)
-    report(capsys, f"a step of the slider, {task}", 1000 * taken, "ms")
-    assert taken < 0.15
+    record("speed", f"a step of the slider of notebook 2, {task}", "150 ms", f"{1000 * taken:.0f} ms", taken < 0.15)
 
 
 @pytest.mark.parametrize("task", vsp.paper.TASKS)
-def test_a_trial_of_the_laboratory(task, capsys):
+def test_a_trial_of_the_laboratory(task, record):
     """With every class of sub-policy, in the smallest cells that the slider allows."""
-    lab = laboratory(vsp.load_teacher(task), task)
+    teacher, times = vsp.load_teacher(task), {}
+    lab = laboratory(teacher, task)
     distance = lab.settings["min_pol_distance"].min
     for sub_policy in lab.settings["sub_policy"].options:
         begin = time.perf_counter()
         place = lab.trial({"sub_policy": sub_policy, "min_pol_distance": distance})
         lab.show(place)
-        taken = time.perf_counter() - begin
-        report(capsys, f"a trial with {len(lab.trials[place][1])} {sub_policy} cells, {task}", taken, "s")
-        assert taken < 2
+        times[f"{len(lab.trials[place][1])} {sub_policy} cells"] = time.perf_counter() - begin
+    longest = max(times, key=times.get)
+    text = f"{statistics.median(times.values()):.1f} s, at most {times[longest]:.1f} s with {longest}"
+    alone = seconds(lambda: vsp.distill(teacher, task, seed=0), repeats=1)
+    why = f"a slow machine: a distillation of the paper takes {alone:.1f} s" if alone > 1 else ""
+    record("speed", f"a trial in the laboratory of notebook 2, {task}", "2 s", text, times[longest] < 2, why=why)
