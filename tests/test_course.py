@@ -13,7 +13,6 @@ from collections import Counter
 from dataclasses import replace
 
 import course_answers
-import nbformat
 import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
@@ -21,6 +20,7 @@ from IPython.core.interactiveshell import InteractiveShell
 import vsp
 from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages
 from vsp.distill import distill, merge_regions, split_regions, teacher_episodes
+from vsp.notebook import nbformat
 from vsp.partition import Partition
 
 LESSONS = build.read_sources()

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
-import nbformat
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,6 +19,7 @@ from vsp.envs import GOAL, PIT, TRUNCATED
 from vsp.evaluate import interval, outcomes
 from vsp.experiments import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
 from vsp.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, VERDICTS, last_digit, left_out, results_of, verdict
+from vsp.notebook import nbformat
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 

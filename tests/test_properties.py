@@ -50,7 +50,7 @@ OUTSIDE = {
         scaling study summaries teachers_study training""",
     "draw such tables, and histories": "animation explorer figures_beyond figures_explorer figures_trust",
     "machinery around the method, each with tests of its own faults": """
-        environment machine manifest progress runner store workers""",
+        environment machine manifest notebook progress runner store workers""",
     "what the others check with": "checks",
 }
 MODULES = sorted(

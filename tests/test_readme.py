@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 
 import measured
-import nbformat
 import pandas as pd
+
+from vsp.notebook import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -10,10 +10,10 @@ import time
 from functools import partial
 from pathlib import Path
 
-import nbformat
 import pytest
 
 from vsp import runner, store
+from vsp.notebook import nbformat
 
 DRAW = """\
 from pathlib import Path

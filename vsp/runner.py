@@ -25,8 +25,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import nbformat
-
+from .notebook import nbformat
 from .store import MANIFEST, ROOT, alone, atomic_path, fix, list_file, reason
 
 KERNEL = "python3"

@@ -13,7 +13,6 @@ from functools import partial
 from pathlib import Path
 
 import measured
-import nbformat
 import numpy as np
 import pytest
 import yaml
@@ -22,6 +21,7 @@ from support import SIMPLEGOAL, TINY, CurvedTeacher
 import vsp
 from vsp import beyond, comparison, experiments, paper, runner, store, study, training
 from vsp.course import build
+from vsp.notebook import nbformat
 from vsp.store import DamagedFile
 
 FLIPS, TRUNCATIONS = 100, 50

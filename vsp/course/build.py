@@ -18,9 +18,7 @@ import os
 import re
 from pathlib import Path
 
-import nbformat
-from nbformat import NotebookNode
-
+from ..notebook import NotebookNode, nbformat
 from ..store import ROOT, DamagedFile, alone, read_sealed, sha256, write_sealed, write_text
 from .handout import write_handout
 

@@ -11,9 +11,7 @@ import argparse
 import os
 from pathlib import Path
 
-import nbformat
-from nbformat import NotebookNode
-
+from ..notebook import NotebookNode, nbformat
 from ..runner import KERNEL, clean_outputs
 from ..store import write_text
 from .build import SOURCES, is_check, is_solution, read_sources, student

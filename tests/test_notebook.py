@@ -1,0 +1,13 @@
+import subprocess
+import sys
+
+
+def test_no_grammar_of_addresses_is_built_and_who_asks_for_it_finds_it():
+    """In a process of its own: here somebody may have asked before."""
+    code = (
+        "import sys, importlib.util; from vsp.notebook import NotebookNode, nbformat; "
+        "assert 'jsonschema' in sys.modules and not [n for n in sys.modules if n.startswith(('rfc3987_', 'lark'))]; "
+        "assert importlib.util.find_spec('rfc3987_syntax'); "
+        "nbformat.validate(nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell('1 + 1')]))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
