@@ -112,33 +112,22 @@ def _emphasised(cell):
     return set(re.findall(r"\*([A-Z][a-z ]+)\.\*", cell.source))
 
 
-def test_hints_that_checks_point_to_are_there():
-    for lesson, module in zip(LESSONS.values(), (lesson_1, lesson_2, lesson_3)):
-        texts = "\n".join(cell.source for cell in lesson.cells)
-        for number in {number for number, (owner, _) in EXERCISES.items() if owner is module}:
-            section = texts.split(f"## Exercise {number} ")[1].split("## Exercise")[0]
-            hints = {int(n) for n in re.findall(r"Hint (\d)</summary>", section)}
-            assert hints == set(range(1, len(hints) + 1)), number
-            pointed = {_hint(_message(i)) for i, entry in enumerate(course_answers.WRONG) if entry[0] == number} - {0}
-            assert pointed <= hints, (number, pointed, hints)
+@pytest.mark.parametrize("number", EXERCISES)
+def test_hints_are_counted_from_one(number):
+    assert hints(number) == set(range(1, 1 + len(hints(number))))
+
+
+def hints(number):
+    """The numbers of the hints of an exercise."""
+    texts = (cell.source for lesson in LESSONS.values() for cell in lesson.cells)
+    (text,) = (text for text in texts if f"## Exercise {number} " in text)
+    return {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
 
 
 def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
     text = " ".join(cell.source for cell in LESSONS["lesson_1_black_box.ipynb"].cells)
     assert f"{lesson_1.CELLS} codewords, at most {lesson_1.MARGIN * 100:.0f} % of the error" in text
     assert lesson_1.AT_MOST == 8 and "**at most eight codewords that" in text
-
-
-def _hint(message):
-    found = re.search(r"→ Hint (\d) of exercise (\d\.\d)$", message)
-    return int(found[1]) if found else 0
-
-
-@functools.cache
-def _message(i):
-    """What the check says to the wrong answer number i."""
-    number, _, answer = course_answers.WRONG[i]
-    return _refused(number, answer)
 
 
 def test_metadata_is_what_nbgrader_expects(lesson):
@@ -384,9 +373,11 @@ def label(entry):
 
 @pytest.mark.parametrize("i", range(len(course_answers.WRONG)), ids=lambda i: label(course_answers.WRONG[i]))
 def test_wrong_answers_are_told_what_is_wrong(i):
-    number, words, _ = course_answers.WRONG[i]
-    message = _message(i)
+    number, words, answer = course_answers.WRONG[i]
+    message = _refused(number, answer)
     assert words in message and message.startswith(f"{number} {EXERCISES[number][1]}") and "\n" not in message
+    pointed = re.search(r"→ Hint (\d) of exercise (\d\.\d)$", message)
+    assert pointed is None or (pointed[2] == number and int(pointed[1]) in hints(number)), message
 
 
 @pytest.mark.parametrize("entry", course_answers.RIGHT, ids=label)
