@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, same_arrays, tiny
 
-from vsp import experiments, store
+from vsp import experiments, store, workers
 from vsp.evaluate import outcomes
 from vsp.experiments import (
     EVALUATION_SEED,
@@ -318,3 +318,16 @@ def test_the_command_clears_away_what_a_kill_left(made, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path)])
     experiments.main()
     assert files(tmp_path / "data" / "runs") == before
+
+
+def test_a_killed_worker_ends_the_notebooks_of_this_make(tmp_path, monkeypatch):
+    def dies(*arguments, **named):
+        raise workers.WorkerDied("a worker process was killed")
+
+    ended = []
+    monkeypatch.setattr(experiments, "paper_results", dies)
+    monkeypatch.setattr(store, "end_others", ended.append)
+    monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path)])
+    with pytest.raises(workers.WorkerDied):
+        experiments.main()
+    assert ended == [tmp_path / "build" / "locks"]

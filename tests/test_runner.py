@@ -261,6 +261,18 @@ def test_end_by_signal_ends_kernel(tmp_path):
     assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
 
 
+def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
+    """Which make would wait for, however long."""
+    started = "(Path(out).parents[3] / 'started').touch()\nimport time\ntime.sleep(120)"
+    other = write(tmp_path, DRAW, started).rename(tmp_path / "other.ipynb")
+    command = [sys.executable, "-m", "vsp.runner", str(other), "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until((tmp_path / "started").exists)
+    killed = write(tmp_path, DRAW, "import os\nos.kill(os.getpid(), 9)")
+    assert runner.main([str(killed), "--out", str(tmp_path)]) == 1
+    assert "other.ipynb: interrupted" in process.communicate(timeout=30)[1]
+
+
 def alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)

@@ -370,15 +370,31 @@ def test_what_a_kill_leaves_has_a_name_that_is_known(tmp_path):
     assert not (tmp_path / "0001.run").match(store.TEMPORARY)
 
 
+def holds(lock, **options):
+    """A process that holds `lock`."""
+    code = f"from vsp.store import alone\nwith alone({str(lock)!r}, 'x'):\n  print(1, flush=True)\n  input()"
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, **options)
+    process.stdout.readline()
+    return process
+
+
 def test_one_after_the_other(tmp_path, capfd):
     """The second waits, says so, and comes in when the first is killed."""
     lock = tmp_path / "build" / "lock"
-    hold = f"from vsp.store import alone\nwith alone({str(lock)!r}, 'x'):\n  print(1, flush=True)\n  input()"
-    first = subprocess.Popen([sys.executable, "-c", hold], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    first.stdout.readline()
+    first = holds(lock)
     threading.Timer(0.3, first.kill).start()
     with store.alone(lock, "writes here"):
         assert first.wait() == -signal.SIGKILL
     assert capfd.readouterr().err == "another run writes here: waiting for it to end\n"
     with store.alone(lock, "writes here"):
         assert capfd.readouterr().err == ""
+
+
+def test_those_of_our_group_that_hold_a_lock_are_ended_and_nobody_else(tmp_path):
+    ours, anothers = holds(tmp_path / "a"), holds(tmp_path / "b", start_new_session=True)
+    (tmp_path / "c").write_text(str(anothers.pid))  # which held it once
+    with store.alone(tmp_path / "d", "writes here"):
+        store.end_others(tmp_path)
+    assert ours.wait(10) == -signal.SIGTERM and anothers.poll() is None
+    anothers.kill()
+    anothers.wait()

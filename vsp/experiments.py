@@ -287,15 +287,19 @@ def main() -> None:
     parser.add_argument("--jobs", type=workers.jobs, default=-1, help=workers.JOBS)
     arguments = parser.parse_args()
     out, jobs = Path(arguments.out), arguments.jobs
-    runs = out / "data" / "runs"
-    with store.alone(out / "build" / "locks" / "runs", f"makes runs in {out}"):
+    runs, locks = out / "data" / "runs", out / "build" / "locks"
+    with store.alone(locks / "runs", f"makes runs in {out}"):
         for left in runs.rglob(store.TEMPORARY):
             left.unlink(missing_ok=True)  # of a process that was killed
-        for task in N_RUNS:
-            results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
-            n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS
-            baselines.kept_comparison(results, n_runs, runs=runs, jobs=jobs)
-            print(f"{task}: {len(results.runs)} runs are there, and what stands beside them", flush=True)
+        try:
+            for task in N_RUNS:
+                results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
+                n_runs = baselines.QUICK_RUNS if arguments.quick else baselines.N_RUNS
+                baselines.kept_comparison(results, n_runs, runs=runs, jobs=jobs)
+                print(f"{task}: {len(results.runs)} runs are there, and what stands beside them", flush=True)
+        except workers.WorkerDied:
+            store.end_others(locks)  # make would wait for its notebooks, minutes
+            raise
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .notebook import nbformat
-from .store import MANIFEST, ROOT, alone, atomic_path, fix, list_file, reason
+from .store import MANIFEST, ROOT, alone, atomic_path, end_others, fix, list_file, reason
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
@@ -38,6 +38,10 @@ _WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
 
 class NotebookError(RuntimeError):
     """A notebook that did not run as a whole; the message names it and the cell."""
+
+
+class KernelDied(NotebookError):
+    """A notebook whose kernel was killed."""
 
 
 def run(
@@ -166,7 +170,8 @@ def _check_cells(notebook: Path, cells: list[nbformat.NotebookNode], stopped: Ex
     started = [name for name, cell in zip(names, cells) if cell.metadata.get("papermill", {}).get("start_time")]
     if stopped and type(stopped).__name__ != "PapermillExecutionError":  # no cell's own error: a dead kernel, a timeout
         where = started[-1] if started else notebook.name
-        raise NotebookError(f"{where} did not end: {type(stopped).__name__}: {stopped}") from stopped
+        kind = KernelDied if type(stopped).__name__ == "DeadKernelError" else NotebookError
+        raise kind(f"{where} did not end: {type(stopped).__name__}: {stopped}") from stopped
     count = 0
     for name, cell in zip(names, cells):
         for output in cell.outputs:
@@ -310,7 +315,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parameters = {key: _value(text) for key, text in given.parameters}
         changed = run(given.notebook, given.out, parameters=parameters, expect=given.expect, timeout=given.timeout)
     except NotebookError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        if isinstance(error, KernelDied):  # make would wait for the others, minutes
+            end_others(Path(given.out) / "build" / "locks")
         return 1
     except OSError as error:
         print(f"error: {name}: {reason(error)}", file=sys.stderr)
