@@ -1,10 +1,11 @@
-"""What several test files share: teachers that need no file, a short configuration, small partitions."""
+"""What several test files share: teachers that need no file, a short configuration, small partitions, processes."""
 
 import dataclasses
 import hashlib
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 
@@ -151,3 +152,20 @@ def distilled_elsewhere(task, *, teacher="shipped", config="paper", seed=0, ahea
 def threads(n):
     """The environment variables for n threads of everything that has any."""
     return {f"{name}_NUM_THREADS": str(n) for name in ("OMP", "OPENBLAS", "MKL", "VECLIB", "NUMEXPR")}
+
+
+def alive(pid: int) -> bool:
+    """Whether there is a process of that number."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def until(condition) -> None:
+    """Wait for `condition`, for at most 30 s."""
+    deadline = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < deadline, "waited 30 s in vain"
+        time.sleep(0.05)

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, same_arrays, tiny
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, alive, same_arrays, tiny, until
 
 from vsp import experiments, store, workers
 from vsp.evaluate import outcomes
@@ -318,6 +318,18 @@ def test_the_command_clears_away_what_a_kill_left(made, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path)])
     experiments.main()
     assert files(tmp_path / "data" / "runs") == before
+
+
+def test_an_end_by_signal_ends_the_workers_too(tmp_path):
+    """Else they would wait for ever, with open pipes, to hand over their next run."""
+    command = [sys.executable, "-m", "vsp.experiments", "--jobs", "2", "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until(lambda: list(tmp_path.rglob("[0-9]*.run")))
+    workers = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
+    process.terminate()
+    assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
+    until(lambda: not any(alive(int(pid)) for pid in workers))
+    assert len(workers) >= 2
 
 
 def test_a_killed_worker_ends_the_notebooks_of_this_make(tmp_path, monkeypatch):

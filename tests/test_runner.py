@@ -6,11 +6,11 @@ import resource
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 import pytest
+from support import alive, until
 
 from vsp import runner, store
 from vsp.notebook import nbformat
@@ -261,6 +261,15 @@ def test_end_by_signal_ends_kernel(tmp_path):
     assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
 
 
+def test_a_kernel_that_dies_before_the_first_cell(tmp_path, monkeypatch):
+    def dies(*arguments, **named):
+        raise RuntimeError("Kernel died before replying to kernel_info")  # jupyter_client's words
+
+    monkeypatch.setattr("papermill.execute_notebook", dies)
+    with pytest.raises(runner.KernelDied, match="story.ipynb did not end: RuntimeError: Kernel died"):
+        runner.run(write(tmp_path, DRAW, "2"), tmp_path / "out")
+
+
 def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
     """Which make would wait for, however long."""
     started = "(Path(out).parents[3] / 'started').touch()\nimport time\ntime.sleep(120)"
@@ -271,18 +280,3 @@ def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
     killed = write(tmp_path, DRAW, "import os\nos.kill(os.getpid(), 9)")
     assert runner.main([str(killed), "--out", str(tmp_path)]) == 1
     assert "other.ipynb: interrupted" in process.communicate(timeout=30)[1]
-
-
-def alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
-def until(condition) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline, "waited 30 s in vain"
-        time.sleep(0.05)

@@ -392,9 +392,11 @@ def test_one_after_the_other(tmp_path, capfd):
 
 def test_those_of_our_group_that_hold_a_lock_are_ended_and_nobody_else(tmp_path):
     ours, anothers = holds(tmp_path / "a"), holds(tmp_path / "b", start_new_session=True)
-    (tmp_path / "c").write_text(str(anothers.pid))  # which held it once
-    with store.alone(tmp_path / "d", "writes here"):
+    ends = holds(tmp_path / "elsewhere" / "c")  # of our group, but it holds nothing in the folder
+    (tmp_path / "d").write_text(str(ends.pid))  # any more
+    with store.alone(tmp_path / "e", "writes here"):
         store.end_others(tmp_path)
-    assert ours.wait(10) == -signal.SIGTERM and anothers.poll() is None
-    anothers.kill()
-    anothers.wait()
+    assert ours.wait(10) == -signal.SIGTERM
+    for spared in (anothers, ends):
+        spared.communicate(b"\n", 10)
+        assert spared.returncode == 0

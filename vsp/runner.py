@@ -18,7 +18,6 @@ import json
 import os
 import re
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -26,7 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .notebook import nbformat
-from .store import MANIFEST, ROOT, alone, atomic_path, end_others, fix, list_file, reason
+from .store import MANIFEST, ROOT, alone, atomic_path, end_others, fix, heed_sigterm, list_file, reason
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
@@ -170,7 +169,7 @@ def _check_cells(notebook: Path, cells: list[nbformat.NotebookNode], stopped: Ex
     started = [name for name, cell in zip(names, cells) if cell.metadata.get("papermill", {}).get("start_time")]
     if stopped and type(stopped).__name__ != "PapermillExecutionError":  # no cell's own error: a dead kernel, a timeout
         where = started[-1] if started else notebook.name
-        kind = KernelDied if type(stopped).__name__ == "DeadKernelError" else NotebookError
+        kind = KernelDied if "Kernel died" in str(stopped) else NotebookError  # in a cell, or before the first
         raise kind(f"{where} did not end: {type(stopped).__name__}: {stopped}") from stopped
     count = 0
     for name, cell in zip(names, cells):
@@ -295,10 +294,6 @@ def _value(text: str) -> object:
         return text
 
 
-def _interrupt(signum: int, frame: object) -> None:
-    raise KeyboardInterrupt  # unwinds through papermill, which ends the kernel
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m vsp.runner", description="Run one notebook, strictly.")
@@ -308,7 +303,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files, in OUT, that it must make")
     parser.add_argument("--timeout", type=int, default=1800, help="seconds for each cell (%(default)s)")
     given = parser.parse_args(arguments)
-    signal.signal(signal.SIGTERM, _interrupt)
+    heed_sigterm()
     began, name = time.monotonic(), Path(given.notebook).name
     print(f"{name}: running", flush=True)
     try:
@@ -323,7 +318,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {name}: {reason(error)}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print(f"error: {name}: interrupted; nothing was changed", file=sys.stderr)
+        print(f"error: {name}: interrupted: the next make runs it anew", file=sys.stderr)
         return 130
     print(f"{name}: done in {time.monotonic() - began:.0f} s, {len(changed)} files changed", flush=True)
     return 0

@@ -102,30 +102,42 @@ def alone(lock: str | os.PathLike, what: str) -> Iterator[None]:
     import fcntl  # here, since Windows, where students read files, has none
 
     Path(lock).parent.mkdir(parents=True, exist_ok=True)
-    with open(lock, "a+") as file:
+    with open(lock, "ab", buffering=0) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             print(f"another run {what}: waiting for it to end", file=sys.stderr, flush=True)
             fcntl.flock(file, fcntl.LOCK_EX)
-        file.truncate(0)
-        file.write(str(os.getpid()))  # for `end_others`
-        file.flush()
+        with contextlib.suppress(OSError):  # a full disk shall stop what is done alone, with its own words
+            file.truncate(0)
+            file.write(b"%d" % os.getpid())  # for `end_others`
         yield
 
 
 def end_others(locks: str | os.PathLike) -> None:
-    """Ask the processes that hold locks in the folder `locks` to end: those of our own group, of the same make."""
+    """SIGTERM to the processes that hold locks in the folder `locks`, if they are of our process group.
+
+    That is mostly those of the same make. One that has no lock yet goes on.
+    """
     import fcntl
 
     for lock in Path(locks).iterdir():
-        with open(lock, "r+") as file, contextlib.suppress(ProcessLookupError, ValueError):
+        with contextlib.suppress(OSError, ValueError), open(lock, encoding="utf-8") as file:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # who held it has ended, whatever is written there
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # who held it has ended, whatever is written there
             except BlockingIOError:
                 holder = int(file.read())
                 if holder != os.getpid() and os.getpgid(holder) == os.getpgrp():
                     os.kill(holder, signal.SIGTERM)
+
+
+def heed_sigterm() -> None:
+    """Let SIGTERM raise KeyboardInterrupt, which unwinds through whatever has kernels or workers to end."""
+    signal.signal(signal.SIGTERM, _interrupt)
+
+
+def _interrupt(signum: int, frame: object) -> None:
+    raise KeyboardInterrupt
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:

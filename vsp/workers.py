@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from .machine import cpu_type
 from .progress import progress
-from .store import MANIFEST, ROOT, reason
+from .store import MANIFEST, ROOT, heed_sigterm, reason
 
 JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # words for --jobs
 ANSWER = 10  # seconds within which a scheduler answers
@@ -126,9 +126,12 @@ def _shared(arguments: Sequence[tuple]) -> list:
 
 @contextlib.contextmanager
 def in_one_line() -> Iterator[None]:
-    """A killed worker, a full disk and the like end a command with one line and status 1, without a traceback."""
+    """A killed worker, a full disk, SIGTERM and the like end a command and its workers with one line, no traceback."""
+    heed_sigterm()
     try:
         yield
+    except KeyboardInterrupt:
+        sys.exit("error: interrupted. What is on disk stays: the same command goes on from there.")
     except (WorkerDied, UnlikeWorker, NoScheduler) as error:
         sys.exit(f"error: {error}")
     except OSError as error:

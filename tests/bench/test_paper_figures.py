@@ -29,9 +29,7 @@ def test_paper_figures(tmp_path, record, monkeypatch):
         f"{median:.0f} s ({min(times):.0f} to {max(times):.0f}); on {cores} cores, all distillations alone take "
         f"{distilling:.0f} s, the teachers' forward passes in them {passes:.0f} s"
     )
-    why = "a slow machine: see what the distillations take" if distilling > SECONDS / 2 else ""
-    name = "`make paper-figures` from nothing, notebooks 01 to 05"
-    record("speed", name, f"{SECONDS} s", text, median <= SECONDS, why=why)
+    record("speed", "`make paper-figures` from nothing, notebooks 01 to 05", f"{SECONDS} s", text, median <= SECONDS)
 
 
 def one_distillation(task: str, monkeypatch) -> tuple[float, float]:
