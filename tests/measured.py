@@ -53,8 +53,8 @@ def write(path: Path, frame: pd.DataFrame) -> None:
 
 
 def merged(old: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
-    """The rows of both, the new one in the place of an old one; by table, in the order of `TABLES`."""
-    frame = pd.concat([old, new]).groupby(["table", "what"], sort=False, as_index=False).last()[COLUMNS]
+    """The rows of both, the new one in the place of an old one; tables in the order of `TABLES`, rows by name."""
+    frame = pd.concat([old, new]).groupby(["table", "what"], as_index=False).last()[COLUMNS]
     return frame.sort_values("table", key=lambda names: names.map(list(TABLES).index), kind="stable", ignore_index=True)
 
 

@@ -325,11 +325,11 @@ def test_an_end_by_signal_ends_the_workers_too(tmp_path):
     command = [sys.executable, "-m", "vsp.experiments", "--jobs", "2", "--out", str(tmp_path)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     until(lambda: list(tmp_path.rglob("[0-9]*.run")))
-    workers = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
+    children = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
     process.terminate()
     assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
-    until(lambda: not any(alive(int(pid)) for pid in workers))
-    assert len(workers) >= 2
+    until(lambda: not any(alive(int(pid)) for pid in children))
+    assert len(children) >= 2
 
 
 def test_a_killed_worker_ends_the_notebooks_of_this_make(tmp_path, monkeypatch):

@@ -125,6 +125,7 @@ def _finding(title: str, printed: str, arithmetic: str, agrees: bool, concerns: 
 
 
 def run_counts() -> Finding:
+    """The protocol, the text and the coverage each ask for a number of distilled policies."""
     notes, ids, wrong = [], [], []
     for task, name in PREFIX.items():
         protocol, text = value(f"{name}_policies"), value(f"{name}_text_policies")
@@ -243,6 +244,7 @@ def outlier_moments() -> Finding:
 
 
 def printed_twice() -> Finding:
+    """Numbers that the paper prints in two places are compared digit by digit."""
     pairs = {}
     for task, subject in COLUMNS:
         column, name, label = _column(task, subject), PREFIX[task], _label(task, subject)
@@ -259,6 +261,7 @@ def printed_twice() -> Finding:
 
 
 def simplegoal_wording() -> Finding:
+    """What the text calls similar, as ratios of the printed columns; a judgement, so left open."""
     ours, drl = _column(SIMPLEGOAL, "ours"), _column(SIMPLEGOAL, "drl")
     lost, spread, iqr = drl["mean"] - ours["mean"], ours["std"] / drl["std"], ours["iqr"] / drl["iqr"]
     text = (
@@ -285,6 +288,7 @@ def printed_digits() -> Finding:
 
 
 def simplegoal_rows() -> Finding:
+    """Rows of T3 without an x in any output, and codewords that lie in the pit."""
     frame = paper.linear_policies(SIMPLEGOAL)
     codewords, printed = frame.filter(like="codeword_"), frame.filter(like="_printed")
     in_pit = ((codewords > PIT_LOW) & (codewords < PIT_HIGH)).all(axis=1)
@@ -301,6 +305,7 @@ def simplegoal_rows() -> Finding:
 
 
 def mountaincar_colours() -> Finding:
+    """Colours of T4 that stand for the same forces at their codewords."""
     frame, policy = paper.linear_policies(MOUNTAINCAR), paper.published_policy(MOUNTAINCAR)
     force = pd.Series(policy.predict(policy.codewords)[0][:, 0]).groupby(frame["colour"])
     low, high = force.min(), force.max()
@@ -330,6 +335,7 @@ def close_pairs(task: str, table: str) -> Finding:
 
 
 def outputs_beyond_limits() -> Finding:
+    """Linear outputs at the codewords that only clipping makes actions."""
     notes = []
     for task in paper.TASKS:
         policy = paper.published_policy(task)
@@ -341,6 +347,7 @@ def outputs_beyond_limits() -> Finding:
 
 
 def dimensions() -> Finding:
+    """Coordinates and outputs counted in T3 and T4 against those that the text states."""
     frames = [paper.linear_policies(task) for task in paper.TASKS]
     states, actions = ([frame.filter(like=like).shape[1] for frame in frames] for like in ("codeword_", "_printed"))
     text = f"coordinates of codewords (T3, T4): {states}; outputs: {actions}"
@@ -350,6 +357,7 @@ def dimensions() -> Finding:
 
 
 def truncation() -> Finding:
+    """The longest episode as printed against that of the registered environment."""
     steps, printed, lowest = get_task(MOUNTAINCAR).max_steps, value("mc_max_steps"), value("mc_ours_min")
     text = (
         f"{printed:.0f} and {steps} of the registered environment. No printed return depends on it: the lowest, "

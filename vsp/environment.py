@@ -66,6 +66,7 @@ def _plain(name: str) -> str:
 
 
 def main() -> str | None:
+    """The command line; returns what is not as it should be, for `sys.exit`, or None."""
     if "--built" not in sys.argv:
         found = changes()
         return "; ".join(found[:3] + ["..."] * (len(found) > 3)) or None
