@@ -36,10 +36,13 @@ def drawn(seed=0):
     return fig
 
 
-@pytest.fixture
-def saved(tmp_path):
-    picture = save_figure(drawn(), "cells_example", alt=ALT, out=tmp_path)
-    return picture, tmp_path / "figures" / "cells_example.pdf", tmp_path / "figures" / "cells_example.png"
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """The picture as it is shown, and its two files; the figure is closed."""
+    out = tmp_path_factory.mktemp("saved")
+    picture = save_figure(drawn(), "cells_example", alt=ALT, out=out)
+    assert not plt.get_fignums()
+    return picture, out / "figures" / "cells_example.pdf", out / "figures" / "cells_example.png"
 
 
 def streams(pdf):
@@ -58,10 +61,9 @@ def png_size(png):
     return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
 
 
-def test_both_files_are_there_and_the_figure_is_closed(saved, tmp_path):
-    assert sorted(p.name for p in (tmp_path / "figures").iterdir()) == ["cells_example.pdf", "cells_example.png"]
+def test_both_files_are_there(saved):
+    assert sorted(p.name for p in saved[1].parent.iterdir()) == ["cells_example.pdf", "cells_example.png"]
     assert saved[1].read_bytes().startswith(b"%PDF-") and saved[2].read_bytes().startswith(b"\x89PNG")
-    assert not plt.get_fignums()
 
 
 def test_the_picture_is_as_wide_as_a_page_of_the_proceedings(saved):
@@ -121,7 +123,7 @@ def test_a_quick_figure_is_marked(tmp_path):
     assert full.shape == quick.shape and (full[middle] != quick[middle]).any()
 
 
-def test_a_failed_save_leaves_the_previous_figure(saved, tmp_path, monkeypatch):
+def test_a_failed_save_leaves_the_previous_figure(saved, monkeypatch):
     before = saved[1].read_bytes()
     fig = drawn(seed=1)
 
@@ -131,9 +133,9 @@ def test_a_failed_save_leaves_the_previous_figure(saved, tmp_path, monkeypatch):
 
     monkeypatch.setattr(fig, "savefig", fail)
     with pytest.raises(OSError, match="disk full"):
-        save_figure(fig, "cells_example", alt=ALT, out=tmp_path)
+        save_figure(fig, "cells_example", alt=ALT, out=saved[1].parents[1])
     plt.close(fig)
-    assert saved[1].read_bytes() == before and len(list((tmp_path / "figures").iterdir())) == 2
+    assert saved[1].read_bytes() == before and len(list(saved[1].parent.iterdir())) == 2
 
 
 def test_style_does_not_leak():

@@ -292,17 +292,27 @@ def test_the_trials_tell_how_it_came_about(refined):
     assert (trials["restart"][4:] == trials["restart"][value[:4].idxmax()]).all()
 
 
+PLAIN = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return refine(PumpingTeacher(), MOUNTAINCAR, PLAIN, seed=0)[1]
+
+
 @pytest.mark.parametrize(
     "change",
     [{"n_cells": 2}, {"n_episodes": 30}, {"n_steps": 200}, {"batch_size": 64}, {"learning_rate": 0.01},
      {"hottest": 0.5}, {"coldest": 0.01}, {"leak": 0.2}, {"n_corrections": 2}, {"n_correction_episodes": 20},
      {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.3}, {"error_price": 100.0}],
 )  # fmt: skip
-def test_every_setting_acts(change):
-    base = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
-    one, rows = refine(PumpingTeacher(), MOUNTAINCAR, base, seed=0)
-    other, changed = refine(PumpingTeacher(), MOUNTAINCAR, dataclasses.replace(base, **change), seed=0)
-    assert not rows.equals(changed)
+def test_every_setting_acts(plain, change):
+    changed = refine(PumpingTeacher(), MOUNTAINCAR, dataclasses.replace(PLAIN, **change), seed=0)[1]
+    assert not plain.equals(changed)
+
+
+def test_the_same_settings_give_the_same_trials(plain):
+    assert plain.equals(refine(PumpingTeacher(), MOUNTAINCAR, PLAIN, seed=0)[1])
 
 
 @pytest.mark.parametrize(("change", "stages"), [({"n_restarts": 1}, "lfct"), ({"n_corrections": 0}, "lfft"),
