@@ -136,11 +136,11 @@ test: venv ## runs the tests, several at a time: about 3 minutes
 MEASURED = $(OUT)/build/measured
 PUBLISH = $(PY) tests/measured.py "$(MEASURED)" "$(OUT)/data/results" README.md
 
-bench: venv ## measures speed and scale, into data/results/: an HOUR, on a machine that does nothing else
+bench: venv ## measures speed and scale, into data/results/: an HOUR or more, on a machine that does nothing else
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/bench --record "$(MEASURED)"; status=$$?; test $$status -le 1 && \
 	  $(PY) -m vsp.scale_study --out "$(OUT)" && $(PUBLISH) && exit $$status
 
-torture: venv ## breaks it in every way we know, into data/results/: 2 to 3 HOURS; kills resume
+torture: venv ## breaks it in every way we know, into data/results/: 3 HOURS or more; kills resume
 	@MPLBACKEND=Agg $(PY) -m pytest -q tests/torture --record "$(MEASURED)"; status=$$?; test $$status -le 1 && \
 	  $(PUBLISH) && exit $$status
 
@@ -157,7 +157,7 @@ define notebook-rules
 $(call outputs,$(1)): $(1) ;
 $(1): venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@mkdir -p "$$(STATE)"; for file in $$(READS_$(1)); do test -f "$$$$file" || { \
-	  echo "error: $$$$file is missing: \`git checkout $$$$file\` brings it back; \`make study beyond lookup bench torture\` makes all such files" >&2; exit 1; }; done; \
+	  echo "error: $$$$file is missing: \`git checkout $$$$file\` brings it back; \`make study beyond beyond-long lookup bench torture\` makes all such files" >&2; exit 1; }; done; \
 	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) $(if $(filter $(1),$(NEED_RUNS)),"$$(STATE)/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$(QUICK)"; (cd "$$(OUT)" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$(STATE)/$(1)"; then \

@@ -288,6 +288,28 @@ def test_of_several_writers_none_loses_a_line(tmp_path):
         assert store.read_listed(path).decode() == path.stem[2:]
 
 
+@pytest.mark.parametrize("killed", ["a.csv", store.MANIFEST])
+def test_the_next_writer_removes_what_a_killed_one_left(tmp_path, killed):
+    code = f"""
+import os, signal
+from vsp import store
+replace = os.replace
+def die(one, other):
+    if os.path.basename(other) == {killed!r}:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(one, other)
+os.replace = die
+store.write_listed({str(tmp_path / "a.csv")!r}, "1")
+"""
+    subprocess.run([sys.executable, "-c", code])
+    somebodys = tmp_path / ".a-notes.csv"
+    somebodys.write_text("mine")
+    assert len(list(tmp_path.glob(store.TEMPORARY))) == 1
+    store.write_listed(tmp_path / "a.csv", "2")
+    assert {path.name for path in tmp_path.iterdir()} == {"a.csv", store.MANIFEST, somebodys.name}
+    assert store.read_listed(tmp_path / "a.csv") == b"2"
+
+
 @pytest.mark.parametrize(
     "read", [store.read_sealed, store.read_listed, store.read_table], ids=lambda read: read.__name__
 )

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from .notebook import nbformat
-from .store import MANIFEST, ROOT, alone, atomic_path, end_others, fix, heed_sigterm, list_file, reason
+from .store import MANIFEST, ROOT, alone, atomic_path, end_others, fix, heed_sigterm, list_file, reason, sweep
 
 KERNEL = "python3"
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
@@ -282,6 +282,7 @@ def _move(path: Path, target: Path) -> None:
     except OSError as error:
         if error.errno != errno.EXDEV:
             raise
+        sweep(target)
         with atomic_path(target) as beside:  # figures/ or data/ lie on another disk
             shutil.copyfile(path, beside)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import hashlib
 import io
 import json
@@ -82,6 +83,13 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
         raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def sweep(path: str | os.PathLike) -> None:
+    """Remove what `atomic_path` left beside `path` where it was killed; for whom no other writes it now."""
+    path = Path(path)
+    for left in path.parent.glob(f".{glob.escape(path.stem)}-????????{glob.escape(path.suffix)}"):
+        left.unlink(missing_ok=True)
 
 
 def fix(number: int | None) -> str | None:
@@ -238,6 +246,7 @@ def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
     path, content = Path(path), content.encode() if isinstance(content, str) else content
     with _held(path.parent):
         listed = _listed(path.parent)
+        sweep(path)
         with atomic_path(path) as temporary:
             temporary.write_bytes(content)
         _write_manifest(path.parent, {**listed, path.name: hashlib.sha256(content).hexdigest()})
@@ -310,6 +319,7 @@ def _held(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX)
             held = manifest.exists() and os.path.samestat(os.fstat(file.fileno()), manifest.stat())
             if held:  # else another writer put a new one in its place while we waited
+                sweep(manifest)
                 yield
 
 
