@@ -191,6 +191,9 @@ def test_what_cannot_be_drawn_is_named(run):
     task, teacher, history = run
     with pytest.raises(ValueError, match="task is Pendulum-v1, expected one of .*SimpleGoal-v0"):
         Growth(history, teacher, PENDULUM)
+    other = MOUNTAINCAR if task == SIMPLEGOAL else SIMPLEGOAL
+    with pytest.raises(ValueError, match=f"history is of a run on {task}, expected one on {other}"):
+        Growth(history, teacher, other)
     with pytest.raises(ValueError, match="history is a DataFrame, expected the History"):
         Growth(pd.DataFrame(), teacher, task)
     with pytest.raises(ValueError, match="iteration is 120, expected an integer from 0 to 119"):

@@ -353,6 +353,20 @@ def test_without_a_kernel_there_are_the_first_trials(lab, monkeypatch):
     assert fresh[1] == strip  # whatever was tried before
 
 
+@pytest.mark.parametrize(
+    ("teacher", "message"),
+    [
+        (None, "the policy is None, expected something with `predict`"),
+        (PumpingTeacher(), r"actions have shape \(1, 1\)"),
+    ],
+)
+def test_a_teacher_that_does_not_play_the_task_is_refused(teacher, message):
+    history = distill(CurvedTeacher(), SIMPLEGOAL, tiny(n_epochs=3, n_freeze=3), seed=0)[1]
+    for make in (lambda: laboratory(teacher, SIMPLEGOAL, CONFIG), lambda: replay(teacher, SIMPLEGOAL, history)):
+        with pytest.raises(ValueError, match=message):
+            make()
+
+
 def test_a_laboratory_needs_cells_to_split():
     with pytest.raises(ValueError, match="config is a Refinement, expected a Config"):
         laboratory(CurvedTeacher(), SIMPLEGOAL, vsp.preset(SIMPLEGOAL, "best"))

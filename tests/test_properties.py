@@ -48,7 +48,8 @@ OUTSIDE = {
     "commands and studies, and what reads the tables that they write: their arguments are ours": """
         audit beyond comparison crowd experiments ledger lookup_study measure methods race readings_study scale_study
         scaling study summaries teachers_study training""",
-    "draw such tables, and histories": "animation explorer figures_beyond figures_explorer figures_trust",
+    "draw such tables, and histories, with tests of what they refuse": """
+        animation explorer figures_beyond figures_explorer figures_trust""",
     "machinery around the method, each with tests of its own faults": """
         environment machine manifest notebook progress runner store workers""",
     "what the others check with": "checks",

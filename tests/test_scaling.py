@@ -99,6 +99,7 @@ def test_memory_is_the_bound_of_the_buffers_by_hand():
     row = cost(curves(), tasks=[Environment("toy", 3, 1, 100, False)]).iloc[0]
     rows = config.n_reset * 100
     expected = rows * 16 * 5 + rows * 8 * scaling.N_CELLS + 500 * 100 * 8 * 4 + 40 * config.n_epochs
+    expected += (500 + 250 + 50) * (2000 + 8 * scaling.N_CELLS * (3 + 4))  # 5000 iterations, passes every 20 and 100
     assert row["MB in memory"] == pytest.approx(expected / 1e6)
 
 
@@ -115,6 +116,28 @@ def test_the_cost_of_a_run_is_near_what_a_run_took():
     seconds = np.interp(preset("SimpleGoal-v0").n_epochs, taken["size"], taken["seconds"])
     row = cost(frame, n_runs=1, tasks=scaling.TEN_TASKS[:1]).iloc[0]
     assert 1 / 3 < row["distillation"] * 3600 / seconds < 3
+
+
+def test_memory_at_most_is_more_than_a_run_took():
+    """Of the made-up teacher, which has no network."""
+    frame = study.read("scale")
+    taken = frame[frame["what"].str.startswith("distillation")].dropna(subset=["megabytes"]).sort_values("size")
+    megabytes = np.interp(preset("SimpleGoal-v0").n_epochs, taken["size"], taken["megabytes"])
+    assert megabytes < cost(frame, tasks=scaling.TEN_TASKS[:1])["MB in memory"].iloc[0] < 5 * megabytes
+
+
+@pytest.mark.parametrize(("changes", "what"), [({"n_runs": -3}, "n_runs"), ({"n_runs": 1.5}, "n_runs"),
+                                               ({"tasks": [Environment("toy", 3, -50, 100, False)]}, "m")])  # fmt: skip
+def test_what_is_no_count_is_refused(changes, what):
+    with pytest.raises(ValueError, match=f"^{what} is .*, expected an integer from 1 on"):
+        cost(curves(), **changes)
+
+
+def test_workers_have_no_exponent():
+    frame = pd.concat(
+        [curves(), pd.DataFrame({"what": "processes", "over": "workers", "size": [4, 8, 16], "seconds": 1.0})]
+    )
+    assert "workers" not in set(exponents(frame)["over"])
 
 
 def test_ten_tasks_are_ten_within_the_measured_dimensions():

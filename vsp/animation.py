@@ -6,6 +6,7 @@ for whoever wants no motion.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from .envs import Task, get_task
 from .figures_explorer import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map, state
 from .history import History
 from .policy import VoronoiPolicy
-from .rollouts import Policy
+from .rollouts import Policy, play
 
 WIDTH, HEIGHT = 6.0, 2.6  # inches
 FINE = 301  # grid points per axis on which cells are looked up
@@ -72,10 +73,16 @@ class Maps:
             state(ax, point)
 
 
+def check_plays(policy: Policy, task: Task) -> None:
+    """Raise ValueError unless `policy` takes a step of `task`."""
+    play(policy, dataclasses.replace(task, max_steps=1), task.start(np.random.default_rng(0), 1))
+
+
 class Growth:
     """Draws a run at any iteration: the teacher's map, the copy's with its cells, their number over the iterations.
 
-    Raises ValueError for a task without such maps, and for what is no history of the paper's method.
+    Raises ValueError for a task without such maps, for what is no history of the paper's method on that task, and for
+    a teacher that does not play it.
     """
 
     def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI, chosen: bool = False):
@@ -83,6 +90,9 @@ class Growth:
             kind = type(history).__name__
             raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
         self.history, self.maps = history, Maps(get_task(task))
+        if (found := history.policy_at(0).task.name) != self.maps.task.name:
+            raise ValueError(f"history is of a run on {found}, expected one on {self.maps.task.name}")
+        check_plays(teacher, self.maps.task)
         self._chosen = chosen  # whether states will be chosen, for the legend
         self.stage, self._axes = self._set_stage(teacher, dpi)
 

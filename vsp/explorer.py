@@ -18,7 +18,7 @@ import pandas as pd
 from IPython.display import display
 
 from . import figures
-from .animation import Growth, Maps
+from .animation import Growth, Maps, check_plays
 from .config import Config, preset
 from .distill import distill
 from .envs import Task, get_task
@@ -115,7 +115,8 @@ class Explorer:
 class Replay(Explorer):
     """Replay of a distillation: the partition at any iteration, and what teacher and copy do in a chosen state.
 
-    Raises ValueError for another task than the paper's, and for a history of another method.
+    Raises ValueError for another task than the paper's, for a history of another method or task, and for a teacher that
+    does not play the task.
     """
 
     def __init__(self, teacher: Policy, task: str | Task, history: History):
@@ -192,7 +193,7 @@ class Laboratory(Explorer):
     """Laboratory: a distillation at each change of a setting, with its cells and its return beside earlier trials.
 
     `config` is where the controls begin, the paper's preset if None. Raises ValueError for another task than the
-    paper's, and for a `Refinement`.
+    paper's, for a `Refinement`, and for a teacher that does not play the task.
     """
 
     ready, busy, height = "Change a setting: a distillation follows, in about a second.", "distilling …", "395px"
@@ -200,6 +201,7 @@ class Laboratory(Explorer):
     def __init__(self, teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int = 0):
         self.teacher, self.task, self.seed = Remembered(teacher), get_task(task), seed
         self.maps = Maps(self.task)
+        check_plays(teacher, self.task)
         self.config = preset(self.task.name) if config is None else config
         if not isinstance(self.config, Config):
             raise ValueError(f"config is a {type(self.config).__name__}, expected a Config: it has no cells to split")

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from .checks import check_array
+from .checks import check_array, check_count
 from .config import Config, preset
 from .distill import EPISODES_AHEAD
+from .history import SNAPSHOTS
 from .scale_study import N_CELLS, N_STEPS
 
 POINTS = 4  # sizes that a fit needs at least
+POLICY_BYTES = 2000  # of a policy's objects, beside its numbers
 
 
 class Environment(NamedTuple):
@@ -25,7 +27,7 @@ class Environment(NamedTuple):
     engine: bool  # whether a physics engine plays it
 
 
-TEN_TASKS = (  # continuous tasks of Gymnasium, two of them the paper's; MuJoCo's as of version 5
+TEN_TASKS = (  # two of them the paper's, the others Gymnasium's; MuJoCo's as of version 5
     Environment("SimpleGoal", 2, 2, 12, False),
     Environment("MountainCarContinuous", 2, 1, 65, False),
     Environment("Pendulum", 3, 1, 200, False),
@@ -42,10 +44,11 @@ TEN_TASKS = (  # continuous tasks of Gymnasium, two of them the paper's; MuJoCo'
 def exponents(frame: pd.DataFrame) -> pd.DataFrame:
     """How everything measured in at least `POINTS` sizes grows: a row per thing and quantity, with 95 % intervals.
 
+    Workers are left out: what they add ends with the cores, which is no power law.
     Columns: over (what the size counts), what, quantity ("seconds" or "megabytes"), exponent, low, high.
     """
     rows = []
-    for (over, what), part in frame.groupby(["over", "what"], sort=False):
+    for (over, what), part in frame[frame["over"] != "workers"].groupby(["over", "what"], sort=False):
         for quantity in ("seconds", "megabytes"):
             measured = part.dropna(subset=[quantity])
             if len(measured) < POINTS:
@@ -92,12 +95,14 @@ def cost(frame: pd.DataFrame, *, n_runs: int = 1000, tasks=TEN_TASKS) -> pd.Data
     A run has SimpleGoal's settings, `N_CELLS` cells throughout, the teacher's network of the paper, and two evaluations
     of 1000 episodes. A pass costs what it does in d dimensions, times what the steps of an episode make of it; a step
     of any physics engine, what LunarLander's does. Columns: task, d, steps, then core-hours: teacher, physics,
-    distillation, evaluation, all; then megabytes: of one run at most, by what its buffers promise, and on disk for all
-    runs. Raises ValueError for a task outside what was measured.
+    distillation, evaluation, all; then megabytes: of one run at most, beside its teacher's network, and on disk for all
+    runs. Raises ValueError for a task outside what was measured, and for what is no count.
     """
+    check_count("n_runs", n_runs)
     config = preset("SimpleGoal-v0")
     rows = []
     for task in tasks:
+        check_count("m", task.m)
         training, split, merge = (
             _at(frame, what, "dimensions", task.d)
             * (_at(frame, what, "steps", task.steps) / _at(frame, what, "steps", N_STEPS))
@@ -126,15 +131,25 @@ def _at(frame: pd.DataFrame, what: str, over: str, size: float) -> float:
 
 
 def _bytes(task: Environment, config: Config) -> float:
-    """What a run holds at most: the bound of `Buffers`, the episodes that are played ahead, the history."""
+    """What a run holds at most: the bound of `Buffers`, the episodes that are played ahead, and the history.
+
+    Of that the losses and numbers of cells, and the snapshots, where each pass that may change the cells adds one.
+    """
     rows = config.n_reset * task.steps
     buffers = rows * (16 * (task.d + 1 + task.m) + 8 * N_CELLS)
-    return buffers + EPISODES_AHEAD * task.steps * 8 * (task.d + task.m) + 40 * config.n_epochs
+    ahead = EPISODES_AHEAD * task.steps * 8 * (task.d + task.m)
+    snapshots = SNAPSHOTS + config.n_epochs / config.n_split + config.n_epochs / config.n_merge
+    return buffers + ahead + 40 * config.n_epochs + snapshots * (POLICY_BYTES + 8 * _numbers(task))
 
 
 def _bytes_on_disk(task: Environment, config: Config) -> float:
     """The file of a run: returns, lengths and ends of 1000 episodes, the history, the policy."""
-    return 8 * (3 * 1000 + config.n_epochs + N_CELLS * (task.d + (task.d + 1) * task.m))
+    return 8 * (3 * 1000 + config.n_epochs + _numbers(task))
+
+
+def _numbers(task: Environment) -> int:
+    """Those in a policy: codewords and coefficients."""
+    return N_CELLS * (task.d + (task.d + 1) * task.m)
 
 
 def second_worker(frame: pd.DataFrame, what: str = "Dask workers") -> float:

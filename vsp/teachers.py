@@ -124,7 +124,7 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
     """A teacher ready to act: the shipped one of a task by its name, or one from a file.
 
     `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` that Stable-Baselines3
-    saved (then `task` says which task it is for). Tensors are all that is read: nothing is unpickled. Raises
+    saved (then `task` says which task it is for). Tensors are all that is read: no code from it runs. Raises
     ValueError for an unknown task or a teacher that does not fit, FileNotFoundError, `store.DamagedFile`.
     """
     path = Path(source)

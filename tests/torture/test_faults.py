@@ -226,7 +226,9 @@ def test_full_disk(folder, reference, record, room, of):
     wrong, found = refused(make, "No space left on device", "free some space"), tree(after)
     whole = {name for name in found.keys() - before.keys() if found[name] == reference.tree.get(name)}
     wrong = wrong or difference(before, {name: found[name] for name in found.keys() - whole})
-    record("faults", f"full disk, {room} kB left for {of}", "clear error, outputs untouched", wrong or "held", not wrong)
+    record(
+        "faults", f"full disk, {room} kB left for {of}", "clear error, outputs untouched", wrong or "held", not wrong
+    )
 
 
 @pytest.mark.parametrize("how", ["mounted", "immutable", "by rights"])

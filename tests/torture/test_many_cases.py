@@ -19,10 +19,10 @@ def with_many_cases(file: str) -> tuple[int, str]:
 
 def test_properties_of_public_functions(record):
     sys.path.insert(0, str(TESTS))
-    from test_properties import CASES, MOMENTS
+    from test_properties import CASES
 
     passed, last = with_many_cases("test_properties.py")
-    what = f"{len(CASES) + len(MOMENTS)} functions, up to 200 cases each" if passed else last
+    what = f"{len(CASES)} functions, up to 200 cases each" if passed else last
     record(
         "input",
         "bad arguments of the public functions of a reader",
