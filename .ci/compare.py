@@ -20,16 +20,9 @@ from vsp.machine import cpu_type
 from vsp.paper import PREFIX
 
 TABLES = Path("figures/tables")
-FIXED = (
-    "hyperparameters",
-    "tdavq_comparison",
-    "audit",
-    "readings_study",
-    "teacher_study",
-    "trust",
-    "scale",
-    "cluster",
-)  # no run
+FIXED = (  # tables that no run of this machine enters
+    "hyperparameters", "tdavq_comparison", "audit", "readings_study", "teacher_study", "trust", "scale", "cluster",
+)  # fmt: skip
 SPREAD = {"Mean": "mean", "Std": "std", "Q1": "q1", "Median/Q2": "median", "Q3": "q3", "IQR": "iqr"}
 OUTLIERS = ("outliers", "whisker_low", "whisker_high")
 Z = norm.isf(0.001 / 2 / (2 * len(PREFIX) * (len(SPREAD) + len(OUTLIERS))))

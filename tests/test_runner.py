@@ -201,7 +201,7 @@ def test_all_or_nothing_where_one_folder_is_closed(tmp_path, monkeypatch, capsys
 
 
 def test_figures_on_another_disk(tmp_path, monkeypatch):
-    """A file cannot be renamed from one disk to another: it is copied, whole or not at all."""
+    """A file cannot be renamed from one disk to another: it is copied, whole or not at all; what a kill left goes."""
     replace = os.replace
 
     def within(path, target):
@@ -210,8 +210,12 @@ def test_figures_on_another_disk(tmp_path, monkeypatch):
         replace(path, target)
 
     monkeypatch.setattr(os, "replace", within)
-    runner._publish(write(tmp_path).parent, out := tmp_path / "out")
-    assert (out / "story.ipynb").read_bytes() == (tmp_path / "story.ipynb").read_bytes()
+    staging, out = tmp_path / "staging", tmp_path / "out"
+    staging.mkdir(), out.mkdir()
+    (out / ".story-12345678.ipynb").write_text("half")
+    story = write(staging).read_bytes()
+    runner._publish(staging, out)
+    assert (out / "story.ipynb").read_bytes() == story
     assert [path.name for path in out.iterdir()] == ["story.ipynb"]
 
 

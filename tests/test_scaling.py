@@ -121,7 +121,7 @@ def test_the_cost_of_a_run_is_near_what_a_run_took():
 def test_memory_at_most_is_more_than_a_run_took():
     """Of the made-up teacher, which has no network."""
     frame = study.read("scale")
-    taken = frame[frame["what"].str.startswith("distillation")].dropna(subset=["megabytes"]).sort_values("size")
+    taken = frame[frame["what"] == "distillation"].dropna(subset=["megabytes"]).sort_values("size")
     megabytes = np.interp(preset("SimpleGoal-v0").n_epochs, taken["size"], taken["megabytes"])
     assert megabytes < cost(frame, tasks=scaling.TEN_TASKS[:1])["MB in memory"].iloc[0] < 5 * megabytes
 
