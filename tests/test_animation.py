@@ -167,7 +167,8 @@ def test_it_is_shown_with_words_and_moves_only_when_asked(saved):
     assert repr(shown) == ALT
 
 
-def test_another_process_writes_the_same_bytes_and_a_quick_run_is_marked(tmp_path):
+def test_another_process_writes_the_same_bytes_and_a_quick_run_is_marked(tmp_path, monkeypatch):
+    monkeypatch.setattr(animation, "FRAMES", 8)
     history = distill(CurvedTeacher(), SIMPLEGOAL, tiny(n_epochs=60), seed=0)[1]
     folders = [tmp_path / name for name in ("here", "quick", "there")]
     for folder, quick in zip(folders, (False, True)):
@@ -176,10 +177,11 @@ def test_another_process_writes_the_same_bytes_and_a_quick_run_is_marked(tmp_pat
 import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "tests")!r}]
 import matplotlib; matplotlib.use("Agg")
 from support import CurvedTeacher, tiny
-from vsp.animation import save_growth
+from vsp import animation
 from vsp.distill import distill
+animation.FRAMES = 8
 history = distill(CurvedTeacher(), {SIMPLEGOAL!r}, tiny(n_epochs=60), seed=0)[1]
-save_growth(history, CurvedTeacher(), {SIMPLEGOAL!r}, "growth", out={str(folders[2])!r}, alt="")
+animation.save_growth(history, CurvedTeacher(), {SIMPLEGOAL!r}, "growth", out={str(folders[2])!r}, alt="")
 """
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONHASHSEED": "7", "PATH": ""}, cwd=tmp_path)
     for name in ("growth.gif", "growth.png"):

@@ -56,17 +56,15 @@ def test_the_c_code_of_the_published_policies(task, tmp_path):
 
 def check_c(policy, library, n):
     states = states_of(policy, n)
-    doubles = ctypes.POINTER(ctypes.c_double)
-    library.vsp_act.argtypes, library.vsp_act.restype = [doubles, doubles], None
-    library.vsp_cell.argtypes = [doubles]
-    expected, cells, action = policy.predict(states)[0], policy.cells(states), np.zeros(len(policy.task.action_low))
-    found = np.empty_like(expected)
-    for i, state in enumerate(states):
-        at = state.ctypes.data_as(doubles)
-        library.vsp_act(at, action.ctypes.data_as(doubles))
-        found[i] = action
+    library.vsp_act.argtypes, library.vsp_act.restype = [ctypes.c_void_p, ctypes.c_void_p], None
+    library.vsp_cell.argtypes = [ctypes.c_void_p]
+    expected, cells = policy.predict(states)[0], policy.cells(states)
+    found = np.full_like(expected, np.nan)
+    at, into = (array.ctypes.data + array.strides[0] * np.arange(n) for array in (states, found))
+    for i, (state, action) in enumerate(zip(at.tolist(), into.tolist())):
+        library.vsp_act(state, action)
         if i % 97 == 0:
-            assert library.vsp_cell(at) == cells[i]
+            assert library.vsp_cell(state) == cells[i]
     assert np.abs(found - expected).max() <= 1e-12 and len(np.unique(cells)) > 1
 
 

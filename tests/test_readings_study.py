@@ -317,7 +317,9 @@ def test_a_resumed_study_makes_no_run_again(small, made, monkeypatch):
 
 
 def test_workers_have_no_say_in_the_study(small, made, tmp_path):
-    assert as_bytes(readings_study.study(tmp_path, jobs=2, tried=TRIED)) == as_bytes(made[1])
+    tried = {"default": {}, "box": TRIED["box"]}
+    there, here = readings_study.study(tmp_path, jobs=2, tried=tried), readings_study.study(made[0], tried=tried)
+    assert as_bytes(there) == as_bytes(here)
 
 
 def test_one_task_will_do(small, made):

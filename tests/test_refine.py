@@ -297,7 +297,7 @@ PLAIN = dataclasses.replace(SMALL, n_restarts=1, failure_price=0.0)
 
 @pytest.fixture(scope="module")
 def plain():
-    return refine(PumpingTeacher(), MOUNTAINCAR, PLAIN, seed=0)[1]
+    return refine(CurvedTeacher(), SIMPLEGOAL, PLAIN, seed=0)[1]
 
 
 @pytest.mark.parametrize(
@@ -307,12 +307,12 @@ def plain():
      {"n_generations": 5}, {"n_tuning_episodes": 40}, {"tuning_step": 0.3}, {"error_price": 100.0}],
 )  # fmt: skip
 def test_every_setting_acts(plain, change):
-    changed = refine(PumpingTeacher(), MOUNTAINCAR, dataclasses.replace(PLAIN, **change), seed=0)[1]
+    changed = refine(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(PLAIN, **change), seed=0)[1]
     assert not plain.equals(changed)
 
 
 def test_the_same_settings_give_the_same_trials(plain):
-    assert plain.equals(refine(PumpingTeacher(), MOUNTAINCAR, PLAIN, seed=0)[1])
+    assert plain.equals(refine(CurvedTeacher(), SIMPLEGOAL, PLAIN, seed=0)[1])
 
 
 @pytest.mark.parametrize(("change", "stages"), [({"n_restarts": 1}, "lfct"), ({"n_corrections": 0}, "lfft"),

@@ -4,7 +4,6 @@ import os
 import sys
 from pathlib import Path
 
-import nbformat
 import pytest
 
 pytest.importorskip("nbgrader", reason="nbgrader is not installed: `make test-site` brings it")
@@ -14,6 +13,7 @@ from nbgrader.apps import NbGraderAPI  # noqa: E402
 from traitlets.config import Config  # noqa: E402
 
 from vsp.course import build  # noqa: E402
+from vsp.notebook import nbformat  # noqa: E402
 from vsp.store import ROOT  # noqa: E402
 
 ASSIGNMENT = "homework"
