@@ -42,6 +42,11 @@ def once(teacher, task, config=None, *, seed):
     return RUNS[key]
 
 
+def briefly(teacher, task, config, *, seed):
+    """`distill` with a tenth of the iterations."""
+    return distill(teacher, task, config.quick(), seed=seed)
+
+
 @pytest.fixture(params=LESSONS)
 def lesson(request):
     return LESSONS[request.param]
@@ -218,6 +223,7 @@ def run(notebook, monkeypatch):
     """The names of a notebook after its last cell, and what went wrong in which cell (by id)."""
     monkeypatch.setattr(vsp, "distill", once)
     monkeypatch.setattr(lesson_2, "distill", once)
+    monkeypatch.setattr("vsp.explorer.distill", briefly)
     monkeypatch.setattr("vsp.course.show", lambda fig, alt: drawing.plt.close(fig) or alt)
     names, failed = {}, {}
     for cell in code_cells(notebook):

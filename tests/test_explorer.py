@@ -73,10 +73,19 @@ def run(request):
     return request.param, teacher, distill(teacher, request.param, config, seed=0)[1]
 
 
-@pytest.fixture
-def shown(run):
+@pytest.fixture(scope="module")
+def stage(run):
     task, teacher, history = run
-    return replay(teacher, task, history)
+    return replay(teacher, task, history).growth
+
+
+@pytest.fixture
+def shown(run, stage, monkeypatch):
+    """One stage for all tests: a slider draws into it again and again, too."""
+    task, teacher, history = run
+    with monkeypatch.context() as patch:
+        patch.setattr(explorer, "Growth", lambda *given, **named: stage)
+        return replay(teacher, task, history)
 
 
 def test_the_slider_turns_the_pages(shown, run):

@@ -35,19 +35,15 @@ def experiment(task):
     return dataclasses.replace(quick, config=config, n_episodes=40)
 
 
-def make_results(runs, jobs):
-    """Tiny runs of both tasks, in the folder `runs`."""
-    found = {}
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Tiny runs of both tasks."""
+    runs, found = tmp_path_factory.mktemp("runs"), {}
     for task in TASKS:
         one = experiment(task)
         teacher = outcomes(one.teacher, task, one.n_episodes, seed=EVALUATION_SEED)
-        found[task] = Results(one, make_runs(one, SEEDS, runs=runs, jobs=jobs), teacher)
+        found[task] = Results(one, make_runs(one, SEEDS, runs=runs), teacher)
     return found
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return make_results(tmp_path_factory.mktemp("runs"), jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -414,14 +410,6 @@ def test_more_resamples_change_the_intervals_alone(book, results):
 def test_the_same_results_give_the_same_rows(book, results):
     again = ledger.ledger(dict(reversed(results.items())), n_resamples=N_RESAMPLES)
     assert as_bytes(again) == as_bytes(book)
-
-
-def test_workers_have_no_say_in_the_intervals(book, results, tmp_path):
-    found = make_results(tmp_path, jobs=2)
-    assert as_bytes(ledger.ledger(found, n_resamples=N_RESAMPLES)) == as_bytes(book)
-    for task in TASKS:
-        one, other = (as_bytes(left_out(r[task], n_resamples=N_RESAMPLES)) for r in (results, found))
-        assert one == other
 
 
 # Made by hand

@@ -188,6 +188,7 @@ def test_landmarks_by_hand():
 
 TINY = tiny(n_epochs=30, n_freeze=5)
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+FEW = {"choosing": range(2), "confirming": range(10, 13)}  # seeds
 TRIED = {"default": {}, "one split": {"one_split": True}, "zeros": {"initial": "zeros"}, "box": {"scale": "box"}}
 
 
@@ -205,8 +206,8 @@ def fewer_resamples(returns, *, n_resamples):
 def small():
     """The study with tiny runs of a few seeds, 100 resamples, and one variant confirmed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(readings_study, "CHOOSING", range(3))
-        patch.setattr(readings_study, "CONFIRMING", range(10, 14))
+        patch.setattr(readings_study, "CHOOSING", FEW["choosing"])
+        patch.setattr(readings_study, "CONFIRMING", FEW["confirming"])
         patch.setattr(readings_study, "N_CONFIRMED", 1)
         patch.setattr(readings_study, "preset", lambda task: TINY)
         patch.setattr(readings_study, "paper_experiment", lambda task: Experiment(task, TINY, TEACHERS[task], 20))
@@ -235,7 +236,7 @@ def test_the_study_has_a_row_per_phase_variant_and_task(made):
     nearest = {"default", first, *(ranking(chosen, task)[0] for task in TASKS)}
     assert set(confirmed["variant"]) == nearest and len(chosen) == 3 * 4 and len(confirmed) == 3 * len(nearest)
     single = frame[frame["task"] != "both"]
-    assert single["runs"].tolist() == [3] * 8 + [4] * 2 * len(nearest)
+    assert single["runs"].tolist() == [2] * 8 + [3] * 2 * len(nearest)
     assert frame[frame["task"] == "both"]["settings"].isna().all()
     assert set(single["code"]) == {readings_study.code()} == {experiments.code_id("readings_study")}
 
@@ -257,7 +258,7 @@ def played(runs, task, change, seeds):
     return experiment, found
 
 
-@pytest.mark.parametrize(("phase", "seeds"), [("choosing", range(3)), ("confirming", range(10, 14))])
+@pytest.mark.parametrize(("phase", "seeds"), FEW.items())
 @pytest.mark.parametrize("task", TASKS)
 def test_a_row_says_what_its_runs_came_to(made, phase, seeds, task):
     runs, frame = made
@@ -311,7 +312,7 @@ def test_a_resumed_study_makes_no_run_again(small, made, monkeypatch):
     asked, original = [], experiments.make_run
     monkeypatch.setattr(experiments, "make_run", lambda e, seed: (asked.append(seed), original(e, seed))[1])
     assert as_bytes(readings_study.study(made[0], tried=TRIED)) == as_bytes(made[1]) and not asked
-    one, _ = played(made[0], SIMPLEGOAL, TRIED["box"], range(3))
+    one, _ = played(made[0], SIMPLEGOAL, TRIED["box"], FEW["choosing"])
     (one.folder(made[0]) / "0001.run").unlink()
     assert as_bytes(readings_study.study(made[0], tried=TRIED)) == as_bytes(made[1]) and asked == [1]
 

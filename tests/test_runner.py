@@ -103,7 +103,6 @@ def test_of_an_explorer_its_strip_is_left_once(tmp_path):
     (output,) = nbformat.read(copy, as_version=4).cells[1].outputs
     assert output.data["text/html"].endswith("<figcaption>on this page</figcaption></figure></div>")
     assert "widget" not in copy.read_text() and output.data["text/plain"] == "Small."
-    assert runner.run(notebook, tmp_path) == []
 
 
 def test_results_are_listed_beside_those_of_others(tmp_path):
