@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, alive, same_arrays, tiny, until
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, alive, same_arrays, tiny, until
 
 from vsp import experiments, store, workers
 from vsp.evaluate import outcomes
