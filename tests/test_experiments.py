@@ -3,12 +3,13 @@ import os
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, alive, same_arrays, tiny, until
 
-from vsp import experiments, store, workers
+from vsp import baselines, experiments, store, workers
 from vsp.evaluate import outcomes
 from vsp.experiments import (
     EVALUATION_SEED,
@@ -309,6 +310,21 @@ def test_the_command_clears_away_what_a_kill_left(made, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path)])
     experiments.main()
     assert files(tmp_path / "data" / "runs") == before
+
+
+@pytest.mark.parametrize(
+    ("options", "quick", "n_fits", "jobs"), [(["--quick", "--jobs", "2"], True, 2, 2), ([], False, 20, -1)]
+)
+def test_the_command_makes_the_runs_and_what_stands_beside_them(tmp_path, monkeypatch, options, quick, n_fits, jobs):
+    made, runs = [], tmp_path / "data" / "runs"
+    results = SimpleNamespace(runs=[])
+    monkeypatch.setattr(experiments, "paper_results", lambda task, **named: made.append((task, named)) or results)
+    monkeypatch.setattr(baselines, "kept_comparison", lambda *given, **named: made.append((given, named)))
+    monkeypatch.setattr(sys, "argv", ["experiments", "--out", str(tmp_path), *options])
+    experiments.main()
+    beside = (results, n_fits), {"runs": runs, "jobs": jobs}
+    first, second = ((task, {"runs": runs, "quick": quick, "jobs": jobs}) for task in N_RUNS)
+    assert made == [first, beside, second, beside]
 
 
 def test_an_end_by_signal_ends_the_workers_too(tmp_path):
