@@ -1,12 +1,11 @@
-"""Compare the committed tables with those just made in another folder: `python .ci/compare.py FOLDER`.
+"""Compare the committed figures, tables and executed notebooks with those in a folder: `python .ci/compare.py FOLDER`.
 
-On the CPU type that the committed tables were made on, every table must be the same to the byte. On another, rounding
-may send runs down other paths: then what does not come from runs must be the same to the byte, and the numbers of the
-distilled policies and of the teacher must lie inside simultaneous 99.9 % intervals, from resampled policies and from
-resampled episodes (Bonferroni over all numbers compared): a few episodes of a network end elsewhere too.
+On the CPU type in data/results/made_on.txt every file must have the same bytes. On another, rounding may change the
+path of a run. There only tables are compared: those that do not depend on runs must have the same bytes; the statistics
+of the distilled policies and of the teacher (a few of its episodes end differently too) must lie inside simultaneous
+99.9 % intervals, from resampled policies and from resampled episodes, with Bonferroni's correction.
 """
 
-import filecmp
 import sys
 from pathlib import Path
 
@@ -14,24 +13,24 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from vsp import experiments, store
-from vsp.evaluate import outlier_numbers, spread
-from vsp.machine import cpu_type
-from vsp.paper import PREFIX
+from vsp.beyond.benchmarks.trust import save_kills
+from vsp.paper import runs
+from vsp.paper.printed import PREFIX
+from vsp.paper.statistics import outlier_numbers, spread
+from vsp.run import listed
+from vsp.run.machine import cpu_type
 
-TABLES = Path("figures/tables")
-FIXED = (  # tables that no run of this machine enters
-    "hyperparameters", "tdavq_comparison", "audit", "readings_study", "teacher_study", "trust", "scale", "cluster",
-)  # fmt: skip
+FIGURES = Path("figures")
+TABLES = FIGURES / "tables"
+FIXED = ("hyperparameters", "tdavq_comparison", "audit", "readings_study", "teacher_study")  # made without new runs
 SPREAD = {"Mean": "mean", "Std": "std", "Q1": "q1", "Median/Q2": "median", "Q3": "q3", "IQR": "iqr"}
 OUTLIERS = ("outliers", "whisker_low", "whisker_high")
 Z = norm.isf(0.001 / 2 / (2 * len(PREFIX) * (len(SPREAD) + len(OUTLIERS))))
 
 
-def different(made: Path, names: list[str]) -> list[str]:
-    """Those of the committed tables `names` that are missing in `made` or differ in a byte."""
-    _, differing, missing = filecmp.cmpfiles(TABLES, made / TABLES, names, shallow=False)
-    return differing + missing
+def different(made: Path, paths: list[Path]) -> list[str]:
+    """Those of the committed files `paths` that are missing in `made` or have other bytes."""
+    return [str(p) for p in paths if not (made / p).is_file() or (made / p).read_bytes() != p.read_bytes()]
 
 
 def statistics(returns: np.ndarray) -> dict[str, float]:
@@ -54,7 +53,7 @@ def committed(task: str) -> tuple[dict[str, float], dict[str, float]]:
 
 def implausible(made: Path, task: str) -> list[str]:
     """The statistics of `task` whose committed value is implausible given the runs in `made`."""
-    results = experiments.paper_results(task, runs=made / "data" / "runs")
+    results = runs.paper_results(task, runs=made / "data" / "runs")
     rng, wrong = np.random.default_rng(0), []
     made_returns = (results.teacher_returns, results.returns)
     for subject, then, returns in zip(("TD3", "distilled"), committed(task), made_returns, strict=True):
@@ -69,16 +68,17 @@ def implausible(made: Path, task: str) -> list[str]:
 
 def main() -> None:
     made = Path(sys.argv[1])
-    names = sorted(path.name for path in TABLES.iterdir())
-    if store.read_listed("data/results/made_on.txt").decode().strip() == cpu_type():
-        wrong, rule = different(made, names), "the same bytes, on the same CPU type"
+    if listed.read_listed("data/results/made_on.txt").decode().strip() == cpu_type():
+        save_kills(made)  # the only figure that no notebook makes
+        paths = sorted(path for path in FIGURES.rglob("*") if path.is_file())
+        wrong, right = different(made, paths), f"all {len(paths)} files of {FIGURES}/ have the same bytes"
     else:
-        wrong = different(made, [name for name in names if name.startswith(FIXED)])
-        wrong += [name for task in PREFIX for name in implausible(made, task)]
-        rule = "inside the intervals, on another CPU type"
+        paths = sorted(path for path in TABLES.iterdir() if path.name.startswith(FIXED))
+        wrong = different(made, paths) + [name for task in PREFIX for name in implausible(made, task)]
+        right = f"another CPU type: {len(paths)} tables have the same bytes, the others are inside the intervals"
     if wrong:
         sys.exit(f"differ: {', '.join(wrong)}")
-    print(f"all tables are {rule}")
+    print(right)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 project = "vsp"
 author = "the vsp authors"
 language = "en"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "mathematics", "outputs", "docstrings", "pages"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "mathematics", "outputs", "docstrings", "pages", "trust_tables"]
 exclude_patterns = ["README.md"]  # its parts are included in the pages
 
 # Notebooks: shown as they were executed

@@ -6,10 +6,10 @@ import pandas as pd
 import pytest
 from support import CurvedTeacher
 
-from vsp import store
+from vsp.run import listed
 
 hypothesis.settings.register_profile("vsp", derandomize=True, database=None, deadline=None, max_examples=60)
-hypothesis.settings.register_profile("torture", parent=hypothesis.settings.get_profile("vsp"), max_examples=200)
+hypothesis.settings.register_profile("many", parent=hypothesis.settings.get_profile("vsp"), max_examples=200)
 hypothesis.settings.load_profile("vsp")
 
 
@@ -18,7 +18,7 @@ def pytest_addoption(parser):
         "--remake-golden", action="store_true", help="write tests/golden/*.json anew from the present code"
     )
     parser.addoption(
-        "--record", type=Path, help="the folder that figures go into, see measured.py; else they are only shown"
+        "--record", type=Path, help="write measurements into this folder, see measured.py; default: only print them"
     )
 
 
@@ -32,7 +32,7 @@ def ax():
     """Axes to draw into."""
     import matplotlib.pyplot as plt
 
-    from vsp.figures import panels
+    from vsp.show import panels
 
     fig, axes = panels()
     yield axes[0]
@@ -41,29 +41,32 @@ def ax():
 
 @pytest.fixture
 def record(request, capsys):
-    """`record(table, what, to_hold, value, held)` shows and keeps a measured figure, then asserts that it holds.
+    """`record(table, what, measured, unit, at_least=...)`, or `at_most=`: show and keep a measurement, then assert it.
 
-    `why` explains, in the table too, what did not hold and is not expected to.
+    Arguments are those of `measured.row`. `why` explains a target that is known to be missed, and lets the test pass.
     """
 
-    def record(table: str, what: str, to_hold: str, value: str, held: bool, *, why: str = "") -> None:
-        verdict = "yes" if held else f"no: {why}" if why else "no"
+    def record(*about, why: str = "", note: str = "", **numbers) -> None:
+        row = measured.row(*about, note=note, **numbers)
+        if row["met"] == "no" and why:
+            row["note"] = "; ".join(filter(None, (note, why)))
+        text = "{what}: {measured:g} {unit}, expected {rule} {target:g}; {note}".format(**row)
         with capsys.disabled():
-            print(f"\n{what}: {value} (to hold: {to_hold}; {verdict})", end="")
+            print(f"\n{text}", end="")
         if folder := request.config.getoption("record"):
-            measured.record(folder / "trust.csv", table, what, to_hold, value, verdict)
-        assert held or why, f"{what}: {value}, expected {to_hold}"
+            measured.add(folder / "trust.csv", row)
+        assert row["met"] == "yes" or why, text
 
     return record
 
 
 @pytest.fixture
 def keep(request):
-    """`keep(name, frame)` writes a whole table beside the one of `record`."""
+    """`keep(name, frame)` writes a table of its own, beside that of `record`."""
 
     def keep(name: str, frame: pd.DataFrame) -> None:
         if folder := request.config.getoption("record"):
             text = frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
-            store.write_listed(folder / f"{name}.csv", text)
+            listed.write_listed(folder / f"{name}.csv", text)
 
     return keep

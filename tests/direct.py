@@ -8,17 +8,17 @@ first parameters and minibatches. Codewords in a line are not provided for.
 
 from __future__ import annotations
 
-import importlib
-
 import gymnasium
 import numpy as np
 import torch
 from scipy.spatial import Delaunay, KDTree
 from torch.nn.functional import mse_loss
 
+import vsp
+from vsp import algorithms
 from vsp.config import Config
 from vsp.rollouts import Episode
-from vsp.teachers import SHIPPED
+from vsp.teachers.teacher import SHIPPED
 
 
 def evaluate_directly(policy, task: str, n_episodes: int, *, seed: int) -> np.ndarray:
@@ -55,11 +55,10 @@ class OneByOne:
 def same_run(found, teacher, task: str, config: Config, seed: int, monkeypatch) -> bool:
     """Whether `vsp.distill` does, with the episodes of the direct way's run `found`, what was done there."""
     cells, events, losses, episodes = found
-    module = importlib.import_module("vsp.distill")  # `vsp.distill` is the function
     played = [Episode(*map(np.array, zip(*episode))) for episode in episodes]
     with monkeypatch.context() as patch:
-        patch.setattr(module, "teacher_episodes", lambda *_: iter(played))
-        policy, history = module.distill(teacher, task, config, seed=seed)
+        patch.setattr(algorithms, "teacher_episodes", lambda *_: iter(played))
+        policy, history = vsp.distill(teacher, task, config, seed=seed)
     own = [(event.iteration, event.kind, tuple(event.codeword)) for event in history.events]
     return (
         own == [(n, kind, tuple(codeword)) for n, kind, codeword in events]

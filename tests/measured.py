@@ -1,29 +1,28 @@
-"""The figures that `make bench` and `make torture` measure, in one table: trust.csv.
+"""Collects what `make bench` and `make faults` measure in one table, trust.csv, which docs/trust.md shows.
 
-    python tests/measured.py build/measured data/results README.md
+    python tests/measured.py build/measured data/results
 
-puts the tables in the first folder, where the tests write as they go, into the second, and the figures into the README,
-between two lines that say so. Not before: a notebook shows them, and tests compare what notebooks make.
+merges the tables of the first folder, where the tests write as they run, into those of the second. This waits until the
+tests have ended, because they compare what is made from data/results.
 """
 
 import os
 import platform
-import re
 import sys
 from pathlib import Path
 
 import pandas as pd
 
-from vsp import store
-from vsp.machine import cpu_type
+from vsp.beyond.benchmarks.trust import save_kills
+from vsp.run import atomic, listed
+from vsp.run.machine import cpu_type
 
-COLUMNS = ["table", "what", "to hold", "measured", "held", "machine"]
-TABLES = {"faults": "Faults", "input": "Bad input", "same": "The same everywhere", "speed": "Speed"}
-BLOCK = re.compile(r"(<!-- measured -->\n).*(<!-- end of what was measured -->)", re.DOTALL)
+COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
+TABLES = ["faults", "input", "same", "speed"]
 
 
 def machine() -> str:
-    """Processor, cores, memory and type of this machine, in words."""
+    """Processor, cores, memory and CPU type of this machine."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({cpu_type()})"
 
@@ -37,51 +36,47 @@ def _processor() -> str:
     return named[0] if named else platform.machine()
 
 
-def record(path: Path, table: str, what: str, to_hold: str, measured: str, held: str) -> None:
-    """Put one row into the CSV at `path`, in the place of the one with the same `table` and `what`."""
-    row = dict(zip(COLUMNS, (table, what, to_hold, measured, held, machine())))
-    write(path, merged(read(path), pd.DataFrame([row])))
+def row(
+    table: str, what: str, measured: float, unit: str, *, at_least: float | None = None, at_most: float | None = None,
+    low: float | None = None, high: float | None = None, note: str = "",
+) -> dict:  # fmt: skip
+    """A row of trust.csv. `low` and `high` are the range of repeated measurements, `measured` their median."""
+    rule, target = ("at most", at_most) if at_least is None else ("at least", at_least)
+    met = measured <= target if at_least is None else measured >= target
+    numbers = (rule, target, measured, unit, low, high)
+    return dict(zip(COLUMNS, (table, what, *numbers, "yes" if met else "no", note, machine()), strict=True))
+
+
+def add(path: Path, new: dict) -> None:
+    """Put a row into the CSV at `path`, in place of the one with the same `table` and `what`."""
+    write(path, merged(read(path), pd.DataFrame([new])))
 
 
 def read(path: Path) -> pd.DataFrame:
     """The table at `path`, empty if there is none."""
-    return store.read_table(path, dtype=str) if path.exists() else pd.DataFrame(columns=COLUMNS, dtype=str)
+    return listed.read_table(path) if path.exists() else pd.DataFrame(columns=COLUMNS)
 
 
 def write(path: Path, frame: pd.DataFrame) -> None:
-    store.write_listed(path, frame.to_csv(index=False, lineterminator="\n"))
+    listed.write_listed(path, frame.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 
 def merged(old: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
-    """The rows of both, the new one in the place of an old one; tables in the order of `TABLES`, rows by name."""
-    frame = pd.concat([old, new]).groupby(["table", "what"], as_index=False).last()[COLUMNS]
-    return frame.sort_values("table", key=lambda names: names.map(list(TABLES).index), kind="stable", ignore_index=True)
-
-
-def markdown(path: Path) -> str:
-    """The rows of the CSV at `path` for the README, with the machines that they were measured on."""
-    frame = read(path)
-    lines = ["| what | to hold | measured | held |", "|---|---|---|---|"]
-    for table, title in TABLES.items():
-        rows = frame[frame["table"] == table].drop(columns=["table", "machine"])
-        lines += [f"| **{title}** | | | |"] * bool(len(rows))
-        lines += [
-            f"| {' | '.join(' '.join(text.split()).replace('|', '/') for text in row)} |" for row in rows.to_numpy()
-        ]
-    return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}.\n"])
+    """The rows of both, new ones in place of old ones; tables in the order of `TABLES`, rows by name."""
+    frame = pd.concat([part for part in (old, new) if len(part)])[COLUMNS]
+    frame = frame.drop_duplicates(["table", "what"], keep="last").sort_values("what")
+    return frame.sort_values("table", key=lambda names: names.map(TABLES.index), kind="stable", ignore_index=True)
 
 
 def main() -> None:
-    source, results, readme = map(Path, sys.argv[1:])
+    source, results = map(Path, sys.argv[1:])
     for path in source.glob("*.csv"):
         if path.name == "trust.csv":
             write(results / path.name, merged(read(results / path.name), read(path)))
         else:
-            store.write_listed(results / path.name, store.read_listed(path))
-    if results.resolve() != store.ROOT / "data" / "results":
-        return  # the README tells what is committed
-    text = markdown(results / "trust.csv")
-    store.write_text(readme, BLOCK.sub(lambda block: block[1] + text + block[2], readme.read_text(encoding="utf-8")))
+            listed.write_listed(results / path.name, listed.read_listed(path))
+    if results.resolve() == atomic.ROOT / "data" / "results":
+        save_kills(atomic.ROOT)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """What several test files share: teachers that need no file, a short configuration, small partitions, processes."""
 
 import dataclasses
+import functools
 import hashlib
 import os
 import subprocess
@@ -10,11 +11,15 @@ import time
 import numpy as np
 
 from vsp.config import Config
-from vsp.distill import Partition
-from vsp.envs import get_task
+from vsp.geometry import nearest
+from vsp.partition import Partition
 from vsp.rollouts import Episode
-from vsp.store import ROOT
-from vsp.teachers import Teacher
+from vsp.run.atomic import ROOT
+from vsp.run.machine import cpu_type
+from vsp.tasks.registry import get_task
+from vsp.teachers.teacher import Teacher
+
+nearest_brute, nearest_kdtree = (functools.partial(nearest, kdtree=kdtree) for kdtree in (False, True))
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
 PENDULUM, LUNARLANDER = "Pendulum-v1", "LunarLanderContinuous-v3"
@@ -127,10 +132,10 @@ def examples(task, n=300, seed=0):
 
 
 _DISTIL = """
-import dataclasses, hashlib, importlib, sys
+import dataclasses, hashlib, sys
 import support, vsp
 task, teacher, config, seed, ahead = sys.argv[1:]
-importlib.import_module("vsp.distill").EPISODES_AHEAD = int(ahead)
+vsp.algorithms.EPISODES_AHEAD = int(ahead)
 players = {"curved": support.CurvedTeacher, "pumping": support.PumpingTeacher}
 player = players[teacher]() if teacher in players else vsp.load_teacher(task)
 policy, _ = vsp.distill(player, task, support.TINY if config == "tiny" else vsp.preset(task), seed=int(seed))
@@ -152,6 +157,11 @@ def distilled_elsewhere(task, *, teacher="shipped", config="paper", seed=0, ahea
 def threads(n):
     """The environment variables for n threads of everything that has any."""
     return {f"{name}_NUM_THREADS": str(n) for name in ("OMP", "OPENBLAS", "MKL", "VECLIB", "NUMEXPR")}
+
+
+def made_on() -> dict[str, str]:
+    """What golden numbers depend on. "AMD EPYC" alone would not do: some have AVX-512 and some have not."""
+    return {"cpu": cpu_type(), "numpy": np.__version__}
 
 
 def alive(pid: int) -> bool:

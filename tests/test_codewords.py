@@ -1,27 +1,25 @@
 """Codewords in every position, one, two, in a row, nearly equal, on a grid, in 1 to 8 dimensions; and in any order."""
 
 import itertools
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import partition_of, tiny
+from support import nearest_brute, nearest_kdtree, partition_of, tiny
 
-from vsp.distill import merge_regions
-from vsp.envs import Task
-from vsp.geometry import (
-    METRICS,
-    delaunay_neighbours,
-    distances,
-    lookup_neighbours,
-    nearest_brute,
-    nearest_kdtree,
-    visited_neighbours,
-)
+from vsp.algorithms import merge_regions
+from vsp.config import Config
+from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
 from vsp.partition import Partition
 from vsp.policy import VoronoiPolicy
-from vsp.readings import NEIGHBOURS
+from vsp.tasks.base import Task
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
 
 KINDS = {
     "one": lambda rng, d: rng.random((1, d)),
@@ -29,14 +27,8 @@ KINDS = {
     "scattered": lambda rng, d: rng.random((int(rng.integers(3, 16)), d)),
     "in a row": lambda rng, d: rng.random(d) + rng.permutation(7)[:, None] * rng.normal(size=d) / 7,
     "in a plane": lambda rng, d: rng.random((9, min(d, 2))) @ rng.normal(size=(min(d, 2), d)),
-    "on a grid": lambda rng, d: rng.permutation(
-        list(itertools.islice(itertools.product((0.0, 0.5, 1.0), repeat=d), 27))
-    ),
-    "on a sphere": lambda rng, d: (
-        (lambda x: x / np.linalg.norm(x, axis=1)[:, None] + x * 0)(rng.normal(size=(9, d)))
-        if d > 1
-        else rng.random((3, 1))
-    ),
+    "on a grid": lambda rng, d: rng.permutation([*itertools.islice(itertools.product((0, 0.5, 1), repeat=d), 27)]),
+    "on a sphere": lambda rng, d: unit(rng.normal(size=(9, d))),
     "nearly equal": lambda rng, d: (
         np.repeat(rng.random((3, d)) + 0.5, 2, axis=0)
         + np.tile([[0.0], [1.0]], (3, 1)) * 10.0 ** -rng.integers(3, 16) * rng.uniform(0.5, 1, d)
@@ -83,7 +75,7 @@ def policy_of(codewords, metric="manhattan", *, seed=0):
 
 
 def test_every_kind_of_neighbours_is_tried():
-    assert graphs(*codewords_of("two", 2, 0), "manhattan").keys() == NEIGHBOURS.keys()
+    assert graphs(*codewords_of("two", 2, 0), "manhattan").keys() == set(get_args(get_type_hints(Config)["neighbours"]))
 
 
 @pytest.mark.parametrize("metric", METRICS)

@@ -10,8 +10,9 @@ import torch
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 import vsp
-from vsp.evaluate import outcomes
-from vsp.teachers import load_teacher
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import printed
+from vsp.teachers.teacher import load_teacher
 
 SHORT = {  # often enough split, merged and reset to be worth comparing
     SIMPLEGOAL: {"n_epochs": 300, "n_freeze": 50, "n_split": 10, "n_merge": 30, "n_reset": 70},
@@ -57,6 +58,6 @@ def test_both_play_from_the_same_starts(task, agent):
 @pytest.mark.parametrize("who", ["copy", "teacher"])
 def test_evaluate_policy_comes_to_the_same_returns(task, agent, who):
     """To what it rounds to, and to what Gymnasium's MountainCar makes of an action in float32."""
-    policy = vsp.paper.published_policy(task) if who == "copy" else direct.OneByOne(agent)
+    policy = printed.published_policy(task) if who == "copy" else direct.OneByOne(agent)
     returns, tolerance = direct.evaluate_directly(policy, task, 10, seed=3), 1e-6 if who == "copy" else 1e-5
-    assert np.allclose(returns, outcomes(policy, task, 10, seed=3).returns, rtol=0, atol=tolerance)
+    assert np.allclose(returns, rollout_from_seed(policy, task, 10, seed=3).returns, rtol=0, atol=tolerance)

@@ -1,18 +1,20 @@
 import ctypes
+import dataclasses
 import json
 import re
 import shutil
 import subprocess
+from functools import partial
 
 import numpy as np
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp import paper
-from vsp.envs import get_task
 from vsp.export import symbol
+from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
-from vsp.subpolicies import form_of
+from vsp.subpolicies.registry import policy_class
+from vsp.tasks.registry import get_task
 
 TASKS = (SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER)
 
@@ -29,7 +31,21 @@ def states_of(policy, n, seed=1):
     return np.random.default_rng(seed).uniform(policy.task.low, policy.task.high, size=(n, len(policy.task.low)))
 
 
-CASES = [(task, metric) for task in TASKS for metric in ("manhattan", "euclidean", "chebyshev")]
+CLASSES = [(form, task) for form in ("constant", "quadratic", "pid", "network") for task in (MOUNTAINCAR, PENDULUM)]
+CLASSES += [("quadratic", LUNARLANDER), ("network", LUNARLANDER)]
+
+
+def other(form, task):
+    like, rng = some(task), np.random.default_rng(2)
+    (k, _, m), shape = like.coefficients.shape, policy_class(form, like.task)
+    coefficients = rng.normal(size=(k, len(shape.rows), m)) / shape.units
+    return VoronoiPolicy(like.codewords, coefficients, task=task, scale=like.scale, sub_policy=form)
+
+
+METRICS = ("manhattan", "euclidean", "chebyshev")
+POLICIES = {f"{task}-{metric}": partial(some, task, metric) for task in TASKS for metric in METRICS}
+POLICIES |= {f"{task}-{form}": partial(other, form, task) for form, task in CLASSES}
+each_policy = pytest.mark.parametrize("make", POLICIES.values(), ids=POLICIES)
 
 
 def compiled(policy, folder):
@@ -42,16 +58,16 @@ def compiled(policy, folder):
     return ctypes.CDLL(str(library))
 
 
-@pytest.mark.parametrize(("task", "metric"), CASES)
-def test_the_c_code_acts_as_the_policy_does(task, metric, tmp_path):
-    policy = some(task, metric)
-    check_c(policy, compiled(policy, tmp_path), 100_000)
+@each_policy
+def test_the_c_code_acts_as_the_policy_does(make, tmp_path):
+    policy = make()
+    check_c(policy, compiled(policy, tmp_path), 20_000)
 
 
 @pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
 def test_the_c_code_of_the_published_policies(task, tmp_path):
-    policy = paper.published_policy(task)
-    check_c(policy, compiled(policy, tmp_path), 100_000)
+    policy = printed.published_policy(task)
+    check_c(policy, compiled(policy, tmp_path), 20_000)
 
 
 def check_c(policy, library, n):
@@ -68,29 +84,77 @@ def check_c(policy, library, n):
     assert np.abs(found - expected).max() <= 1e-12 and len(np.unique(cells)) > 1
 
 
-@pytest.mark.parametrize(("task", "metric"), CASES)
-def test_the_python_code_acts_as_the_policy_does(task, metric):
-    policy, module = some(task, metric), {}
+def executed(policy):
+    """The module that `to_python` writes."""
+    module = {}
     exec(compile(policy.to_python(), "policy.py", "exec"), module)
-    states = states_of(policy, 2000)
+    return module
+
+
+@each_policy
+def test_the_python_code_acts_as_the_policy_does(make):
+    policy = make()
+    module, states = executed(policy), states_of(policy, 1000)
     assert np.abs([module["act"](s.tolist()) for s in states] - policy.predict(states)[0]).max() <= 1e-12
     assert [module["cell"](s.tolist()) for s in states] == policy.cells(states).tolist()
-    assert module["__doc__"].startswith(f"{task}: 7 linear policies")
+    assert module["__doc__"].startswith(f"{policy.task.name}: 7 {policy.policy_class.name} policies")
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_json_holds_the_same_numbers(task):
-    policy = some(task, "chebyshev")
+@pytest.mark.parametrize("form", ["constant", "linear", "network"])
+def test_a_state_that_is_not_finite_gets_no_action(form, tmp_path):
+    """Not full torque: fmax and fmin prefer a limit to NaN, and a constant does not look at the state."""
+    policy = other(form, MOUNTAINCAR)
+    library, module = compiled(policy, tmp_path), executed(policy)
+    for bad in ([np.nan, 0.0], [0.0, np.nan], [np.inf, 0.0], [0.0, -np.inf]):
+        state, action = (ctypes.c_double * 2)(*bad), (ctypes.c_double * 1)(0.5)
+        library.vsp_act(state, action)
+        assert library.vsp_cell(state) == module["cell"](bad) == -1
+        assert np.isnan(action[0]) and np.isnan(module["act"](bad)).all()
+
+
+def test_an_action_that_overflows_is_no_full_torque(tmp_path):
+    policy = VoronoiPolicy([[0, 0]], [[[20], [-20], [0]]], task=MOUNTAINCAR)
+    state, action = (ctypes.c_double * 2)(1e308, 1e308), (ctypes.c_double * 1)(0.5)
+    compiled(policy, tmp_path).vsp_act(state, action)
+    assert np.isnan(action[0]) and np.isnan(executed(policy)["act"]([1e308, 1e308])).all()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ['"""\nran = 1\n"""', "*/ int ran; /*", "\nran = 1", "\\", '\\"""+ran', "*\\\n/int ran;/*", "/*/"],
+)  # fmt: skip
+def test_names_are_no_code(name, tmp_path):
+    task = dataclasses.replace(get_task(MOUNTAINCAR), name=name, inputs=(name, "v"), outputs=(name,))
+    policy = VoronoiPolicy(np.eye(2), np.ones((2, 3, 1)), task=task)
+    module, library = executed(policy), compiled(policy, tmp_path)
+    assert "ran" not in module and not hasattr(library, "ran")
+    assert module["act"]([0.1, 0.2]) == pytest.approx([1.0]) and module["__doc__"].endswith("is the nearest.")
+    assert "*/" in name or "/*" in name or module["__doc__"].startswith(name)
+
+
+@pytest.mark.parametrize(
+    "code", ["print(1)", "state[0]; int ran", "__import__('os')", "1 if state[0] else 2", "x", "1\n"]
+)
+def test_signals_that_are_no_arithmetic_are_refused(code):
+    signals = dataclasses.replace(get_task(MOUNTAINCAR).signals, code=(code, "state[1]"))
+    task = dataclasses.replace(get_task(MOUNTAINCAR), signals=signals)
+    policy = VoronoiPolicy([[0, 0]], np.ones((1, 3, 1)), task=task, sub_policy="pid")
+    for export in (policy.to_c, policy.to_python):
+        with pytest.raises(ValueError, match="expected arithmetic with state"):
+            export()
+
+
+@each_policy
+def test_json_holds_the_same_numbers(make):
+    policy = make()
     told = json.loads(policy.to_json())
     arrays = {name: np.array(told[name]) for name in ("codewords", "coefficients", "scale")}
-    back = VoronoiPolicy(**arrays, task=told["task"], metric=told["metric"])
+    back = VoronoiPolicy(**arrays, task=told["task"], metric=told["metric"], sub_policy=told["sub_policy"])
     states = states_of(policy, 100)
     assert np.array_equal(back.predict(states)[0], policy.predict(states)[0])
     assert told["inputs"] == list(policy.task.inputs) and told["outputs"] == list(policy.task.outputs)
-    assert (
-        told["action_low"] == policy.task.action_low.tolist()
-        and told["action_high"] == (-np.array(told["action_low"])).tolist()
-    )
+    assert told["rows"] == list(policy.policy_class.rows)
+    assert told["action_low"] == policy.task.action_low.tolist() == [-high for high in told["action_high"]]
 
 
 def test_latex_by_hand():
@@ -150,42 +214,6 @@ def test_what_is_printed_exactly_reads_back_as_the_same_policy(seed):
 )  # fmt: skip
 def test_symbols_by_hand(name, code):
     assert symbol(name) == code
-
-
-# Other classes of sub-policy
-
-FORMS = [(form, task) for form in ("constant", "quadratic", "pid", "network") for task in (MOUNTAINCAR, PENDULUM)]
-FORMS += [("quadratic", LUNARLANDER), ("network", LUNARLANDER)]
-
-
-def other(form, task):
-    like, rng = some(task), np.random.default_rng(2)
-    (k, _, m), shape = like.coefficients.shape, form_of(form, like.task)
-    coefficients = rng.normal(size=(k, len(shape.rows), m)) / shape.units
-    return VoronoiPolicy(like.codewords, coefficients, task=task, scale=like.scale, sub_policy=form)
-
-
-@pytest.mark.parametrize(("form", "task"), FORMS)
-def test_the_c_code_of_another_class_acts_as_the_policy_does(form, task, tmp_path):
-    policy = other(form, task)
-    check_c(policy, compiled(policy, tmp_path), 5_000)
-
-
-@pytest.mark.parametrize(("form", "task"), FORMS)
-def test_the_python_code_of_another_class_acts_as_the_policy_does(form, task):
-    policy, module = other(form, task), {}
-    exec(compile(policy.to_python(), "policy.py", "exec"), module)
-    states = states_of(policy, 500)
-    assert np.abs([module["act"](s.tolist()) for s in states] - policy.predict(states)[0]).max() <= 1e-12
-    assert module["__doc__"].startswith(f"{task}: 7 {form} policies")
-
-
-@pytest.mark.parametrize(("form", "task"), FORMS)
-def test_json_names_the_class_and_the_rows(form, task):
-    policy = other(form, task)
-    told = json.loads(policy.to_json())
-    assert told["sub_policy"] == form and told["rows"] == list(policy.form.rows)
-    assert np.array_equal(told["coefficients"], policy.coefficients)
 
 
 @pytest.mark.parametrize(

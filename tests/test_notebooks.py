@@ -2,6 +2,7 @@
 
 import ast
 import html
+import pydoc
 import re
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from vsp.notebook import nbformat
+from vsp.run.notebook import nbformat
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -53,6 +54,12 @@ def test_every_saved_figure_has_alternative_text(notebook):
                 assert {"alt", "out", "quick"} <= {keyword.arg for keyword in call.keywords}, cell.id
 
 
+def test_names_in_the_text_exist(notebook):
+    text = "".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    assert [name for name in re.findall(r"`(vsp(?:\.\w+)+)", text) if pydoc.locate(name) is None] == []
+    assert [path for path in re.findall(r"`(vsp/[\w/.]+)`", text) if not (ROOT / path).exists()] == []
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "figures" / "executed").glob("*.ipynb")), ids=lambda path: path.stem)
 def test_alternative_texts_are_sentences(path):
     """They say what is to be seen, and nothing that only Python would say."""
@@ -73,14 +80,59 @@ def test_first_code_cell_holds_the_parameters(notebook):
     )
 
 
-def test_only_the_cell_that_trains_imports_a_training_library(notebook):
-    """It comes in notebook 6 alone, where a reader's own agent is distilled."""
-    for cell in code_cells(notebook):
-        if cell.id != "own":
-            assert "import torch" not in cell.source and "stable_baselines3" not in cell.source, cell.id
+# What they import, and where they run
+
+BLOCKED = """
+import importlib.abc, sys
+
+class Blocked(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("torch", "stable_baselines3"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Blocked())
+"""
 
 
-def test_drawing_loads_no_training_library():
-    code = "import vsp, vsp.experiments, vsp.figures, vsp.tables, sys; vsp.load_teacher(vsp.tasks()[0]); "
-    code += "sys.exit(bool({'torch', 'stable_baselines3'} & set(sys.modules)))"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+def run_without_torch(code):
+    """Standard output of `code` in a fresh Python that has neither torch nor Stable-Baselines3."""
+    done = subprocess.run([sys.executable, "-c", BLOCKED + code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_those_of_the_paper_draw_without_torch():
+    """01 to 05: everything that they import, and a teacher."""
+    statements = {
+        ast.unparse(node)
+        for path in NOTEBOOKS if path.stem < "06"
+        for cell in code_cells(nbformat.read(path, as_version=4))
+        for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Import | ast.ImportFrom)
+    }  # fmt: skip
+    assert len(statements) > 10
+    run_without_torch("\n".join([*sorted(statements), "vsp.load_teacher('SimpleGoal-v0')"]))
+
+
+def test_the_cell_that_trains_says_what_to_type_where_torch_is_missing():
+    notebook = nbformat.read(ROOT / "notebooks" / "06_beyond.ipynb", as_version=4)
+    (cell,) = (cell for cell in notebook.cells if cell.id == "own")
+    said = run_without_torch(cell.source)
+    (target,) = re.findall(r"`make ([\w-]+)`", said)
+    assert target in (ROOT / "Makefile").read_text("utf-8").split()
+
+
+def test_defaults_lie_in_the_checkout(notebook):
+    """Wherever it runs: in the root, as by plain papermill, or in notebooks/, as in JupyterLab."""
+    cells, names = {cell.id: ast.parse(cell.source).body for cell in code_cells(notebook)}, {"ROOT": ROOT}
+    for line in [*cells["parameters"], *(line for line in cells["imports"] if "ROOT / " in ast.unparse(line))]:
+        exec(ast.unparse(line), names)
+    assert names["out"] == ROOT / "build" / "lab"
+    assert names.get("runs", ROOT / "data" / "runs") == ROOT / "data" / "runs"
+
+
+def test_one_runs_by_plain_papermill_from_the_root(tmp_path):
+    command = [sys.executable, "-m", "papermill", "notebooks/01_teacher.ipynb", str(tmp_path / "out.ipynb")]
+    options = ["-p", "out", str(tmp_path), "-p", "quick", "true", "--no-progress-bar"]
+    done = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "figures" / "environments.pdf").exists()

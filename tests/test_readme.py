@@ -1,15 +1,19 @@
-"""What the README says can be done can be done."""
+"""The README and docs/: examples run, links lead somewhere, and what is quoted equals the tables."""
 
+import pydoc
 import re
-from pathlib import Path
+import subprocess
 
-import measured
 import pandas as pd
+import pytest
 
-from vsp.notebook import nbformat
+from vsp.run.atomic import ROOT
+from vsp.run.notebook import nbformat
 
-ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+TABLES = ROOT / "figures" / "tables"
+PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+README = PAGES[0].read_text("utf-8")
+RESULTS = (ROOT / "docs" / "results.md").read_text("utf-8")
 
 
 def test_python_example_runs(tmp_path, monkeypatch, capsys):
@@ -20,30 +24,95 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "my_policy.vsp").exists()
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere(page):
+    folders = (page.parent, ROOT) if page.name == "index.md" else (page.parent,)  # the index is for the site alone
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text("utf-8")):
+        assert target.startswith("https://") or any((folder / target).exists() for folder in folders), target
+
+
+def test_a_link_of_the_readme_leads_to_the_condition_of_a_split():
+    ((file, number),) = re.findall(r"\]\((vsp/[\w/]+\.py)#L(\d+)\)", README)
+    line = (ROOT / file).read_text("utf-8").splitlines()[int(number) - 1]
+    assert line.strip().startswith("if ") and "config.max_pol_loss" in line, f"{file}:{number} is {line!r}"
+
+
+def test_targets_exist():
+    known = subprocess.run(["make", "-npq", "help"], cwd=ROOT, capture_output=True, text=True).stdout
+    targets = set(re.findall(r"^([a-z][\w-]*):", known, flags=re.M))
+    for page in PAGES:
+        for words in re.findall(r"`make ([a-z][a-z -]*)`", page.read_text("utf-8")):
+            assert set(words.split()) <= targets, f"{page.name}: make {words}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_names_exist(page):
+    text = page.read_text("utf-8")
+    assert [name for name in re.findall(r"`(vsp(?:\.\w+)+)", text) if pydoc.locate(name) is None] == []
+    assert [path for path in re.findall(r"`((?:vsp|tests|\.ci)/[\w/.]*)`", text) if not (ROOT / path).exists()] == []
+
+
 def test_artefacts_and_cells_exist():
     cells = {
         path.stem[:2]: {cell.id for cell in nbformat.read(path, as_version=4).cells}
         for path in (ROOT / "notebooks").glob("*.ipynb")
     }
-    rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", README, flags=re.M)
-    assert len(rows) == 30
+    page = (ROOT / "docs" / "artefacts.md").read_text("utf-8")
+    rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", page, flags=re.M)
+    assert {notebook for _, notebook, _ in rows} == set(cells)
     for artefacts, notebook, names in rows:
         assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
         for artefact in re.findall(r"`([a-z_/]+)`", artefacts):
             assert list((ROOT / "figures").glob(f"{artefact}.*")), artefact
 
 
-def test_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        assert target.startswith("https://") or (ROOT / target).exists(), target
+def test_the_api_has_every_module():
+    """But those of the course, which checks answers."""
+    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "api").glob("*.md"))
+    shown = set(re.findall(r"automodule:: ([\w.]+)", pages))
+    paths = [path.relative_to(ROOT) for path in (ROOT / "vsp").rglob("*.py") if not path.name.startswith("_")]
+    assert shown == {".".join(path.with_suffix("").parts) for path in paths if "course" not in path.parts}
+
+
+# Quoted results
+
+
+def quoted(text):
+    """Whether the README says `text`, wherever its lines break."""
+    return " ".join(text.split()) in " ".join(README.split())
+
+
+def test_numbers_of_the_readme_are_those_of_the_tables():
+    cells = pd.read_csv(TABLES / "what_cells_buy.csv").set_index(["task", "policy"])
+    failing, mean = cells["failing"]["SimpleGoal-v0"], cells["mean"]["MountainCarContinuous-v0"]
+    assert quoted(f"13 constants misses the goal in {failing['tree, 13 leaves']:.1%}".replace("%", " %"))
+    assert quoted(f"the distilled policies in {failing['distilled, all runs']:.1%}".replace("%", " %"))
+    assert quoted(f"fail in {failing['same cells, least squares']:.1%}".replace("%", " %"))
+    assert quoted(f"returns {mean['12 · velocity']:.2f} on average, the teacher {mean['teacher (TD3)']:.2f}")
+    missed = cells["failing"]["MountainCarContinuous-v0"]["12 · velocity"]
+    assert quoted(f"misses the flag in {missed:.1%}".replace("%", " %"))
+    spread = pd.read_csv(TABLES / "simplegoal_spread.csv", index_col="metric").loc["Mean"]
+    assert quoted(f"return {spread.iloc[3]:.2f}, the paper prints {spread.iloc[2]:.2f}")
+
+
+def test_counts_of_the_readme_are_those_of_the_ledger():
+    counts = pd.read_csv(TABLES / "ledger.csv").groupby("part")["verdict"].value_counts()
+    (results, of), (settings, of_settings) = (
+        (found["reproduced"], found["reproduced"] + found["differs"])
+        for found in (counts["results"], counts["settings"])
+    )
+    assert quoted(
+        f"{results} of {of} checkable results reproduce**, and {settings} of {of_settings} checkable settings"
+    )
+    assert quoted(f"contradicts itself in {counts[:, 'contradicts itself'].sum()} values")
 
 
 def test_results_are_those_of_the_tables():
     tables = {
-        name: pd.read_csv(ROOT / "figures" / "tables" / f"{name.lower()}_spread.csv", index_col="metric")
+        name: pd.read_csv(TABLES / f"{name.lower()}_spread.csv", index_col="metric")
         for name in ("SimpleGoal", "MountainCar")
     }
-    rows = re.findall(r"^\| (SimpleGoal|MountainCar), ([a-z]+)[^|]* \| (.*) \|$", README, flags=re.M)
+    rows = re.findall(r"^\| (SimpleGoal|MountainCar), ([a-z]+)[^|]* \| (.*) \|$", RESULTS, flags=re.M)
     assert len(rows) == 8
     for task, metric, cells in rows:
         expected = tables[task].rename(index={"Median/Q2": "Median"}).loc[metric.capitalize()]
@@ -51,47 +120,40 @@ def test_results_are_those_of_the_tables():
 
 
 def test_ledger_counts_are_those_of_the_ledger():
-    book = pd.read_csv(ROOT / "figures" / "tables" / "ledger.csv")
+    book = pd.read_csv(TABLES / "ledger.csv")
     verdicts = ["reproduced", "differs", "cannot be checked", "contradicts itself"]
-    for part, name in (
-        ("settings", "settings and counts"),
-        ("results", "results"),
-        ("coefficients", "coefficients[^|]*"),
-    ):
-        (cells,) = re.findall(rf"^\| {name} \| (.*) \|$", README, flags=re.M)
+    names = {"settings": "settings and counts", "results": "results", "coefficients": "coefficients[^|]*"}
+    for part, name in names.items():
+        (cells,) = re.findall(rf"^\| {name} \| (.*) \|$", RESULTS, flags=re.M)
         found = book.loc[book["part"] == part, "verdict"].value_counts()
         assert [int(n) for n in cells.split(" | ")] == [found.get(verdict, 0) for verdict in verdicts]
 
 
 def test_headline_is_that_of_the_table():
-    table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_headline.csv")
-    block = README.partition("## Three or four cells")[2].partition("\n## ")[0]
     pattern = r"^\| (\w+) \| ([-\d.]+) \| (\d+) \| ([-\d.]+) \| (\d+) % \| ([-\d.]+) \| (\d+) % \|$"
-    rows = re.findall(pattern, block, flags=re.M)
-    assert rows == [
+    assert re.findall(pattern, RESULTS, flags=re.M) == [
         (row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f}",
          f"{row['rival mean']:.2f}", f"{100 * row['rival reached']:.0f}")
-        for row in table.to_dict("records")
+        for row in pd.read_csv(TABLES / "beyond_headline.csv").to_dict("records")
     ]  # fmt: skip
 
 
 def test_what_is_found_without_a_teacher_is_that_of_the_table():
-    table = pd.read_csv(ROOT / "figures" / "tables" / "beyond_ablation.csv")
+    table = pd.read_csv(TABLES / "beyond_ablation.csv")
     without = table[table["part"] == "no teacher"].set_index("task")["mean"]
-    lander = pd.read_csv(ROOT / "figures" / "tables" / "beyond_lunarlander.csv").set_index(["method", "size"])["mean"]
+    lander = pd.read_csv(TABLES / "beyond_lunarlander.csv").set_index(["method", "size"])["mean"]
     pattern = r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\) and LunarLander \(([\d.]+)\)"
-    (text,) = re.findall(pattern, README)
+    (text,) = re.findall(pattern, RESULTS)
     found = without["SimpleGoal"], without["Pendulum"], lander["refined, no teacher", 4]
     assert text == tuple(f"{mean:.2f}" for mean in found)
-    assert re.findall(r"as any partition does\n  \(([\d.]+)\)", README) == [f"{lander['refined', 1]:.2f}"]
+    assert f"one tuned linear map per engine returns {lander['refined', 1]:.2f}" in RESULTS
 
 
 def test_the_printed_policy_is_that_of_the_table():
-    table = (ROOT / "figures" / "tables" / "beyond_pendulum_policy.csv").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", README, flags=re.S)
+    table = (TABLES / "beyond_pendulum_policy.csv").read_text("utf-8")
+    (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", RESULTS, flags=re.S)
     cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
-    assert len(cells) == len(table.splitlines()) - 1
-    for row, (codeword, equation) in zip(table.splitlines()[1:], cells):
+    for row, (codeword, equation) in zip(table.splitlines()[1:], cells, strict=True):
         found, printed = (
             re.findall(r"-?\d+\.?\d*", text.replace("- ", "-")) for text in (row, f"{codeword} {equation}")
         )
@@ -99,21 +161,10 @@ def test_the_printed_policy_is_that_of_the_table():
 
 
 def test_what_cells_buy_is_that_of_the_table():
-    table = pd.read_csv(ROOT / "figures" / "tables" / "what_cells_buy.csv")
-    block = README.partition("### What do the cells buy?")[2]
+    table = pd.read_csv(TABLES / "what_cells_buy.csv")
+    block = RESULTS.partition("### What do the cells buy?")[2]
     rows = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", block, flags=re.M)
     shown = {tuple(row[1:3]) for row in rows}, {tuple(row[3:]) for row in rows}
     for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
         kinds = kinds.to_dict("records")
         assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}
-
-
-def test_measured_figures_are_those_of_the_table():
-    """Else: `python tests/measured.py build/measured data/results README.md` puts them there."""
-    assert measured.markdown(ROOT / "data" / "results" / "trust.csv") in README
-
-
-def test_what_the_promises_name_is_there():
-    page = (ROOT / "docs" / "promises.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"`((?:tests|\.ci|data)/[\w./]+)`", page))
-    assert len(named) > 8 and all((ROOT / name).exists() for name in named)

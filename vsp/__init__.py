@@ -1,31 +1,66 @@
 """vsp: distil reinforcement-learning policies to linear policies in Voronoi cells of the state space.
 
-`vsp.distill`, `vsp.evaluate` and `vsp.simplify` are the functions; what else their modules hold is imported by name, as
-in `from vsp.distill import split_regions`.
+The method of the paper is the files of this folder: begin with `algorithms.py`. The folders are its wings: tasks/,
+subpolicies/ and teachers/ are what it works on; baselines/, paper/, beyond/ and course/ are what is done with it; show/
+draws, run/ runs. This file is the public face: names of tasks are resolved here, and `distill` and `preset` choose
+between the paper's method and ours.
 """
 
-from . import envs, paper
-from .agents import agent
-from .config import Config, Refinement, preset
-from .distill import distill
-from .envs import get_task, tasks
-from .evaluate import evaluate
-from .policy import VoronoiPolicy
-from .simplify import simplify
-from .teachers import load_teacher
+from __future__ import annotations
 
-__all__ = [
-    "Config",
-    "Refinement",
-    "VoronoiPolicy",
-    "agent",
-    "distill",
-    "envs",
-    "evaluate",
-    "get_task",
-    "load_teacher",
-    "paper",
-    "preset",
-    "simplify",
-    "tasks",
-]
+import importlib
+from types import ModuleType
+from typing import Literal
+
+import pandas as pd
+
+from . import algorithms
+from .algorithms import merge_regions, split_regions, teacher_episodes
+from .beyond.refinement import Refinement, best_preset, simplify
+from .beyond.refinement.refine import refine
+from .checks import check_choice, check_seed
+from .config import Config, paper_preset
+from .evaluation import evaluate, rollout_from_seed, start_states
+from .export import distances_latex
+from .geometry import nearest
+from .history import History
+from .partition import Partition
+from .policy import VoronoiPolicy
+from .rollouts import Policy, collect_episodes, rollout, visited_states
+from .tasks import Task, get_task, task_names
+from .teachers import agent, load_teacher
+
+
+def distill(
+    teacher: Policy, task: str | Task, config: Config | Refinement | None = None, *, seed: int
+) -> tuple[VoronoiPolicy, History | pd.DataFrame]:
+    """Distil `teacher` to a `VoronoiPolicy`: by the paper's method for a `Config`, by ours for a `Refinement`.
+
+    `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
+    of the task. Returns the policy and its history: a `History` that lets a notebook replay the run, or a row for each
+    candidate of `refine`. Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its
+    states or actions are not finite, or `seed` is no integer from 0 on.
+    """
+    check_seed(seed)
+    task = get_task(task)
+    if isinstance(config, Refinement):
+        return refine(teacher, task, config, seed=seed)
+    if config is not None and not isinstance(config, Config):
+        raise ValueError(f"config is {config!r}, expected a Config or a Refinement, such as vsp.preset({task.name!r})")
+    return algorithms.distill(teacher, task, config or paper_preset(task), seed=seed)
+
+
+def preset(task: str | Task, kind: Literal["paper", "best"] = "paper") -> Config | Refinement:
+    """The settings for `task`: the paper's (table T2, with the default readings) or the best we know.
+
+    Raises ValueError for an unknown task or kind, and for a task without such settings.
+    """
+    check_choice("kind", kind, ("paper", "best"))
+    return paper_preset(task) if kind == "paper" else best_preset(task)
+
+
+def __getattr__(name: str) -> ModuleType:
+    """The other wings, as in `vsp.paper.published_policy`, imported when asked for."""
+    if name in ("baselines", "beyond", "course", "paper", "show"):
+        return importlib.import_module(f"vsp.{name}")
+    raise AttributeError(f"module 'vsp' has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""What cells remember of the states in them: `Buffers` holds every row, `Sums` what least squares needs of them.
+"""What cells remember of the states in them: `Buffers` keeps rows, `SufficientStatistics` what least squares needs.
 
 A row is the features of a state, on which a sub-policy's parameters work (the state itself, for linear ones), and the
 teacher's action there.
@@ -67,8 +67,8 @@ class Buffers:
         self._size = 0
 
 
-class Sums:
-    """What least squares needs to know of the rows in a cell's buffer, and no row: memory is the same for ever."""
+class SufficientStatistics:
+    """The sums over a cell's rows that least squares needs, and no row: constant memory."""
 
     def __init__(self, q: int, m: int):
         self.products = np.zeros((0, q + 1, q + 1))  # (k, q + 1, q + 1) X'X, features and a column of ones
@@ -113,11 +113,12 @@ class Sums:
         self.reset(slice(None))
 
 
-class Recent:
-    """The last states that were seen, `size` of them as soon as so many came."""
+class RecentStates:
+    """The last `size` states that were seen, or all of them while there are fewer."""
 
     def __init__(self, size: int):
-        self.size, self._episodes, self._held = size, deque(), 0
+        self.size, self._held = size, 0
+        self._episodes: deque[np.ndarray] = deque()
 
     def append(self, states: np.ndarray) -> None:
         """Add the states (T, d) of an episode, and drop episodes that are too old."""

@@ -57,12 +57,15 @@ def check_choice(what: str, value: str, known: Collection[str]) -> None:
         raise ValueError(f"{what} is {value!r}, expected one of {list(known)}")
 
 
-def check_array(what: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """`values` in float64. Raises ValueError unless they are finite and of `shape`, where -1 stands for any number."""
+def check_array(what: str, values: np.ndarray, shape: tuple[int, ...], *, most: float = np.inf) -> np.ndarray:
+    """`values` in float64. Raises ValueError unless they are finite, at most `most` in size, and of `shape`, where -1
+    stands for any number."""
     values = check_finite(what, values)
     if values.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, values.shape)):
         wanted = str(shape).replace("-1", "n")
         raise ValueError(f"{what} have shape {values.shape}, expected {wanted}")
+    if np.abs(values).max(initial=0.0) > most:
+        raise ValueError(f"{what} hold {np.abs(values).max()}, expected numbers of at most {most} in size")
     return values
 
 

@@ -12,57 +12,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .checks import check_count
-from .subpolicies import HIDDEN, number
+from .subpolicies.base import SHARED, number
 
 if TYPE_CHECKING:
     from .policy import VoronoiPolicy
 
-# Functions that a `Form` may use in its code: C and Python's math have them by the same names
-SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs")
 _SYMBOLS = {
     "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
     "cos ": r"\cos ", "sin ": r"\sin ", "tanh": r"\tanh",
 }  # fmt: skip
 
 
-# How one action comes from the features, a 1 and its parameters: linear in these, and as a network
-_PYTHON_LINEAR = """
-def output(row, features):
-    return sum(w * f for w, f in zip(row, features))
-"""
-_PYTHON_NETWORK = f"""
-def output(row, features):
-    hidden = [sum(w * f for w, f in zip(row[h::{HIDDEN}], features)) for h in range({HIDDEN})]
-    return sum(w * u for w, u in zip(row[-{HIDDEN + 1} :], [*map(tanh, hidden), 1.0]))
-"""
-_C_LINEAR = """
-static double output(const double *row, const double *features) {
-    double sum = 0.0;
-    for (int i = 0; i < INPUTS; i++) sum += row[i] * features[i];
-    return sum;
-}
-"""
-_C_NETWORK = """
-static double output(const double *row, const double *features) {
-    double sum = row[(INPUTS + 1) * HIDDEN];
-    for (int h = 0; h < HIDDEN; h++) {
-        double unit = 0.0;
-        for (int i = 0; i < INPUTS; i++) unit += row[i * HIDDEN + h] * features[i];
-        sum += row[INPUTS * HIDDEN + h] * tanh(unit);
-    }
-    return sum;
-}
-"""
-
-
 def to_json(policy: VoronoiPolicy) -> str:
-    """All numbers of the policy by name, and what they are for."""
+    """All numbers of the policy by name."""
     task = policy.task
     about = {
         "task": task.name,
         "inputs": list(task.inputs),
-        "sub_policy": policy.form.name,
-        "rows": list(policy.form.rows),
+        "sub_policy": policy.policy_class.name,
+        "rows": list(policy.policy_class.rows),
         "outputs": list(task.outputs),
         "metric": policy.metric,
         "action_low": task.action_low.tolist(),
@@ -75,7 +43,10 @@ def to_json(policy: VoronoiPolicy) -> str:
 
 
 def to_python(policy: VoronoiPolicy) -> str:
-    """A module without imports beyond the standard library: `act(state)` returns a list of actions."""
+    """A module that imports only the standard library: `cell(state)` and `act(state)`, which returns a list of actions.
+
+    For a state that is not finite they give -1 and nan. Raises ValueError for features that are not plain arithmetic.
+    """
     task = policy.task
     distance = {
         "manhattan": "sum(abs(a - b) for a, b in zip(point, codeword))",
@@ -90,25 +61,30 @@ def to_python(policy: VoronoiPolicy) -> str:
         "HIGH": task.action_high,
     }
     return "\n".join([
-        f'"""{_headline(policy)}"""',
+        f'"""{_escaped(_headline(policy))}"""',
         "",
-        f"from math import {', '.join(SHARED)}  # noqa: F401",
+        f"from math import {', '.join(SHARED)}, isfinite, nan  # noqa: F401",
         "",
         *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
         "",
         "",
         "def cell(state):",
-        '    """Index of the nearest codeword."""',
+        '    """Index of the nearest codeword; -1 for a state that is not finite."""',
+        "    if not all(map(isfinite, state)):",
+        "        return -1",
         "    point = [s / unit for s, unit in zip(state, SCALE)]",
         f"    distances = [{distance} for codeword in CODEWORDS]",
         "    return distances.index(min(distances))",
         "",
-        _PYTHON_NETWORK if policy.form.name == "network" else _PYTHON_LINEAR,
+        policy.policy_class.OUTPUT_IN_PYTHON,
         "",
         "def act(state):",
-        f'    """From [{", ".join(task.inputs)}] to [{", ".join(task.outputs)}]."""',
-        f"    features = [{', '.join([*policy.form.code, '1.0'])}]",
-        "    raw = [output(row, features) for row in COEFFICIENTS[cell(state)]]",
+        f'    """From [{_names(task.inputs)}] to [{_names(task.outputs)}]; nan for a state that is not finite."""',
+        "    i = cell(state)",
+        "    if i < 0:",
+        "        return [nan for _ in LOW]",
+        f"    features = [{policy.policy_class.feature_code()}]",
+        "    raw = [output(row, features) for row in COEFFICIENTS[i]]",
         "    return [min(max(a, low), high) for a, low, high in zip(raw, LOW, HIGH)]",
         "",
     ])  # fmt: skip
@@ -116,18 +92,20 @@ def to_python(policy: VoronoiPolicy) -> str:
 
 def to_c(policy: VoronoiPolicy) -> str:
     """C99 with nothing but the standard library: `int vsp_cell(const double *state)` and
-    `void vsp_act(const double *state, double *action)`."""
-    (k, p, m), d, q = policy.coefficients.shape, len(policy.task.low), len(policy.form.code)
+    `void vsp_act(const double *state, double *action)`.
+
+    For a state that is not finite they give -1 and NAN. Raises ValueError for features that are not plain arithmetic.
+    """
+    (k, p, m), d, inputs = policy.coefficients.shape, len(policy.task.low), len(policy.policy_class.code) + 1
     add = {
         "manhattan": "distance += fabs(gap);",
         "euclidean": "distance += gap * gap;",
         "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
     }[policy.metric]
-    output = _C_NETWORK if policy.form.name == "network" else _C_LINEAR
-    output = output.replace("HIDDEN", str(HIDDEN)).replace("INPUTS", str(q + 1))
+    output = policy.policy_class.OUTPUT_IN_C.replace("INPUTS", str(inputs))
     root = "        distance = sqrt(distance);\n" if policy.metric == "euclidean" else ""
-    return f"""/* {_headline(policy)}
-   state: {", ".join(policy.task.inputs)}; action: {", ".join(policy.task.outputs)}. */
+    return f"""/* {_escaped(_headline(policy))}
+   state: {_names(policy.task.inputs)}; action: {_names(policy.task.outputs)}. */
 #include <math.h>
 
 static const double scale[{d}] = {_braces(policy.scale)};
@@ -136,10 +114,11 @@ static const double coefficients[{k}][{m}][{p}] = {_braces(policy.coefficients.t
 static const double low[{m}] = {_braces(policy.task.action_low)};
 static const double high[{m}] = {_braces(policy.task.action_high)};
 
-/* The index of the nearest codeword. */
+/* The index of the nearest codeword; -1 for a state that is not finite. */
 int vsp_cell(const double *state) {{
     int nearest = 0;
     double least = INFINITY;
+    for (int j = 0; j < {d}; j++) if (!isfinite(state[j])) return -1;
     for (int i = 0; i < {k}; i++) {{
         double distance = 0.0;
         for (int j = 0; j < {d}; j++) {{
@@ -155,15 +134,18 @@ int vsp_cell(const double *state) {{
 }}
 {output}
 void vsp_act(const double *state, double *action) {{
-    const double features[{q + 1}] = {{{", ".join([*policy.form.code, "1.0"])}}};
+    const double features[{inputs}] = {{{policy.policy_class.feature_code()}}};
     int i = vsp_cell(state);
-    for (int j = 0; j < {m}; j++) action[j] = fmin(fmax(output(coefficients[i][j], features), low[j]), high[j]);
+    for (int j = 0; j < {m}; j++) {{
+        double raw = i < 0 ? NAN : output(coefficients[i][j], features);
+        action[j] = raw < low[j] ? low[j] : raw > high[j] ? high[j] : raw;
+    }}
 }}
 """
 
 
 def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """The whole policy in plain words: what distances are, and for every codeword its equations."""
+    """The whole policy in words: the distance, and the equations of every codeword."""
     lines = [_headline(policy)]
     if len(policy) > 1:
         lines.append(f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}.")
@@ -177,7 +159,7 @@ def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 
 def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
-    """What states are divided by before distances are taken, in words; nothing if they are taken as they are."""
+    """The scale of the distance in words; nothing for raw states."""
     if (policy.scale == 1).all():
         return ""
     units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
@@ -185,7 +167,7 @@ def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
 
 
 def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """A table of the codewords and their equations, one row per cell, and what distances are; needs booktabs."""
+    """A table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
     outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
     rows = [
         " & ".join([codeword_latex(policy, i, digits), *equations_latex(policy, i, digits)]) for i in range(len(policy))
@@ -201,7 +183,7 @@ def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 
 def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """What distances to the codewords are: a caption for their table."""
+    """The distance to the codewords, as a caption for their table."""
     if len(policy) == 1:
         return "One cell, wherever its codeword is"
     if (policy.scale == 1).all():
@@ -217,13 +199,13 @@ def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> 
 
 
 def equations_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> list[str]:
-    """The right sides of the equations of a cell between dollars, one per action."""
+    """The right-hand sides of the equations of a cell between dollars, one per action."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
-    return [f"${policy.form.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
+    return [f"${policy.policy_class.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
 
 
 def symbol(name: str) -> str:
-    """A variable's name as LaTeX prints it in mathematics; products and squares of variables too."""
+    """The name of a variable, or of a product or square of variables, in LaTeX's mathematics."""
     if "·" in name:
         return " ".join(symbol(factor) for factor in name.split("·"))
     if name.endswith("²"):
@@ -237,13 +219,19 @@ def symbol(name: str) -> str:
 
 def _headline(policy: VoronoiPolicy) -> str:
     if len(policy) == 1:
-        return f"{policy.task.name}: one {policy.form.name} policy."
-    return (
-        f"{policy.task.name}: {len(policy)} {policy.form.name} policies, each valid where its codeword is the nearest."
-    )
+        return f"{policy.task.name}: one {policy.policy_class.name} policy."
+    policies = f"{len(policy)} {policy.policy_class.name} policies"
+    return f"{policy.task.name}: {policies}, each valid where its codeword is the nearest."
+
+
+def _names(symbols: tuple[str, ...]) -> str:
+    return _escaped(", ".join(symbols))
+
+
+def _escaped(text: str) -> str:
+    """`text` for a docstring and a comment of C: a name can neither end them nor begin a line."""
+    return json.dumps(text, ensure_ascii=False)[1:-1].replace("*/", "* /").replace("/*", "/ *")
 
 
 def _braces(values: np.ndarray) -> str:
-    if not np.ndim(values):
-        return repr(float(values))
-    return "{" + ", ".join(_braces(value) for value in values) + "}"
+    return json.dumps(values.tolist()).replace("[", "{").replace("]", "}")

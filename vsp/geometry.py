@@ -1,4 +1,4 @@
-"""Distances, nearest codewords, neighbouring cells, and grids to draw them on.
+"""Distances, nearest codewords, and neighbouring cells.
 
 A metric is a name that `scipy.spatial.distance.cdist` knows; `METRICS` maps the names used here to SciPy's and to the
 order p of the kd-tree. All functions take codewords (k, d) already divided by the scale of the distance, and raise
@@ -11,11 +11,11 @@ import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 from scipy.spatial.distance import cdist
 
-from .checks import check_array, check_choice, check_count
+from .checks import check_array, check_choice
 
 METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
 LOOKUP = "manhattan"  # the distance that finds a state's cell
-KDTREE_FROM = 512  # codewords from which the kd-tree is faster in a few dimensions; see lookup_study.py for more
+KDTREE_FROM = 512  # codewords from which the kd-tree is faster in a few dimensions; see `vsp.beyond.benchmarks.lookup`
 WITNESSES = 4096  # points that look for touching cells
 
 
@@ -25,43 +25,29 @@ def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -
     return cdist(states, codewords, METRICS[metric][0])
 
 
-def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
+def nearest(
+    codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
+) -> np.ndarray:
     """Index of the nearest codeword (k, d) of each state (n, d); of equally near ones the lowest. (n,)
 
-    Paper, Algorithm 1 line 6: kd-tree(C, s_t). For the few dozen codewords of the paper comparing with all of them is
-    faster than a kd-tree and gives the same indices.
+    Paper, Algorithm 1 line 6: kd-tree(C, s_t). Comparing with all codewords gives the same indices and is faster for
+    the few dozen of the paper; `kdtree` says which way to take, None: the faster one.
     """
-    return look_up(*_checked(codewords, states, metric), metric)
+    codewords, states = _checked(codewords, states, metric)
+    return look_up(codewords, states, metric, kdtree=kdtree)
 
 
-def look_up(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
+def look_up(
+    codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
+) -> np.ndarray:
     """`nearest` for arrays that were checked before: a distillation and a policy ask thousands of times."""
-    lookup = _by_kdtree if len(codewords) >= KDTREE_FROM else _by_brute
-    return lookup(codewords, states, metric)
-
-
-def nearest_brute(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
-    """`nearest`, by comparing with every codeword."""
-    return _by_brute(*_checked(codewords, states, metric), metric)
-
-
-def _by_brute(codewords: np.ndarray, states: np.ndarray, metric: str) -> np.ndarray:
-    return cdist(states, codewords, METRICS[metric][0]).argmin(axis=1)
-
-
-def nearest_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
-    """`nearest`, by kd-tree. The tree answers ties in any order, so states between two codewords are compared again."""
-    return _by_kdtree(*_checked(codewords, states, metric), metric)
-
-
-def _by_kdtree(codewords: np.ndarray, states: np.ndarray, metric: str) -> np.ndarray:
-    if len(codewords) == 1:
-        return np.zeros(len(states), dtype=np.intp)
-    found, index = cKDTree(codewords).query(states, k=2, p=METRICS[metric][1])
+    kind, order = METRICS[metric]
+    if len(codewords) == 1 or not (len(codewords) >= KDTREE_FROM if kdtree is None else kdtree):
+        return cdist(states, codewords, kind).argmin(axis=1)
+    gaps, index = cKDTree(codewords).query(states, k=2, p=order)
     index = index[:, 0]
-    tied = np.isclose(found[:, 0], found[:, 1], rtol=1e-12, atol=0)
-    if tied.any():
-        index[tied] = _by_brute(codewords, states[tied], metric)
+    tied = np.isclose(gaps[:, 0], gaps[:, 1], rtol=1e-12, atol=0)  # the tree answers ties in any order
+    index[tied] = cdist(states[tied], codewords, kind).argmin(axis=1)
     return index
 
 
@@ -123,14 +109,6 @@ def visited_neighbours(codewords: np.ndarray, witnesses: np.ndarray, metric: str
     if k <= 2:
         return ~np.eye(k, dtype=bool)
     return _adjacency(k, np.argpartition(distances(witnesses, codewords, metric), 1, axis=1)[:, :2])
-
-
-def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A grid over a two-dimensional box, for drawing: x (r, r), y (r, r), and the same as states (r * r, 2)."""
-    low, high = check_array("low", low, (2,)), check_array("high", high, (2,))
-    check_count("resolution", resolution)
-    x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))
-    return x, y, np.column_stack([x.ravel(), y.ravel()])
 
 
 def check_codewords(codewords: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class History:
         """Note how iteration n left the partition."""
         self.cells.append(len(partition.codewords))
         self.losses.append(loss)
-        changed = n and not np.array_equal(partition.codewords, self._snapshots[-1][1].codewords)
+        changed = self.events and self.events[-1].iteration == n
         if changed or n % self.every == 0:
             self._snapshots.append((n, partition.policy()))
 

@@ -8,12 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from . import export, geometry, store
+from . import export, geometry
 from .checks import check_array, check_choice, check_count, check_observations
-from .envs import Task, get_task
-from .subpolicies import form_of
+from .run import sealed
+from .run.atomic import DamagedFile
+from .subpolicies.registry import policy_class
+from .tasks.base import Task
+from .tasks.registry import get_task
 
-_STEPS = 200  # places along an axis in which a border is looked for, at once
+_STEPS = 200  # points of an axis that are tried at once for a border
+MOST, LEAST_SCALE = 1e50, 1e-50  # of a policy's numbers: squared distances and products stay below 1e308
 
 
 @dataclass(frozen=True)
@@ -23,20 +27,21 @@ class Explanation:
     cell: int
     codeword: np.ndarray  # (d,)
     equations: tuple[str, ...]  # one per action, such as "F = 0.5 x - 1.2 v + 0.3"
-    contributions: pd.DataFrame  # one row per action; a column per feature and the bias (or rest), they add up to `raw`
+    contributions: pd.DataFrame  # a row per action, a column per feature and the bias (or rest); rows add up to `raw`
     raw: np.ndarray  # (m,) output of the sub-policy
     action: np.ndarray  # (m,) `raw` limited to the action box
     next_cell: int | None  # the cell with the second nearest codeword; None if there is one cell
-    margin: float  # how much nearer the own codeword is than that one, in units of the look-up distance
-    borders: pd.DataFrame  # one row per input: the least change of it alone that leads to another cell, and which one
+    margin: float  # how much nearer the own codeword is than the second nearest, in units of the look-up distance
+    borders: pd.DataFrame  # a row per input: the least change of it alone that leads to another cell, and that cell
 
 
 class VoronoiPolicy:
     """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
 
-    `codewords` (k, d); `coefficients` (k, p, m): of linear ones, d weights, then the bias; of other classes
-    `sub_policy`, see `subpolicies.FORMS`; `scale` (d,): distances are taken between states divided by it (None: raw
-    states). Everything is float64. Raises ValueError for wrong shapes, numbers that are not finite, or equal codewords.
+    `codewords` (k, d); `coefficients` (k, p, m), rows as `policy_class.rows` names them: for linear sub-policies d
+    weights, then the bias; `sub_policy`: one of `subpolicies.POLICY_CLASSES`; `scale` (d,): distances are taken between
+    states divided by it (None: raw states). Everything is float64. Raises ValueError for wrong shapes, equal codewords,
+    and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`.
     """
 
     def __init__(
@@ -50,16 +55,16 @@ class VoronoiPolicy:
         sub_policy: str = "linear",
     ):
         self.task = get_task(task)
-        self.form = form_of(sub_policy, self.task)
-        d, p, m = len(self.task.low), len(self.form.rows), len(self.task.action_low)
-        self.codewords = check_array("codewords", codewords, (-1, d)).copy()
-        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), p, m)).copy()
-        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,))
+        self.policy_class = policy_class(sub_policy, self.task)
+        d, p, m = len(self.task.low), len(self.policy_class.rows), len(self.task.action_low)
+        self.codewords = check_array("codewords", codewords, (-1, d), most=MOST).copy()
+        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), p, m), most=MOST).copy()
+        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,), most=MOST)
         check_choice("metric", metric, geometry.METRICS)
         if not len(self.codewords) or not geometry.all_differ(self.codewords):
             raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
-        if not (self.scale > 0).all():
-            raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers")
+        if not (self.scale >= LEAST_SCALE).all():
+            raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers of at least {LEAST_SCALE}")
         self.metric = metric
         self._scaled = self.codewords / self.scale
 
@@ -67,9 +72,11 @@ class VoronoiPolicy:
         return len(self.codewords)
 
     def check_linear(self) -> None:
-        """Raise ValueError unless the sub-policies are linear, for what only knows these."""
-        if self.form.name != "linear":
-            raise ValueError(f"the policy has sub_policy {self.form.name!r}, expected 'linear': distil one of these")
+        """Raise ValueError unless the sub-policies are linear, for callers that support no others."""
+        if self.policy_class.name != "linear":
+            raise ValueError(
+                f"the policy has sub_policy {self.policy_class.name!r}, expected 'linear': distil one of these"
+            )
 
     def cells(self, obs: np.ndarray) -> np.ndarray:
         """Index of the cell of each observation (n, d), or of one (d,)."""
@@ -78,7 +85,7 @@ class VoronoiPolicy:
     def linear(self, obs: np.ndarray) -> np.ndarray:
         """Output of the sub-policies before it is limited to the action box: (n, m), or (m,) for one observation."""
         states = self._states(obs)
-        return self.form.outputs(self.form.features(states), self.coefficients[self._cells(states)])
+        return self.policy_class.outputs(self.policy_class.features(states), self.coefficients[self._cells(states)])
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions within the task's limits, in Stable-Baselines3's convention.
@@ -89,7 +96,7 @@ class VoronoiPolicy:
         return np.minimum(np.maximum(self.linear(obs), self.task.action_low), self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
-        """Cell, equation, contribution of each feature, and how far the borders are, for one observation (d,).
+        """Cell, equation, contribution of each feature, and distance to the borders, for one observation (d,).
 
         Raises ValueError for a batch, as `predict` does for bad numbers.
         """
@@ -103,7 +110,7 @@ class VoronoiPolicy:
             cell=cell,
             codeword=self.codewords[cell],
             equations=self.equations(cell),
-            contributions=self.form.contributions(state, self.coefficients[cell]).set_axis(self.task.outputs),
+            contributions=self.policy_class.contributions(state, self.coefficients[cell]).set_axis(self.task.outputs),
             raw=raw,
             action=self.predict(state)[0],
             next_cell=int(order[1]) if len(self) > 1 else None,
@@ -112,9 +119,10 @@ class VoronoiPolicy:
         )
 
     def _borders(self, state: np.ndarray, cell: int) -> pd.DataFrame:
-        """Columns change (in units of the input, NaN where no change of it within the box helps) and cell (-1 there).
+        """Columns change (in units of the input; NaN where no change within the box leads to another cell) and cell
+        (-1 there).
 
-        Looks in `_STEPS` places along each axis and then between two of them, so a sliver of a cell may be missed.
+        Tries `_STEPS` points of each axis, then refines between two of them: a sliver of a cell may be missed.
         """
         rows = []
         for axis in range(len(state)):
@@ -126,7 +134,7 @@ class VoronoiPolicy:
     def _border(self, state: np.ndarray, cell: int, axis: int, end: float) -> tuple[float, int]:
         """The change along one axis towards `end` at which another cell begins, and that cell."""
         inside, outside = state[axis], end
-        for _ in range(5):  # each time in a finer grid
+        for _ in range(5):  # each time on a finer grid
             line = np.tile(state, (_STEPS, 1))
             line[:, axis] = np.linspace(inside, outside, _STEPS)
             left = np.flatnonzero(self.cells(line) != cell)
@@ -138,12 +146,12 @@ class VoronoiPolicy:
     def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
         """The sub-policy of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
 
-        `digits` are decimals; None: each number exactly, and no term that is zero, as `simplify` leaves policies.
-        Raises ValueError for a cell that is not there.
+        `digits` are decimals; None: each number exactly, without terms that are zero, as for policies of `simplify`.
+        Raises ValueError for a cell that does not exist.
         """
         check_count("cell", cell, least=0, most=len(self) - 1)
         return tuple(
-            f"{output} = {self.form.expression(self.coefficients[cell, :, j], digits)}"
+            f"{output} = {self.policy_class.expression(self.coefficients[cell, :, j], digits)}"
             for j, output in enumerate(self.task.outputs)
         )
 
@@ -151,7 +159,7 @@ class VoronoiPolicy:
         """One row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
         columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
         for j, output in enumerate(self.task.outputs):
-            for i, name in enumerate(self.form.rows):
+            for i, name in enumerate(self.policy_class.rows):
                 columns[f"{output.replace('Δ', 'd')}_{name}"] = self.coefficients[:, i, j]
         return pd.DataFrame(columns).rename_axis("cell")
 
@@ -178,19 +186,22 @@ class VoronoiPolicy:
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""
         arrays = {"codewords": self.codewords, "coefficients": self.coefficients, "scale": self.scale}
-        about = {"task": self.task.name, "metric": self.metric, "sub_policy": self.form.name}
-        store.save(path, arrays, {"kind": "VoronoiPolicy", **about})
+        about = {"task": self.task.name, "metric": self.metric, "sub_policy": self.policy_class.name}
+        sealed.save_arrays(path, arrays, {"kind": "VoronoiPolicy", **about})
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> VoronoiPolicy:
-        """Read a policy that `save` wrote. Raises `store.DamagedFile` if a bit is missing or altered."""
-        arrays, about = store.load(path, kind="VoronoiPolicy")
-        about = {"sub_policy": "linear"} | about  # which older files do not name
-        return cls(**arrays, task=about["task"], metric=about["metric"], sub_policy=about["sub_policy"])
+        """Read a policy that `save` wrote. Raises FileNotFoundError, and `run.atomic.DamagedFile` where a bit is
+        missing or altered, or the file holds no policy."""
+        arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
+        try:
+            return cls(**arrays, task=about["task"], metric=about["metric"], sub_policy=about["sub_policy"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise DamagedFile(f"{path}: sealed, but no policy that can act: {error}") from error
 
     def _cells(self, states: np.ndarray) -> np.ndarray:
         found = geometry.look_up(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
-        return found.reshape(states.shape[:-1])[()]  # of one state a number, which is quicker to index with
+        return found.reshape(states.shape[:-1])[()]  # a number for one state: quicker to index with
 
     def _states(self, obs: np.ndarray) -> np.ndarray:
         return check_observations(obs, len(self.task.low), self.task.name)

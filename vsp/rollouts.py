@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from .checks import check_array, check_data, check_finite
-from .envs import RUNNING, TRUNCATED, Task, get_task
+from .tasks import GOAL, RUNNING, TRUNCATED, Task, get_task
+
+Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # episodes (a,) that go on, what they see (a, d), what they do (a, m)
 
 
 class Policy(Protocol):
@@ -21,15 +24,17 @@ class Policy(Protocol):
 class Episode:
     """One recorded episode of T steps: the states acted in and the actions taken there.
 
-    Raises ValueError unless both are finite and as many, at least one.
+    Raises ValueError unless both are finite and as many, at least one. `checked`: they are known to be.
     """
 
     states: np.ndarray  # (T, d) float64, as the policy observed them
     actions: np.ndarray  # (T, m) float64
+    checked: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
-        for name, values in zip(("states", "actions"), check_data(self.states, self.actions)):
-            object.__setattr__(self, name, values)
+    def __post_init__(self, checked: bool) -> None:
+        if not checked:
+            for name, values in zip(("states", "actions"), check_data(self.states, self.actions)):
+                object.__setattr__(self, name, values)
 
 
 @dataclass(frozen=True)
@@ -38,46 +43,54 @@ class Outcomes:
 
     returns: np.ndarray  # (n,) undiscounted sum of rewards
     lengths: np.ndarray  # (n,) steps
-    codes: np.ndarray  # (n,) outcomes, codes of vsp.envs.OUTCOMES
+    outcomes: np.ndarray  # (n,) how each ended, an index of `vsp.tasks.OUTCOMES`
 
 
-def play(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
+def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
     """Play one episode of `policy` from each start state (n, s).
 
-    Raises ValueError for starts that are not finite or lie outside the box, and for a policy that does not fit.
+    Raises ValueError for starts that are not finite or lie outside the box, and for a policy that does not fit the
+    task or whose actions are not finite.
     """
-    result, _ = _advance(policy, task, starts, record=False)
-    return result
+    task = get_task(task)
+    return _advance(policy, task, _begin(policy, task, starts))
 
 
-def record(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
-    """Play one episode from each start state (n, d) and keep every state and action, in the order of `starts`.
+def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
+    """Play one episode from each start state (n, s) and keep every state and action, in the order of `starts`.
 
-    Raises ValueError as `play` does.
+    Raises ValueError as `rollout` does.
     """
-    _, steps = _advance(policy, task, starts, record=True)
-    if not len(starts):
+    task = get_task(task)
+    steps: list[Step] = []
+    n = len(_advance(policy, task, _begin(policy, task, starts), steps).returns)
+    if not n:
         return []
-    index = np.concatenate([active for active, _, _ in steps])
+    index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
     order = np.argsort(index, kind="stable")  # by episode; steps stay in time order
-    states = np.concatenate([s for _, s, _ in steps])[order]
-    actions = np.concatenate([a for _, _, a in steps])[order]
-    cuts = np.cumsum(np.bincount(index, minlength=len(starts)))[:-1]
-    return [Episode(s, a) for s, a in zip(np.split(states, cuts), np.split(actions, cuts))]
+    states, actions = check_data(states[order], actions[order])
+    ends = np.cumsum(np.bincount(index, minlength=n))
+    return [Episode(states[i:j], actions[i:j], checked=True) for i, j in pairwise([0, *ends.tolist()])]
 
 
-def visited(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:
-    """All states (t, d) on the way from the start states (n, s), episode by episode. Raises ValueError as `play` does,
-    and for no starts."""
-    episodes = record(policy, task, starts)
+def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:
+    """All states (t, d) on the way from the start states (n, s), episode by episode.
+
+    Raises ValueError as `rollout` does, and for no starts.
+    """
+    episodes = collect_episodes(policy, task, starts)
     if not episodes:
         raise ValueError("there are no start states, expected at least one")
     return np.concatenate([episode.states for episode in episodes])
 
 
-def _advance(policy: Policy, task: str | Task, starts: np.ndarray, *, record: bool):
-    """The loop behind `play` and `record`; finished episodes leave the batch."""
-    task = get_task(task)
+def score(result: Outcomes, failure_penalty: float) -> float:
+    """Mean return, less the penalty for every failed episode; where none can succeed this changes no comparison."""
+    return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))
+
+
+def _begin(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
+    """The states that episodes from `starts` (n, s) begin in."""
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(
             f"the policy is {policy!r}, expected something with `predict`, which `vsp.agent` makes of others"
@@ -85,20 +98,25 @@ def _advance(policy: Policy, task: str | Task, starts: np.ndarray, *, record: bo
     starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
     states = task.begin(starts)
     seen = task.see(states)
-    outside = (seen < task.low) | (seen > task.high)
+    outside = ((seen < task.low) | (seen > task.high)).any(axis=1)
     if outside.any():
-        row = np.flatnonzero(outside.any(axis=1))[0]
-        low, high = task.low.tolist(), task.high.tolist()
-        raise ValueError(f"start state {starts[row].tolist()} lies outside the box of {task.name}, {low} to {high}")
+        first, low, high = starts[outside.argmax()].tolist(), task.low.tolist(), task.high.tolist()
+        raise ValueError(f"start state {first} lies outside the box of {task.name}, {low} to {high}")
+    return states
+
+
+def _advance(policy: Policy, task: Task, states: np.ndarray, steps: list[Step] | None = None) -> Outcomes:
+    """Play episodes from `states` to their ends, all together; finished ones leave the batch.
+
+    What was seen and done in each step is appended to `steps`, if there is such a list.
+    """
     n = len(states)
-    returns, lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
-    outcomes = np.full(n, TRUNCATED)
-    active = np.arange(n)
-    steps = []
+    returns, lengths, outcomes = np.zeros(n), np.zeros(n, dtype=np.int64), np.full(n, TRUNCATED)
+    active = np.arange(n)  # the episodes that go on
     for t in range(task.max_steps):
         observations = task.observe(states)
         actions = _act(policy, task, observations)
-        if record:
+        if steps is not None:
             steps.append((active, observations.astype(np.float64), actions))
         states, rewards, ended = task.step(states, actions)
         returns[active] += rewards
@@ -108,7 +126,7 @@ def _advance(policy: Policy, task: str | Task, starts: np.ndarray, *, record: bo
         active, states = active[~done], states[~done]
         if not len(active):
             break
-    return Outcomes(returns, lengths, outcomes), steps
+    return Outcomes(returns, lengths, outcomes)
 
 
 def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:

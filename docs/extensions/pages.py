@@ -1,4 +1,4 @@
-"""What a page says about itself to search engines; and what the theme brings along that no page asks for."""
+"""Links of pages, their descriptions for search engines, and what the theme brings along that no page asks for."""
 
 import html
 import re
@@ -8,6 +8,13 @@ from docutils import nodes
 
 _UNUSED = ("*.js.map", "*.css.map", "scripts/fontawesome.js")
 _MAP = re.compile(rb"\n?(//# |/\*# )sourceMappingURL=[^\n*]*( \*/|\*/)?")
+
+
+def _move_links(app, docname, source):
+    """The pages of docs/ lie in the root of the site, so links between them and other pages lose a folder."""
+    source[0] = source[0].replace("](../docs/", "](../")
+    if "/" not in docname:
+        source[0] = source[0].replace("](../", "](")
 
 
 def _describe(app, pagename, templatename, context, doctree):
@@ -29,6 +36,7 @@ def _thin(app, error):
 
 
 def setup(app):
+    app.connect("source-read", _move_links)
     app.connect("html-page-context", _describe)
     app.connect("build-finished", _thin)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""How fast it is, side by side with the direct way: `make bench`."""
+"""Speed and memory compared with the direct way, `tests/direct.py`: `make bench`."""
 
 import dataclasses
 import shutil
@@ -15,11 +15,12 @@ from direct import OneByOne, evaluate_directly, same_run, teacher_agent
 from direct import distill as distill_directly
 
 import vsp
-from vsp.evaluate import outcomes
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import printed
 
 REPEATS = 5
-SLOW_EPISODES = 100  # of the slow side of an evaluation; its time is scaled to 1000
-MEMORY = 64  # bytes that an iteration more may take; the history's two numbers are 40
+SLOW_EPISODES = 100  # of the direct way; their time is scaled to 1000
+MEMORY = 64  # bytes that each further iteration may take; 40 of them are the history's
 
 
 @pytest.fixture(autouse=True)
@@ -27,27 +28,32 @@ def one_thread():
     torch.set_num_threads(1)
 
 
-def seconds(work) -> float:
+def timed(work) -> tuple[float, object]:
+    """Seconds that `work` takes, and its result."""
     begin = time.perf_counter()
-    work()
-    return time.perf_counter() - begin
+    result = work()
+    return time.perf_counter() - begin, result
 
 
-def race(quick, slow, *, calls=(1, 1), repeats: int = REPEATS) -> np.ndarray:
-    """Seconds per call of both, in turn, after a call of each that does not count. (repeats, 2)"""
+def repeated(work, n: int) -> None:
+    for _ in range(n):
+        work()
+
+
+def time_in_turns(quick, slow, *, calls=(1, 1), repeats: int = REPEATS) -> np.ndarray:
+    """Seconds per call of both (repeats, 2), timed alternately after one call each as warm-up."""
     quick(), slow()
     sides = list(zip((quick, slow), calls))
-    return np.array([
-        [seconds(lambda: [work() for _ in range(n)]) / n for work, n in sides] for _ in range(repeats)
-    ])  # fmt: skip
+    return np.array([[timed(partial(repeated, *side))[0] / side[1] for side in sides] for _ in range(repeats)])
 
 
-def told(times: np.ndarray, least: float) -> tuple[str, bool]:
-    """The median ratio of `times` (n, 2) and its range in words, and whether it is at least `least`."""
+def record_ratio(record, what: str, times: np.ndarray, at_least: float, *, why: str = "") -> float:
+    """Record how many times faster the first column of `times` (n, 2) is than the second; return the median."""
     ratios = times[:, 1] / times[:, 0]
     ours, direct = (duration(t) for t in np.median(times, axis=0))
-    text = f"{np.median(ratios):.0f} times ({ratios.min():.0f} to {ratios.max():.0f}): {ours} against {direct}"
-    return text, bool(np.median(ratios) >= least)
+    about = {"low": ratios.min(), "high": ratios.max(), "note": f"{ours} against {direct}"}
+    record("speed", what, np.median(ratios), "times", at_least=at_least, **about, why=why)
+    return float(np.median(ratios))
 
 
 def duration(t: float) -> str:
@@ -55,82 +61,72 @@ def duration(t: float) -> str:
     return f"{t / unit:.3g} {name}"
 
 
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
+@pytest.mark.parametrize("task", printed.TASKS)
 def test_one_distillation(task, record, monkeypatch):
     """At the paper's configuration; every pair of runs is compared as well."""
     teacher, agent, config = vsp.load_teacher(task), teacher_agent(task), vsp.preset(task)
     vsp.distill(teacher, task, config, seed=0)
-    times, same = [], True
+    times, same = [], 0
     for seed in range(REPEATS):
-        found = []
-        slow = seconds(lambda: found.append(distill_directly(agent, gymnasium.make(task), config, seed=seed)))
-        times.append((seconds(lambda: vsp.distill(teacher, task, config, seed=seed)), slow))
-        same &= same_run(found[0], teacher, task, config, seed, monkeypatch)
-    to_hold = f"{REPEATS} of {REPEATS} equal to the direct way, coefficients within 1e-9"
-    record("speed", f"the same partition, {task}", to_hold, "all equal" if same else "not all equal", same)
-    text, held = told(np.array(times), 40)
-    record("speed", f"a distillation against the direct way, {task}", "40 times", text, held)
+        slow, found = timed(partial(distill_directly, agent, gymnasium.make(task), config, seed=seed))
+        times.append((timed(partial(vsp.distill, teacher, task, config, seed=seed))[0], slow))
+        same += same_run(found, teacher, task, config, seed, monkeypatch)
+    note = "equal to the direct way, coefficients within 1e-9"
+    record("speed", f"the same partition, {task}", same, f"of {REPEATS}", at_least=REPEATS, note=note)
+    record_ratio(record, f"a distillation against the direct way, {task}", np.array(times), 40)
 
 
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
-def test_evaluation_of_a_copy(task, record):
+@pytest.mark.parametrize("task", printed.TASKS)
+def test_evaluation_of_a_distilled_policy(task, record):
     policy = vsp.distill(vsp.load_teacher(task), task, seed=0)[0]
-    text, held = told(evaluations(policy, policy, task), 100)
-    record(
-        "speed",
-        f"1000 episodes of a copy against evaluate_policy ({SLOW_EPISODES}, scaled), {task}",
-        "100 times",
-        text,
-        held,
-    )
-    gap = np.abs(evaluate_directly(policy, task, 1000, seed=1) - outcomes(policy, task, 1000, seed=1).returns).max()
-    text = f"largest difference {gap:.1g}"
-    record("speed", f"the same 1000 returns of a copy, {task}", "within 1e-6", text, gap <= 1e-6)
+    what = f"1000 episodes of a distilled policy against evaluate_policy ({SLOW_EPISODES}, scaled), {task}"
+    record_ratio(record, what, evaluations(policy, policy, task), 100)
+    ours, direct = rollout_from_seed(policy, task, 1000, seed=1), evaluate_directly(policy, task, 1000, seed=1)
+    what, gap = f"the same 1000 returns of a distilled policy, {task}", np.abs(direct - ours.returns).max()
+    record("speed", what, gap, "largest difference", at_most=1e-6)
 
 
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
+@pytest.mark.parametrize("task", printed.TASKS)
 def test_evaluation_of_the_teacher(task, record):
-    """Its forward passes are the floor. Their last bit decides an episode that comes to the very edge of the goal."""
+    """Its forward passes bound the speed. Their last bit decides an episode that ends at the very edge of the goal."""
     teacher, agent = vsp.load_teacher(task), teacher_agent(task)
-    times = evaluations(teacher, agent, task)
-    text, held = told(times, 100)
     what = f"1000 episodes of the teacher against evaluate_policy ({SLOW_EPISODES}, scaled), {task}"
-    record("speed", what, "100 times", text, held, why="both go through its network")
-    assert np.median(times[:, 1] / times[:, 0]) > 25
+    times, why = evaluations(teacher, agent, task), "both go through its network"
+    assert record_ratio(record, what, times, 100, why=why) > 25
     direct, single, own = (
         evaluate_directly(agent, task, 1000, seed=1),
-        *(outcomes(policy, task, 1000, seed=1).returns for policy in (OneByOne(agent), teacher)),
+        *(rollout_from_seed(policy, task, 1000, seed=1).returns for policy in (OneByOne(agent), teacher)),
     )
     gap, others = np.abs(direct - single).max(), int((np.abs(direct - own) > 1e-5).sum())
     what = f"the same 1000 returns of the teacher, {task}"
-    text = f"largest difference {gap:.1g}"
-    record("speed", f"{what}, with the agent's actions", "within 1e-5", text, gap <= 1e-5)
-    text = f"{others} of 1000 differ by more, the mean by {abs(direct.mean() - own.mean()):.1g}"
-    why = "a float32 sum in another order decides an episode at the very edge of the goal"
-    record("speed", f"{what}, with our forward pass", "within 1e-5", text, others == 0, why=why)
+    record("speed", f"{what}, with the agent's actions", gap, "largest difference", at_most=1e-5)
+    about = {"note": f"the means by {abs(direct.mean() - own.mean()):.1g}"}
+    about["why"] = "a float32 sum in another order decides an episode at the very edge of the goal"
+    record("speed", f"{what}, with our forward pass", others, "of 1000 differ by over 1e-5", at_most=0, **about)
     assert abs(direct.mean() - own.mean()) < 0.1
 
 
 def evaluations(ours, theirs, task: str) -> np.ndarray:
     """Seconds for 1000 episodes, ours and directly, these scaled from fewer. (repeats, 2)"""
     slow = partial(evaluate_directly, theirs, task, SLOW_EPISODES, seed=1)
-    return race(lambda: outcomes(ours, task, 1000, seed=1), slow, calls=(3, 1)) * [1, 1000 / SLOW_EPISODES]
+    return time_in_turns(lambda: rollout_from_seed(ours, task, 1000, seed=1), slow, calls=(3, 1)) * [
+        1,
+        1000 / SLOW_EPISODES,
+    ]
 
 
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
+@pytest.mark.parametrize("task", printed.TASKS)
 def test_one_state(task, record, tmp_path):
     agent, policy = teacher_agent(task), vsp.distill(vsp.load_teacher(task), task, seed=0)[0]
     env = gymnasium.make(task)
     observations = [env.reset(seed=seed)[0] for seed in range(100)]
     slow = lambda: [agent.predict(obs, deterministic=True) for obs in observations]  # noqa: E731
-    times = race(lambda: [policy.predict(obs) for obs in observations], slow, calls=(20, 2), repeats=3 * REPEATS)
-    text, held = told(times / len(observations), 20)
-    what = f"predict of one state against the teacher's, {task}"
-    record("speed", what, "20 times", text, held, why="a dozen calls of NumPy for whatever number of states")
-    assert np.median(times[:, 1] / times[:, 0]) > 8
-    times = race(program(policy, tmp_path), slow, repeats=3 * REPEATS)
-    text, held = told(times / [CALLS, len(observations)], 1000)
-    record("speed", f"the exported C against the teacher's predict, {task}", "1000 times", text, held)
+    quick = lambda: [policy.predict(obs) for obs in observations]  # noqa: E731
+    times = time_in_turns(quick, slow, calls=(20, 2), repeats=3 * REPEATS) / len(observations)
+    what, why = f"predict of one state against the teacher's, {task}", "a dozen calls of NumPy for any number of states"
+    assert record_ratio(record, what, times, 20, why=why) > 8
+    times = time_in_turns(program(policy, tmp_path), slow, repeats=3 * REPEATS) / [CALLS, len(observations)]
+    record_ratio(record, f"the exported C against the teacher's predict, {task}", times, 1000)
 
 
 CALLS = 2_000_000  # of the exported C
@@ -171,7 +167,7 @@ def program(policy, folder):
     return act
 
 
-@pytest.mark.parametrize("task", vsp.paper.TASKS)
+@pytest.mark.parametrize("task", printed.TASKS)
 def test_memory_of_a_run(task, record):
     """Between 4 and 16 times the paper's iterations, where the number of snapshots no longer grows."""
     teacher, config = vsp.load_teacher(task), vsp.preset(task)
@@ -185,6 +181,5 @@ def test_memory_of_a_run(task, record):
         tracemalloc.stop()
     each = (peaks[16] - peaks[4]) / (12 * config.n_epochs)
     sizes = ", ".join(f"{peak / 1e6:.1f}" for peak in peaks.values())
-    text = f"peaks of {sizes} MB at 1, 4, 16 times the iterations: {each:.0f} bytes an iteration"
-    to_hold = f"buffers bounded by n_reset; the history's 40 bytes an iteration, at most {MEMORY} in all"
-    record("speed", f"memory of one run, {task}", to_hold, text, each <= MEMORY)
+    note = f"peaks of {sizes} MB at 1, 4, 16 times the iterations"
+    record("speed", f"memory of a run, {task}", each, "bytes an iteration", at_most=MEMORY, note=note)

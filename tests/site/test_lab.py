@@ -1,6 +1,6 @@
 """JupyterLab with a kernel: notebook 02 runs from top to bottom, its controls answer, and it can be opened again.
 
-What this needs of `vsp/explorer.py`: the labels of its controls, and an <img> below them.
+This needs the labels of the controls in `vsp/show/page.py`, and an <img> below them.
 """
 
 import json
@@ -102,7 +102,7 @@ def _below(page, place):
 
 
 class Controls:
-    """What `vsp/explorer.py` shows in a notebook."""
+    """What `vsp/show/page.py` shows in a notebook."""
 
     def __init__(self, page, label):
         self.page = page

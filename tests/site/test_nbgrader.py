@@ -8,13 +8,13 @@ import pytest
 
 pytest.importorskip("nbgrader", reason="nbgrader is not installed: `make test-site` brings it")
 
-from nbgrader.api import Gradebook  # noqa: E402
-from nbgrader.apps import NbGraderAPI  # noqa: E402
-from traitlets.config import Config  # noqa: E402
+from nbgrader.api import Gradebook
+from nbgrader.apps import NbGraderAPI
+from traitlets.config import Config
 
-from vsp.course import build  # noqa: E402
-from vsp.notebook import nbformat  # noqa: E402
-from vsp.store import ROOT  # noqa: E402
+from vsp.course import build
+from vsp.run.atomic import ROOT
+from vsp.run.notebook import nbformat
 
 ASSIGNMENT = "homework"
 LESSONS = build.read_sources()

@@ -11,9 +11,8 @@ from visits import Visit
 
 SITE = Path(os.environ.get("SITE", "nowhere"))
 NAMES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob("*.html") if "_static" not in path.parts)
-DESK, PHONE, PAPER = (
-    {"width": w, "height": h} for w, h in ((1280, 900), (390, 844), (680, 960))
-)  # A4 less its margins
+# Paper: A4 less its margins
+DESK, PHONE, PAPER = ({"width": w, "height": h} for w, h in ((1280, 900), (390, 844), (680, 960)))
 NAVIGATION = ".bd-sidebar-primary, .bd-sidebar-secondary, .bd-header-article, .prev-next-footer, #pst-back-to-top"
 
 
@@ -208,11 +207,6 @@ def test_links_within_the_site_lead_somewhere(page, address):
         elif not path.exists() or (anchor and path.is_file() and f'id="{anchor}"' not in path.read_text("utf-8")):
             missing.append(link.removeprefix(address))
     assert missing == []
-
-
-def test_mathematics_of_tables_is_mathml(start, address):
-    start.goto(address + "notebooks/04_appendix_tables.html")
-    assert start.locator("article table math").count() > 200
 
 
 def test_numbers_of_the_text_stand_under_each_other(start, address):

@@ -18,12 +18,16 @@ import os
 import re
 from pathlib import Path
 
-from ..notebook import NotebookNode, nbformat
-from ..store import ROOT, DamagedFile, alone, read_sealed, sha256, write_sealed, write_text
+from ..run.atomic import ROOT, DamagedFile, sha256, write_text
+from ..run.command import in_one_line
+from ..run.locks import file_lock
+from ..run.notebook import NotebookNode, nbformat
+from ..run.sealed import read_sealed, write_sealed
 from .handout import write_handout
 
 SOURCES = ROOT / "notebooks" / "course"
-MADE = ".made"  # the checksums of what was written
+GUIDE = Path(__file__).with_name("guide.md")  # how the lecturer's guide begins
+MADE = ".made"  # checksums of the files written last
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
 _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
@@ -39,7 +43,7 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts = {f"student/{name}": text for name, text in students.items()}
     texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
     texts["guide.md"] = guide(lessons)
-    with alone(folder.parent / "locks" / "course", f"writes into {folder}"):
+    with file_lock(folder.parent / "locks" / "course", f"writes into {folder}"):
         _keep_edited(folder, texts)
         for name, text in texts.items():
             write_text(folder / name, text)
@@ -50,11 +54,11 @@ def build(out: str | os.PathLike) -> list[Path]:
 
 
 def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
-    """Rename the files that are about to be replaced and are not what was written here, the last time or just now."""
+    """Rename files that somebody edited: their content is neither the last build's nor this one's."""
     try:
         made = json.loads(read_sealed(folder / MADE))
     except (FileNotFoundError, DamagedFile):
-        made = {}  # nothing is known of the last time
+        made = {}  # no record of the last build
     for path, text in ((folder / name, text) for name, text in texts.items()):
         ours = (made.get(path.relative_to(folder).as_posix()), hashlib.sha256(text.encode()).hexdigest())
         if path.exists() and sha256(path) not in ours:
@@ -88,10 +92,7 @@ def solution(lesson: NotebookNode) -> NotebookNode:
 
 
 def without_answers(source: str) -> str:
-    """The code of a solution cell with the stub in place of what stands between the marks.
-
-    Raises ValueError for a mark without its counterpart, and for a solution cell without marks.
-    """
+    """The code of a solution cell with the stub for each answer. Raises ValueError unless marks come in pairs."""
     stubbed, n = _ANSWER.subn(lambda match: "\n".join(match[1] + line for line in STUB), source)
     if not n or BEGIN in stubbed or END in stubbed:
         raise ValueError(f"expected `{BEGIN}` and `{END}` in pairs, on lines of their own, in:\n{source}")
@@ -119,8 +120,8 @@ def points(lesson: NotebookNode) -> int:
 
 
 def guide(lessons: dict[str, NotebookNode]) -> str:
-    """The lecturer's guide, in Markdown: what the students see in short, then notes and solutions, lesson by lesson."""
-    parts = [_BEFORE, "# What students see\n"]
+    """The lecturer's guide, in Markdown: an overview of what students see, then notes and solutions for each lesson."""
+    parts = [GUIDE.read_text(encoding="utf-8"), "# What students see\n"]
     parts += [_overview(name, lesson) for name, lesson in lessons.items()]
     parts += ["# For lecturers only\n"]
     parts += [_notes(lesson) for lesson in lessons.values()]
@@ -137,7 +138,7 @@ def _overview(name: str, lesson: NotebookNode) -> str:
 
 
 def _notes(lesson: NotebookNode) -> str:
-    """The lecturer's cells, each under the heading before it, and after them the solutions of that section."""
+    """The lecturer's cells and the solutions of each section, under its heading."""
     lines, heading = [], ""
     for cell in lesson.cells:
         found = re.findall(r"^#{1,2} (.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
@@ -155,32 +156,14 @@ def _deeper(markdown: str) -> str:
     return re.sub(r"^#", "##", markdown, flags=re.MULTILINE)
 
 
-_BEFORE = """# Lecturer's guide
-
-Three lessons of 90 minutes. `make course` writes beside this guide:
-
-- `handout.zip`, for your students: the lessons without answers, and all that they need. It says how to set up, with
-  Python 3.11, in a few minutes and without torch. Let them do that at home. A clone of the repository has the answers.
-- `student/`, the same lessons to look at: `.venv/bin/jupyter lab build/course/student`. Work in a copy elsewhere; but
-  what somebody wrote here is kept, under another name, when `make course` runs again.
-- `solution/`, the lessons with answers. Run one as a whole (15 s) to see all its pictures.
-
-Every exercise is followed by a check that answers at once. It calls what the student wrote and does not compare text,
-so any way of solving an exercise counts, and nobody has to wait for you to hear what is wrong.
-
-With nbgrader: activate the environment that has it (it looks for its parts on the path); the files in `solution/` are
-sources. Copy one to `source/<assignment>/`, run `nbgrader generate_assignment`, and grade as ever; points are in the
-cells. The lessons in `notebooks/course` have the same cells and the notes below: do not release those.
-"""
-
-
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", default=".", help="folder that build/course is made in")
+    parser.add_argument("--out", default=".", help="files go to OUT/build/course")
     *files, guide, handout = build(parser.parse_args().out)
     print(f"{len(files)} notebooks in {guide.parent}; begin with {guide}; for students: {handout}")
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line():
+        main()

@@ -1,7 +1,6 @@
-"""What a check says: one line on what was found and what was expected, in kind, or one line that all is well.
+"""What checks share: calling a student's function, recognising common mistakes, and one line of feedback.
 
-A check never tells the answer: it calls what a student wrote on small cases, tries whether the result is what a common
-mistake would give, and points to a hint.
+Feedback says what was found and what was expected, and points to a hint; it never gives the answer.
 """
 
 from __future__ import annotations
@@ -11,16 +10,18 @@ import functools
 import hashlib
 import textwrap
 import traceback
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from ..rollouts import Episode, Policy
 
 WIDTH = 90  # characters of a message's lines
 
 
 class NotYet(AssertionError):
-    """An answer that is missing or not right yet. Jupyter shows its message and no traceback."""
+    """An answer that is missing or wrong. Jupyter shows its message without a traceback."""
 
     def _render_traceback_(self) -> list[str]:
         return _lines(f"✗ {self}")
@@ -28,17 +29,38 @@ class NotYet(AssertionError):
 
 @dataclass(frozen=True)
 class Mistake:
-    """What a common mistake makes of a case, and what to say about it."""
+    """The result that a common mistake gives in a case, and what to say about it."""
 
-    result: object  # numbers, compared with what the student's function returned
+    result: object  # numbers, compared with what the student's function returned; None: any others
     found: str
     expected: str
     hint: int | None = None
 
 
 @dataclass(frozen=True)
+class Question:
+    """A question, the answers to choose from, and what to say about wrong ones."""
+
+    options: Sequence[str]
+    right: str  # the right answer, or its `seal` where nobody is to read it
+    hint: int
+    teaching: dict[str, str] = field(default_factory=dict)
+
+
+class ActionsAlone:
+    """A policy whose `predict` returns the actions and no second thing, as one who forgets that takes it to do."""
+
+    def __init__(self, policy: Policy):
+        self.policy = policy
+
+    def predict(self, obs: np.ndarray) -> np.ndarray:
+        """The actions alone."""
+        return self.policy.predict(obs)[0]
+
+
+@dataclass(frozen=True)
 class Exercise:
-    """One exercise: its number, and the name of what the student writes."""
+    """One exercise: its number, and the name that the student defines."""
 
     number: str
     name: str
@@ -47,6 +69,11 @@ class Exercise:
         """The exception to raise for an answer that is not right; `hint` is the number of the hint that helps."""
         found = " ".join(found.split())  # an error's own words may have many lines
         return NotYet(f"{self.number} {self.name}: found {found}, expected {expected}.{self._pointer(hint)}")
+
+    def refuse_if(self, wrong: bool, found: str, expected: str, hint: int | None = None) -> None:
+        """Raise NotYet if the answer is `wrong`."""
+        if wrong:
+            raise self.wrong(found, expected, hint)
 
     def _pointer(self, hint: int | None) -> str:
         return f" → Hint {hint} of exercise {self.number}" if hint else ""
@@ -57,7 +84,7 @@ class Exercise:
         return NotYet(f"{self.number} {self.name} is not written yet: {todo}.")
 
     def checks(self, check: Callable) -> Callable:
-        """Decorator of the exercise's check: what the check cannot read it says in words, like all else."""
+        """Decorator of the exercise's check: errors inside the check become feedback too."""
 
         @functools.wraps(check)
         def careful(*answer: object, **settings: object) -> None:
@@ -80,8 +107,7 @@ class Exercise:
 
         Raises NotYet for a stub, an error, or no result.
         """
-        if not callable(function):
-            raise self.wrong(f"{function!r}", "a function")
+        self.refuse_if(not callable(function), f"{function!r}", "a function")
         try:
             result = function(*(arguments if keep else copy.deepcopy(arguments)))
         except NotImplementedError:
@@ -89,8 +115,7 @@ class Exercise:
         except Exception as error:
             found = f"{type(error).__name__} ({error}) {_place(function, error)}"
             raise self.wrong(found, "a result: print what that line works with") from None
-        if result is None:
-            raise self.wrong("None as the result", "something after `return`")
+        self.refuse_if(result is None, "None as the result", "something after `return`")
         return result
 
     def array(
@@ -101,57 +126,57 @@ class Exercise:
         try:
             values = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
-            shown = " ".join(repr(value).split())[:40]
-            raise self.wrong(
-                f"{what} that is not made of numbers, {shown}", f"numbers of shape {shape}", hint
-            ) from None
-        if values.shape != shape:
-            raise self.wrong(f"{what} of shape {values.shape}", f"{shape}{': ' if meaning else ''}{meaning}", hint)
-        if not np.isfinite(values).all():
-            raise self.wrong(f"NaN or infinity in {what}", "finite numbers", hint)
+            found = f"{what} that is not made of numbers, {value!r:.40}"
+            raise self.wrong(found, f"numbers of shape {shape}", hint) from None
+        expected = f"{shape}: {meaning}" if meaning else f"{shape}"
+        self.refuse_if(values.shape != shape, f"{what} of shape {values.shape}", expected, hint)
+        self.refuse_if(not np.isfinite(values).all(), f"NaN or infinity in {what}", "finite numbers", hint)
         return values
 
-    def size(self, value: object) -> int:
-        """How many entries `value` has. Raises NotYet for what is no collection."""
-        if not hasattr(value, "__len__"):
-            raise self.wrong(f"{value!r} as the result", "a list")
-        return len(value)
-
-    def compare(
-        self, value: object, right: object, mistakes: Sequence[Mistake], otherwise: Mistake, rtol: float = 1e-6
-    ) -> None:
-        """Raise NotYet unless `value` is `right`, with the words of the first mistake that it agrees with."""
+    def compare(self, value: object, right: object, mistakes: Sequence[Mistake], rtol: float = 1e-6) -> None:
+        """Raise NotYet unless `value` is `right`, with the words of the first mistake that it agrees with: the last one
+        agrees with any."""
         if not _close(value, right, rtol):
-            mistake = next((m for m in mistakes if _close(value, m.result, rtol)), otherwise)
+            mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, rtol))
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
-    def answers(self, given: object, options: dict[str, Sequence[str] | type]) -> dict:
-        """The dictionary `given`, with an answer for every key of `options`. Raises NotYet for what is none of them."""
-        if not isinstance(given, dict):
-            raise self.wrong(f"{given!r}", "a dictionary of answers")
+    def answers(self, given: object, options: dict[str, Sequence[str] | type]) -> None:
+        """Raise NotYet unless the dictionary `given` has one of the `options`, or a number, for every key of them."""
+        self.refuse_if(not isinstance(given, dict), f"{given!r}", "a dictionary of answers")
         for key, choices in options.items():
             answer = given.get(key)
             if answer is None:
                 todo = "write your answer in place of None and run that cell, without the stub"
                 raise NotYet(f"{self.number} {self.name}: question {key!r} is not answered yet: {todo}.")
             if choices is float:
-                if isinstance(answer, bool) or not isinstance(answer, int | float | np.number):
-                    raise self.wrong(f"{answer!r} for {key!r}", "a number")
-            elif answer not in choices:
-                raise self.wrong(f"{answer!r} for {key!r}", f"one of {list(choices)}")
-        return given
+                number = isinstance(answer, int | float | np.number) and not isinstance(answer, bool)
+                self.refuse_if(not number, f"{answer!r} for {key!r}", "a number")
+            else:
+                self.refuse_if(answer not in choices, f"{answer!r} for {key!r}", f"one of {list(choices)}")
 
-    def choice(self, given: dict, key: str, right: str, teaching: dict[str, str], hint: int | None = None) -> None:
-        """Raise NotYet unless the answer to `key` is `right`; `teaching` says something about wrong ones."""
-        if given[key] != right:
-            words = teaching.get(given[key], "look again")
-            raise NotYet(
-                f"{self.number} {self.name}, question {key!r}: not {given[key]!r}: {words}.{self._pointer(hint)}"
-            )
+    def ask(self, given: object, questions: dict[str, Question]) -> None:
+        """Raise NotYet unless the dictionary `given` has the right answer to every question."""
+        self.answers(given, {key: question.options for key, question in questions.items()})
+        for key, question in questions.items():
+            answer = given[key]
+            if question.right not in (answer, seal(self.number, key, answer)):
+                words = f"not {answer!r}: {question.teaching.get(answer, 'look again')}.{self._pointer(question.hint)}"
+                raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}")
 
-    def sealed(self, given: dict, key: str, digest: str, teaching: dict[str, str], hint: int | None = None) -> None:
-        """As `choice`, for a right answer of which only the salted digest is known."""
-        self.choice(given, key, given[key] if seal(self.number, key, given[key]) == digest else "", teaching, hint)
+
+def works(attempt: Callable, *given: object) -> bool:
+    """Whether `attempt` ends without an error."""
+    try:
+        attempt(*given)
+    except Exception:
+        return False
+    return True
+
+
+def joined(episodes: Iterable[Episode]) -> tuple[np.ndarray, np.ndarray]:
+    """The states (n, d) and actions (n, m) of all episodes."""
+    parts = [(episode.states, episode.actions.astype(float)) for episode in episodes]
+    return tuple(map(np.concatenate, zip(*parts)))
 
 
 def seal(number: str, key: str, answer: str) -> str:

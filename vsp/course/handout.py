@@ -1,6 +1,6 @@
-"""The hand-out: the students' copies and all that they need, in one file.
+"""The hand-out: the students' copies and all that they need, in one zip file.
 
-Without torch, which the lessons do not use (teachers act by NumPy), a student's set-up is a small download.
+The lessons need no torch, because teachers act by NumPy, so a student's set-up is a small download.
 """
 
 from __future__ import annotations
@@ -10,24 +10,24 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-from ..store import ROOT, atomic_path
+from ..run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
-UNUSED = ("papermill", "stable-baselines3", "torch")  # of the package's dependencies, by the lessons
+UNUSED = ("cma", "papermill")  # dependencies of the package that the lessons do not need
 FILES = ("LICENSE", "vsp/**/*.py", "data/paper/*", "data/teachers/*.*")
 
 README = """# vsp: the course
 
-Set up once, with Python 3.11 (Linux, macOS):
+Set up once, with Python 3.11, 3.12 or 3.13 (Linux, macOS):
 
-    python3.11 -m venv .venv
+    python3 -m venv .venv
     .venv/bin/python -m pip install -r requirements.txt
 
 and then, each time:
 
     .venv/bin/jupyter lab
 
-On Windows, `py -3.11 -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`.
+On Windows, `py -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`.
 
 Begin with lesson_1_black_box.ipynb. Whatever you change stays in this folder.
 """
@@ -48,7 +48,7 @@ def write_handout(path: Path, copies: dict[str, str]) -> None:
 
 
 def requirements() -> str:
-    """What pip is to install for the lessons, in the versions of environment.lock."""
+    """The lines of requirements.txt: what the lessons need, in the versions of environment.lock."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = [re.match(r"[\w-]+", line)[0] for line in project["dependencies"]]
     locked = dict(

@@ -9,13 +9,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .. import baselines, geometry
-from ..distill import teacher_episodes
-from ..envs import GOAL_EDGE, PIT_HIGH, Task, get_task
+from .. import baselines, geometry, show
+from ..algorithms import teacher_episodes
 from ..policy import VoronoiPolicy
 from ..rollouts import Policy
+from ..tasks import Task, get_task
+from ..tasks.simplegoal import GOAL_EDGE, PIT_HIGH
 from ..teachers import load_teacher
-from .feedback import Exercise, Mistake, NotYet
+from .feedback import ActionsAlone, Exercise, Mistake, NotYet, Question, joined, works
 
 SEEDS = range(3)
 CASES = ((2, 2), (2, 1), (3, 2))  # dimensions of state and action
@@ -38,19 +39,19 @@ PLACES = ("beyond the pit, seen from the goal", "between goal and pit", "along t
 
 
 @READING.checks
-def reading(answers: dict, teacher: Policy) -> None:
+def reading(answers: object, teacher: Policy) -> None:
     """1.1: answers `right of the pit`, `beyond the pit`, `at the limit`, `sudden turn`."""
-    options = {"right of the pit": WAYS, "beyond the pit": WAYS, "at the limit": SHARES, "sudden turn": PLACES}
-    READING.answers(answers, options)
     shortest = {"down-left": "that is the straight way to the goal; look at what lies on it"}
-    READING.choice(answers, "right of the pit", _way(teacher, [0.9, 0.2]), {}, 1)
-    READING.choice(answers, "beyond the pit", _way(teacher, [0.7, 0.6]), shortest, 1)
-    _, _, states = geometry.grid(np.zeros(2), np.ones(2), 21)
+    _, _, states = show.grid(np.zeros(2), np.ones(2), 21)
     actions = teacher.predict(states)[0]
-    full = (np.abs(actions) > 0.99).mean()
-    share = SHARES[int(np.digitize(full, [0.25, 0.75]))]
-    READING.choice(answers, "at the limit", share, {}, 2)
-    READING.choice(answers, "sudden turn", _sharpest(states, actions), {}, 3)
+    share = SHARES[int(np.digitize((np.abs(actions) > 0.99).mean(), [0.25, 0.75]))]
+    questions = {
+        "right of the pit": Question(WAYS, _way(teacher, [0.9, 0.2]), 1),
+        "beyond the pit": Question(WAYS, _way(teacher, [0.7, 0.6]), 1, shortest),
+        "at the limit": Question(SHARES, share, 2),
+        "sudden turn": Question(PLACES, _sharpest(states, actions), 3),
+    }
+    READING.ask(answers, questions)
     READING.passed("you read the arrows as the network means them.")
 
 
@@ -90,25 +91,24 @@ def _fits(function: Callable, states: np.ndarray, actions: np.ndarray) -> None:
     found = FIT_LINEAR.call(function, states, actions)
     if isinstance(found, tuple):
         raise FIT_LINEAR.wrong(f"{len(found)} things", f"one array {(p, m)}, the coefficients alone", 3)
-    found = np.asarray(found)
-    if found.shape == (d, m):
+    shape = np.shape(found)
+    if shape == (d, m):
         raise FIT_LINEAR.wrong(f"{d} rows for {d} inputs", "one row more: at the origin such a map can only say 0", 1)
-    if found.shape == (m, p) and m != p:
-        raise FIT_LINEAR.wrong(f"shape {found.shape}", f"{(p, m)}: a row per input, a column per action", 2)
+    if shape == (m, p) and m != p:
+        raise FIT_LINEAR.wrong(f"shape {shape}", f"{(p, m)}: a row per input, a column per action", 2)
     found = FIT_LINEAR.array(found, (p, m), hint=2)
     best = np.linalg.lstsq(inputs, actions, rcond=None)[0]
-    first = Mistake(np.roll(best, 1, axis=0), "the bias in the first row", "it in the last one", 2)
     error, least = (np.square(inputs @ c - actions).mean() for c in (found, best))
     if error > 1.001 * least:  # a map that was found by descent is right too
-        words = f"a squared error of {error:.4g}", f"the least that a linear map can have, {least:.4g}"
-        otherwise = Mistake(None, *words, 1)
-        others = {"states": states[::-1], "actions": -actions}
-        FIT_LINEAR.compare(
-            found, best, [first], _whatever(FIT_LINEAR, function, (states, actions), others) or otherwise
-        )
+        mistakes = [
+            Mistake(np.roll(best, 1, axis=0), "the bias in the first row", "it in the last one", 2),
+            *_whatever(FIT_LINEAR, function, (states, actions), {"states": states[::-1], "actions": -actions}),
+            Mistake(None, f"a squared error of {error:.4g}", f"the least that a linear map can have, {least:.4g}", 1),
+        ]
+        FIT_LINEAR.compare(found, best, mistakes)
 
 
-def _whatever(exercise: Exercise, function: Callable, case: tuple, others: dict[str, object]) -> Mistake | None:
+def _whatever(exercise: Exercise, function: Callable, case: tuple, others: dict[str, object]) -> list[Mistake]:
     """What to say of a function whose result for `case` stays the same when one of the arguments is replaced: as a rule
     it takes a variable of the notebook instead. `others` has another value for each argument, by name."""
     here, blind = exercise.call(function, *case), []
@@ -119,7 +119,7 @@ def _whatever(exercise: Exercise, function: Callable, case: tuple, others: dict[
             continue  # it fails there: so it looks at it
         blind += [f"any `{name}`"] if same else []
     words = f"the same result for {' and '.join(blind)}", "one that is made of the arguments, not of other variables"
-    return Mistake(None, *words) if blind else None
+    return [Mistake(None, *words)] if blind else []
 
 
 class _Map:
@@ -130,13 +130,6 @@ class _Map:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         return np.asarray(obs) @ self.weights, None
-
-
-class _Bare(_Map):
-    """The same, but what it predicts is the actions alone."""
-
-    def predict(self, obs: np.ndarray) -> np.ndarray:
-        return super().predict(obs)[0]
 
 
 @ACTION_ERROR.checks
@@ -153,10 +146,16 @@ def action_error(function: Callable) -> None:
 
 
 def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
-    value, squares = np.asarray(_measured(function, case)), np.square(difference)
-    if np.size(value) != 1:
-        raise ACTION_ERROR.wrong(f"an array of shape {np.shape(value)}", "one number for all states together", 1)
+    own, other, states = case
+    alone = ActionsAlone(own), ActionsAlone(other), states
+    pair = not works(ACTION_ERROR.call, function, *case) and works(ACTION_ERROR.call, function, *alone)
+    found = "all that `predict` returns taken for the actions"
+    ACTION_ERROR.refuse_if(pair, found, "the first of its two things", 1)
+    value, squares = np.asarray(ACTION_ERROR.call(function, *case)), np.square(difference)
+    found = f"an array of shape {value.shape}"
+    ACTION_ERROR.refuse_if(value.size != 1, found, "one number for all states together", 1)
     (value,) = ACTION_ERROR.array(np.ravel(value), (1,))
+    others = {"policy": _Map(-own.weights), "teacher": _Map(-other.weights), "states": states + 1}
     mistakes = [
         Mistake(squares.sum(axis=1).mean(), "a sum over the actions", "a mean over them too", 2),
         Mistake(squares.sum(), "a sum over everything", "a mean", 2),
@@ -166,25 +165,10 @@ def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
         Mistake(-difference.mean(), "a mean in which errors to either side cancel", "one of squares", 2),
         Mistake(difference.mean() ** 2, "the square of a mean", "the mean of squares: first square, then average", 2),
         Mistake(squares.mean() / 2, "half of what it should be", "the mean of squares as it is", 2),
+        *_whatever(ACTION_ERROR, function, case, others),
+        Mistake(None, "another number", "a mean of squared differences of actions", 1),
     ]
-    otherwise = Mistake(None, "another number", "a mean of squared differences of actions", 1)
-    own, other, states = case
-    others = {"policy": _Map(-own.weights), "teacher": _Map(-other.weights), "states": states + 1}
-    ACTION_ERROR.compare(value, squares.mean(), mistakes, _whatever(ACTION_ERROR, function, case, others) or otherwise)
-
-
-def _measured(function: Callable, case: tuple) -> object:
-    """The result for `case`. Raises NotYet, in other words where the function would work if `predict` returned the
-    actions alone: then it has forgotten the second thing."""
-    try:
-        return ACTION_ERROR.call(function, *case)
-    except NotYet as failed:
-        own, other, states = case
-        try:
-            ACTION_ERROR.call(function, _Bare(own.weights), _Bare(other.weights), states)
-        except NotYet:
-            raise failed from None
-    raise ACTION_ERROR.wrong("all that `predict` returns taken for the actions", "the first of its two things", 1)
+    ACTION_ERROR.compare(value, squares.mean(), mistakes)
 
 
 @NEAREST.checks
@@ -209,8 +193,8 @@ def _looks_up(function: Callable, codewords: np.ndarray, states: np.ndarray) -> 
     if (value != np.round(value)).any():
         raise NEAREST.wrong("numbers that are no integers", "indices of codewords, not distances to them", 1)
     right = geometry.nearest(codewords, states)
-    otherwise = Mistake(None, f"the right cell for {(value == right).mean():.0%} of the states", "it for all", 1)
-    NEAREST.compare(value, right, _other_cells(codewords, states), otherwise)
+    share = f"the right cell for {(value == right).mean():.0%} of the states"
+    NEAREST.compare(value, right, [*_other_cells(codewords, states), Mistake(None, share, "it for all", 1)])
 
 
 def _other_cells(codewords: np.ndarray, states: np.ndarray) -> list[Mistake]:
@@ -250,20 +234,22 @@ def _acts(function: Callable, codewords: np.ndarray, coefficients: np.ndarray, s
     weighted, bias = np.einsum("nd,ndm->nm", states, own[:, :-1]), own[:, -1]
     raw, first = weighted + bias, states @ coefficients[0, :-1] + coefficients[0, -1]
     ahead = np.einsum("nd,ndm->nm", states, own[:, 1:]) + own[:, 0]
+    right, both = np.clip(raw, -1, 1), "limits on both sides, -1 and 1"
+    bias_lost = "maps without their bias", "the last row of a cell's coefficients added", 2
+    share = np.isclose(value, right).all(axis=1).mean()
     mistakes = [
         Mistake(raw, f"an action of {np.abs(raw).max():.2f}", "none beyond the limits -1 and 1", 3),
-        Mistake(np.clip(raw, 0, 1), "no action below 0", "limits on both sides, -1 and 1", 3),
-        Mistake(np.minimum(raw, 1), "one limit only", "limits on both sides, -1 and 1", 3),
-        Mistake(np.maximum(raw, -1), "one limit only", "limits on both sides, -1 and 1", 3),
-        Mistake(np.clip(weighted, -1, 1), "maps without their bias", "the last row of a cell's coefficients added", 2),
-        Mistake(weighted, "maps without their bias", "the last row of a cell's coefficients added", 2),
+        Mistake(np.clip(raw, 0, 1), "no action below 0", both, 3),
+        Mistake(np.minimum(raw, 1), "one limit only", both, 3),
+        Mistake(np.maximum(raw, -1), "one limit only", both, 3),
+        Mistake(np.clip(weighted, -1, 1), *bias_lost),
+        Mistake(weighted, *bias_lost),
         Mistake(np.clip(weighted, -1, 1) + bias, "the bias added after the limits", "limits last", 3),
         Mistake(np.clip(ahead, -1, 1), "the first row taken for the bias", "it in the last row", 2),
         Mistake(np.clip(first, -1, 1), "one map for all states", "the map of each state's own cell", 1),
+        Mistake(None, f"the right action in {share:.0%} of the states", "it in all", 1),
     ]
-    right = np.isclose(value, np.clip(raw, -1, 1)).all(axis=1).mean()
-    otherwise = Mistake(None, f"the right action in {right:.0%} of the states", "it in all", 1)
-    ACT.compare(value, np.clip(raw, -1, 1), mistakes, otherwise)
+    ACT.compare(value, right, mistakes)
 
 
 def piecewise(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> VoronoiPolicy:
@@ -286,29 +272,23 @@ def leftover(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray) -> 
 @BY_HAND.checks
 def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> None:
     """1.6: at most `AT_MOST` codewords whose maps have at most half the error of one map for everything."""
-    try:
-        points = np.asarray(codewords, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise BY_HAND.wrong(f"{codewords!r:.60}", "an array with a row x, y per codeword", 1) from None
-    if points.ndim != 2 or points.shape[1] != 2 or not len(points):
-        raise BY_HAND.wrong(f"shape {points.shape}", "a row x, y per codeword", 1)
+    n = len(codewords) if np.ndim(codewords) else 1
+    points = BY_HAND.array(codewords, (max(1, n), 2), "codewords", 1, "a row x, y per codeword")
     if points.shape == (2, 2) and np.allclose(points, GIVEN):
         raise BY_HAND.unsolved()
-    if not ((points >= 0) & (points <= 1)).all():
-        raise BY_HAND.wrong("a codeword outside the unit square", "all of them inside", 1)
-    if len(np.unique(points, axis=0)) < len(points):
-        raise BY_HAND.wrong("a codeword that is there twice", "all of them different", 1)
-    if len(points) > AT_MOST:
-        raise BY_HAND.wrong(f"{len(points)} codewords", f"at most {AT_MOST}", 3)
-    one, many = (_imitation(c, states, actions, task) for c in (points[:1], points))
-    if many > one / 2:
-        raise BY_HAND.wrong(f"{many / one:.1%} of the error of one map", "at most 50%", 2)
+    inside = ((points >= 0) & (points <= 1)).all()
+    BY_HAND.refuse_if(not inside, "a codeword outside the unit square", "all of them inside", 1)
+    _all_different(BY_HAND, points)
+    BY_HAND.refuse_if(len(points) > AT_MOST, f"{len(points)} codewords", f"at most {AT_MOST}", 3)
+    policies = (piecewise(c, states, actions, task) for c in (points[:1], points))
+    one, many = (np.square(policy.predict(states)[0] - actions).mean() for policy in policies)
+    BY_HAND.refuse_if(many > one / 2, f"{many / one:.1%} of the error of one map", "at most 50%", 2)
     BY_HAND.passed(f"{len(points)} codewords leave {many / one:.0%} of the error of one map.")
 
 
-def _imitation(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> float:
-    """Mean squared error of the policy with least-squares maps in these cells."""
-    return float(np.square(piecewise(codewords, states, actions, task).predict(states)[0] - actions).mean())
+def _all_different(exercise: Exercise, points: np.ndarray) -> None:
+    twice = len(np.unique(points, axis=0)) < len(points)
+    exercise.refuse_if(twice, "a codeword that is there twice", "all of them different", 1)
 
 
 @PLACE.checks
@@ -317,17 +297,14 @@ def place(function: Callable) -> None:
     for name, n_episodes in (("SimpleGoal-v0", 150), ("MountainCarContinuous-v0", 10)):
         for seed in SEEDS:
             rng = np.random.default_rng(seed)
-            episodes = list(teacher_episodes(load_teacher(name), get_task(name), n_episodes, rng))
-            states = np.concatenate([e.states for e in episodes])
-            actions = np.concatenate([e.actions for e in episodes]).astype(float)
+            states, actions = joined(teacher_episodes(load_teacher(name), get_task(name), n_episodes, rng))
             _places(function, states, actions, name, rng)
     PLACE.passed(f"your rule beats random codewords on both tasks, with {CELLS} cells.")
 
 
 def _places(function: Callable, states: np.ndarray, actions: np.ndarray, name: str, rng: np.random.Generator) -> None:
     points = PLACE.array(PLACE.call(function, states, actions, CELLS), (CELLS, states.shape[1]), "codewords", 1)
-    if len(np.unique(points, axis=0)) < CELLS:
-        raise PLACE.wrong("codewords that are there twice", "all of them different", 1)
+    _all_different(PLACE, points)
     own, different = leftover(points, states, actions), np.unique(states, axis=0)
     draws = [rng.choice(different, CELLS, replace=False) for _ in range(15)]
     random = np.median([leftover(draw, states, actions) for draw in draws])

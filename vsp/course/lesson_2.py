@@ -1,7 +1,7 @@
 """Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs that it shows.
 
-Its other checks, of the two passes and of a class of sub-policy, have modules of their own. Each check takes what the
-student wrote, tries it on cases whose answer is known, and raises `NotYet` or prints one line.
+The checks of the two passes and of a class of sub-policy have modules of their own. Each check calls what the student
+wrote on cases with a known answer, and raises `NotYet` or prints one line.
 """
 
 from __future__ import annotations
@@ -13,34 +13,18 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from ..algorithms import distill, teacher_episodes
+from ..algorithms import merge_regions as vsp_merge
+from ..algorithms import split_regions as vsp_split
 from ..config import Config
-from ..distill import distill, teacher_episodes
-from ..distill import merge_regions as vsp_merge
-from ..distill import split_regions as vsp_split
-from ..envs import Task
 from ..history import History
 from ..partition import Partition
 from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
-from .feedback import Exercise, Mistake, NotYet
-from .lesson_2_form import FORM, my_form
-from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk
-
-__all__ = [
-    "CHANGES",
-    "FORM",
-    "MERGE",
-    "SPLIT",
-    "algorithm_1",
-    "grown",
-    "merge_regions",
-    "my_form",
-    "prediction",
-    "reading",
-    "running_mean",
-    "runs",
-    "split_regions",
-]
+from ..tasks import Task
+from .feedback import Exercise, Mistake, NotYet, Question
+from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, handed on
+from .lesson_2_policy_class import OWN_CLASS, my_policy_class  # noqa: F401
 
 READING = Exercise("2.1", "reading")
 RUNNING_MEAN = Exercise("2.2", "running_mean")
@@ -60,10 +44,9 @@ CHANGES = {
 
 
 @READING.checks
-def reading(answers: dict, history: History, config: Config) -> None:
+def reading(answers: object, history: History, config: Config) -> None:
     """2.1: answers `last change` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
-    options = {"last change": float, "half of the cells": MOMENTS, "fewer cells by": CAUSES, "loss jumps by": CAUSES}
-    READING.answers(answers, options)
+    READING.answers(answers, {"last change": float})
     given, last = answers["last change"], max((event.iteration for event in history.events), default=0)
     if abs(given - last) > 0.04 * config.n_epochs:
         side = "the number of cells still changes after it" if given < last else "nothing changes there any more"
@@ -71,20 +54,22 @@ def reading(answers: dict, history: History, config: Config) -> None:
         raise READING.wrong(f"iteration {given:g}, but {side}", "the last step of the left curve", 1)
     cells = np.array(history.cells)
     early = int(np.argmax(cells >= cells[-1] / 2))
-    READING.choice(answers, "half of the cells", MOMENTS[int(np.digitize(early, [500, 2000]))], {}, 1)
-    teaching = {
+    same_teacher = {"a change of the teacher": "the teacher is the same all the time"}
+    fewer = {
         "a split": "a split adds a codeword",
         "a reset of the buffers": "a reset empties buffers and leaves codewords where they are",
-        "a change of the teacher": "the teacher is the same all the time",
     }
-    READING.sealed(answers, "fewer cells by", "fb8f27a3b939a5dc", teaching, 2)
-    teaching |= {
-        "a split": "look again",
+    jumps = {
         "a merge": "a merge keeps a map that is trained already",
         "a reset of the buffers": "an emptied buffer holds few states for a while, which moves the loss a little, also "
         "in the freeze; the large jumps are another matter",
     }
-    READING.sealed(answers, "loss jumps by", "71c02946198a22ee", teaching, 3)
+    questions = {
+        "half of the cells": Question(MOMENTS, MOMENTS[int(np.digitize(early, [500, 2000]))], 1),
+        "fewer cells by": Question(CAUSES, "fb8f27a3b939a5dc", 2, fewer | same_teacher),
+        "loss jumps by": Question(CAUSES, "71c02946198a22ee", 3, jumps | same_teacher),
+    }
+    READING.ask(answers, questions)
     READING.passed("the plot has told you what the algorithm does when.")
 
 
@@ -109,6 +94,7 @@ def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
     sums = right * (steps - [np.argmax(visit == v) for v in visit])
     stuck = _since(cells, losses, lambda t: cells[t] != cells[0])
     remember = "the mean since the cell was entered (is the cell of the step before remembered in every step?)"
+    step = np.argmin(np.isclose(value, right))
     mistakes = [
         Mistake(losses.cumsum() / steps, "the mean since the episode began", "it since the cell was entered", 2),
         Mistake(by_cell, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
@@ -116,9 +102,11 @@ def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
         Mistake(sums, "sums", "means", 1),
         Mistake(losses, "the losses themselves, as if the mean began anew at every step", remember, 2),
         Mistake(stuck, "a mean that begins anew at every step outside the first cell", remember, 2),
+        Mistake(
+            None, f"another number at step {step} of cells {cells.tolist()}", "the mean since its cell was entered", 1
+        ),
     ]
-    found = f"another number at step {np.argmin(np.isclose(value, right))} of cells {cells.tolist()}"
-    RUNNING_MEAN.compare(value, right, mistakes, Mistake(None, found, "the mean since that cell was entered", 1))
+    RUNNING_MEAN.compare(value, right, mistakes)
 
 
 def _since(cells: np.ndarray, losses: np.ndarray, entered: Callable[[int], bool] | None = None) -> np.ndarray:
@@ -132,40 +120,41 @@ def _since(cells: np.ndarray, losses: np.ndarray, entered: Callable[[int], bool]
 
 
 class _Witness:
-    """Stands in for a partition and writes down what is done with it."""
+    """Stands in for a partition and records the calls: what was done since each episode was observed."""
 
     def __init__(self) -> None:
-        self.codewords, self.done = np.zeros((0, 2)), []
+        self.codewords, self.before, self.episodes, self.rounds = np.zeros((0, 2)), [], [], []
         self.strays = 0  # splitting passes over anything but the last episode
 
-    def add(self, state: np.ndarray, rng: object = None) -> int:
+    def _do(self, what: str, result: object = None) -> object:
+        (self.rounds[-1] if self.rounds else self.before).append(what)
+        return result
+
+    def add(self, state: np.ndarray, rng: object = None) -> object:
         self.codewords = np.vstack([self.codewords, state])
-        self.done.append("add")
-        return len(self.codewords) - 1
+        return self._do("add", len(self.codewords) - 1)
 
     def observe(self, episode: Episode) -> None:
-        self.done.append(episode)
+        self.episodes.append(episode)
+        self.rounds.append([])
 
-    def train(self, rng: object = None) -> float:
-        self.done.append("train")
-        return 0.0
+    def train(self, rng: object = None) -> object:
+        return self._do("train", 0.0)
 
-    def clear(self) -> None:
-        self.done.append("clear")
+    def clear(self) -> object:
+        return self._do("clear")
 
-    def split(self, partition: object, episode: Episode, config: Config, rng: object) -> list:
-        self.done.append("split")
-        self.strays += episode is not next(what for what in self.done[::-1] if isinstance(what, Episode))
-        return []
+    def split(self, partition: object, episode: Episode, config: Config, rng: object) -> object:
+        self.strays += episode is not self.episodes[-1]
+        return self._do("split", [])
 
-    def merge(self, partition: object, config: Config) -> list:
-        self.done.append("merge")
-        return []
+    def merge(self, partition: object, config: Config) -> object:
+        return self._do("merge", [])
 
 
 @ALGORITHM_1.checks
 def algorithm_1(function: Callable) -> None:
-    """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)`: who is called when."""
+    """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)` makes the right calls in the right order."""
     schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 14, 50))
     for n_epochs, n_split, n_merge, n_freeze, n_reset in schedules:
         rule = replace(SMALL, n_epochs=n_epochs, n_split=n_split, n_merge=n_merge, n_freeze=n_freeze, n_reset=n_reset)
@@ -178,39 +167,28 @@ def _on_schedule(function: Callable, config: Config) -> None:
     partition = _Witness()
     given = partition, list(episodes), config, np.random.default_rng(0), partition.split, partition.merge
     ALGORITHM_1.call(lambda *given: [function(*given)], *given, keep=True)  # it may return nothing
-    if not any(isinstance(done, Episode) for done in partition.done):
-        raise ALGORITHM_1.wrong("no episode observed", "one in every iteration", 1)
-    if "add" not in partition.done or not np.array_equal(partition.codewords[0], episodes[0].states[0]):
-        raise ALGORITHM_1.wrong(
-            "another first codeword or none", "the first state of the first episode, added before it is observed", 1
-        )
-    rounds = _rounds(partition.done)
-    if len(rounds) != config.n_epochs or any(r[0] is not e for r, e in zip(rounds, episodes)):
-        raise ALGORITHM_1.wrong(f"{len(rounds)} episodes observed", f"each of the {config.n_epochs}, in their order", 1)
-    if "add" in [done for r in rounds for done in r]:
+    observed, expected = partition.episodes, "the first state of the first episode, added before it is observed"
+    ALGORITHM_1.refuse_if(not observed, "no episode observed", "one in every iteration", 1)
+    first = "add" in partition.before and np.array_equal(partition.codewords[0], episodes[0].states[0])
+    ALGORITHM_1.refuse_if(not first, "another first codeword or none", expected, 1)
+    if len(observed) != config.n_epochs or any(own is not e for own, e in zip(observed, episodes)):
+        raise ALGORITHM_1.wrong(f"{len(observed)} episodes observed", f"each of the {config.n_epochs}, in order", 1)
+    if any("add" in done for done in partition.rounds):
         raise ALGORITHM_1.wrong("codewords added in the loop", "the first one only: the rest is up to `split`", 1)
-    for n, done in enumerate(rounds):
-        _one_round(n, done[1:], config)
-    if partition.strays:
-        raise ALGORITHM_1.wrong("a splitting pass over something else", "one over the episode just observed", 1)
-
-
-def _rounds(done: list) -> list[list]:
-    """What was done, cut where an episode was observed; what came before the first is left out."""
-    cuts = [i for i, what in enumerate(done) if isinstance(what, Episode)]
-    return [done[a:b] for a, b in zip(cuts, [*cuts[1:], len(done)])]
+    for n, done in enumerate(partition.rounds):
+        _one_round(n, done, config)
+    stray = "a splitting pass over something else"
+    ALGORITHM_1.refuse_if(partition.strays > 0, stray, "one over the episode just observed", 1)
 
 
 def _one_round(n: int, done: list[str], config: Config) -> None:
     frozen = config.n_epochs - config.n_freeze
-    if done[:1] != ["train"] or done.count("train") != 1:
-        raise ALGORITHM_1.wrong(
-            f"{done or 'nothing'} in iteration {n} after its episode was observed", "one training step first", 1
-        )
+    found = f"{done or 'nothing'} in iteration {n} after its episode was observed"
+    ALGORITHM_1.refuse_if(done[:1] != ["train"] or done.count("train") != 1, found, "one training step first", 1)
     for what, every in (("split", config.n_split), ("merge", config.n_merge), ("clear", config.n_reset)):
         due = n > 0 and n % every == 0 and (what == "clear" or n < frozen)
         if (what in done) != due and not (n == 0 and what == "clear"):
-            period = {"split": "n_split", "merge": "n_merge", "clear": "n_reset"}[what]
+            period = "n_reset" if what == "clear" else f"n_{what}"
             hint, freeze = 3 if n >= frozen - 1 else 2, f"the freeze begins at {frozen}"
             if due:
                 expected = f"one every {period} = {every} iterations" + (f": {freeze}" if n == frozen - 1 else "")
@@ -218,9 +196,9 @@ def _one_round(n: int, done: list[str], config: Config) -> None:
             why = freeze if n >= frozen and n % every == 0 else "it is not due then"
             why = "a map that was trained once tells nothing yet" if n == 0 else why
             raise ALGORITHM_1.wrong(f"`{what}` in iteration {n}", f"none: {why}", hint)
-    passes = [what for what in done if what in ("split", "merge")]
-    if passes == ["merge", "split"]:
-        raise ALGORITHM_1.wrong("a merge before a split in one iteration", "splits first, as the paper prints it", 2)
+    order = [what for what in done if what in ("split", "merge")]
+    found = "a merge before a split in one iteration"
+    ALGORITHM_1.refuse_if(order == ["merge", "split"], found, "splits first, as the paper prints it", 2)
 
 
 def grown(
@@ -296,7 +274,7 @@ def runs(teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -
     """Numbers of cells: a row for `config` as it is and one for each of `CHANGES` alone; seed by seed, and the mean."""
     changes = {"as it is": {}} | CHANGES
     cells = {
-        name: [len(distill(teacher, task.name, replace(config, **change), seed=seed)[0]) for seed in seeds]
+        name: [len(distill(teacher, task, replace(config, **change), seed=seed)[0]) for seed in seeds]
         for name, change in changes.items()
     }
     return pd.DataFrame(cells, index=[f"seed {seed}" for seed in seeds]).T.assign(mean=lambda t: t.mean(axis=1))

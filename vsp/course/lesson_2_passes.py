@@ -1,29 +1,30 @@
 """Checks of lesson 2: the splitting and the merging pass, on small partitions whose answer is known.
 
-Where the paper is silent (vsp/readings.py) every reading counts as right, but for what the lesson's text says.
+Where the paper leaves a question open (see vsp/config.py) every reading counts as right, unless the lesson decides it.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..config import Config, preset
-from ..distill import split_regions as vsp_split
-from ..envs import get_task
+from ..algorithms import split_regions as vsp_split
+from ..config import Config, paper_preset
 from ..partition import Partition
 from ..rollouts import Episode
+from ..tasks import get_task
 from .feedback import Exercise, NotYet
 
 SPLIT = Exercise("2.3", "split_regions")
 MERGE = Exercise("2.4", "merge_regions")
 
 TASK = "SimpleGoal-v0"
-# Small numbers, by which the cases below are worked out; new cells begin at 0, so that no random number has a say
-SMALL = replace(preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
+# The settings of the cases below; new cells start at 0, so that random numbers do not matter
+SMALL = replace(paper_preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
 # Errors in students' code that tell which hint helps: the exercise, the error, words of it, and the hint
 CURES = (
     (SPLIT, NameError, "", 1),
@@ -54,12 +55,24 @@ def on_a_line(places: list[float], biases: list[float], config: Config = SMALL) 
     for x in places:
         partition.add(np.array([x, 0.5]), np.random.default_rng(0))
     partition.models.parameters[:, -1] = np.asarray(biases, dtype=float)[:, None]
-    partition.observe(Episode(partition.codewords.copy(), np.zeros((len(places), 2))))
+    return _with_states(partition)
+
+
+def _random_partition(rng: np.random.Generator, k: int) -> Partition:
+    partition = Partition(get_task(TASK), SMALL)
+    for codeword in rng.uniform(size=(k, 2)):
+        partition.add(codeword, rng)
+    return _with_states(partition)
+
+
+def _with_states(partition: Partition) -> Partition:
+    """The same partition, with one state in each buffer: the codeword."""
+    partition.observe(Episode(partition.codewords.copy(), np.zeros_like(partition.codewords)))
     return partition
 
 
 def _patient(partition: Partition) -> Partition:
-    """The same partition, which loses its patience with a loop that never ends."""
+    """The same partition, which raises RuntimeError in a loop that never ends."""
     for name in ("neighbours", "comparable_parameters"):
         turns, asked = iter(range(500)), getattr(partition, name)
 
@@ -78,8 +91,7 @@ def walk(places: list[float], actions: list[float]) -> Episode:
     return Episode(np.column_stack([places, np.full(len(places), 0.5)]), np.column_stack([actions, actions]))
 
 
-@dataclass(frozen=True)
-class SplitCase:
+class SplitCase(NamedTuple):
     """A partition and an episode, where a pass has to split, and what it means if it does not."""
 
     places: list[float]
@@ -129,7 +141,7 @@ def split_regions(function: Callable) -> None:
         before = len(partition.codewords)
         added = _call(SPLIT, function, partition, walk(case.way, case.actions), SMALL, np.random.default_rng(0))
         new = partition.codewords[before:, 0]
-        if not _same(new, case.splits):
+        if len(new) != len(case.splits) or not np.allclose(new, case.splits):
             found = "a split elsewhere" if len(new) == len(case.splits) else _count(len(new), "split")
             raise SPLIT.wrong(found, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         _told(SPLIT, added, partition.codewords[before:], "one for every new cell")
@@ -141,17 +153,12 @@ def split_regions(function: Callable) -> None:
 
 def _told(exercise: Exercise, returned: object, right: np.ndarray, what: str) -> None:
     """Whether the codewords (n, d) that a pass returned are the right ones, in any order."""
-    if exercise.size(returned) != len(right):
-        raise exercise.wrong(f"{len(returned)} codewords returned", f"{what}, {len(right)}", 1)
+    exercise.refuse_if(not hasattr(returned, "__len__"), f"{returned!r} as the result", "a list")
+    exercise.refuse_if(len(returned) != len(right), f"{len(returned)} codewords returned", f"{what}, {len(right)}", 1)
     if len(right):
         meaning = "the codewords themselves, not their indices"
         values = exercise.array(returned, right.shape, "a list of codewords", 1, meaning)
-        if sorted(values.tolist()) != sorted(right.tolist()):
-            raise exercise.wrong("other codewords returned", what, 1)
-
-
-def _same(found: np.ndarray, right: list[float]) -> bool:
-    return len(found) == len(right) and np.allclose(found, right)
+        exercise.refuse_if(sorted(values.tolist()) != sorted(right.tolist()), "other codewords returned", what, 1)
 
 
 def _count(n: int, what: str) -> str:
@@ -162,28 +169,29 @@ def _emptied(function: Callable) -> None:
     """Whether the buffers of the split cell and of its neighbours are empty, and no others."""
     partition = on_a_line([0.05, 0.55, 0.75, 0.95], [1, 0, 0, 0])
     _call(SPLIT, function, partition, walk([0.27], [0]), SMALL, np.random.default_rng(0))
-    left = partition.buffers.counts.tolist()
-    if left != [0, 0, 1, 1, 0]:
-        words = {
-            (1, 1, 1, 1, 0): "full buffers beside a new cell",
-            (0, 0, 0, 0, 0): "all buffers empty after a split",
-            (1, 0, 1, 1, 0): "a full buffer in the cell that was split, which has just lost states",
-            (0, 1, 1, 1, 0): "full buffers in the neighbours of the cell that was split",
-        }
-        found = words.get(tuple(left), f"buffers of {left} states in a case of four cells in a row")
-        raise SPLIT.wrong(found, "those of the cell that was split and of its old neighbours emptied, no others", 5)
+    words = {
+        (0, 0, 1, 1, 0): "",
+        (1, 1, 1, 1, 0): "full buffers beside a new cell",
+        (0, 0, 0, 0, 0): "all buffers empty after a split",
+        (1, 0, 1, 1, 0): "a full buffer in the cell that was split, which has just lost states",
+        (0, 1, 1, 1, 0): "full buffers in the neighbours of the cell that was split",
+    }
+    _full(SPLIT, partition, words, "those of the cell that was split and of its old neighbours emptied, no others")
+
+
+def _full(exercise: Exercise, partition: Partition, words: dict[tuple, str], expected: str) -> None:
+    """Whether the right buffers are full; `words`, for numbers of states per buffer: what is wrong, "" if nothing."""
+    counts = tuple(partition.buffers.counts.tolist())
+    found = words.get(counts, f"buffers of {counts} states in a case of cells in a row")
+    exercise.refuse_if(found != "", found, expected, 5)
 
 
 def _like_ours(function: Callable, seed: int) -> None:
     """A random partition and episode: the same codewords as ours, under one of the readings of R14."""
     rng = np.random.default_rng(seed)
-    task = get_task(TASK)
-    partition = Partition(task, SMALL)
-    for codeword in rng.uniform(size=(4, 2)):
-        partition.add(codeword, rng)
+    partition = _random_partition(rng, 4)
     partition.models.parameters[:] = rng.normal(size=partition.models.parameters.shape)
     states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
-    partition.observe(Episode(partition.codewords.copy(), np.zeros((4, 2))))
     episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
     own = copy.deepcopy(partition)
     _call(SPLIT, function, own, episode, SMALL, np.random.default_rng(0))
@@ -193,13 +201,12 @@ def _like_ours(function: Callable, seed: int) -> None:
         vsp_split(other, episode, replace(SMALL, loss_after_split=after), np.random.default_rng(0))
         ways.append(other.codewords)
     if not any(own.codewords.shape == way.shape and np.allclose(own.codewords, way) for way in ways):
-        found = f"{_count(len(own.codewords) - 4, 'split')} on a random walk"
-        right = "where both conditions hold, by `partition.loss` and `partition.far`"
-        raise SPLIT.wrong(found, f"{_count(len(ways[0]) - 4, 'split')}, {right}", 1)
+        found, right = (_count(len(codewords) - 4, "split") for codewords in (own.codewords, ways[0]))
+        where = "where both conditions hold, by `partition.loss` and `partition.far`"
+        raise SPLIT.wrong(f"{found} on a random walk", f"{right}, {where}", 1)
 
 
-@dataclass(frozen=True)
-class MergeCase:
+class MergeCase(NamedTuple):
     """Biases of cells in a row, which places may be left after a pass, and what it means if others are."""
 
     biases: list[float]
@@ -256,33 +263,29 @@ def _measured(function: Callable) -> None:
         partition = on_a_line([0.2, 0.8], [0, 0])
         partition.models.parameters[1] = np.reshape(difference, (3, 2))
         _call(MERGE, function, _patient(partition), SMALL)
-        if len(partition.codewords) != left:
-            raise MERGE.wrong(f"{_count(len(partition.codewords), 'cell')} left", f"{left}, in a case of {what}", 1)
+        found = len(partition.codewords)
+        MERGE.refuse_if(found != left, f"{_count(found, 'cell')} left", f"{left}, in a case of {what}", 1)
 
 
 def _emptied_by_merge(function: Callable) -> None:
     partition = on_a_line([0.05, 0.2, 0.5, 0.7, 0.95], [5, 0, 0.1, 10, 15])
     _call(MERGE, function, _patient(partition), SMALL)
-    counts = partition.buffers.counts.tolist()
-    if counts not in ([0, 0, 1, 1], [0, 0, 0, 1]):
-        words = {
-            (1, 1, 1, 1): "all buffers as they were",
-            (0, 0, 0, 0): "all buffers emptied",
-            (1, 0, 1, 1): "a full buffer beside the cell that is gone",
-            (0, 1, 1, 1): "the survivor's buffer as it was",
-        }
-        found = words.get(tuple(counts), f"buffers of {counts} states in a case of five cells in a row")
-        raise MERGE.wrong(found, "those of the survivor and of its neighbours emptied, no others", 5)
+    words = {
+        (0, 0, 1, 1): "",
+        (0, 0, 0, 1): "",
+        (1, 1, 1, 1): "all buffers as they were",
+        (0, 0, 0, 0): "all buffers emptied",
+        (1, 0, 1, 1): "a full buffer beside the cell that is gone",
+        (0, 1, 1, 1): "the survivor's buffer as it was",
+    }
+    _full(MERGE, partition, words, "those of the survivor and of its neighbours emptied, no others")
 
 
 def _properties(function: Callable, seed: int) -> None:
     """On a random partition: whoever went had a twin, and of neighbours that were alike one went at least."""
     rng = np.random.default_rng(seed)
-    partition = Partition(get_task(TASK), SMALL)
-    for codeword in rng.uniform(size=(12, 2)):
-        partition.add(codeword, rng)
+    partition = _random_partition(rng, 12)
     partition.models.parameters[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
-    partition.observe(Episode(partition.codewords.copy(), np.zeros((12, 2))))
     before, graph, own = partition.codewords.copy(), partition.neighbours(), copy.deepcopy(partition)
     parameters = partition.comparable_parameters()
     _call(MERGE, function, _patient(own), SMALL)
@@ -293,8 +296,6 @@ def _properties(function: Callable, seed: int) -> None:
         raise MERGE.wrong("a cell gone, or altered, that was like no other", "only cells removed that have a twin", 1)
     if (graph & alike)[np.ix_(alive, alive)].any():
         raise MERGE.wrong("two neighbours with like maps, both still there", "one of them removed, in every pair", 4)
-    same = own.models.parameters.shape == (alive.sum(), 3, 2) and np.allclose(
-        own.models.parameters, partition.models.parameters[alive]
-    )
-    if not same:
-        raise MERGE.wrong("other maps in the cells that are left", "those that they had: nothing is averaged", 1)
+    found, right = own.models.parameters, partition.models.parameters[alive]
+    same = found.shape == right.shape and np.allclose(found, right)
+    MERGE.refuse_if(not same, "other maps in the cells that are left", "those that they had: nothing is averaged", 1)

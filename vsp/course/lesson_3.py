@@ -5,19 +5,19 @@ Each check takes what the student wrote, tries it on small random cases, and rai
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable
 
 import numpy as np
 
 from .. import baselines
-from ..distill import teacher_episodes
-from ..envs import GOAL, PIT, Task, get_task
-from ..evaluate import spread, start_states
+from ..algorithms import teacher_episodes
+from ..evaluation import start_states
+from ..paper.statistics import spread
 from ..policy import VoronoiPolicy
-from ..rollouts import Episode, Policy, play, record, visited
+from ..rollouts import Episode, Policy, collect_episodes, rollout, visited_states
+from ..tasks import GOAL, PIT, Task, get_task
 from ..teachers import load_teacher
-from .feedback import Exercise, Mistake
+from .feedback import ActionsAlone, Exercise, Mistake, Question, works
 
 TASK = "SimpleGoal-v0"
 FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
@@ -39,27 +39,27 @@ SEES = ("the median", "the height of the box", "the mean")
 
 
 @READING.checks
-def reading(answers: dict, ours: np.ndarray, theirs: np.ndarray) -> None:
+def reading(answers: object, ours: np.ndarray, theirs: np.ndarray) -> None:
     """3.1: answers `higher median`, `inside the box`, `pit episodes`, `sees the pit`, about two arrays of returns."""
-    options = {"higher median": WHO, "inside the box": INSIDE, "pit episodes": WHERE, "sees the pit": SEES}
-    READING.answers(answers, options)
     facts, own = spread(ours), spread(theirs)
-    READING.choice(answers, "higher median", WHO[int(facts["median"] > own["median"])], {}, 1)
     inside = ((ours >= facts["q1"]) & (ours <= facts["q3"])).mean()
-    teaching = {"a quarter": "a quarter lies between one edge and the median", "nearly all": "that is box and whiskers"}
-    READING.choice(
-        answers, "inside the box", INSIDE[int(np.abs(np.array([0.25, 0.5, 0.75, 1]) - inside).argmin())], teaching, 1
-    )
+    share = INSIDE[int(np.abs(np.array([0.25, 0.5, 0.75, 1]) - inside).argmin())]
+    shares = {"a quarter": "a quarter lies between one edge and the median", "nearly all": "that is box and whiskers"}
     pit = np.median(ours[ours < 0]) if (ours < 0).any() else -10.0
     place = WHERE[int(pit < facts["q1"]) + int(pit < facts["lower_fence"])]
-    teaching = {
+    places = {
         "in the lower whisker": "read off how far down it reaches; what does a fall into the pit return",
         "inside the box": "a fall into the pit costs ten points",
     }
-    READING.choice(answers, "pit episodes", place, teaching, 2)
-    without = ours[ours >= facts["lower_fence"]]
-    change = [abs(spread(without)[name] - facts[name]) for name in ("median", "iqr", "mean")]
-    READING.choice(answers, "sees the pit", SEES[int(np.argmax(change))], {}, 3)
+    without = spread(ours[ours >= facts["lower_fence"]])
+    change = [abs(without[name] - facts[name]) for name in ("median", "iqr", "mean")]
+    questions = {
+        "higher median": Question(WHO, WHO[int(facts["median"] > own["median"])], 1),
+        "inside the box": Question(INSIDE, share, 1, shares),
+        "pit episodes": Question(WHERE, place, 2, places),
+        "sees the pit": Question(SEES, SEES[int(np.argmax(change))], 3),
+    }
+    READING.ask(answers, questions)
     READING.passed("a plot may hide just what went wrong.")
 
 
@@ -77,16 +77,16 @@ def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
     values = PAIRED_GAP.call(function, ours, theirs)
     gap, error = PAIRED_GAP.array(values, (2,), hint=1, meaning="the gap and its standard error")
     right = (ours - theirs).mean()
-    turned = Mistake(-right, "a gap with the sign turned", "the mean of ours less theirs", 1)
-    otherwise = Mistake(None, f"a gap of {gap:.3g}", "the mean of ours less theirs", 1)
-    PAIRED_GAP.compare(gap, right, [turned], otherwise)
+    mistakes = [
+        Mistake(-right, "a gap with the sign turned", "the mean of ours less theirs", 1),
+        Mistake(None, f"a gap of {gap:.3g}", "the mean of ours less theirs", 1),
+    ]
+    PAIRED_GAP.compare(gap, right, mistakes)
     right = (ours - theirs).std(ddof=1) / np.sqrt(len(ours))
-    words = f"a standard error of {error:.3g}", "the deviation of the mean of the differences"
-    otherwise = Mistake(None, *words, 3)
-    PAIRED_GAP.compare(error, right, _other_errors(ours, theirs), otherwise, rtol=0.05)  # n or n - 1, or a bootstrap
+    PAIRED_GAP.compare(error, right, _other_errors(error, ours, theirs), rtol=0.05)  # n or n - 1, or a bootstrap
 
 
-def _other_errors(ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
+def _other_errors(error: float, ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
     n, difference, deviation = len(ours), ours - theirs, (ours - theirs).std()
     unrelated = "the standard error of two samples that have nothing to do with each other"
     shared = "that of the differences: both played from the same starts"
@@ -97,6 +97,7 @@ def _other_errors(ours: np.ndarray, theirs: np.ndarray) -> list[Mistake]:
         Mistake(abs(ours.std() - theirs.std()) / np.sqrt(n), "a difference of two deviations", shared, 2),
         Mistake(ours.std() / np.sqrt(n), "the deviation of our returns", shared, 2),
         Mistake(1.96 * deviation / np.sqrt(n), "half a 95 % interval", "the standard error itself", 3),
+        Mistake(None, f"a standard error of {error:.3g}", "the deviation of the mean of the differences", 3),
     ]
 
 
@@ -116,19 +117,18 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
     low, high = INTERVAL.array(values, (2,), hint=1, meaning="the ends of the interval")
     means = returns.mean(axis=1)
     width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # what a bootstrap of the mean comes to, in large samples
-    if low > high:
-        raise INTERVAL.wrong("the upper end first", "the lower end first", 1)
-    if high - low < 1e-6 * width:
-        raise INTERVAL.wrong("an interval of no width", "draws *with* replacement, which differ from each other", 2)
-    if not low <= means.mean() <= high:
-        found = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
-        raise INTERVAL.wrong(found, "one around it", 1)
+    INTERVAL.refuse_if(low > high, "the upper end first", "the lower end first", 1)
+    with_replacement = "draws *with* replacement, which differ from each other"
+    INTERVAL.refuse_if(high - low < 1e-6 * width, "an interval of no width", with_replacement, 2)
+    found = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
+    INTERVAL.refuse_if(not low <= means.mean() <= high, found, "one around it", 1)
+    unsteady = not np.isclose(high - low, width, rtol=NEAR) and _unsteady(function, returns, width)
+    found = "ends that come out differently every time: too few resamples"
+    INTERVAL.refuse_if(unsteady, found, "a few thousand", 2)
     middle = "the middle 95 % of the means of resampled policies"
-    if not np.isclose(high - low, width, rtol=NEAR) and _unsteady(function, returns, width):
-        found = "ends that come out differently every time: too few resamples"
-        raise INTERVAL.wrong(found, "a few thousand", 2)
-    otherwise = Mistake(None, f"an interval that is too {'narrow' if high - low < width else 'wide'}", middle, 2)
-    INTERVAL.compare(high - low, width, _other_widths(returns, width), otherwise, rtol=NEAR)
+    size = f"an interval that is too {'narrow' if high - low < width else 'wide'}"
+    mistakes = [*_other_widths(returns, width), Mistake(None, size, middle, 2)]
+    INTERVAL.compare(high - low, width, mistakes, rtol=NEAR)
 
 
 def _unsteady(function: Callable, returns: np.ndarray, width: float) -> bool:
@@ -174,14 +174,14 @@ class _Sometimes:
 
 def failures(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
     """From which starts (n, d) the teacher reaches the goal and the policy does not. (n,) bool"""
-    ours, theirs = (play(actor, task, starts).codes for actor in (policy, teacher))
+    ours, theirs = (rollout(actor, task, starts).outcomes for actor in (policy, teacher))
     return (ours != GOAL) & (theirs == GOAL)
 
 
 def last_states(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
     """Where the policy acted last in its failures from `starts` (n, d), of which there must be some. (f, d)"""
     failed = starts[failures(policy, teacher, task, starts)]
-    return np.array([episode.states[-1] for episode in record(policy, task, failed)])
+    return np.array([episode.states[-1] for episode in collect_episodes(policy, task, failed)])
 
 
 @BLAME.checks
@@ -198,34 +198,28 @@ def blame(function: Callable) -> None:
 def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray) -> None:
     k = len(policy)
     value = BLAME.array(BLAME.call(function, policy, teacher, task, starts), (k,), hint=1, meaning="a count per cell")
-    ours, failed = play(policy, task, starts).codes, failures(policy, teacher, task, starts)
-    ways = [policy.cells(episode.states) for episode in record(policy, task, starts)]
+    ours, failed = rollout(policy, task, starts).outcomes, failures(policy, teacher, task, starts)
+    ways = [policy.cells(episode.states) for episode in collect_episodes(policy, task, starts)]
 
-    def count(cells: list) -> np.ndarray:
-        return np.bincount(np.array(cells, dtype=int), minlength=k)
+    def count(cells: np.ndarray) -> np.ndarray:
+        return np.bincount(cells.astype(int), minlength=k)
 
-    right = count([way[-1] for way, f in zip(ways, failed) if f])
-    too_many = "only those of starts from which the teacher reaches the goal"
-    too_many_words = "failures counted where the teacher fails too"
-    mistakes = [
-        Mistake(count([way[-1] for way, o in zip(ways, ours) if o != GOAL]), too_many_words, too_many, 2),
-        Mistake(
-            count(policy.cells(starts)[failed]), "failures counted in the cell of their start", "in the last one", 3
-        ),
-        Mistake(
-            count([way[-1] for way, f, o in zip(ways, failed, ours) if f and o == PIT]),
-            "only the episodes that end in the pit",
-            "also those that run out of steps",
-            2,
-        ),
-        Mistake(count([way[-1] for way, o in zip(ways, ours) if o == GOAL]), "successes", "failures", 1),
-        Mistake(count([i for way, f in zip(ways, failed) if f for i in way]), "every step of a failure", "its last", 3),
-        Mistake(count([way[-1] for way in ways]), "all episodes", "those that fail", 1),
-        Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
-    ]
+    first, last = policy.cells(starts), np.array([way[-1] for way in ways])
+    right, too_many = count(last[failed]), "only those of starts from which the teacher reaches the goal"
+    every_step = np.concatenate([np.zeros(0), *(way for way, f in zip(ways, failed) if f)])
     number = "as many failures, but in other cells" if value.sum() == right.sum() else f"{value.sum():g} failures"
-    otherwise = Mistake(None, number, f"{failed.sum()}, each in the cell of the policy's last state", 3)
-    BLAME.compare(value, right, mistakes, otherwise)
+    in_pit, pit_only = failed & (ours == PIT), "only the episodes that end in the pit"
+    mistakes = [
+        Mistake(count(last[ours != GOAL]), "failures counted where the teacher fails too", too_many, 2),
+        Mistake(count(first[failed]), "failures counted in the cell of their start", "in the last one", 3),
+        Mistake(count(last[in_pit]), pit_only, "also those that run out of steps", 2),
+        Mistake(count(last[ours == GOAL]), "successes", "failures", 1),
+        Mistake(count(every_step), "every step of a failure", "its last", 3),
+        Mistake(count(last), "all episodes", "those that fail", 1),
+        Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
+        Mistake(None, number, f"{failed.sum()}, each in the cell of the policy's last state", 3),
+    ]
+    BLAME.compare(value, right, mistakes)
 
 
 @REFIT.checks
@@ -250,23 +244,20 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
     except Exception as error:
         found = f"{type(error).__name__} ({error})"
         raise REFIT.wrong(found, "a result, also where no state is in a cell", 3) from None
-    if not isinstance(new, VoronoiPolicy):
-        raise REFIT.wrong(f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
-    if not np.array_equal(policy.coefficients, before):
-        raise REFIT.wrong("the old policy altered", "a new one: work on a copy of its coefficients", 1)
-    if not np.array_equal(new.codewords, policy.codewords):
-        raise REFIT.wrong("other codewords", "the same cells", 1)
-    if not np.allclose(new.coefficients[2], before[2]):
-        raise REFIT.wrong("another map in a cell without states", "the one it had: nothing is known there", 3)
+    REFIT.refuse_if(not isinstance(new, VoronoiPolicy), f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
+    altered = not np.array_equal(policy.coefficients, before)
+    REFIT.refuse_if(altered, "the old policy altered", "a new one: work on a copy of its coefficients", 1)
+    REFIT.refuse_if(not np.array_equal(new.codewords, policy.codewords), "other codewords", "the same cells", 1)
+    kept = np.allclose(new.coefficients[2], before[2])
+    REFIT.refuse_if(not kept, "another map in a cell without states", "the one it had: nothing is known there", 3)
     whole = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
-    if np.allclose(new.coefficients[0], whole):
-        raise REFIT.wrong("the same map in every cell", "one per cell, from the states in it", 2)
-    if np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0):
-        raise REFIT.wrong("constants", "weights and bias by least squares", 2)
+    one = np.allclose(new.coefficients[0], whole)
+    REFIT.refuse_if(one, "the same map in every cell", "one per cell, from the states in it", 2)
+    constants = np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0)
+    REFIT.refuse_if(constants, "constants", "weights and bias by least squares", 2)
     best = baselines.refit(policy, states, actions)
     found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
-    if found > 1.01 * least:  # maps that were found by descent are right too
-        raise REFIT.wrong(f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
+    REFIT.refuse_if(found > 1.01 * least, f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
 
 
 @DAGGER.checks
@@ -277,33 +268,12 @@ def dagger_round(function: Callable) -> None:
         rng = np.random.default_rng(seed)
         policy, starts = _random_policy(rng), task.start(rng, 20)
         before = next(teacher_episodes(teacher, task, 1, rng))
-        try:
-            _labels(function, policy, teacher, task, starts, before)
-        except Exception:
-            if _right_without_pairs(function, policy, teacher, task, starts, before):
-                found = "the pair that `predict` returns, used as the actions"
-                raise DAGGER.wrong(found, "its first part, `predict(states)[0]`", 2) from None
-            raise
+        case = policy, teacher, task, starts, before
+        pair = not works(_labels, function, *case) and works(_labels, function, *case, ActionsAlone(teacher))
+        found = "the pair that `predict` returns, used as the actions"
+        DAGGER.refuse_if(pair, found, "its first part, `predict(states)[0]`", 2)
+        _labels(function, *case)
     DAGGER.passed("the copy went there, the teacher said what is right there, and nothing was forgotten.")
-
-
-class _NoPair:
-    """A teacher whose `predict` returns its actions and no second thing."""
-
-    def __init__(self, teacher: Policy):
-        self.teacher = teacher
-
-    def predict(self, obs: np.ndarray) -> np.ndarray:
-        return self.teacher.predict(obs)[0]
-
-
-def _right_without_pairs(function, policy, teacher, *case) -> bool:
-    """Whether all would be well if `predict` returned the actions alone."""
-    try:
-        _labels(function, policy, teacher, *case, asked=_NoPair(teacher))
-    except Exception:
-        return False
-    return True
 
 
 def _labels(
@@ -315,7 +285,7 @@ def _labels(
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
     states, actions = (np.asarray(part, dtype=np.float64) for part in value)
-    _gathered(states, before.states, *(visited(p, task, starts) for p in (policy, teacher)), len(starts))
+    _gathered(states, before.states, *(visited_states(p, task, starts) for p in (policy, teacher)), len(starts))
     if actions.shape != states.shape:
         raise DAGGER.wrong(f"actions of shape {actions.shape}", f"one for each state, {states.shape}", 2)
     labels, own = (p.predict(states)[0] for p in (teacher, policy))
@@ -348,7 +318,7 @@ def corrected(
     policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray, states: np.ndarray, actions: np.ndarray
 ) -> VoronoiPolicy:
     """The policy after a round of DAgger from `starts` (n, d), its maps fitted again to the enlarged data."""
-    more = visited(policy, task, starts)
+    more = visited_states(policy, task, starts)
     labels = np.concatenate([actions, teacher.predict(more)[0]])
     return baselines.refit(policy, np.concatenate([states, more]), labels)
 
@@ -362,27 +332,22 @@ def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
     """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of `copies`, from fresh starts."""
     if policy is None:
         raise CHALLENGE.unsolved()
-    if inspect.isclass(policy):
+    if isinstance(policy, type):
         raise CHALLENGE.wrong(f"the class {policy.__name__} itself", "a policy that was made with it", 1)
-    if isinstance(policy, tuple) and any(isinstance(part, VoronoiPolicy) for part in policy):
-        raise CHALLENGE.wrong("a policy and something else", "the policy alone: `vsp.distill` returns two things", 1)
-    if not isinstance(policy, VoronoiPolicy):
-        raise CHALLENGE.wrong(f"a {type(policy).__name__}", "a vsp.VoronoiPolicy", 1)
-    if len(policy) >= FEWER_THAN:
-        raise CHALLENGE.wrong(f"{len(policy)} cells", f"fewer than {FEWER_THAN}", 1)
+    two = isinstance(policy, tuple) and any(isinstance(part, VoronoiPolicy) for part in policy)
+    alone = "the policy alone: `vsp.distill` returns two things"
+    CHALLENGE.refuse_if(two, "a policy and something else", alone, 1)
+    CHALLENGE.refuse_if(not isinstance(policy, VoronoiPolicy), f"a {type(policy).__name__}", "a vsp.VoronoiPolicy", 1)
+    CHALLENGE.refuse_if(len(policy) >= FEWER_THAN, f"{len(policy)} cells", f"fewer than {FEWER_THAN}", 1)
     if policy.task.name != copies[0].task.name:
         raise CHALLENGE.wrong(f"a policy for {policy.task.name}", f"one for {copies[0].task.name}", 1)
     task = get_task(TASK)
     starts = start_states(task, 2000, FRESH)
-    own, *others = (play(p, task, starts) for p in [policy, *copies])
-    best = max(other.returns.mean() for other in others)
-    if own.returns.mean() <= best:
-        found = (
-            f"a mean return of {own.returns.mean():.2f} from fresh starts, {(own.codes != GOAL).mean():.1%} failures"
-        )
-        raise CHALLENGE.wrong(found, f"more than the best copy's {best:.2f}", 2)
-    teacher = play(load_teacher(TASK), task, starts).returns.mean()
-    ours, failing = f"{len(policy)} cells return {own.returns.mean():.2f}", (own.codes != GOAL).mean()
-    CHALLENGE.passed(
-        f"{ours}, the best copy {best:.2f}, the teacher {teacher:.2f}; {failing:.1%} of the episodes fail."
-    )
+    own, *others = (rollout(p, task, starts) for p in [policy, *copies])
+    best, mean = max(other.returns.mean() for other in others), own.returns.mean()
+    failing = f"{(own.outcomes != GOAL).mean():.1%} of the episodes fail"
+    found = f"a mean return of {mean:.2f} from fresh starts ({failing})"
+    CHALLENGE.refuse_if(mean <= best, found, f"more than the best copy's {best:.2f}", 2)
+    teacher = rollout(load_teacher(TASK), task, starts).returns.mean()
+    others = f"the best copy {best:.2f}, the teacher {teacher:.2f}"
+    CHALLENGE.passed(f"{len(policy)} cells return {mean:.2f}, {others}; {failing}.")

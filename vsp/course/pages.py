@@ -1,8 +1,8 @@
-"""The lessons as pages to read: students' copies with the pictures of what is worked out in them.
+"""The lessons as pages of the site: students' copies with the output of the worked cells.
 
     python -m vsp.course.pages --out .
 
-A copy is run as it is handed out. Where an exercise is unsolved, and in its check, there is nothing to see.
+Each copy is run as students get it; exercises and their checks show no output.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ import argparse
 import os
 from pathlib import Path
 
-from ..notebook import NotebookNode, nbformat
-from ..runner import KERNEL, clean_outputs
-from ..store import write_text
+from ..run.atomic import write_text
+from ..run.command import in_one_line
+from ..run.notebook import NotebookNode, nbformat
+from ..run.run_notebook import KERNEL, clean_outputs
 from .build import SOURCES, is_check, is_solution, read_sources, student
 
 TIMEOUT = 600  # seconds for a cell
@@ -29,13 +30,12 @@ def write_pages(out: str | os.PathLike) -> list[Path]:
 
 
 def page(lesson: NotebookNode) -> NotebookNode:
-    """Run a student's copy and return it with its outputs. Raises RuntimeError where another cell than those of the
-    exercises fails."""
+    """Run a student's copy and return it with its outputs. Raises RuntimeError if a worked cell fails."""
     from nbclient import NotebookClient
 
     lesson.metadata.kernelspec = {"name": KERNEL, "display_name": "Python 3", "language": "python"}
     place = {"metadata": {"path": str(SOURCES)}}
-    quiet = ["--log-level=CRITICAL"]  # the kernel's own chatter on standard error
+    quiet = ["--log-level=CRITICAL"]  # no messages of the kernel itself
     NotebookClient(
         lesson, timeout=TIMEOUT, kernel_name=KERNEL, allow_errors=True, extra_arguments=quiet, resources=place
     ).execute()
@@ -57,10 +57,11 @@ def page(lesson: NotebookNode) -> NotebookNode:
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--out", default=".", help="folder that build/course/pages is made in")
+    parser.add_argument("--out", default=".", help="pages go to OUT/build/course/pages")
     for path in write_pages(parser.parse_args().out):
         print(path)
 
 
 if __name__ == "__main__":
-    main()
+    with in_one_line():
+        main()

@@ -1,0 +1,133 @@
+"""What every method with committed rows gives today against what it gave when its version was raised last.
+
+A version names results: whoever changes what a method does raises it, and `stale` then says which tables are old.
+"""
+
+import dataclasses
+import functools
+import importlib
+import inspect
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import support
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
+
+from vsp import algorithms
+from vsp.baselines import tdavq
+from vsp.baselines.soft_tree import SoftTree
+from vsp.beyond.comparison import measure, method_rows, methods, time_to_quality
+from vsp.beyond.comparison.method_rows import METHODS
+from vsp.beyond.comparison.methods import Budget
+from vsp.beyond.refinement.config import Refinement
+from vsp.beyond.refinement.simplification import simplify
+from vsp.paper import beside
+from vsp.paper.runs import Experiment, Run
+from vsp.tasks.registry import get_task
+
+imitate = importlib.import_module("vsp.beyond.refinement.imitate")  # the module, not its function
+GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
+# Of actions on another type of processor, where sums are rounded differently, and a split may go elsewhere
+TOLERANCE, TOLERANCES = 1e-6, {"METHODS['oblique tree, linear leaves, DAgger']": 0.1}
+SMALL = Refinement(
+    n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
+    n_generations=1, n_tuning_episodes=10, n_validation=20,
+)  # fmt: skip
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+SHORTER = {  # settings of methods that would take long
+    "refined, faithful": {"n_generations": 1, "n_tuning_episodes": 10},
+    "TD-AVQ": {"n_steps": 1000},
+    "TD-AVQ, coarse": {"n_steps": 1000},
+}
+AT_LENGTH = {  # numbers that decide on a policy and are made small here
+    "refined, closest": imitate.N_MOVES,
+    "refined, faithful": imitate.N_MOVES,
+    "soft tree, DAgger": SoftTree.N_STEPS,
+    "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,
+    "TD-AVQ, coarse": inspect.signature(tdavq.learn).parameters["n_steps"].default,
+}
+
+
+@pytest.fixture(autouse=True)
+def shorter(monkeypatch):
+    monkeypatch.setattr(SoftTree, "N_STEPS", 50)
+    monkeypatch.setattr(imitate, "N_MOVES", 1)
+    monkeypatch.setattr(methods, "paper_preset", lambda task: tiny(n_epochs=40, n_freeze=10))
+
+
+def states(task):
+    """Twenty states of the box, or near the origin where it has no limits."""
+    task = get_task(task)
+    low, high = np.maximum(task.low, -1.5), np.minimum(task.high, 1.5)
+    return low + (high - low) * np.random.default_rng(0).random((20, len(low)))
+
+
+def actions(policy, task):
+    return np.asarray(policy.predict(states(task))[0], dtype=np.float64).tolist()
+
+
+def by_method(name):
+    """Actions on every task that the method is for, SimpleGoal if it is for all."""
+    method, found = METHODS[name], {"at length": AT_LENGTH.get(name, 0)}
+    for task in method.tasks or (SIMPLEGOAL,):
+        budget = Budget(TEACHERS.get(task), get_task(task), SMALL)
+        found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
+    return found
+
+
+def by_time_to_quality():
+    few = dataclasses.replace(SMALL, n_restarts=1, n_generations=0)
+    made = {name: make(TEACHERS[SIMPLEGOAL], few, 0) for name, (make, _) in time_to_quality.METHODS.items()}
+    return {name: actions(policy, SIMPLEGOAL) for name, policy in made.items()}
+
+
+def by_simplest():
+    few = dataclasses.replace(SMALL, n_generations=2)
+    policy, _ = simplify(TEACHERS[SIMPLEGOAL], SIMPLEGOAL, few, tolerance=1.0, seed=0)
+    return {SIMPLEGOAL: actions(policy, SIMPLEGOAL)}
+
+
+def beside_a_run():
+    one = Experiment(SIMPLEGOAL, tiny(n_epochs=30, n_freeze=5), TEACHERS[SIMPLEGOAL], n_episodes=20)
+    policy, _ = algorithms.distill(one.teacher, get_task(SIMPLEGOAL), one.config, seed=0)
+    run = Run(0, policy, None, 0.0, np.zeros(1), 0, 0, "")
+    return {kind: actions(fitted, SIMPLEGOAL) for kind, fitted in beside.fit(one, run).items()}
+
+
+def by_measure():
+    """Of a tree, by what is reported of it."""
+    task, teacher = get_task(SIMPLEGOAL), TEACHERS[SIMPLEGOAL]
+    return measure.measure(METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 0), teacher, task)
+
+
+CASES = {f"METHODS[{name!r}]": (functools.partial(by_method, name), METHODS[name].version) for name in METHODS} | {
+    "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),
+    "method_rows.simplest": (by_simplest, method_rows.SIMPLIFY_VERSION),
+    "beside": (beside_a_run, beside.VERSION),
+    "measure": (by_measure, measure.VERSION),
+}
+
+
+def close(found, kept, tolerance):
+    return found.keys() == kept.keys() and all(np.allclose(found[k], kept[k], rtol=0, atol=tolerance) for k in kept)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_results_are_those_of_the_version(name, request):
+    make, version = CASES[name]
+    found, every = json.loads(json.dumps(make())), json.loads(GOLDEN.read_text(encoding="utf-8"))
+    if request.config.getoption("--remake-golden") and version > every.get(name, {"version": 0})["version"]:
+        every[name] = {"version": version, "made on": support.made_on(), "found": found}
+        lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
+        GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    kept = every[name]
+    tolerance = 0 if kept["made on"] == support.made_on() else TOLERANCES.get(name, TOLERANCE)
+    advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
+    assert version == kept["version"] and close(found, kept["found"], tolerance), advice
+
+
+def test_the_papers_method_has_the_version_of_the_algorithms():
+    """tests/golden/distill.json guards it."""
+    assert METHODS["the paper's method"].version == algorithms.VERSION

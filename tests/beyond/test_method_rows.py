@@ -1,0 +1,174 @@
+import dataclasses
+import shutil
+
+import pandas as pd
+import pytest
+from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
+
+from vsp.beyond.comparison import make_rows, measure, method_rows
+from vsp.beyond.comparison.method_rows import ABLATION, METHODS, TASKS, Job, jobs_of, make_all, make_row, rows, simplest
+from vsp.beyond.comparison.method_summary import read_rows
+from vsp.beyond.comparison.methods import Budget
+from vsp.beyond.refinement.config import Refinement, best_preset
+from vsp.evaluation import start_states
+from vsp.paper import printed
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import rollout
+from vsp.run import atomic, listed, sealed
+from vsp.tasks.registry import get_task
+from vsp.teachers.teacher import load_teacher
+
+SMALL = Refinement(
+    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
+    n_generations=1, n_tuning_episodes=10, n_validation=20,
+)  # fmt: skip
+
+
+@pytest.fixture
+def small(monkeypatch):
+    monkeypatch.setattr(method_rows, "SEEDS", range(2))
+    monkeypatch.setattr(measure, "N_REPORTED", 30)
+    monkeypatch.setattr(measure, "N_ERROR", 10)
+    monkeypatch.setattr(method_rows, "best_preset", lambda task: SMALL)
+    two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
+    monkeypatch.setattr(method_rows, "METHODS", two)
+    monkeypatch.setattr(method_rows, "ABLATION", {})
+    return monkeypatch
+
+
+def name_of(job):
+    """All that its file is called."""
+    return tuple(job.about().values())
+
+
+# What is compared
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
+    found = jobs_of(task)
+    assert len(set(found)) == len(found) == len({name_of(job) for job in found})
+    for name, method in METHODS.items():
+        own = {(job.size, job.seed) for job in found if job.method == name}
+        seeds, wanted = range(20 if method.chance else 1), method.tasks is None or task in method.tasks
+        assert own == ({(size, seed) for size in method.sizes for seed in seeds} if wanted else set())
+        assert method.sizes in ((1, 2, 3, 4, 8, 13, 32), (2, 4, 8, 32), (3, 4), (13,), (0,))
+    for part in ABLATION:
+        own = {(job.size, job.seed) for job in found if job.method == f"refined, {part}"}
+        assert {(best_preset(task).n_cells, seed) for seed in range(20)} <= own
+
+
+def test_methods_that_know_one_task_are_not_asked_about_others():
+    own = {task: {job.method for job in jobs_of(task)} for task in TASKS}
+    assert all(("the paper's method" in own[task]) == (task in printed.TASKS) for task in TASKS)
+    assert [task for task in TASKS if "TD-AVQ" in own[task]] == [SIMPLEGOAL]
+    assert [task for task in TASKS if "heuristic" in own[task]] == [PENDULUM]
+    assert METHODS["heuristic"].tasks == (PENDULUM, LUNARLANDER)
+
+
+# Rows
+
+
+def test_a_row_holds_what_is_measured(small):
+    job = Job(SIMPLEGOAL, "CART", 3, 1)
+    _, about = make_row(job)
+    teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
+    policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
+    assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
+    assert about.items() >= {**dataclasses.asdict(job), **job.provenance}.items() and about["seconds"] > 0
+
+
+def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
+    make_all(tmp_path, tasks=[SIMPLEGOAL])
+    frame, seconds = rows(tmp_path, SIMPLEGOAL)
+    assert len(frame) == 2 * 2 + 1 == len(seconds) and frame["method"].tolist() == ["CART"] * 4 + ["teacher"]
+    assert frame[["settings", "teacher", "version"]].to_dict("records") == [j.provenance for j in jobs_of(SIMPLEGOAL)]
+    assert (seconds["task"] == SIMPLEGOAL).all()
+    made, original = [], make_row
+    small.setattr(method_rows, "make_row", lambda job: (made.append(job), original(job))[1])
+    jobs_of(SIMPLEGOAL)[2].path(tmp_path).unlink()
+    make_all(tmp_path, tasks=[SIMPLEGOAL])
+    assert made == [jobs_of(SIMPLEGOAL)[2]] and rows(tmp_path, SIMPLEGOAL)[0].equals(frame)
+
+
+@pytest.mark.parametrize(
+    ("of", "why"),
+    [(Job(SIMPLEGOAL, "CART", 1, 0), "size 1, expected 3"), (Job(SIMPLEGOAL, "CART", 3, 1), "seed 1, expected 0"),
+     (Job(SIMPLEGOAL, "teacher", 0, 0), "method 'teacher', expected 'CART'")],
+)  # fmt: skip
+def test_a_file_of_another_row_is_refused(small, tmp_path, of, why):
+    make_all(tmp_path, tasks=[SIMPLEGOAL])
+    path = Job(SIMPLEGOAL, "CART", 3, 0).path(tmp_path)
+    shutil.copy(of.path(tmp_path), path)
+    with pytest.raises(atomic.DamagedFile, match=f"{path.name}: made with {why}: delete it"):
+        rows(tmp_path, SIMPLEGOAL)
+
+
+def test_other_settings_and_other_versions_are_other_rows(small):
+    job = Job(SIMPLEGOAL, "CART", 3, 1)
+    one = name_of(job)
+    others = [dataclasses.replace(job, **change) for change in ({"method": "teacher"}, {"size": 2}, {"seed": 0})]
+    assert len({one, *map(name_of, others)}) == 4
+    for change in ({"settings": {"depth": 3}}, {"version": 2}):
+        small.setattr(method_rows, "METHODS", {"CART": dataclasses.replace(METHODS["CART"], **change)})
+        assert name_of(job) != one
+    small.setattr(method_rows, "METHODS", METHODS)
+    assert name_of(job) == one
+    small.setattr(measure, "VERSION", 2)
+    assert name_of(job) != one
+
+
+def test_a_row_depends_on_the_settings_that_its_method_reads(small):
+    jobs = [Job(SIMPLEGOAL, name, size, 0) for name, size in (("CART", 3), ("refined", 3), ("teacher", 0))]
+    small.setattr(method_rows, "METHODS", METHODS)
+    before = [job.provenance for job in jobs]
+    for change, equal in (({"n_steps": 99}, [True, False, True]), ({"n_episodes": 99}, [False, False, True])):
+        small.setattr(method_rows, "best_preset", lambda task, change=change: dataclasses.replace(SMALL, **change))
+        assert [job.provenance == known for job, known in zip(jobs, before)] == equal
+
+
+def test_an_ablated_row_is_that_of_the_changed_settings(monkeypatch):
+    job, whole = Job(SIMPLEGOAL, "refined, no leak", 3, 0), Job(SIMPLEGOAL, "refined", 3, 0)
+    assert job.how.settings == ABLATION["no leak"] and job.provenance["settings"] != whole.provenance["settings"]
+    monkeypatch.setitem(METHODS, "refined", dataclasses.replace(METHODS["refined"], version=5))
+    assert job.provenance["version"] == whole.provenance["version"] == 5
+
+
+def test_the_command_writes_results_and_times_apart(small, tmp_path):
+    small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
+    small.setattr(make_rows, "time_to_quality", lambda: pd.DataFrame({"seconds": [0.5]}))
+    small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1"])
+    make_rows.main()
+    results = tmp_path / "data" / "results"
+    frame = read_rows(SIMPLEGOAL, results)
+    assert len(frame) == 5 and "seconds" not in frame
+    assert len(pd.read_csv(results / "beyond_seconds.csv")) == 5
+    assert (results / "beyond_race.csv").read_text() == "seconds\n0.500000\n"
+    listed.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
+    assert read_rows("Pendulum-v1", results)["failing"].isna().all()
+
+
+def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
+    small.setattr(method_rows, "LONG", (SIMPLEGOAL,))
+    small.setattr(make_rows, "LONG", (SIMPLEGOAL,))
+    small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
+    make_rows.main()
+    results = tmp_path / "data" / "results"
+    policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
+    _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
+    assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= method_rows.simplest_provenance(SIMPLEGOAL).items()
+    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 2 * 5 + 1  # few seeds
+    assert not (results / "beyond_race.csv").exists()
+    listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
+
+
+def test_the_simplified_policy_may_lose_its_share(small):
+    asked = []
+    small.setattr(
+        method_rows, "simplify", lambda *given, **settings: asked.append((given, settings)) or ("policy", None)
+    )
+    assert simplest(SIMPLEGOAL) == "policy"
+    ((teacher, task, config), settings) = asked[0]
+    starts = start_states(get_task(SIMPLEGOAL), SMALL.n_validation, 0)
+    own = rollout(teacher, get_task(SIMPLEGOAL), starts).returns.mean()
+    assert (task, config, settings) == (SIMPLEGOAL, SMALL, {"tolerance": pytest.approx(0.02 * own), "seed": 0})

@@ -1,0 +1,501 @@
+"""The course: its sources, the copies made of them, and that checks know right answers from wrong ones."""
+
+import ast
+import builtins
+import functools
+import hashlib
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from collections import Counter
+from dataclasses import replace
+
+import course_answers
+import numpy as np
+import pytest
+from course_answers import EXERCISES
+from IPython.core.interactiveshell import InteractiveShell
+
+import vsp
+from vsp import baselines, distill
+from vsp.algorithms import split_regions, teacher_episodes
+from vsp.course import build, drawing, feedback, handout, lesson_2, pages
+from vsp.course.lesson_1 import AT_MOST, CELLS, MARGIN, fit_linear
+from vsp.course.lesson_2 import _algorithm_1
+from vsp.run import atomic
+from vsp.run.notebook import nbformat
+
+LESSONS = build.read_sources()
+SIMPLEGOAL = "SimpleGoal-v0"
+RUNS = {}
+
+
+def once(teacher, task, config=None, *, seed):
+    """`distill`, whose runs are kept for the next copy of a lesson: same arguments, same policy."""
+    key = teacher.digest, vsp.get_task(task).name, config or vsp.preset(task), seed
+    if key not in RUNS:
+        RUNS[key] = distill(teacher, task, config, seed=seed)
+    return RUNS[key]
+
+
+def briefly(teacher, task, config, *, seed):
+    """`distill` with a tenth of the iterations."""
+    return distill(teacher, task, config.quick(), seed=seed)
+
+
+@pytest.fixture(params=LESSONS)
+def lesson(request):
+    return LESSONS[request.param]
+
+
+def code_cells(notebook):
+    return [cell for cell in notebook.cells if cell.cell_type == "code"]
+
+
+def by_kind(notebook, wanted):
+    return [cell for cell in notebook.cells if wanted(cell)]
+
+
+def identity(cell):
+    return cell.metadata.nbgrader.grade_id
+
+
+# The sources
+
+
+def test_sources_hold_no_output_and_unique_ids(lesson):
+    nbformat.validate(lesson)
+    assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(lesson))
+    assert max(Counter(cell.id for cell in lesson.cells).values()) == 1
+
+
+def test_worked_cells_are_short_and_define_no_helpers(lesson):
+    for cell in code_cells(lesson):
+        assert len(cell.source.splitlines()) < (25 if build.is_solution(cell) else 15), cell.id
+        defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(ast.parse(cell.source)))
+        assert build.is_solution(cell) or not defines, cell.id
+
+
+def test_pictures_have_alternative_text(lesson):
+    for cell in code_cells(lesson):
+        calls = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)]
+        shown = [call for call in calls if isinstance(call.func, ast.Name) and call.func.id == "picture"]
+        assert len(shown) == cell.source.count("fig, axes ="), cell.id
+        assert all(len(ast.literal_eval(call.args[1])) > 40 for call in shown), cell.id
+
+
+def test_every_exercise_has_a_text_with_hints_an_answer_a_check_and_notes(lesson):
+    for i, cell in enumerate(lesson.cells):
+        if build.is_check(cell):
+            text, answer = lesson.cells[i - 2 : i]
+            notes = next(cell for cell in lesson.cells[i:] if build.for_lecturer(cell))
+            assert re.search(r"^## Exercise \d\.\d · ", text.source, re.MULTILINE), cell.id
+            n = text.source.count("<details><summary>Hint")
+            assert n == text.source.count("</details>") >= 1, cell.id
+            assert build.is_solution(answer) and {"Common mistakes", "Discuss", "Exam"} <= _emphasised(notes), cell.id
+
+
+def _emphasised(cell):
+    return set(re.findall(r"\*([A-Z][a-z ]+)\.\*", cell.source))
+
+
+@pytest.mark.parametrize("number", EXERCISES)
+def test_hints_are_counted_from_one(number):
+    assert hints(number) == set(range(1, 1 + len(hints(number)))) != set()
+
+
+def hints(number):
+    """The numbers of the hints of an exercise."""
+    texts = (cell.source for lesson in LESSONS.values() for cell in lesson.cells)
+    (text,) = (text for text in texts if f"## Exercise {number} " in text)
+    return {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
+
+
+def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
+    text = " ".join(cell.source for cell in LESSONS["lesson_1_black_box.ipynb"].cells)
+    assert f"{CELLS} codewords, at most {MARGIN * 100:.0f} % of the error" in text
+    assert AT_MOST == 8 and "**at most eight codewords that" in text
+
+
+def test_metadata_is_what_nbgrader_expects(lesson):
+    seen = set()
+    for cell in code_cells(lesson):
+        data = cell.metadata.get("nbgrader")
+        if data is None:
+            continue
+        assert set(data) - {"points"} == {"schema_version", "grade_id", "grade", "solution", "locked", "task"}, cell.id
+        assert data.schema_version == 3 and data.task is False and data.grade != data.solution, cell.id
+        assert data.locked == data.grade == ("points" in data), cell.id
+        assert re.fullmatch(r"[A-Za-z0-9_-]+", data.grade_id) and data.grade_id not in seen, cell.id
+        seen.add(data.grade_id)
+    answers, checks = by_kind(lesson, build.is_solution), by_kind(lesson, build.is_check)
+    assert [identity(c).removesuffix("-answer") for c in answers] == [
+        identity(c).removesuffix("-check") for c in checks
+    ]
+
+
+# The copies
+
+
+def test_students_get_stubs_and_no_answers(lesson):
+    made = build.student(lesson)
+    text = "\n".join(_stripped(cell.source) for cell in made.cells)
+    for cell in by_kind(lesson, build.is_solution):
+        answer = re.search(r"### BEGIN SOLUTION\n(.*?)\s*### END SOLUTION", cell.source, re.DOTALL)[1]
+        lines = _stripped(answer).splitlines()
+        for i in range(max(1, len(lines) - 1)):  # a line alone may stand in a worked cell too, two do not
+            assert "\n".join(lines[i : i + 2]) not in text, cell.id
+    assert "SOLUTION" not in text and "lecturer" not in text and "Common mistakes" not in text
+    assert all(build.STUB[1] in cell.source for cell in by_kind(made, build.is_solution))
+    assert all(cell.metadata.editable is False for cell in by_kind(made, build.is_check))
+
+
+def _stripped(text):
+    return "\n".join(line.strip() for line in text.splitlines())
+
+
+def test_answers_to_questions_cannot_be_read_in_a_students_copy(lesson):
+    """Options stand in a comment, all of them; none is marked, and the dictionary has None for every question."""
+    for cell in by_kind(build.student(lesson), build.is_solution):
+        tree = ast.parse(cell.source)
+        for node in (node for node in ast.walk(tree) if isinstance(node, ast.Dict)):
+            assert all(isinstance(value, ast.Constant) and value.value is None for value in node.values), cell.id
+
+
+def test_a_stub_takes_the_place_of_an_answer():
+    source = "def f(x):\n    y = x\n    ### BEGIN SOLUTION\n    return y + 1\n    ### END SOLUTION\n"
+    stub = "def f(x):\n    y = x\n    # YOUR CODE HERE\n    raise NotImplementedError()\n"
+    assert build.without_answers(source) == stub
+
+
+@pytest.mark.parametrize("source", ["x = 1", "### BEGIN SOLUTION\nx = 1", "x = 1\n### END SOLUTION"])
+def test_marks_come_in_pairs(source):
+    with pytest.raises(ValueError, match="in pairs"):
+        build.without_answers(source)
+
+
+def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
+    before = {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in build.SOURCES.glob("*")}
+    first = {(path.parent.name, path.name): path.read_bytes() for path in build.build(tmp_path / "a")}
+    twice = [build.build(tmp_path / name) for name in ("a", "b")]
+    assert [p.read_bytes() for p in twice[0]] == [p.read_bytes() for p in twice[1]]
+    assert all(path.read_bytes() == first[path.parent.name, path.name] for path in twice[0])
+    assert not list(tmp_path.rglob("*.kept-*"))
+    assert before == {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in before}
+    copies = sorted(str(path.relative_to(tmp_path / "b" / "build" / "course")) for path in twice[1])
+    assert copies == sorted(
+        ["guide.md", "handout.zip", *(f"{kind}/{name}" for kind in ("student", "solution") for name in LESSONS)]
+    )
+
+
+def test_the_guide_keeps_answers_apart_from_what_students_see():
+    students, lecturers = build.guide(LESSONS).split("# For lecturers only")
+    assert "SOLUTION" not in students and "Common mistakes" not in students and "```" not in students
+    for lesson in LESSONS.values():
+        assert all(cell.source in lecturers for cell in by_kind(lesson, build.is_solution))
+        assert all(cell.source in lecturers for cell in by_kind(lesson, build.for_lecturer))
+        assert f"| all | {build.points(lesson)} |" in students
+    assert students.count("| Exercise ") == len(EXERCISES) == lecturers.count("### Exercise ")
+
+
+# Running the copies, cell by cell, in one namespace each
+
+
+def run(notebook, monkeypatch):
+    """The names of a notebook after its last cell, and what went wrong in which cell (by id)."""
+    monkeypatch.setattr(vsp, "distill", once)
+    monkeypatch.setattr(lesson_2, "distill", once)
+    monkeypatch.setattr("vsp.show.laboratory.distill", briefly)
+    monkeypatch.setattr("vsp.course.picture", lambda fig, alt: drawing.plt.close(fig) or alt)
+    names, failed = {}, {}
+    for cell in code_cells(notebook):
+        try:
+            exec(compile(cell.source, cell.id, "exec"), names)
+        except (feedback.NotYet, NotImplementedError) as error:
+            failed[cell.id] = error
+    return names, failed
+
+
+def test_solutions_run_and_pass_every_check(lesson, monkeypatch, capsys):
+    _, failed = run(build.solution(lesson), monkeypatch)
+    assert not failed
+    assert capsys.readouterr().out.count("✓ ") == len(by_kind(lesson, build.is_check))
+
+
+def test_the_solutions_of_lesson_2_together_are_the_papers_method():
+    """Cell by cell the same partition as with the passes of vsp, from the same random numbers."""
+    task, teacher, *_ = examples()
+    solutions = map(course_answers.changed, ("2.3", "2.4", "2.5"))
+    own, ours = lesson_2.grown(*solutions, teacher, task, vsp.preset(SIMPLEGOAL).quick(), seed=1)
+    assert np.array_equal(own.codewords, ours.codewords) and len(own) > 5
+    assert np.array_equal(own.coefficients, ours.coefficients)
+
+
+def refuse(*packages):
+    """An `__import__` that finds none of `packages`."""
+    imports = builtins.__import__
+
+    def find(name, *others, **named):
+        assert name.split(".")[0] not in packages, name
+        return imports(name, *others, **named)
+
+    return find
+
+
+def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
+    def stub(*given):
+        raise NotImplementedError
+
+    def split_nothing(partition, episode, config, rng):
+        return []
+
+    task, teacher, *_ = examples()
+    config = vsp.preset(SIMPLEGOAL).quick()
+    stub.__name__ = "merge_regions"
+    own, ours = lesson_2.grown(split_nothing, stub, _algorithm_1, teacher, task, config)
+    out = capsys.readouterr().out
+    assert "Yours: split_regions, algorithm_1. Not written yet, so vsp's: merge_regions." in out
+    assert len(own) == 1 < len(ours) and "not the same codewords" in out
+    own, ours = lesson_2.grown(split_regions, stub, _algorithm_1, teacher, task, config)
+    assert np.array_equal(own.codewords, ours.codewords) and ": the same codewords" in capsys.readouterr().out
+
+
+def test_a_threshold_decides_where_the_guide_says():
+    """The numbers that the notes to exercise 2.6 state, some of them."""
+    notes = next(c.source for c in LESSONS["lesson_2_algorithms.ipynb"].cells if c.id == "predict-notes")
+    _, teacher, *_ = examples()
+    quick = vsp.preset(SIMPLEGOAL).quick()
+    for limit, told in (
+        (quick.max_pol_loss, "(12, 9 and 12 cells"),
+        (0.3, "(12, 9 and 12 cells"),
+        (1.0, "(9, 2 and\n9)"),
+    ):
+        config = replace(quick, max_pol_loss=limit)
+        found = [len(once(teacher, SIMPLEGOAL, config, seed=seed)[0]) for seed in range(3)]
+        assert told in notes and [int(n) for n in re.findall(r"\d+", told)] == found
+
+
+def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
+    """And needs no package that the hand-out leaves out."""
+    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "pygame", "Box2D"))
+    made = build.student(lesson)
+    _, failed = run(made, monkeypatch)
+    checks = {cell.id for cell in by_kind(made, build.is_check)}
+    assert checks <= set(failed) <= checks | {cell.id for cell in by_kind(made, build.is_solution)}
+    for check in checks:
+        assert isinstance(failed[check], feedback.NotYet), check
+        assert re.search(r"is not (written|answered) yet", str(failed[check])), failed[check]
+    assert "✓" not in capsys.readouterr().out
+
+
+def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    teacher = vsp.load_teacher(SIMPLEGOAL)
+    fig, _ = drawing.copy_and_error(baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher)
+    picture = drawing.picture(fig, "a policy")
+    assert 'alt="a policy"' in picture._repr_html_() and picture.png[:4] == b"\x89PNG" and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("on_the_way", [False, True])
+def test_two_squares_side_by_side_are_of_one_size(on_the_way):
+    _, teacher, states, _ = examples()
+    policy = baselines.rule_of_thumb(SIMPLEGOAL)[1]
+    fig, axes = drawing.copy_and_error(policy, teacher, states if on_the_way else None)
+    fig.canvas.draw()
+    one, other = (ax.get_window_extent() for ax in axes)
+    drawing.plt.close(fig)
+    assert (one.width, one.y0, one.y1) == pytest.approx((other.width, other.y0, other.y1))
+    assert one.width == pytest.approx(one.height)
+
+
+# Checks
+
+
+@functools.cache
+def examples():
+    """What the checks of some exercises need besides an answer."""
+    task, teacher = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
+    episodes = list(teacher_episodes(teacher, task, 300, np.random.default_rng(3)))
+    states, actions = (np.concatenate([getattr(e, part) for e in episodes]) for part in ("states", "actions"))
+    return task, teacher, states, actions
+
+
+def arguments(number):
+    task, teacher, states, actions = examples()
+    if number == "2.1":
+        return once(teacher, SIMPLEGOAL, vsp.preset(SIMPLEGOAL), seed=0)[1], vsp.preset(SIMPLEGOAL)
+    if number in ("3.1", "3.7"):
+        copies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in range(2, 4)]
+        played = [vsp.evaluate(p, SIMPLEGOAL, 500, seed=3)["return"].to_numpy() for p in (*copies, teacher)]
+        return (np.concatenate(played[:-1]), played[-1]) if number == "3.1" else (copies,)
+    few = {"1.1": (teacher,), "1.6": (states, actions, task), "2.7": (teacher, task)}
+    return few.get(number, (teacher, task, vsp.preset(SIMPLEGOAL).quick()) if number == "2.6" else ())
+
+
+def check(number, answer):
+    lesson, name = EXERCISES[number]
+    function = {"codewords": "by_hand"}.get(name, name)
+    getattr(lesson, function)(answer() if number == "3.7" else answer, *arguments(number))
+
+
+def _refused(number, answer):
+    with pytest.raises(feedback.NotYet) as refusal, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lesson_2, "distill", once)
+        check(number, answer)
+    return str(refusal.value)
+
+
+def label(entry):
+    number, *words, answer = entry
+    return f"{number} {words[0] if words else getattr(answer, '__name__', 'right')}"
+
+
+@pytest.mark.parametrize("i", range(len(course_answers.WRONG)), ids=lambda i: label(course_answers.WRONG[i]))
+def test_wrong_answers_are_told_what_is_wrong(i):
+    number, words, answer = course_answers.WRONG[i]
+    message = _refused(number, answer)
+    assert words in message and message.startswith(f"{number} {EXERCISES[number][1]}") and "\n" not in message
+    pointed = re.search(r"→ Hint (\d) of exercise (\d\.\d)$", message)
+    assert pointed is None or (pointed[2] == number and int(pointed[1]) in hints(number)), message
+
+
+@pytest.mark.parametrize("entry", course_answers.RIGHT, ids=label)
+def test_other_right_answers_pass(entry, capsys, monkeypatch):
+    monkeypatch.setattr(lesson_2, "distill", once)
+    check(*entry)
+    out = capsys.readouterr().out
+    assert out.startswith(f"✓ {entry[0]} ") and out.count("✓") == 1
+    assert max(map(len, out.splitlines())) <= feedback.WIDTH
+
+
+@pytest.mark.parametrize("number", EXERCISES)
+def test_what_is_no_answer_at_all_is_refused_in_words(number):
+    for nothing in (None, 7, "text"):
+        assert _refused(number, (lambda nothing=nothing: nothing) if number == "3.7" else nothing).startswith(number)
+
+
+def test_a_check_leaves_what_it_was_given_as_it_was():
+    """A student's function that alters its arguments must not spoil the next case."""
+
+    def spoils(states, actions):
+        result = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
+        states[:] = actions[:] = 0.0
+        return result
+
+    fit_linear(spoils)
+
+
+def test_jupyter_shows_the_message_alone(monkeypatch):
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)  # IPython would take its packages for this process's
+    shell, shown = InteractiveShell.instance(), []
+    shell._showtraceback = lambda kind, value, lines: shown.append(lines)
+    shell.run_cell("from vsp.course import lesson_1\nlesson_1.fit_linear(None)")
+    InteractiveShell.clear_instance()
+    assert shown == [["✗ 1.2 fit_linear: found None, expected a function."]]
+
+
+def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
+    source = "def within(x):\n    return x[3]\n\ndef fit(x):\n    return within(x)\n"
+    names, path = {}, tmp_path / "cell.py"
+    path.write_text(source)
+    exec(compile(source, str(path), "exec"), names)
+    with pytest.raises(feedback.NotYet, match=r"found IndexError \(.*\) in line 2 of its cell, `return x\[3\]`, exp"):
+        feedback.Exercise("1.2", "fit").call(names["fit"], [1])
+    with pytest.raises(feedback.NotYet, match="TypeError.* when it is called"):
+        feedback.Exercise("1.2", "fit").call(len, 1)
+
+
+def test_errors_of_many_lines_and_what_is_no_number_are_told_in_one_line():
+    def fails():
+        raise ValueError("first\n   second")
+
+    exercise = feedback.Exercise("1.2", "fit")
+    with pytest.raises(feedback.NotYet, match=r"ValueError \(first second\) in line"):
+        exercise.call(fails)
+    with pytest.raises(
+        feedback.NotYet, match=r"a result that is not made of numbers, \['up', 'down'\], expected numbers of"
+    ):
+        exercise.array(["up", "down"], (2,))
+
+
+def test_a_long_message_is_shown_in_lines():
+    lines = feedback.NotYet("word-with-hyphens " * 30)._render_traceback_()
+    assert len(lines) > 5 and max(map(len, lines)) <= feedback.WIDTH
+    assert " ".join(lines) == "✗ " + " ".join(["word-with-hyphens"] * 30)
+
+
+# What is written
+
+
+def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
+    copy = tmp_path / "build/course/student" / list(LESSONS)[0]
+    for n in (1, 2):
+        build.build(tmp_path)
+        capsys.readouterr()
+        copy.write_text(f"mine {n}")
+    build.build(tmp_path)
+    assert [path.read_text() for path in sorted(copy.parent.glob("*kept*"))] == ["mine 1", "mine 2"]
+    assert "was edited: kept as lesson_1_black_box.kept-2.ipynb" in capsys.readouterr().out
+    assert nbformat.read(copy, as_version=4).cells
+
+
+def test_what_was_written_before_a_kill_is_nobodys_work(tmp_path):
+    """The checksums of what was written come last: without them, a file as it is to be is not taken for edited."""
+    copies = [*build.build(tmp_path)]
+    before = {path: path.read_bytes() for path in copies}
+    (tmp_path / "build/course" / build.MADE).unlink()
+    copies[1].unlink()
+    build.build(tmp_path)
+    assert {path: path.read_bytes() for path in copies} == before and not list(tmp_path.rglob("*.kept-*"))
+
+
+def test_a_hand_out_stands_on_its_own(tmp_path):
+    """Package and teachers are found where it was unpacked; the answers are not in it."""
+    handout.write_handout(tmp_path / "handout.zip", {"lesson.ipynb": "{}"})
+    with zipfile.ZipFile(tmp_path / "handout.zip") as archive:
+        assert not [name for name in archive.namelist() if b"BEGIN SOL" in archive.read(name) and "/vsp/" not in name]
+        archive.extractall(tmp_path)
+    folder = tmp_path / handout.FOLDER
+    code = (
+        "import vsp; from vsp.course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); "
+        "from vsp.paper import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
+    )
+    assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))
+    names = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(SIMPLEGOAL)], cwd=folder, env=names, capture_output=True, text=True
+    )
+    assert done.stdout.strip() == str(folder / "vsp" / "__init__.py"), done.stderr
+
+
+def test_a_hand_out_asks_for_locked_versions_without_torch():
+    lines = handout.requirements().splitlines()
+    locked = (atomic.ROOT / "environment.lock").read_text(encoding="utf-8")
+    assert len(lines) > 12 and all(f"\n{line} " in locked for line in lines)
+    names = {line.partition("==")[0] for line in lines}
+    assert {"numpy", "jupyterlab", "ipywidgets", "gymnasium"} <= names and not names & set(handout.UNUSED)
+
+
+# Pages
+
+
+def small_lesson(worked):
+    new = nbformat.v4
+    answer = new.new_code_cell(f"{build.BEGIN}\nx = 1\n{build.END}", metadata={"nbgrader": {"solution": True}})
+    check = new.new_code_cell("assert x == 1", metadata={"nbgrader": {"grade": True, "points": 1}})
+    return build.student(new.new_notebook(cells=[new.new_code_cell("print(6 * 7)"), answer, check, worked]))
+
+
+def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
+    made = pages.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
+    assert [len(cell.outputs) for cell in made.cells] == [1, 0, 0, 1]
+    assert made.cells[0].outputs[0].text == "42\n" and made.cells[3].outputs[0].data["text/plain"] == "5"
+    assert [cell.execution_count for cell in made.cells] == [1, 2, 3, 4]
+    assert not any("execution" in cell.metadata for cell in made.cells)
+
+
+def test_a_page_must_not_need_an_answer():
+    with pytest.raises(RuntimeError, match="needs-x.*name 'x'"):
+        pages.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))

@@ -1,0 +1,384 @@
+"""Files that are damaged, or made to harm: `make faults`."""
+
+import base64
+import hashlib
+import io
+import json
+import pickle
+import shutil
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import measured
+import numpy as np
+import pytest
+import yaml
+from support import SIMPLEGOAL, TINY, CurvedTeacher
+
+import vsp
+from vsp.beyond.comparison import method_rows
+from vsp.beyond.comparison.method_summary import read_rows
+from vsp.course import build
+from vsp.paper import printed, results, runs
+from vsp.run import atomic, run_notebook
+from vsp.run.atomic import DamagedFile
+from vsp.run.listed import MANIFEST, list_folder, read_carded, read_listed, read_table
+from vsp.run.notebook import nbformat
+from vsp.run.sealed import load_arrays, read_sealed, save_arrays
+from vsp.teachers import train
+
+FLIPS, TRUNCATIONS = 100, 50
+PARSERS = ("json.loads", "numpy.load", "pandas.read_csv", "pickle.load", "pickle.loads", "safetensors.numpy.load",
+           "torch.load")  # fmt: skip
+RECIPE = train.Recipe(steps=40, batch_size=8, learning_starts=20, buffer_size=200)
+EXPERIMENT = runs.Experiment(SIMPLEGOAL, TINY, CurvedTeacher(), 5)
+WEIGHTS, CARD = f"teachers/{SIMPLEGOAL}.safetensors", f"teachers/{SIMPLEGOAL}.json"
+
+
+# Damage
+
+
+@dataclass
+class Kind:
+    """A kind of data file: what makes one in a folder, what reads it, and what may not be called if it is damaged."""
+
+    make: Callable[[Path], Path]
+    read: Callable[[Path], object]
+    parsers: tuple[str, ...] = PARSERS
+
+
+def copied(*names: str, manifest: bool = True) -> Callable[[Path], Path]:
+    """Puts committed files into a folder, the first of them to be damaged, and their manifest."""
+
+    def make(folder: Path) -> Path:
+        more = [str(Path(names[0]).with_name(MANIFEST))] if manifest else []
+        paths = [shutil.copy(atomic.ROOT / "data" / name, folder) for name in (*names, *more)]
+        return Path(paths[0])
+
+    return make
+
+
+def run(folder: Path) -> Path:
+    runs.make_runs(EXPERIMENT, [3], runs=folder)
+    return runs.run_path(EXPERIMENT.folder(folder), 3)
+
+
+def row(folder: Path) -> Path:
+    job = method_rows.Job(SIMPLEGOAL, "teacher", 0, 0)
+    save_arrays(job.path(folder), *method_rows.make_row(job))
+    return job.path(folder)
+
+
+def checkpoint(folder: Path) -> Path:
+    return train.train(SIMPLEGOAL, seed=0, cache=folder, recipe=RECIPE, report=lambda line: None)
+
+
+def course(folder: Path) -> Path:
+    build.build(folder)
+    return folder / "build" / "course" / build.MADE
+
+
+def figures(folder: Path) -> Path:
+    measured.add(folder / "trust.csv", measured.row("input", "a row", 1, "of 1", at_least=1))
+    return folder / "trust.csv"
+
+
+def of_paper(path: Path) -> object:
+    """What the module of printed values makes of a file in another folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(printed, "FOLDER", path.parent)
+        printed._parse.cache_clear()
+        return printed.printed_spread(SIMPLEGOAL)
+
+
+def of_study(path: Path) -> object:
+    return results.read_results(path.stem, path.parent)
+
+
+KINDS = {
+    "run": Kind(run, lambda path: runs.load_run(path, EXPERIMENT)),
+    "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
+    "policy": Kind(copied("results/beyond_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
+    "checkpoint of a training": Kind(checkpoint, train.read_checkpoint),
+    "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
+    "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
+    "weights without a manifest": Kind(  # whose checksum is on the card
+        copied(WEIGHTS, CARD, manifest=False), vsp.load_teacher, tuple(one for one in PARSERS if one != "json.loads")
+    ),
+    "numbers of the paper": Kind(copied("paper/spread.csv"), of_paper),
+    "results of a study": Kind(copied("results/readings.csv"), of_study),
+    "results of the comparison": Kind(
+        copied(f"results/beyond_{SIMPLEGOAL}.csv"), lambda path: read_rows(SIMPLEGOAL, path.parent)
+    ),
+    "summary of the runs": Kind(copied(f"results/{SIMPLEGOAL}.csv"), of_study),
+    "type of processor": Kind(copied("results/made_on.txt"), read_listed),
+    "measured figures": Kind(figures, read_table),
+    "what the course has made": Kind(course, read_sealed),
+}
+TALLY = {}  # kind: refused, tried
+
+
+def damage(content: bytes) -> list[tuple[int, bytes]]:
+    """Copies of `content`, each with one bit flipped or cut off, and at which byte."""
+    rng, found = np.random.default_rng(len(content)), []
+    for bit in rng.choice(8 * len(content), FLIPS, replace=False):
+        damaged = bytearray(content)
+        damaged[bit // 8] ^= 1 << bit % 8
+        found.append((int(bit // 8), bytes(damaged)))
+    return found + [(int(n), content[:n]) for n in rng.choice(len(content), TRUNCATIONS, replace=False)]
+
+
+def refused(read: Callable[[], object]) -> bool:
+    try:
+        read()
+    except DamagedFile:
+        return True
+    return False
+
+
+def parse(*given, **options):
+    raise AssertionError("parsed")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_damaged_file_is_refused_before_it_is_parsed(name, tmp_path, monkeypatch):
+    kind = KINDS[name]
+    path = kind.make(tmp_path)
+    content, found = path.read_bytes(), []
+    kind.read(path)
+    for parser in kind.parsers:
+        monkeypatch.setattr(parser, parse)
+    for _, damaged in damage(content):
+        path.write_bytes(damaged)
+        found.append(refused(partial(kind.read, path)))
+    TALLY[name] = sum(found), len(found)
+    path.write_bytes(content)
+    if kind.read not in (read_listed, read_sealed):  # which parse nothing
+        with pytest.raises(AssertionError, match="parsed"):
+            kind.read(path)
+    assert all(found)
+
+
+def test_of_a_damaged_manifest_the_named_file_is_refused(tmp_path):
+    folder = tmp_path / "results"
+    shutil.copytree(results.RESULTS, folder)
+    manifest, found = folder / MANIFEST, []
+    content = manifest.read_bytes()
+    names = [line.split()[1].decode() for line in content.splitlines()]
+    assert all(read_listed(folder / name) for name in names)
+    for place, damaged in damage(content):
+        manifest.write_bytes(damaged)
+        path = folder / names[content[:place].count(b"\n")]
+        found.append(refused(partial(read_listed, path)))
+    TALLY["manifest"] = sum(found), len(found)
+    assert all(found)
+
+
+def test_all_damage_is_refused(record):
+    assert TALLY.keys() == {*KINDS, "manifest"}, "the tests above did not all run"
+    good, tried = np.sum(list(TALLY.values()), axis=0)
+    what = f"bit flips and truncations, {len(TALLY)} kinds of data file"
+    record("input", what, good, f"of {tried}", at_least=tried, note="refused before they are parsed")
+
+
+# Harm
+
+
+class Payload:
+    """Writes a file when it is unpickled."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (str(self.path), "w")
+
+
+def as_zip(**parts: bytes) -> bytes:
+    """A zip of those members; `_pth` and the like end a name after a dot."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name.replace("__", "."), part)
+    return content.getvalue()
+
+
+def by(write: Callable, *given, **options) -> bytes:
+    """What `write` writes into a file that comes first, last, or before its options."""
+    content = io.BytesIO()
+    write(content, *given, **options)
+    return content.getvalue()
+
+
+def notebook(parameters: str, **metadata) -> bytes:
+    cell = nbformat.v4.new_code_cell(parameters, id="first", metadata={"tags": ["parameters"], **metadata})
+    return nbformat.writes(nbformat.v4.new_notebook(cells=[cell], metadata=metadata)).encode()
+
+
+SUFFIXES = ("run", "row", "policy", "pt", "safetensors", "json", "csv", "zip", "yaml", "ipynb", "npz", "txt", "made")
+
+
+def payloads(mark: Path, agent: bytes) -> dict[str, bytes]:
+    """Files by name that write `mark` if anybody unpickles or constructs what they hold; `agent` is a sound zip."""
+    import torch
+
+    raw, tag = pickle.dumps(Payload(mark)), f'!!python/object/apply:builtins.open ["{mark}", "w"]'
+    text, saved = (
+        base64.b64encode(raw).decode(),
+        by(lambda file: torch.save({"actor.mu.0.weight": Payload(mark)}, file)),
+    )
+    objects = np.array([Payload(mark)], dtype=object)
+    with zipfile.ZipFile(io.BytesIO(agent)) as archive:
+        parts = {name.replace(".", "__"): archive.read(name) for name in archive.namelist()}
+    about = {**json.loads(parts["data"]), "policy_class": {":type:": "x", ":serialized:": text}}
+    kwargs = {**about, "policy_kwargs": {":type:": "dict", ":serialized:": text}}
+    card = {"task": SIMPLEGOAL, "sha256": hashlib.sha256(raw).hexdigest(), ":serialized:": text, "yaml": tag}
+    found = {f"raw.{suffix}": raw for suffix in SUFFIXES} | {
+        f"torch.{suffix}": saved for suffix in ("pt", "zip", "run")
+    }
+    found |= {
+        "data.zip": as_zip(**parts | {"data": json.dumps(about).encode()}),
+        "kwargs.zip": as_zip(**parts | {"data": json.dumps(kwargs).encode()}),
+        "pickled_data.zip": as_zip(**parts | {"data": raw}),
+        "policy.zip": as_zip(**parts | {"policy__pth": raw}),
+        "policy_torch.zip": as_zip(**parts | {"policy__pth": saved}),
+        "variables.zip": as_zip(**parts | {"pytorch_variables__pth": saved}),
+        "optimizer.zip": as_zip(**parts | {"actor__optimizer__pth": raw, "critic__optimizer__pth": saved}),
+        "objects.npy": by(np.save, objects, allow_pickle=True),
+        "objects.npz": by(lambda file: np.savez(file, codewords=objects)),
+        "objects.zip": by(lambda file: np.savez(file, data=objects)),
+        "tag.yaml": tag.encode(),
+        "tag.json": json.dumps(tag).encode(),
+        "tag.ipynb": tag.encode(),
+        "table.csv": f'key,settings,code,failing\n"{tag}",{text},{text},1\n'.encode(),
+        "card.json": json.dumps(card).encode(),
+        "card.safetensors": raw,
+        "metadata.ipynb": notebook("out = ''", vsp=tag, papermill={"parameters": tag, "state": text}),
+        "parameters.ipynb": notebook(f"out = open({str(mark)!r}, 'w')"),
+        "expression.ipynb": notebook(f"out = ''\n[open({str(mark)!r}, 'w')]"),
+        "kernel.ipynb": notebook("out = ''", kernelspec={"name": tag, "display_name": tag, "argv": [tag]}),
+    }
+    about = {"about": json.dumps({"kind": "Run", "settings": {"task": tag}, "seed": text})}
+    from safetensors.numpy import save
+
+    sealed = {"pickle": raw, "torch": saved, "tensors": save({"codewords": np.zeros(1)}, metadata=about)}
+    return found | {
+        f"sealed_{name}.{suffix}": hashlib.sha256(content).hexdigest().encode() + b"\n" + content
+        for name, content in sealed.items()
+        for suffix in ("run", "pt")
+    }
+
+
+LOADERS = {
+    "teacher": vsp.load_teacher,
+    "teacher of a task": lambda path: vsp.load_teacher(path, SIMPLEGOAL),
+    "agent": vsp.agent,
+    "policy": vsp.VoronoiPolicy.load,
+    "run": lambda path: runs.load_run(path, EXPERIMENT),
+    "row": partial(load_arrays, kind="Row"),
+    "checkpoint": train.read_checkpoint,
+    "sealed": read_sealed,
+    "listed": read_listed,
+    "table": read_table,
+    "carded": read_carded,
+    "study": lambda path: of_study(path.with_suffix(".csv")),
+    "notebook": lambda path: run_notebook._read(path),
+}
+REFUSALS = (ValueError, FileNotFoundError, run_notebook.NotebookError)
+
+
+@pytest.fixture
+def agent(tmp_path):
+    """The zip that Stable-Baselines3 saves."""
+    import gymnasium
+    from stable_baselines3 import TD3
+
+    made = TD3("MlpPolicy", gymnasium.make(SIMPLEGOAL), buffer_size=10, policy_kwargs={"net_arch": [8]}, device="cpu")
+    made.save(tmp_path / "agent.zip")
+    return (tmp_path / "agent.zip").read_bytes()
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_no_payload_runs(agent, tmp_path, listed, record):
+    mark, folder = tmp_path / "ran", tmp_path / "files"
+    folder.mkdir()
+    made, harmless = payloads(mark, agent), 0
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    if listed:
+        list_folder(folder)  # somebody accepted them all
+    for name in made:
+        for loader in LOADERS.values():
+            try:
+                loader(folder / name)
+            except REFUSALS as error:
+                assert str(error)
+        harmless += not mark.exists()
+        mark.unlink(missing_ok=True)
+    if listed:
+        what = "files with pickles, YAML tags or code, through every loader"
+        record("input", what, harmless, f"of {len(made)}", at_least=len(made), note="no code was run")
+    assert harmless == len(made) >= 20
+
+
+def test_the_payloads_are_live(agent, tmp_path):
+    """Whoever unpickles them, or makes what their tags say, writes the mark."""
+    import torch
+
+    mark = tmp_path / "ran"
+    made = payloads(mark, agent)
+    attacks = [
+        lambda: pickle.loads(made["raw.run"]),
+        lambda: yaml.unsafe_load(made["tag.yaml"]),
+        lambda: np.load(io.BytesIO(made["objects.npy"]), allow_pickle=True),
+        lambda: torch.load(io.BytesIO(made["torch.pt"]), weights_only=False),
+        lambda: pickle.loads(base64.b64decode(json.loads(made["card.json"])[":serialized:"])),
+        lambda: eval(nbformat.reads(made["parameters.ipynb"].decode(), 4).cells[0].source.removeprefix("out = ")),
+    ]
+    for attack in attacks:
+        attack()
+        assert mark.exists()
+        mark.unlink()
+
+
+@pytest.mark.parametrize("member", ["data", "policy.pth"])
+def test_a_zip_that_claims_10_gb_is_refused(agent, tmp_path, member):
+    path = tmp_path / "claims.zip"
+    with zipfile.ZipFile(io.BytesIO(agent)) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name))
+        new.getinfo(member).file_size = 10 * 2**30
+    with pytest.raises(DamagedFile, match="107374[0-9]* bytes unpacked, expected at most "):
+        vsp.load_teacher(path, SIMPLEGOAL)
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_a_zip_that_unpacks_to_1_gb_is_refused(agent, tmp_path, deep):
+    """Whether the zip itself is one of zeros, or the zip in it that holds the tensors."""
+    path, zeros = tmp_path / "bomb.zip", bytes(2**24)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("data", "{}")
+        if not deep:
+            with archive.open("policy.pth", "w", force_zip64=True) as file:
+                for _ in range(64):
+                    file.write(zeros)
+        else:
+            inner = io.BytesIO()
+            with (
+                zipfile.ZipFile(inner, "w", zipfile.ZIP_DEFLATED) as tensors,
+                tensors.open("x/data.pkl", "w", force_zip64=True) as file,
+            ):
+                for _ in range(64):
+                    file.write(zeros)
+            archive.writestr("policy.pth", inner.getvalue())
+    tracemalloc.start()
+    try:
+        with pytest.raises(DamagedFile, match="107374[0-9]* bytes unpacked, expected at most "):
+            vsp.load_teacher(path, SIMPLEGOAL)
+        assert tracemalloc.get_traced_memory()[1] < 1.5e9
+    finally:
+        tracemalloc.stop()

@@ -1,0 +1,215 @@
+import itertools
+
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL
+
+from vsp.paper import audit
+from vsp.paper import printed as printed_module
+from vsp.paper.printed import _read, linear_policies, printed_values, published_policy
+from vsp.paper.statistics import Part, least_std, mean_range, quarters, remaining_mean, remaining_std
+
+TASK = {"sg": SIMPLEGOAL, "mc": MOUNTAINCAR}
+HOLDS, CONTRADICTS, OPEN = audit.VERDICTS
+
+VERDICTS = {
+    "Number of distilled policies": CONTRADICTS,
+    "SimpleGoal: coverage of Ours": CONTRADICTS,
+    "Coverage and moments of the other columns": HOLDS,
+    "MountainCar: quartiles of Ours, and a higher median": CONTRADICTS,
+    "One rule for what an outlier is": OPEN,
+    "SimpleGoal: what the outliers of DRL are": HOLDS,
+    "Shares and moments of outliers": HOLDS,
+    "Numbers printed twice": HOLDS,
+    "Returns within the limits of the tasks": HOLDS,
+    "SimpleGoal: how similar is similar": OPEN,
+    "T3 and T4: digits": CONTRADICTS,
+    "T3: a row without x, a codeword in the pit": OPEN,
+    "T4: colours against the force": OPEN,
+    "T3: pairs closer than the thresholds": OPEN,
+    "T4: pairs closer than the thresholds": OPEN,
+    "T3 and T4: outputs beyond the limits of actions": OPEN,
+    "Dimensions of states and actions": CONTRADICTS,
+    "MountainCar: truncation": OPEN,
+    "A dot that separates thousands": OPEN,
+    "When the partition stands still": CONTRADICTS,
+}
+IN_DOUBT = {
+    "sg_text_policies", "mc_text_policies", "sg_spread_ours_coverage", "mc_spread_ours_q1", "mc_spread_ours_median",
+    "mc_spread_ours_q3", "mc_spread_ours_iqr", "sg_table_digits", "mc_table_digits", "action_dimensions",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {finding.title: finding for finding in audit.audit_findings()}
+
+
+@pytest.fixture
+def alter(monkeypatch):
+    """Print other numbers: alter({id: text}), for ids of the text and of T5 and T6."""
+
+    def change(printed):
+        read = _read
+
+        def altered(file, numbers=None):
+            frame = read(file, numbers)
+            for id, text in printed.items():
+                as_read = float(text) if numbers else text
+                if file == "text_numbers.csv" and "_spread_" not in id:
+                    frame.loc[frame["id"] == id, ["value", "printed"]] = [as_read, text]
+                elif file == "spread.csv" and "_spread_" in id:
+                    task, (subject, metric) = TASK[id[:2]], id[len("sg_spread_") :].split("_")
+                    row = (frame["task"] == task) & frame["metric"].str.lower().str.startswith(metric)
+                    assert row.sum() == 1
+                    frame.loc[row, subject] = as_read
+            return frame
+
+        monkeypatch.setattr(printed_module, "_read", altered)
+
+    return change
+
+
+# The findings
+
+
+def test_verdicts(found):
+    assert {title: finding.verdict for title, finding in found.items()} == VERDICTS
+
+
+def test_every_finding_says_what_is_printed_and_computes(found):
+    for finding in found.values():
+        assert finding.printed and any(digit in finding.arithmetic for digit in "0123456789"), finding
+        assert "nan" not in (finding.printed + finding.arithmetic).split()
+        assert not finding.concerns or finding.verdict == CONTRADICTS
+
+
+def test_what_is_in_doubt_exists(found):
+    assert audit.in_doubt() == IN_DOUBT
+    assert IN_DOUBT <= set(printed_values()["id"])
+
+
+def test_frame(found):
+    frame = audit.audit_table(list(found.values()))
+    assert frame.columns.tolist() == ["number", "finding", "printed", "arithmetic", "verdict"]
+    assert frame["number"].tolist() == list(range(1, len(VERDICTS) + 1))
+    assert frame["finding"].tolist() == list(VERDICTS) and frame["verdict"].tolist() == list(VERDICTS.values())
+
+
+@pytest.mark.parametrize(
+    ("title", "numbers"),
+    [
+        ("Number of distilled policies", ["SimpleGoal: 85 and 40", "80022", "MountainCar: 40 and 85", "40026"]),
+        # 11067/85000 = 0.13020; 0.1383 * 85000 = 11755.5; 11067/0.1383 = 80022, that is 80 policies
+        ("SimpleGoal: coverage of Ours", ["86.98 %", "86.17 %", "1175", "80000 episodes", "68933", "73933"]),
+        ("SimpleGoal: coverage of Ours", ["std 1.491 (1.633", "std 2.754 (1.647"]),
+        ("Coverage and moments of the other columns", ["1 - 24/1000 = 97.6 %", "1 - 3130/40000 = 92.175 %"]),
+        ("Coverage and moments of the other columns", ["1 - 0/1000 = 100 %", "mean 16.801 (", "std 2.737 ("]),
+        # (94.130 - 93.313)/4 = 0.20425; 93.313 + 1.5 * 0.20425 = 93.619375; 93.403 - 1.5 * 0.145 = 93.1855
+        (
+            "MountainCar: quartiles of Ours, and a higher median",
+            ["Q1 93.619", "Q3 93.824", "IQR 0.204", "93.186 and 93.76", "36870", "93.731", "to 93.643", "0.133 (0.222"],
+        ),
+        # 16.599 - 2 * 3.117 = 10.365; 12.657 - 2 * 8.436 = -4.215; 12.298 - 1.5 * 5.348 = 4.276
+        ("One rule for what an outlier is", ["10.364", "10.365", "1.192", "4.276", "-4.215", "93.331", "90.844"]),
+        # (24 * 8.369 + 20)/22 = 10.0389; 0.2 * 0.2 * 1000 = 40
+        ("SimpleGoal: what the outliers of DRL are", ["24 = 2 at -10 and 22 with mean 10.04", "40 of 1000"]),
+        ("Shares and moments of outliers", ["2291/3130 = 73.195 %", "839/3130 = 26.805 %", "of at most 0.204"]),
+        ("Numbers printed twice", ["26 of 26"]),
+        ("Returns within the limits of the tasks", ["= 23.142", "22.798", "16.599 of 16.65", "71.050"]),
+        # 8.436/3.117 = 2.706; 5.348/4.145 = 1.290; 16.599 - 12.657 = 3.942; 16.956 - 15.382 = 1.574
+        ("SimpleGoal: how similar is similar", ["2.71", "1.29", "3.942", "1.26 std", "23.7 %", "1.574"]),
+        # 13 * 2 + 13 * 6 - 2 numbers in T3, 32 * 5 in T4
+        ("T3 and T4: digits", ["Of 262 numbers 6 have 4 decimals (all 2 to 4)"]),
+        ("T3: a row without x, a codeword in the pit", ["1 of 13 rows", "1 of 13 codewords"]),
+        ("T4: colours against the force", ["LimeGreen 0.804 to 1.000", "Goldenrod and LimeGreen", "Violet -0.629"]),
+        # |0.891 - 0.826| + |0.628 - 0.460| = 0.065 + 0.168 = 0.233
+        ("T3: pairs closer than the thresholds", ["of 78 pairs", "manhattan: 1 (rows 1-2)", "euclidean: 12 ("]),
+        ("T4: pairs closer than the thresholds", ["of 496 pairs", "manhattan: 8 (", "neighbours: 4 (rows 3-8,"]),
+        # row 2 of T3, second output: -1.087 * 0.826 - 1.370 * 0.460 - 0.319 = -1.847
+        ("T3 and T4: outputs beyond the limits of actions", ["9 of 26", "1.847", "10 of 32", "1.011"]),
+        ("Dimensions of states and actions", ["[2, 2]", "[2, 1]"]),
+        ("MountainCar: truncation", ["1000 and 999", "71.050"]),
+        ("A dot that separates thousands", ["500 steps, 10 episodes", "not 500000"]),
+        ("When the partition stands still", ["4000, 1000, 5000 - 20 = 4980", "1600, 400, 2000 - 50 = 1950"]),
+    ],
+)
+def test_key_numbers_by_hand(found, title, numbers):
+    for number in numbers:
+        assert number in found[title].arithmetic, (number, found[title].arithmetic)
+
+
+QUARTILES = {"q1": "93.619", "median": "93.74", "q3": "93.824", "iqr": "0.204"}
+QUARTILES = {f"mc_spread_ours_{name}": text for name, text in QUARTILES.items()}
+
+
+@pytest.mark.parametrize(
+    ("title", "numbers", "verdict"),
+    [
+        ("Number of distilled policies", {"sg_text_policies": "85", "mc_text_policies": "40"}, HOLDS),
+        ("SimpleGoal: coverage of Ours", {"sg_spread_ours_coverage": "86.98"}, HOLDS),
+        ("Coverage and moments of the other columns", {"sg_drl_outliers": "25"}, CONTRADICTS),
+        ("Coverage and moments of the other columns", {"sg_spread_ours_std": "8.0"}, CONTRADICTS),
+        ("MountainCar: quartiles of Ours, and a higher median", QUARTILES, HOLDS),
+        ("One rule for what an outlier is", {"sg_drl_outliers_max": "8.0"}, HOLDS),
+        ("SimpleGoal: what the outliers of DRL are", {"sg_drl_outliers_std": "4.5"}, OPEN),
+        ("Shares and moments of outliers", {"mc_ours_outliers_below_share": "73.25"}, CONTRADICTS),
+        ("Shares and moments of outliers", {"mc_ours_outliers_above_std": "0.3"}, CONTRADICTS),
+        ("Numbers printed twice", {"sg_ours_mean": "12.658"}, CONTRADICTS),
+        ("Numbers printed twice", {"mc_cells": "31"}, CONTRADICTS),
+        ("Numbers printed twice", {"sg_spread_drl_iqr": "4.2"}, CONTRADICTS),
+        ("Returns within the limits of the tasks", {"sg_spread_ours_max": "23.2"}, CONTRADICTS),
+        ("Returns within the limits of the tasks", {"sg_spread_drl_mean": "16.7"}, CONTRADICTS),
+        ("Returns within the limits of the tasks", {"mc_spread_ours_min": "-5"}, CONTRADICTS),
+        ("MountainCar: truncation", {"mc_max_steps": "999"}, HOLDS),
+        ("A dot that separates thousands", {"sg_training_steps": "500000"}, HOLDS),
+    ],
+)
+def test_another_number_another_verdict(found, alter, title, numbers, verdict):
+    check = dict(zip(found, audit._CHECKS))[title]
+    alter(numbers)
+    finding = check()
+    assert finding.title == title and finding.verdict == verdict != VERDICTS[title]
+    assert not finding.concerns or verdict == CONTRADICTS
+
+
+def test_other_tables_other_verdicts(monkeypatch):
+    def put(name, other):
+        monkeypatch.setattr(printed_module, name, lambda *task: other)
+
+    values, policies, published = printed_values(), linear_policies(MOUNTAINCAR), published_policy(MOUNTAINCAR)
+    cells = values["id"].str.contains("_cell_")
+    values.loc[cells, "paper"] = values.loc[cells, "value"].map("{:.4f}".format)
+    put("printed_values", values)
+    assert audit.printed_digits().verdict == HOLDS
+    put("linear_policies", policies.assign(G_printed=policies["F_printed"]))
+    assert audit.dimensions().verdict == HOLDS
+    put("published_policy", published)
+    put("linear_policies", policies.replace("LimeGreen", "Goldenrod"))
+    assert audit.mountaincar_colours().verdict == HOLDS
+    put("printed_hyperparameters", {"n_epochs": 8, "n_split": 4, "n_freeze": 4})
+    assert audit.frozen_iterations().verdict == HOLDS
+
+
+# Rounding of the printed values decides nothing
+
+
+def corners(numbers):
+    """Every way to be half a unit of the third decimal beside each of `numbers`."""
+    return itertools.product(*((number - 0.0005, number + 0.0005) for number in numbers))
+
+
+@pytest.mark.parametrize(("n", "possible"), [(80_000, False), (85_000, True)])
+def test_rounding_does_not_decide_on_the_coverage(n, possible):
+    for mean, std, out_mean, out_std in corners([12.657, 8.436, -8.042, 1.830]):
+        out = [Part(11067, out_mean, out_std, -11.79, 1.192)]
+        groups = quarters(n, [1.192, 12.298, 15.382, 17.646, 22.798], below=11067)
+        assert (remaining_std(n, mean, std, out) >= least_std(remaining_mean(n, mean, out), groups) + 0.05) == possible
+
+
+def test_rounding_does_not_decide_on_the_quartiles():
+    groups = quarters(40_000, [93.313, 93.403, 93.476, 93.548, 94.130], below=2291, above=839)
+    for mean, std, mean_b, std_b, mean_a, std_a in corners([93.534, 1.345, 90.116, 4.338, 94.221, 0.110]):
+        out = [Part(2291, mean_b, std_b, 71.05, 93.313), Part(839, mean_a, std_a, 94.13, 94.68)]
+        rest = remaining_mean(40_000, mean, out)
+        assert rest > mean_range(groups)[1] + 0.08
+        assert remaining_std(40_000, mean, std, out) < least_std(rest, groups) - 0.07

@@ -1,0 +1,351 @@
+import ast
+import dataclasses
+import inspect
+import itertools
+import re
+from functools import cache
+from typing import Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
+
+from vsp import distill
+from vsp.config import EXTENSIONS, Config, paper_preset
+from vsp.evaluation import fences, rollout_from_seed
+from vsp.paper import printed
+from vsp.paper import runs as runs_module
+from vsp.paper.results import read_results
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, make_run, paper_experiment
+from vsp.paper.statistics import interval, resample, spread
+from vsp.paper.studies import interpretations
+from vsp.paper.studies.interpretations import AS_PRINTED, READINGS, as_intervals, distance, landmarks, ranking, study
+from vsp.tasks import base
+
+CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer
+
+# What is tried
+
+ALONE = [(number, change) for number, changes in READINGS.items() for change in changes]
+BEYOND = [("neighbours", "visited")]  # values of readings that are none of the paper's
+PRINTED = {*printed.printed_hyperparameters(SIMPLEGOAL)} - {"one_split"}  # T2 prints it, yet it is a reading (R4)
+
+
+def forgotten(config, readings):
+    """Fields of `config` that T2 does not settle and no reading changes, and values of theirs that are not tried."""
+    tried = {(name, value) for changes in readings.values() for change in changes for name, value in change.items()}
+    missing = []
+    for field in dataclasses.fields(config):
+        kind, default = get_type_hints(config)[field.name], field.default
+        if field.name in PRINTED or field.name in EXTENSIONS:
+            continue
+        values = get_args(kind) if get_origin(kind) is Literal else (not default,) if kind is bool else ()
+        others = [(field.name, value) for value in values if value != default]
+        missing += [other for other in others if other not in tried and other not in BEYOND]
+        if field.name not in {name for name, _ in tried}:
+            missing.append((field.name, "any"))
+    return missing
+
+
+def test_no_reading_is_forgotten():
+    assert forgotten(Config, READINGS) == []
+    assert not any((name, value) in BEYOND for _, change in ALONE for name, value in change.items())
+
+
+def test_readings_have_the_numbers_that_the_configuration_gives_them():
+    body = ast.parse(inspect.getsource(Config)).body[0].body
+    number = {
+        field.target.id: re.match(r"R\d+", text.value.value)[0]
+        for field, text in itertools.pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and text.value.value.startswith("R")
+    }
+    assert len(number) > 15 and all(number[name] == key for key, change in ALONE for name in change)
+    assert list(READINGS) == sorted(READINGS, key=lambda key: int(key[1:]))
+    assert set(number.values()) == set(READINGS)
+
+
+def test_each_reading_changes_one_field_to_another_value():
+    default = paper_preset(SIMPLEGOAL)
+    for _, change in ALONE:
+        ((name, value),) = change.items()
+        assert getattr(default, name) != value and getattr(paper_preset(MOUNTAINCAR), name) == getattr(default, name)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_variants_are_experiments_that_differ(task):
+    tried = interpretations.variants()
+    configs = {name: dataclasses.replace(paper_preset(task), **change) for name, change in tried.items()}
+    assert next(iter(tried)) == "default" and configs["default"] == paper_preset(task)
+    assert len(set(configs.values())) == len(configs) == 1 + len(ALONE) + 1 + 18
+    found = interpretations.experiments(tried)
+    assert found.keys() == {(name, task) for name in tried for task in TASKS}
+    usual = paper_experiment(task)
+    for name, config in configs.items():
+        assert found[name, task].provenance == dataclasses.replace(usual, config=config).provenance
+
+
+def test_combinations_take_all_their_parts():
+    tried = interpretations.variants()
+    assert tried["R3 + R4 + R7 zeros"] == {"split_metric": "euclidean", "one_split": True, "initial": "zeros"}
+    combined = {frozenset(name.split(" + ")) for name in tried if " + " in name}
+    every = {frozenset(c) for size in range(2, 6) for c in itertools.combinations(interpretations.FACTORS, size)}
+    assert combined == {chosen for chosen in every if not {"R2", "R4"} <= chosen} and len(every - combined) == 8
+    assert all(any(change == factor for _, change in ALONE) for factor in interpretations.FACTORS.values())
+
+
+def test_the_algorithms_as_printed_are_readings_that_are_tried_alone_too():
+    alone = {name: value for _, change in ALONE for name, value in change.items() if name in AS_PRINTED}
+    assert all(any(change == {name: value} for _, change in ALONE) for name, value in AS_PRINTED.items())
+    assert alone.keys() == AS_PRINTED.keys() and interpretations.variants()["algorithms as printed"] is AS_PRINTED
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_after_one_split_the_second_look_up_says_nothing(seed):
+    """So R2 with R4 is R4 alone; with many splits per pass R2 makes another policy."""
+
+    def policies(**changes):
+        for lookup in ("kept", "refreshed"):
+            config = tiny(n_epochs=60, n_freeze=5, max_pol_loss=1e-3, split_lookup=lookup, **changes)
+            policy, _ = distill(CurvedTeacher(), SIMPLEGOAL, config, seed=seed)
+            yield policy.codewords.tobytes() + policy.coefficients.tobytes()
+
+    kept, refreshed = policies(one_split=True)
+    assert kept == refreshed
+    kept, refreshed = policies(one_split=False)
+    assert kept != refreshed
+
+
+# How far from the paper
+
+
+def test_standing_by_hand():
+    policies, teacher = {"mean": 12.0, "q1": 9.0, "q3": 14.0, "std": 2 * np.e}, {"mean": 10.0, "std": 2.0, "q1": 0}
+    assert interpretations.standing(policies, teacher) == pytest.approx({"mean": 1, "q1": -0.5, "q3": 2, "std": 1})
+
+
+def test_distance_by_hand():
+    one, other = {"mean": 1.0, "q1": 0.0, "q3": 2.0, "std": -1.0}, {"mean": 0.0, "q1": 0.0, "q3": 0.0, "std": 1.0}
+    assert distance(one, other) == distance(other, one) == pytest.approx(np.sqrt((1 + 0 + 4 + 4) / 4))
+    assert distance(one, one) == 0
+
+
+def test_landmarks_by_hand():
+    """SimpleGoal from T5. On MountainCar the bounds 93.313 and 94.130 lie four interquartile ranges apart: 0.20425."""
+    assert landmarks(SIMPLEGOAL) == pytest.approx({
+        "mean": (12.657 - 16.599) / 3.117, "q1": (12.298 - 16.599) / 3.117, "q3": (17.646 - 16.599) / 3.117,
+        "std": np.log(8.436 / 3.117),
+    })  # fmt: skip
+    found = landmarks(MOUNTAINCAR)
+    q1, q3 = 93.313 + 1.5 * 0.20425, 94.130 - 1.5 * 0.20425
+    assert fences(q1, q3) == pytest.approx((93.313, 94.130))
+    assert found == pytest.approx({
+        "mean": (93.534 - 93.481) / 0.075, "q1": (q1 - 93.481) / 0.075, "q3": (q3 - 93.481) / 0.075,
+        "std": np.log(1.345 / 0.075),
+    })  # fmt: skip
+    assert found["q1"] > 0  # not T6's quartiles, which repeat the teacher's
+
+
+# The study
+
+TINY = tiny(n_epochs=30, n_freeze=5)
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+FEW = {"choosing": range(2), "confirming": range(10, 13)}  # seeds
+TRIED = {"default": {}, "one split": {"one_split": True}, "zeros": {"initial": "zeros"}, "box": {"scale": "box"}}
+
+
+@cache
+def teacher_outcomes(task):
+    return rollout_from_seed(TEACHERS[task], task, seed=EVALUATION_SEED)
+
+
+def fewer_resamples(returns, *, n_resamples):
+    assert n_resamples == interpretations.N_RESAMPLES == 1000
+    return resample(returns, n_resamples=100)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """The study with tiny runs of a few seeds, 100 resamples, and one variant confirmed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(interpretations, "CHOOSING", FEW["choosing"])
+        patch.setattr(interpretations, "CONFIRMING", FEW["confirming"])
+        patch.setattr(interpretations, "N_CONFIRMED", 1)
+        patch.setattr(interpretations, "paper_experiment", lambda task: Experiment(task, TINY, TEACHERS[task], 20))
+        patch.setattr(interpretations, "rollout_from_seed", lambda teacher, task, *, seed: teacher_outcomes(task))
+        patch.setattr(interpretations, "resample", fewer_resamples)
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def made(small, tmp_path_factory):
+    runs = tmp_path_factory.mktemp("study")
+    return runs, study(runs, tried=TRIED)
+
+
+def as_bytes(frame):
+    return frame.to_csv(index=False).encode()
+
+
+def test_the_study_has_a_row_per_phase_variant_and_task(made):
+    frame = made[1]
+    chosen, confirmed = (frame[frame["phase"] == phase] for phase in ("choosing", "confirming"))
+    assert len(chosen) + len(confirmed) == len(frame)
+    assert not frame.duplicated(["phase", "variant", "task"]).any() and set(frame["task"]) == {*TASKS, "both"}
+    assert list(dict.fromkeys(chosen["variant"])) == list(TRIED)
+    first = next(name for name in ranking(chosen) if name != "default")
+    nearest = {"default", first, *(ranking(chosen, task)[0] for task in TASKS)}
+    assert set(confirmed["variant"]) == nearest and len(chosen) == 3 * 4 and len(confirmed) == 3 * len(nearest)
+    single = frame[frame["task"] != "both"]
+    assert single["runs"].tolist() == [2] * 8 + [3] * 2 * len(nearest)
+    assert frame[frame["task"] == "both"][["settings", "teacher", "version"]].isna().all(axis=None)
+    assert set(single["version"]) == {1} and single["settings"].nunique() == len(single)
+
+
+@pytest.mark.parametrize("best", ["default", "box"])
+def test_the_default_is_confirmed_whatever_its_rank(small, made, monkeypatch, best):
+    order = [best, *(name for name in TRIED if name != best)]
+    monkeypatch.setattr(interpretations, "ranking", lambda frame, task="both": order if task == "both" else order[::-1])
+    frame = study(made[0], tried=TRIED)
+    confirmed = frame[frame["phase"] == "confirming"]["variant"]
+    first = next(name for name in order if name != "default")
+    assert list(dict.fromkeys(confirmed)) == ["default", first, order[-1]]  # the nearest of each task too
+
+
+def played(runs, task, change, seeds):
+    experiment = Experiment(task, dataclasses.replace(TINY, **change), TEACHERS[task], 20)
+    return experiment, load_runs(experiment, seeds, runs=runs)
+
+
+@pytest.mark.parametrize(("phase", "seeds"), FEW.items())
+@pytest.mark.parametrize("task", TASKS)
+def test_a_row_says_what_its_runs_came_to(made, phase, seeds, task):
+    runs, frame = made
+    names = ["default", "box"] if phase == "choosing" else ["default"]
+    rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant")
+    own = spread(teacher_outcomes(task).returns)
+    for name in names:
+        experiment, found = played(runs, task, TRIED[name], seeds)
+        row, returns = rows.loc[name], np.stack([run.outcomes.returns for run in found])
+        cells = [len(run.policy) for run in found]
+        assert dict(row[["settings", "teacher", "version"]]) == interpretations.provenance_of(experiment, seeds)
+        assert row["runs"] == len(seeds)
+        assert (row["cells"], row["cells_min"], row["cells_max"]) == (np.mean(cells), min(cells), max(cells))
+        facts = spread(returns)
+        for name in ("mean", "std", "q1", "median", "q3"):
+            assert row[name] == pytest.approx(facts[name])
+        low, high = interval(returns, np.mean, n_resamples=100)
+        assert (row["mean_low"], row["mean_high"]) == pytest.approx((low, high))
+        assert row[["goal", "pit", "truncated"]].sum() == pytest.approx(1)
+        assert row["pit"] == np.mean([run.outcomes.outcomes == base.PIT for run in found])
+        assert row["runs_above_teacher"] == np.mean(returns.mean(axis=1) > own["mean"])
+        assert row["distance"] == pytest.approx(distance(interpretations.standing(facts, own), landmarks(task)))
+        draws = np.random.default_rng(0).integers(len(returns), size=(100, len(returns)))
+        away = [distance(interpretations.standing(spread(returns[draw]), own), landmarks(task)) for draw in draws]
+        assert (row["distance_low"], row["distance_high"]) == pytest.approx(np.percentile(away, [2.5, 97.5]))
+
+
+def test_distances_of_both_tasks_are_averaged_and_gaps_are_to_the_default(made):
+    for _, rows in made[1].groupby("phase"):
+        joint = rows[rows["task"] == "both"].set_index("variant")
+        each = rows[rows["task"] != "both"].groupby("variant")["distance"].mean()
+        assert joint["distance"].to_dict() == pytest.approx(each.to_dict())
+        assert joint["gap"].to_dict() == pytest.approx((each - each["default"]).to_dict())
+        assert (joint.loc["default", ["gap", "gap_low", "gap_high"]] == 0).all()
+        assert (joint["gap_low"] <= joint["gap_high"]).all()
+        assert rows[rows["task"] != "both"]["gap"].isna().all()
+
+
+def test_gaps_are_taken_resample_by_resample():
+    """Two variants whose distances always differ by 1: the gap is certain although neither distance is."""
+    away = np.random.default_rng(0).normal(5, 1, 101)
+    frame = interpretations._joint("x", {("default", "t"): away, ("other", "t"): away + 1}, ["t"]).set_index("variant")
+    assert frame.loc["other", ["gap", "gap_low", "gap_high"]].tolist() == pytest.approx([1, 1, 1])
+    assert frame.at["other", "distance"] == away[0] + 1
+    low, high = np.percentile(away[1:], [2.5, 97.5])
+    assert frame.loc["default", ["distance_low", "distance_high"]].tolist() == pytest.approx([low, high])
+    assert high - low > 3
+
+
+def test_a_resumed_study_makes_no_run_again(small, made, monkeypatch):
+    asked, original = [], make_run
+    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: (asked.append(seed), original(e, seed))[1])
+    assert as_bytes(study(made[0], tried=TRIED)) == as_bytes(made[1]) and not asked
+    one, _ = played(made[0], SIMPLEGOAL, TRIED["box"], FEW["choosing"])
+    (one.folder(made[0]) / "0001.run").unlink()
+    assert as_bytes(study(made[0], tried=TRIED)) == as_bytes(made[1]) and asked == [1]
+
+
+def test_seeds_that_rank_are_not_those_that_check():
+    seeds = [*CHOOSING, *CONFIRMING, *range(max(N_RUNS.values()))]
+    assert len(set(seeds)) == len(seeds) and min(len(CHOOSING), len(CONFIRMING)) >= 10
+
+
+# What is shown
+
+FRAME = pd.DataFrame(
+    [
+        ("choosing", "default", "both", 2.0, 1.5, 2.5), ("choosing", "default", SIMPLEGOAL, 1.0, 0.9, 1.1),
+        ("choosing", "a", "both", 3.0, 2.5, 3.5), ("choosing", "a", SIMPLEGOAL, 0.5, 0.4, 0.6),
+        ("choosing", "b", "both", 1.0, 0.5, 1.5), ("choosing", "b", SIMPLEGOAL, 1.5, 1.4, 1.6),
+        ("confirming", "default", "both", 7.0, 6.0, 9.0), ("confirming", "a", "both", 8.0, 7.0, 9.0),
+    ],
+    columns=["phase", "variant", "task", "distance", "distance_low", "distance_high"],
+)  # fmt: skip
+
+
+def test_the_ranking_goes_by_the_distance():
+    chosen = FRAME[FRAME["phase"] == "choosing"]
+    assert ranking(chosen) == ["b", "default", "a"] and ranking(chosen, SIMPLEGOAL) == ["a", "default", "b"]
+    tied = chosen.assign(distance=1.0)
+    assert ranking(tied) == ["default", "a", "b"]  # as they were tried
+
+
+def test_intervals_are_those_of_the_choosing_phase():
+    found = as_intervals(FRAME, "both", "distance")
+    assert found.columns.tolist() == ["here", "low", "high"] and found.index.tolist() == ["default", "a", "b"]
+    assert found.loc["b"].tolist() == [1.0, 0.5, 1.5] and found.loc["default"].tolist() == [2.0, 1.5, 2.5]
+
+
+@pytest.fixture(scope="module")
+def committed():
+    return read_results("readings")
+
+
+def test_all_readings_alone_are_shown_and_the_nearest_combinations(committed):
+    shown = interpretations.shown_variants(committed, n_combinations=3)
+    alone = [f"{number} {interpretations.name_of(change)}" for number, change in ALONE]
+    assert shown[:-3] == ["default", *alone, "algorithms as printed"] and all(" + " in name for name in shown[-3:])
+    chosen = committed[committed["phase"] == "choosing"]
+    away = chosen[chosen["task"] == "both"].set_index("variant")["distance"]
+    combined = away[away.index.str.contains(r" \+ ")].sort_values()
+    assert shown[-3:] == combined.index[:3].tolist()
+    assert len(interpretations.shown_variants(committed)) == len(alone) + 2 + 4
+    assert set(shown) <= set(as_intervals(committed, "both", "distance").index)
+
+
+def test_the_brief_table_has_the_tasks_side_by_side(committed):
+    frame, chosen = interpretations.interpretation_summary(committed), committed[committed["phase"] == "choosing"]
+    assert frame["variant"].tolist() == ranking(chosen) and set(frame["variant"]) == set(interpretations.variants())
+    columns = ["cells", "mean", "std", "failing (%)", "distance"]
+    expected = [f"{task} {name}" for name in columns for task in ("SG", "MC")]
+    assert frame.columns.tolist() == ["variant", *expected, "BOTH distance"]
+    by_name = frame.set_index("variant")
+    for row in chosen.itertuples():
+        prefix = {SIMPLEGOAL: "SG", MOUNTAINCAR: "MC", "both": "BOTH"}[row.task]
+        assert by_name.at[row.variant, f"{prefix} distance"] == round(row.distance, 3)
+        if prefix != "BOTH":
+            assert by_name.at[row.variant, f"{prefix} cells"] == row.cells
+            failing = 100 * (row.pit + row.truncated)
+            assert by_name.at[row.variant, f"{prefix} failing (%)"] == pytest.approx(failing, abs=6e-4)
+
+
+def test_panels_show_columns_with_an_interval(committed):
+    shown = interpretations.shown_variants(committed)
+    for task, column, label, (left, right) in interpretations.PANELS:
+        found = as_intervals(committed, task, column)
+        assert label and found.notna().all(axis=None) and (found["low"] <= found["high"]).all()
+        inside = found.loc[shown, "here"].between(left, right)
+        assert inside.all(), inside[~inside]
+        again = as_intervals(committed, task, column, "confirming")
+        assert again.loc["default"].between(left, right).all()

@@ -1,0 +1,456 @@
+import dataclasses
+import re
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.stats import trim_mean
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
+
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import audit, ledger, tables
+from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, VERDICTS, largest_gaps, results_of, verdict
+from vsp.paper.printed import PREFIX, printed_values, spread_id
+from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
+from vsp.paper.statistics import interval
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Outcomes
+from vsp.run.notebook import nbformat
+from vsp.tasks import mountaincar, registry, simplegoal
+from vsp.tasks.base import GOAL, PIT, TRUNCATED
+from vsp.tasks.registry import _TASKS, get_task
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULT = "_spread_|_drl_|_ours_"  # what the ids of the results in text and tables hold
+SEEDS, N_RESAMPLES = range(4), 40
+
+
+def experiment(task):
+    """The shipped teacher, 60 iterations, 40 episodes."""
+    quick = paper_experiment(task, quick=True)
+    config = dataclasses.replace(quick.config, n_epochs=60, n_freeze=10, n_split=10)
+    return dataclasses.replace(quick, config=config, n_episodes=40)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Tiny runs of both tasks."""
+    runs, found = tmp_path_factory.mktemp("runs"), {}
+    for task in TASKS:
+        one = experiment(task)
+        teacher = rollout_from_seed(one.teacher, task, one.n_episodes, seed=EVALUATION_SEED)
+        found[task] = Results(one, make_runs(one, SEEDS, runs=runs), teacher)
+    return found
+
+
+@pytest.fixture(scope="module")
+def book(results):
+    return ledger.ledger_table(results, n_resamples=N_RESAMPLES)
+
+
+@pytest.fixture(scope="module")
+def by_id(book):
+    return book.set_index("id")
+
+
+def as_bytes(frame):
+    return frame.to_csv().encode()
+
+
+# Every printed value has its row
+
+
+def test_every_printed_value_has_one_row_a_verdict_and_a_cell(book):
+    assert book[["id", "paper"]].equals(printed_values()[["id", "paper"]]) and book["id"].is_unique
+    assert set(book["verdict"]) <= set(VERDICTS) and book["cell"].str.strip().ne("").all()
+    assert book.columns.tolist() == ledger.COLUMNS
+
+
+def test_every_result_of_text_and_tables_is_computed_here(book, results):
+    ids = set(book["id"][book["id"].str.contains(RESULT)])
+    computed = [ledger.measured(task, results[task], n_resamples=2).index for task in TASKS]
+    assert not ids.difference(*computed, ledger._settings(results))
+
+
+def test_the_values_that_nothing_here_compares_with_are_these(book):
+    rows = book[book["here"].isna() & ~book["id"].str.contains("_cell_|_outliers_")]
+    assert rows["id"].tolist() == [
+        "voronoi_example_codewords", "trajectory_buffer_iterations", "action_dimensions", "machine_chip",
+        "machine_memory", "pytorch_version", "python_version", "sg_table_digits", "mc_table_digits",
+    ]  # fmt: skip
+    assert set(rows["verdict"]) == {UNCHECKED, CONTRADICTED}
+    assert set(book[book["id"].str.contains("_cell_")]["verdict"]) == {UNCHECKED}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_text_and_table_print_is_one_result(book, by_id, task):
+    shown = set(results_of(book, task)["id"])
+    text = by_id.index[by_id.index.str.match(f"{PREFIX[task]}_(drl|ours)_")]
+    twins = {id: f"{id[:2]}_spread{id[2:]}" for id in text}
+    for id, twin in twins.items():
+        assert (id in shown) != (twin in shown)
+        if twin in by_id.index:
+            assert by_id.loc[id, ["here", "low", "high"]].equals(by_id.loc[twin, ["here", "low", "high"]])
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_results_of_a_task_are_there_once_the_teachers_first(book, task):
+    rows = results_of(book, task)
+    assert rows["subject"].tolist() == sorted(rows["subject"]) and set(rows["subject"]) == {"DRL", "Ours"}
+    assert rows["id"].str.startswith(PREFIX[task]).all() and rows["id"].is_unique
+    for _, part in rows.groupby("subject"):
+        table = part["id"].str.contains("_spread_").tolist()
+        assert table == sorted(table, reverse=True)  # what the table prints comes before what the text adds
+    assert not rows["id"].str.contains("caption|_text_|_hyper_|_cell_").any()
+    text = rows["id"][~rows["id"].str.contains("_spread_")]
+    assert len(rows) == 2 * 9 + len(text) and f"{PREFIX[task]}_cells" in set(text)
+    assert len(text) == {SIMPLEGOAL: 5 + 5, MOUNTAINCAR: 1 + 9}[task] + 1  # what the text says of outliers
+
+
+def test_parts_are_settings_results_and_coefficients(book):
+    """A result is something with an interval, or something of which nothing was there to be measured."""
+    results = book[book["part"] == "results"]
+    assert (results["low"].notna() == results["here"].notna()).all()
+    assert book[book["part"] != "results"]["low"].isna().all() and book["low"].isna().equals(book["high"].isna())
+    assert (book["part"].eq("coefficients") == book["id"].str.contains("_cell_")).all()
+    assert set(book["part"]) == {"settings", "results", "coefficients"}
+
+
+def test_counts_by_hand():
+    part = ["settings", "results", "results", "coefficients"]
+    table = ledger.verdict_counts(pd.DataFrame({"part": part, "verdict": [REPRODUCED, DIFFERS, DIFFERS, UNCHECKED]}))
+    assert table.index.tolist() == ["settings", "results", "coefficients"] and table.columns.tolist() == list(VERDICTS)
+    assert table.to_numpy().tolist() == [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]]
+
+
+def notebook_cells():
+    found = {}
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        cells = nbformat.read(path, as_version=4).cells
+        found[path.stem[:2]] = {cell.id for cell in cells if cell.cell_type == "code"}
+    return found
+
+
+def test_cells_are_cells_of_the_notebooks_that_hold_code(book):
+    cells = notebook_cells()
+    for place in book["cell"].unique():
+        number, id = re.fullmatch(r"(\d\d), ([\w-]+)", place).groups()
+        assert id in cells[number], place
+
+
+@pytest.mark.parametrize(
+    ("cell", "ids"),
+    [
+        ("04, text-numbers", ["sg_ours_mean", "mc_drl_outliers"]),
+        ("04, simplegoal-spread", ["sg_spread_drl_q1"]),
+        ("04, mountaincar-spread", ["mc_spread_ours_coverage"]),
+        ("04, hyperparameters", ["mc_hyper_n_split"]),
+        ("03, runs", ["sg_caption_policies", "mc_text_drl_episodes"]),
+        ("03, best", ["sg_caption_cells", "mc_cells"]),
+        ("05, replay", ["mc_cell_1_F_x"]),
+        ("05, ledger", ["sg_goal_reward", "state_dimensions"]),
+        ("01, scores", ["sg_training_steps"]),
+    ],
+)
+def test_cells_by_hand(cell, ids):
+    assert {ledger.cell(id) for id in ids} == {cell}
+
+
+# The rules
+
+
+def row(paper, here, low=np.nan, high=np.nan, value=None):
+    value = float(paper.rstrip("%")) if value is None else value
+    return SimpleNamespace(paper=paper, value=value, here=here, low=low, high=high)
+
+
+ROOT2 = np.sqrt(2)
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        (row("M2", np.nan, value=np.nan), UNCHECKED),
+        (row("13", np.nan), UNCHECKED),
+        (row("1000", 1000.0), REPRODUCED),
+        (row("1000", 999.0), DIFFERS),
+        (row("0.1", 0.1 + 1e-12), REPRODUCED),  # a setting found by taking a step
+        (row("0.1", 0.1001), DIFFERS),
+        (row("0", 0.0), REPRODUCED),
+        (row("-0.1", 0.1), DIFFERS),
+        (row("no", 0.0, 0.0, 0.0, value=0.0), REPRODUCED),
+        (row("no", 1.0, 0.0, 1.0, value=0.0), REPRODUCED),
+        # the interval [9, 12] of 10.00 reaches from 10 - √2 to 10 + 2 √2, and half a unit of 0.001 further
+        (row("8.586", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("8.585", 10.0, 9.0, 12.0), DIFFERS),
+        (row("12.828", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("12.829", 10.0, 9.0, 12.0), DIFFERS),
+        (row("9", 10.0, 9.0, 12.0), REPRODUCED),
+        (row("8", 10.0, 9.0, 12.0), DIFFERS),  # up to 8.086 without decimals
+        (row("12.9%", 10.0, 9.0, 12.0), DIFFERS),  # 12.85 and more, against 12.828
+        (row("12.8%", 10.0, 9.0, 12.0), REPRODUCED),
+        # no width: half a unit alone
+        (row("10.00", 10.004, 10.004, 10.004), REPRODUCED),
+        (row("10.00", 10.006, 10.006, 10.006), DIFFERS),
+        (row("10.0", 10.006, 10.006, 10.006), REPRODUCED),
+        (row("-11.790", -10.0, -10.5, -9.0), DIFFERS),
+    ],
+)
+def test_verdicts_by_hand(row, expected):
+    assert verdict(row) == expected
+    assert verdict(row, in_doubt=True) == CONTRADICTED
+
+
+@pytest.mark.parametrize(
+    ("printed", "unit"), [("12.30", 0.01), ("86.17%", 0.01), ("100", 1), ("100%", 1), ("-10.0", 0.1), ("no", 1)]
+)
+def test_the_last_digit_by_hand(printed, unit):
+    assert ledger.last_digit(printed) == pytest.approx(unit)
+
+
+def test_verdicts_of_the_book_are_those_of_the_rules(book):
+    doubted = audit.in_doubt()
+    assert book["id"][book["verdict"] == CONTRADICTED].tolist() == [id for id in book["id"] if id in doubted]
+    values = printed_values().set_index("id")["value"]
+    for found in book.itertuples():
+        as_row = row(found.paper, found.here, found.low, found.high, value=values[found.id])
+        assert found.verdict == verdict(as_row, in_doubt=found.id in doubted), found.id
+
+
+# Settings
+
+
+def test_settings_are_those_of_the_code(by_id):
+    """All that the tasks and T2 fix, and the counts of the tiny runs."""
+    counts = {f"{prefix}_{place}policies": 4 for prefix in ("sg", "mc") for place in ("", "caption_", "text_")}
+    assert {id: by_id.at[id, "here"] for id in counts} == counts
+    assert by_id.loc[["sg_total_episodes", "episodes_per_policy", "mc_caption_drl_episodes"], "here"].tolist() == [
+        160, 40, 40,
+    ]  # fmt: skip
+    tiny = "_policies|episodes|algorithm_runs|" + RESULT + "|_cells|_cell_"
+    fixed = by_id[~by_id.index.str.contains(tiny) & by_id["here"].notna()]
+    assert fixed.index[fixed["verdict"] != REPRODUCED].tolist() == ["mc_max_steps"]  # Gymnasium's 999 for 1000
+    assert len(fixed) == 3 + 16 + 11 + 2 * 9 and fixed["low"].isna().all()
+    assert fixed.at["mc_goal_position", "here"] == 0.45 and fixed.at["mc_force_reward_exponent", "here"] == 2
+    assert fixed.at["sg_training_steps", "here"] == 500_000 and fixed.at["mc_hyper_max_pol_loss", "here"] == 1e-5
+
+
+def differing(results):
+    found = pd.Series(ledger._settings(results))
+    printed = printed_values().set_index("id").loc[lambda frame: frame.index.isin(found.index)]
+    same = np.isclose(found[printed.index], printed["value"], rtol=1e-9)
+    counts = printed.index.str.contains("_policies|episodes|algorithm_runs")
+    return printed.index[~same & ~counts].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda patch: patch(simplegoal, "GOAL_EDGE", 0.12), ["sg_goal_x_high", "sg_goal_y_high"]),
+        (lambda patch: patch(simplegoal, "PIT_LOW", 0.3), ["sg_pit_x_low", "sg_pit_y_low"]),
+        (lambda patch: alter(patch, SIMPLEGOAL, max_steps=51), ["sg_max_steps"]),
+        (lambda patch: alter(patch, MOUNTAINCAR, high=np.array([0.6, 0.08])), ["mc_velocity_high"]),
+        (
+            lambda patch: alter(patch, SIMPLEGOAL, step=partial(simplegoal.step, goal_reward="add")),
+            ["sg_goal_reward", "sg_pit_reward"],
+        ),
+        (
+            lambda patch: alter(patch, MOUNTAINCAR, step=lambda s, a: cost_of_the_cube(s, a)),
+            ["mc_force_reward_exponent"],
+        ),
+    ],
+    ids=["goal", "pit", "steps", "box", "reward", "cost"],
+)
+def test_another_setting_differs(results, monkeypatch, change, expected):
+    """What is compared is what the code does: rewards are found by taking a step."""
+    assert differing(results) == ["mc_max_steps"]
+    change(monkeypatch.setattr)
+    assert sorted(differing(results)) == sorted([*expected, "mc_max_steps"])
+
+
+def alter(patch, task, **changes):
+    patch(registry, "_TASKS", _TASKS | {task: dataclasses.replace(get_task(task), **changes)})
+
+
+def cost_of_the_cube(states, actions):
+    moved, rewards, codes = mountaincar.step(states, actions)
+    return moved, np.where(codes == GOAL, 100.0, 0.0) - 0.1 * np.abs(actions[:, 0]) ** 3, codes
+
+
+# Results
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_our_results_are_those_of_the_tables(book, by_id, results, task):
+    """Two routes: notebook 4 prints the same numbers."""
+    prefix, result = PREFIX[task], results[task]
+    frame = tables.spread_table(task, result.teacher_returns, result.returns).set_index("metric")
+    for metric in frame.index:
+        for who, column in (("drl", "TD3, here"), ("ours", "distilled, here")):
+            here = by_id.at[spread_id(task, who, metric), "here"]
+            assert here == pytest.approx(frame.at[metric, column], rel=1e-12)
+    text = tables.text_number_table(task, result.teacher_returns, result.returns, cells=len(result.best.policy))
+    text = text.set_index("id")["here"].astype(float)
+    ids = [id for id in text.index if id in by_id.index]
+    assert len(ids) > 15 and np.allclose(by_id.loc[ids, "here"].astype(float), text[ids], rtol=1e-12, equal_nan=True)
+    cells = by_id["here"][by_id.index.str.startswith(prefix) & by_id.index.str.endswith("_cells")]
+    assert len(cells) == {SIMPLEGOAL: 2, MOUNTAINCAR: 1}[task] and set(cells) == {text[f"{prefix}_cells"]}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_intervals_resample_runs_and_for_the_teacher_starts(results, task):
+    frame = ledger.measured(task, results[task], n_resamples=300)
+    result, prefix = results[task], PREFIX[task]
+    for subject, values in (("ours", result.returns), ("drl", result.teacher_returns[:, None])):
+        for name, statistic in (("mean", np.mean), ("median", np.median), ("min", np.min)):
+            row = frame.loc[spread_id(task, subject, name)]
+            assert (row["low"], row["high"]) == pytest.approx(interval(values, statistic, n_resamples=300))
+            assert row["low"] <= row["here"] <= row["high"]
+        covered = frame.loc[spread_id(task, subject, "coverage")]
+        assert 50 <= covered["low"] <= covered["high"] <= 100
+    assert frame.loc[f"{prefix}_ours_mean"].tolist() == frame.loc[f"{prefix}_spread_ours_mean"].tolist()
+
+
+def test_more_resamples_change_the_intervals_alone(book, results):
+    more = ledger.ledger_table(results, n_resamples=90)
+    same = ["id", "task", "where", "quantity", "subject", "paper", "here", "cell"]
+    assert as_bytes(more[same]) == as_bytes(book[same]) and not more["low"].equals(book["low"])
+
+
+def test_the_same_results_give_the_same_rows(book, results):
+    again = ledger.ledger_table(dict(reversed(results.items())), n_resamples=N_RESAMPLES)
+    assert as_bytes(again) == as_bytes(book)
+
+
+# Made by hand
+
+
+def run(seed, returns, *, codes=None, cells=1, validation=0.0):
+    returns = np.array(returns, dtype=float)
+    codes = np.full(len(returns), GOAL) if codes is None else np.array(codes)
+    codewords = np.linspace(0.0, 0.9, cells)[:, None] * np.ones(2)
+    policy = VoronoiPolicy(codewords, np.zeros((cells, 3, 2)), task=SIMPLEGOAL)
+    played = Outcomes(returns, np.ones(len(returns), dtype=int), codes)
+    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0, "a processor")
+
+
+TEACHER = Outcomes(np.array([5.0, 5.0, 5.0, 1.0]), np.ones(4, dtype=int), np.array([GOAL, GOAL, GOAL, TRUNCATED]))
+BY_HAND = Results(
+    SimpleNamespace(task=SIMPLEGOAL),
+    [
+        run(0, [6, 6, 6, 6], cells=3, validation=1.0),  # mean 6
+        run(1, [5, 5, 5, 2], cells=5, validation=3.0),  # mean 4.25: 1 of 4 beats the teacher
+        run(2, [4, 4, 4, 0], codes=[GOAL, PIT, PIT, TRUNCATED], cells=4, validation=2.0),  # mean 3: no episode
+        run(3, [9, 0, 9, 0], codes=[GOAL, PIT, GOAL, PIT], cells=9, validation=0.0),  # mean 4.5: 2 of 4
+    ],
+    TEACHER,
+)  # teacher: mean 4
+
+
+def test_what_the_paper_leaves_out_by_hand():
+    frame = ledger.left_out_by_quartiles(BY_HAND, n_resamples=200)
+    here = frame["here"].to_dict()
+    assert here == pytest.approx({
+        "interquartile mean of the runs": (4.25 + 4.5) / 2,
+        "probability that a run beats its teacher": 3 / 4,
+        "probability that an episode does": (4 + 1 + 0 + 2) / 16,
+        "share of episodes: goal": (4 + 4 + 1 + 2) / 16,
+        "share of episodes: pit": (2 + 2) / 16,
+        "share of episodes: truncated": 1 / 16,
+        "cells per run: lowest": 3, "cells per run: first quartile": 3.75, "cells per run: median": 4.5,
+        "cells per run: third quartile": 6, "cells per run: highest": 9,
+    })  # fmt: skip
+    teacher = frame["teacher"].dropna().to_dict()
+    assert teacher == {
+        "interquartile mean of the runs": 4, "share of episodes: goal": 0.75, "share of episodes: pit": 0,
+        "share of episodes: truncated": 0.25,
+    }  # fmt: skip
+
+
+def test_a_tie_beats_nobody():
+    same = dataclasses.replace(BY_HAND, runs=[run(0, TEACHER.returns), run(1, TEACHER.returns)])
+    here = ledger.left_out_by_quartiles(same, n_resamples=5)["here"]
+    assert here["probability that a run beats its teacher"] == here["probability that an episode does"] == 0
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_the_paper_leaves_out_has_its_intervals(results, task):
+    frame, means = ledger.left_out_by_quartiles(results[task], n_resamples=500), results[task].returns.mean(axis=1)
+    assert (frame["low"] <= frame["here"] + 1e-12).all() and (frame["here"] <= frame["high"] + 1e-12).all()
+    shares = frame[frame.index.str.startswith("share of episodes")]
+    assert len(shares) == {SIMPLEGOAL: 3, MOUNTAINCAR: 2}[task]  # MountainCar has no pit
+    assert shares[["here", "teacher"]].sum().tolist() == pytest.approx([1, 1])
+    found = frame.loc["interquartile mean of the runs"]
+    expected = interval(means, lambda drawn: trim_mean(drawn, 0.25), n_resamples=500)
+    assert found[["here", "low", "high"]].tolist() == pytest.approx([trim_mean(means, 0.25), *expected])
+    fewer = ledger.left_out_by_quartiles(results[task], n_resamples=60)
+    assert fewer["here"].equals(frame["here"]) and not fewer[["low", "high"]].equals(frame[["low", "high"]])
+
+
+def test_the_cells_of_the_best_run_are_those_of_the_best_on_the_validation_starts():
+    here, low, high = ledger._best_cells(BY_HAND)
+    assert here == 5 and low < 5 and high == 5  # runs 1, 2, 0, 3 in this order, of 5, 4, 3, 9 cells
+    draws = np.random.default_rng(0).integers(4, size=(10_000, 4))
+    best = [{1: 5, 2: 4, 0: 3, 3: 9}[min(drawn, key=[1, 2, 0, 3].index)] for drawn in draws]
+    assert (low, high) == tuple(np.percentile(best, [2.5, 97.5]))
+
+
+# Gaps
+
+
+def rows(*values):
+    frame = pd.DataFrame(values, columns=["id", "subject", "paper", "here", "low", "high", "verdict"])
+    numbers = frame["paper"].replace("no", "0").str.rstrip("%").astype(float)
+    return frame.assign(value=numbers, wide=frame["verdict"] == REPRODUCED)
+
+
+def test_gaps_by_hand():
+    found = largest_gaps(
+        rows(
+            ("sg_spread_drl_mean", "DRL", "12.0", 10.0, 9.0, 14.0, REPRODUCED),  # 2 of 4 upwards
+            ("sg_ours_whisker_low", "Ours", "7.0", 10.0, 9.0, 14.0, DIFFERS),  # 3 of 1 downwards
+            ("mc_spread_ours_min", "Ours", "-11.790", -10.0, -10.0, -10.0, DIFFERS),  # no width: half of 0.001
+            ("mc_drl_outliers", "DRL", "no", 3.0, 1.0, 4.0, REPRODUCED),
+            ("mc_ours_outliers_below_share", "Ours", "73.19%", 83.19, 73.19, 84.0, REPRODUCED),
+            ("sg_cells", "Ours", "13", 13.0, 12.0, 16.0, REPRODUCED),
+            ("sg_text_policies", "Ours", "40", 85.0, np.nan, np.nan, CONTRADICTED),  # a setting
+            ("sg_drl_outliers_max", "DRL", "10.364", np.nan, np.nan, np.nan, UNCHECKED),
+        )
+    )
+    assert found["gap"].to_dict() == pytest.approx({
+        "TD3: mean": 0.5, "distilled: lower bound": -3, "distilled: min": -1.79 / 0.0005, "TD3: outliers": -1.5,
+        "distilled: outliers below share": -1, "distilled: cells": 0,
+    })  # fmt: skip
+    assert found["verdict"].tolist() == [REPRODUCED, DIFFERS, DIFFERS, REPRODUCED, REPRODUCED, REPRODUCED]
+    assert found.index.name == "statistic" and found["wide"].tolist() == [True, False, False, True, True, True]
+
+
+NUMBERS = st.floats(-100, 100)
+
+
+@given(NUMBERS, st.floats(0, 20), st.floats(0, 20), st.integers(-100_000, 100_000), st.integers(0, 3))
+def test_what_lies_inside_the_band_is_reproduced(here, below, above, number, digits):
+    """The figure's band and the verdict agree, up to the half unit that the verdict adds."""
+    printed = f"{number / 10**digits:.{digits}f}"
+    assume(abs(float(printed)) < 200)
+    low, high = here - below, here + above
+    found = verdict(row(printed, here, low, high))
+    gap = largest_gaps(rows(("sg_ours_mean", "Ours", printed, here, low, high, found)))["gap"].item()
+    wide = (above if gap > 0 else below) > 0.5 * ledger.last_digit(printed)
+    if abs(gap) < (0.999 * ROOT2 if wide else 0.999):
+        assert found == REPRODUCED
+    if abs(gap) > 1.001 * ROOT2 + 1:
+        assert found == DIFFERS
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_gaps_of_the_book(book, task):
+    found, shown = largest_gaps(results_of(book, task)), results_of(book, task)
+    compared = shown[shown["low"].notna()]
+    assert len(found) == len(compared) > 18 and found.index.is_unique
+    assert found["verdict"].tolist() == compared["verdict"].tolist()

@@ -1,0 +1,349 @@
+import dataclasses
+import re
+import shutil
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import support
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, alive, network_teacher, same_arrays, until
+
+from vsp import config, distill
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import make_runs as command
+from vsp.paper import runs as runs_module
+from vsp.paper import tables
+from vsp.paper.beside import kept_comparison
+from vsp.paper.make_runs import main
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Results, load_runs, make_all, make_run, make_runs, paper_results
+from vsp.paper.statistics import spread
+from vsp.run import atomic, listed, workers
+from vsp.tasks.base import GOAL, PIT, TRUNCATED
+
+CONFIG = support.tiny(n_epochs=30, n_freeze=5)
+SMALL = runs_module.Experiment(SIMPLEGOAL, CONFIG, CurvedTeacher(), n_episodes=20)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Three runs, in a folder that tests only read."""
+    runs = tmp_path_factory.mktemp("runs")
+    return runs, make_runs(SMALL, range(3), runs=runs)
+
+
+def test_a_run_keeps_the_class_of_its_sub_policies(tmp_path):
+    for name in ("constant", "network"):
+        (run,) = make_runs(changed(config=dataclasses.replace(CONFIG, sub_policy=name)), [0], runs=tmp_path)
+        assert run.policy.policy_class.name == name and len(run.outcomes.returns) == 20
+
+
+def files(runs, experiment=SMALL):
+    return {path.name: path.read_bytes() for path in sorted(experiment.folder(runs).iterdir())}
+
+
+def changed(**changes):
+    return dataclasses.replace(SMALL, **changes)
+
+
+# Making runs
+
+
+def test_a_run_is_a_distillation_and_its_evaluation(made):
+    run = made[1][1]
+    policy, history = distill(SMALL.teacher, SIMPLEGOAL, CONFIG, seed=1)
+    seeds = EVALUATION_SEED, runs_module.VALIDATION_SEED
+    on_shared, on_validation = (rollout_from_seed(policy, SIMPLEGOAL, 20, seed=seed) for seed in seeds)
+    assert run.seed == 1 and EVALUATION_SEED != runs_module.VALIDATION_SEED
+    assert same_arrays(
+        (run.policy.codewords, policy.codewords), (run.policy.coefficients, policy.coefficients),
+        (run.outcomes.returns, on_shared.returns), (run.outcomes.lengths, on_shared.lengths),
+        (run.outcomes.outcomes, on_shared.outcomes), (run.cells, np.array(history.cells)),
+    )  # fmt: skip
+    assert run.validation_mean == on_validation.returns.mean() != on_shared.returns.mean()
+    assert (run.splits, run.merges) == tuple(sum(e.kind == k for e in history.events) for k in ("split", "merge"))
+
+
+def test_runs_come_in_the_order_of_the_seeds(made):
+    runs, in_order = made
+    assert [run.seed for run in in_order] == [0, 1, 2]
+    assert [run.seed for run in make_runs(SMALL, iter([2, 0]), runs=runs)] == [2, 0]
+
+
+@pytest.mark.parametrize(("jobs", "order"), [(1, [2, 1, 0]), (2, [0, 1, 2])])
+def test_workers_and_order_have_no_say_in_the_bytes(made, tmp_path, jobs, order):
+    make_runs(SMALL, order, runs=tmp_path, jobs=jobs)
+    assert files(tmp_path) == files(made[0])
+
+
+def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monkeypatch):
+    shutil.copytree(made[0], tmp_path / "runs")
+    (SMALL.folder(tmp_path / "runs") / "0001.run").unlink()
+    times = {p: p.stat().st_mtime_ns for p in SMALL.folder(tmp_path / "runs").iterdir()}
+    seeds, original = [], make_run
+    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: (seeds.append(seed), original(e, seed))[1])
+    make_runs(SMALL, range(3), runs=tmp_path / "runs")
+    assert seeds == [1] and files(tmp_path / "runs") == files(made[0])
+    assert all(path.stat().st_mtime_ns == time for path, time in times.items())
+    make_runs(SMALL, range(3), runs=tmp_path / "runs")
+    assert seeds == [1]
+
+
+OTHER = dataclasses.replace(SMALL, config=dataclasses.replace(CONFIG, n_split=5))
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_runs_of_several_experiments_are_those_made_one_by_one(made, tmp_path, jobs):
+    work = [(OTHER, 0), (SMALL, 2), (SMALL, 0), (OTHER, 3)]
+    assert make_all(iter(work), runs=tmp_path / "all", jobs=jobs, label="both") is None
+    make_runs(OTHER, [3, 0], runs=tmp_path / "one")
+    assert files(tmp_path / "all", OTHER) == files(tmp_path / "one", OTHER)
+    before = files(made[0])
+    assert files(tmp_path / "all") == {name: before[name] for name in ("0000.run", "0002.run")}
+
+
+def test_all_that_is_there_is_made_no_more(made, tmp_path, monkeypatch, capsys):
+    shutil.copytree(made[0], tmp_path, dirs_exist_ok=True)
+    asked, original = [], make_run
+    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: (asked.append((e, seed)), original(e, seed))[1])
+    make_all([(SMALL, 1), (SMALL, 2)], runs=tmp_path, label="a study")
+    assert not asked and capsys.readouterr().err == ""
+    make_all([(SMALL, 1), (OTHER, 1), (SMALL, 4)], runs=tmp_path, label="a study")
+    shown = capsys.readouterr().err
+    assert asked == [(OTHER, 1), (SMALL, 4)] and "a study" in shown and "3 of 3 runs" in shown
+    make_all([], runs=tmp_path, label="a study")
+    assert len(asked) == 2 and files(tmp_path).keys() == {f"000{seed}.run" for seed in (0, 1, 2, 4)}
+
+
+# Which runs belong to an experiment
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        changed(config=dataclasses.replace(CONFIG, n_reset=26)),
+        changed(config=dataclasses.replace(CONFIG, max_pol_loss=0.0200001)),
+        changed(config=dataclasses.replace(CONFIG, split_lookup="kept")),
+        changed(n_episodes=21),
+        changed(teacher=PumpingTeacher()),
+        changed(task=MOUNTAINCAR),
+    ],
+)
+def test_changed_settings_and_teachers_use_another_folder(made, other):
+    assert other.provenance != SMALL.provenance and other.folder(made[0]) != SMALL.folder(made[0])
+    with pytest.raises(FileNotFoundError, match="0000.run"):
+        load_runs(other, [0], runs=made[0])
+
+
+OF_A_RUN = {
+    "run": lambda experiment, runs: make_runs(experiment, [0], runs=runs),
+    "teacher": lambda experiment, runs: runs_module.teacher_outcomes(experiment, runs=runs),
+    "baselines": lambda experiment, runs: kept_comparison(
+        Results(experiment, make_runs(experiment, [0], runs=runs), runs_module.teacher_outcomes(experiment, runs=runs)),
+        1, runs=runs, jobs=1,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", OF_A_RUN)
+@pytest.mark.parametrize(
+    ("other", "why"),
+    [
+        (changed(task=MOUNTAINCAR, teacher=PumpingTeacher()), f"task '{MOUNTAINCAR}', expected '{SIMPLEGOAL}'"),
+        (changed(teacher=network_teacher(SIMPLEGOAL)), "teacher '.*', expected '.*'"),
+        (changed(n_episodes=19), "settings '.*', expected '.*'"),
+    ],
+)
+def test_a_file_of_another_experiment_is_refused(tmp_path, kind, other, why):
+    """Copied to the place of one of this experiment, with a checksum that fits."""
+    for experiment in (SMALL, other):
+        OF_A_RUN[kind](experiment, tmp_path)
+    name = "0000" if kind == "run" else kind
+    own, theirs = (next(one.folder(tmp_path).glob(f"{name}*.run")) for one in (SMALL, other))
+    shutil.copy(theirs, own)
+    with pytest.raises(
+        atomic.DamagedFile, match=f"^{re.escape(str(own))}: made with {why}: delete it, and it is made anew$"
+    ):
+        OF_A_RUN[kind](SMALL, tmp_path)
+    own.unlink()
+    OF_A_RUN[kind](SMALL, tmp_path)
+
+
+def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(runs_module, "VERSION", 7)
+        make_runs(changed(), [0], runs=tmp_path)
+        old = changed().folder(tmp_path)
+    shutil.copytree(old, SMALL.folder(tmp_path))
+    with pytest.raises(atomic.DamagedFile, match="0000.run: made with version 7, expected 1: delete it"):
+        load_runs(SMALL, [0], runs=tmp_path)
+
+
+def test_a_run_under_the_name_of_another_seed_is_refused(made, tmp_path):
+    shutil.copytree(made[0], tmp_path / "runs")
+    folder = SMALL.folder(tmp_path / "runs")
+    shutil.copy(folder / "0000.run", folder / "0005.run")
+    with pytest.raises(atomic.DamagedFile, match="0005.run: made with seed 0, expected 5"):
+        load_runs(SMALL, [5], runs=tmp_path / "runs")
+
+
+def test_a_damaged_run_is_named(made, tmp_path):
+    shutil.copytree(made[0], tmp_path / "runs")
+    path = SMALL.folder(tmp_path / "runs") / "0001.run"
+    content = path.read_bytes()
+    for damaged in (content[:-1], b"", content[:300] + bytes([content[300] ^ 4]) + content[301:]):
+        path.write_bytes(damaged)
+        with pytest.raises(atomic.DamagedFile, match="0001.run: SHA-256"):
+            make_runs(SMALL, [0, 1], runs=tmp_path / "runs")
+
+
+def test_a_failing_run_writes_nothing_and_keeps_the_others(tmp_path, monkeypatch):
+    original = make_run
+
+    def fails(experiment, seed):
+        if seed == 1:
+            raise ValueError("the policy's actions hold nan")
+        return original(experiment, seed)
+
+    monkeypatch.setattr(runs_module, "make_run", fails)
+    with pytest.raises(ValueError, match="hold nan"):
+        make_runs(SMALL, [0, 1], runs=tmp_path)
+    assert list(files(tmp_path)) == ["0000.run"]
+
+
+# What is made of runs
+
+
+@pytest.fixture(scope="module")
+def results(made):
+    return Results(SMALL, made[1], rollout_from_seed(SMALL.teacher, SIMPLEGOAL, 20, seed=EVALUATION_SEED))
+
+
+def test_results_gather_what_figures_need(results, made):
+    assert results.returns.shape == results.outcomes.shape == (3, 20) and results.teacher_returns.shape == (20,)
+    assert np.array_equal(results.outcomes[1], made[1][1].outcomes.outcomes)
+
+
+def test_best_goes_by_the_validation_starts_and_then_by_the_seed(results):
+    ranked = zip(results.runs, (1.0, 3.0, 3.0))
+    first, second, third = (dataclasses.replace(run, validation_mean=mean) for run, mean in ranked)
+    most = dataclasses.replace(first, outcomes=dataclasses.replace(first.outcomes, returns=np.full(20, 1e6)))
+    for runs in ([most, second, third], [third, second, most]):
+        assert dataclasses.replace(results, runs=runs).best.seed == 1
+
+
+def test_quick_results_of_the_paper(tmp_path, monkeypatch):
+    monkeypatch.setattr(runs_module, "QUICK_RUNS", 1)
+    found = paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1)
+    again = rollout_from_seed(found.experiment.teacher, SIMPLEGOAL, 100, seed=EVALUATION_SEED)
+    assert found.returns.shape == (1, 100) and np.array_equal(found.teacher_returns, again.returns)
+    monkeypatch.setattr(runs_module, "rollout_from_seed", None)  # what is kept is not played again
+    kept = paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1).teacher_outcomes
+    assert same_arrays((kept.returns, again.returns), (kept.lengths, again.lengths), (kept.outcomes, again.outcomes))
+
+
+@pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
+def test_the_papers_experiment(task):
+    paper, quick = runs_module.paper_experiment(task), runs_module.paper_experiment(task, quick=True)
+    assert paper.config == config.paper_preset(task) and paper.n_episodes == 1000
+    assert quick.config == paper.config.quick() and quick.n_episodes == 100 and quick.provenance != paper.provenance
+    assert N_RUNS == {SIMPLEGOAL: 85, MOUNTAINCAR: 40}
+    with pytest.raises(ValueError, match="no preset for task 'Pendulum-v1', expected one of"):
+        paper_results("Pendulum-v1", runs="unused")
+
+
+def test_overview_and_comparison_by_hand(results):
+    table = tables.run_overview(results)
+    cells = [len(run.policy) for run in results.runs]
+    assert table.loc["cells"].tolist() == [np.mean(cells), min(cells), max(cells)]
+    facts = tables.teacher_beside_runs(results)
+    means = results.returns.mean(axis=1)
+    assert facts["TD3, mean"] == results.teacher_returns.mean() and facts["lowest run"] == means.min()
+    assert facts["95 % interval from"] <= facts["distilled, mean"] <= facts["to"]
+    gap = facts["distilled, mean"] - facts["TD3, mean"]
+    assert facts["difference, from"] <= gap <= facts["difference, to"]
+    assert facts["runs above TD3"] == np.mean([mean > facts["TD3, mean"] for mean in means])
+    independent = 1.96 * results.returns.std(ddof=1) / np.sqrt(60)
+    assert facts["± if independent"] == pytest.approx(independent)
+
+
+def test_summary_tells_each_run(results):
+    frame = tables.run_summary(results.runs, SMALL)
+    assert frame["seed"].tolist() == [0, 1, 2]
+    assert (frame[list(SMALL.provenance)] == list(SMALL.provenance.values())).all(axis=None)
+    assert np.allclose(frame[["goal", "pit", "truncated"]].sum(axis=1), 1)
+    for row, run in zip(frame.to_dict("records"), results.runs):
+        assert row["cells"] == len(run.policy) == 1 + row["splits"] - row["merges"]
+        assert {name: row[name] for name in spread(run.outcomes.returns)} == spread(run.outcomes.returns)
+        for name, code in {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}.items():
+            assert row[name] == np.mean(run.outcomes.outcomes == code)
+
+
+def test_write_summary_keeps_a_row_per_run_and_where_it_was_made(results, tmp_path):
+    mixed = dataclasses.replace(results, runs=[dataclasses.replace(results.runs[0], cpu="other"), *results.runs[1:]])
+    tables.write_summary(mixed, out=tmp_path)
+    folder = tmp_path / "data" / "results"
+    frame = listed.read_table(folder / f"{SIMPLEGOAL}.csv")
+    pd.testing.assert_frame_equal(frame, tables.run_summary(results.runs, SMALL), check_dtype=False, atol=1e-6, rtol=0)
+    made_on = listed.read_listed(folder / "made_on.txt")
+    assert made_on.decode().splitlines() == sorted({"other", results.runs[1].cpu})
+
+
+# The command
+
+
+def test_the_command_clears_away_what_a_kill_left(made, tmp_path, monkeypatch):
+    """And nothing else."""
+    folder = SMALL.folder(tmp_path / "data" / "runs")
+    shutil.copytree(made[0], tmp_path / "data" / "runs")
+    before = files(tmp_path / "data" / "runs")
+    (folder / ".0001-a1b2c3d_.run").write_text("torn")
+    monkeypatch.setattr(command, "N_RUNS", {})
+    monkeypatch.setattr(sys, "argv", ["make_runs", "--out", str(tmp_path)])
+    main()
+    assert files(tmp_path / "data" / "runs") == before
+
+
+@pytest.mark.parametrize(
+    ("options", "quick", "n_fits", "jobs"), [(["--quick", "--jobs", "2"], True, 2, 2), ([], False, 20, -1)]
+)
+def test_the_command_makes_the_runs_and_what_stands_beside_them(tmp_path, monkeypatch, options, quick, n_fits, jobs):
+    made, runs = [], tmp_path / "data" / "runs"
+    results = SimpleNamespace(runs=[])
+    monkeypatch.setattr(command, "paper_results", lambda task, **named: made.append((task, named)) or results)
+    monkeypatch.setattr(command, "kept_comparison", lambda *given, **named: made.append((given, named)))
+    monkeypatch.setattr(sys, "argv", ["make_runs", "--out", str(tmp_path), *options])
+    main()
+    beside = (results, n_fits), {"runs": runs, "jobs": jobs}
+    first, second = ((task, {"runs": runs, "quick": quick, "jobs": jobs}) for task in N_RUNS)
+    assert made == [first, beside, second, beside]
+
+
+def test_an_end_by_signal_ends_the_workers_too(tmp_path):
+    """Else they would wait for ever, with open pipes, to hand over their next run.
+
+    As `make` calls it: a module run as a script has another name than the one workers know it by.
+    """
+    command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "2", "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until(lambda: list(tmp_path.rglob("[0-9]*.run")))
+    children = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
+    process.terminate()
+    assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
+    until(lambda: not any(alive(int(pid)) for pid in children))
+    assert len(children) >= 2
+
+
+def test_a_killed_worker_ends_the_notebooks_of_this_make(tmp_path, monkeypatch):
+    def dies(*arguments, **named):
+        raise workers.WorkerDied("a worker process was killed")
+
+    ended = []
+    monkeypatch.setattr(command, "paper_results", dies)
+    monkeypatch.setattr(command, "terminate_peers", ended.append)
+    monkeypatch.setattr(sys, "argv", ["make_runs", "--out", str(tmp_path)])
+    with pytest.raises(workers.WorkerDied):
+        main()
+    assert ended == [tmp_path / "build" / "locks"]

@@ -1,0 +1,202 @@
+import dataclasses
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
+
+from vsp.config import EXTENSIONS, Config, paper_preset
+from vsp.paper import printed as printed_module
+from vsp.paper import tables
+from vsp.paper.printed import PREFIX, SHORT, printed_hyperparameters, printed_spread, printed_text_numbers
+from vsp.paper.statistics import spread
+from vsp.paper.tables import as_latex, as_text, equation_table, hyperparameter_table, save_table, text_number_table
+from vsp.policy import VoronoiPolicy
+
+FRAME = pd.DataFrame(
+    {"name_of": ["a_b", "c & d"], "value": [1 / 3, 1e-4], "count": [10, 2_000_000], "gap": [np.nan, -2.0]}
+)
+
+
+def returns(seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.normal(16, 3, 200), np.concatenate([rng.normal(15, 4, (5, 200)), rng.normal(-10, 0.1, (1, 200))])
+
+
+def written(out, name="some_table"):
+    folder = out / "figures" / "tables"
+    return (folder / f"{name}.tex").read_text(encoding="utf-8"), folder / f"{name}.csv"
+
+
+def balanced(tex):
+    bare = tex.replace(r"\{", "").replace(r"\}", "")
+    opened, closed = re.findall(r"\\begin\{(\w+)\}", tex), re.findall(r"\\end\{(\w+)\}", tex)
+    return bare.count("{") == bare.count("}") and sorted(opened) == sorted(closed) and tex.count("$") % 2 == 0
+
+
+def unescaped(tex):
+    """Special characters that LaTeX would trip over, outside of mathematics and of the label."""
+    text = re.sub(r"\\label\{[^}]*\}|\$[^$]*\$", "", tex)
+    return re.findall(r"(?<!\\)[_%#^]", text)
+
+
+def test_both_files_are_there_and_the_printed_form_comes_back(tmp_path):
+    found = []
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        assert save_table(FRAME, "some_table", caption="Numbers.", out=folder).equals(as_text(FRAME))
+        found.append({path.name: path.read_bytes() for path in (folder / "figures" / "tables").iterdir()})
+    assert found[0] == found[1] and found[0].keys() == {"some_table.csv", "some_table.tex"}
+
+
+def test_the_latex_is_a_table_of_booktabs(tmp_path):
+    save_table(FRAME, "some_table", caption="Numbers of $x_0$.", out=tmp_path)
+    tex, _ = written(tmp_path)
+    parts = [r"\toprule", r"\midrule", r"\bottomrule", r"\label{tab:some_table}", r"\centering"]
+    assert [tex.count(part) for part in [*parts, r"\caption{Numbers of $x_0$.}"]] == [1] * 6
+    assert balanced(tex) and not unescaped(tex) and r"a\_b" in tex and r"c \& d" in tex and r"name\_of" in tex
+    rows = [line for line in tex.splitlines() if line.endswith(r"\\")]
+    assert len(rows) == 3 and all(len(re.findall(r"(?<!\\)&", row)) == 3 for row in rows)
+
+
+def test_the_csv_parses_back(tmp_path):
+    save_table(FRAME, "some_table", caption="", out=tmp_path)
+    _, csv = written(tmp_path)
+    back = pd.read_csv(csv)
+    assert back.columns.tolist() == FRAME.columns.tolist() and back["name_of"].tolist() == FRAME["name_of"].tolist()
+    assert np.allclose(back["value"], FRAME["value"], rtol=1e-5) and back["count"].tolist() == [10, 2_000_000]
+    assert np.isnan(back["gap"][0]) and b"\r" not in csv.read_bytes()
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: text_number_table(SIMPLEGOAL, *returns(), cells=13), lambda: hyperparameter_table(list(TASKS))]
+)
+def test_numbers_in_a_csv_have_at_most_eight_digits_also_beside_words(tmp_path, make):
+    """Digits beyond the eighth differ between processors."""
+    save_table(make(), "some_table", caption="", out=tmp_path)
+    numbers = re.findall(r"\d+\.\d+", written(tmp_path)[1].read_text())
+    assert numbers and max(len(number.replace(".", "").lstrip("0")) for number in numbers) <= 8
+
+
+def test_as_text_by_hand():
+    values = {"a_b": [1.23456, 0.0, np.nan], "n": [1e-4, -2.0, 0.0005], "c": [3, True, "x_y%"]}
+    shown = as_text(pd.DataFrame(values, dtype=object))
+    assert shown["a_b"].tolist() == ["1.235", "0.000", tables.MISSING]
+    assert shown["n"].tolist() == ["0.0001", "-2.000", "0.0005"] and shown["c"].tolist() == ["3", "True", "x_y%"]
+
+
+def test_counts_have_no_decimals_and_a_missing_one_is_missing():
+    shown = as_text(pd.DataFrame({"cells": [13.0, np.nan], "share": [1.0, 0.5], "steps": [500_000.0, 0.0]}))
+    assert shown["cells"].tolist() == ["13", tables.MISSING] and shown["steps"].tolist() == ["500000", "0"]
+    assert shown["share"].tolist() == ["1.000", "0.500"]
+
+
+def test_a_notebook_shows_no_row_numbers():
+    page = tables.show_table(pd.DataFrame({"a": [7.25], "b": ["x < y"]})).data
+    assert re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", page) == ["a", "b", "7.250", "x &lt; y"]
+
+
+def test_hyperparameters_stand_beside_the_papers():
+    frame = hyperparameter_table(list(TASKS))
+    assert frame["hyperparameter"].tolist() == list(printed_hyperparameters(SIMPLEGOAL)) and frame.shape == (9, 5)
+    for task in TASKS:
+        assert frame[f"{SHORT[task]}, paper"].tolist() == frame[f"{SHORT[task]}, here"].tolist()
+    row = frame.set_index("hyperparameter").loc["n_epochs"]
+    assert row["SimpleGoal, here"] == 5000 and row["MountainCar, here"] == 2000
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_equation_table_is_a_row_of_equations_per_cell(tmp_path, task):
+    policy = printed_module.published_policy(task)
+    shown = equation_table(policy, swatch=task == MOUNTAINCAR)
+    assert len(shown) == len(policy) and shown.shape[1] == 1 + len(policy.task.outputs)
+    first = [float(c) for c in re.findall(r"-?\d+\.\d+", shown["codeword"][0])]
+    assert first == pytest.approx(policy.codewords[0], abs=5e-4)
+    equation = shown.iloc[0, 1].split("}} ")[-1]
+    signed = [float(s.replace(" ", "")) for s in re.findall(r"[+-]? ?\d+\.\d+", equation)]
+    assert signed == pytest.approx(policy.coefficients[0, :, 0], abs=5e-4)
+    save_table(policy.to_frame(), "some_table", caption="c", out=tmp_path, latex=shown)
+    tex, csv = written(tmp_path)
+    assert balanced(tex) and not unescaped(tex)
+    back = pd.read_csv(csv).to_numpy()
+    assert np.allclose(back[:, : len(policy.task.low)], policy.codewords, rtol=1e-5)
+
+
+def test_a_swatch_has_the_colour_of_the_force_at_the_codeword():
+    left, none, right = ([0, 0, f] for f in (-1.0, 0.0, 5.0))
+    policy = VoronoiPolicy([[-1, 0], [-0.5, 0], [0, 0]], np.array([left, none, right])[:, :, None], task=MOUNTAINCAR)
+    colours = (
+        equation_table(policy, swatch=True)["$F$"].str.extract(r"\\textcolor\[HTML\]\{([0-9A-F]{6})\}")[0].tolist()
+    )
+    assert len(set(colours)) == 3
+    red, blue = ([int(c[i : i + 2], 16) for c in colours] for i in (0, 4))
+    assert blue[0] > red[0] and red[2] > blue[2] and min(int(colours[1][i : i + 2], 16) for i in (0, 2, 4)) > 230
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_spread_table_stands_beside_the_papers(task):
+    teacher, runs = returns()
+    frame = tables.spread_table(task, teacher, runs).set_index("metric")
+    printed = printed_spread(task)
+    assert frame.index.tolist() == printed.index.tolist() and frame.shape == (9, 4)
+    assert frame["TD3, paper"].tolist() == printed["drl"].tolist()
+    assert frame["distilled, paper"].tolist() == printed["ours"].tolist()
+    assert frame.at["Mean", "TD3, here"] == teacher.mean() and frame.at["Q1", "distilled, here"] == spread(runs)["q1"]
+    assert frame.at["Median/Q2", "TD3, here"] == np.median(teacher)
+    assert frame.at["Coverage", "distilled, here"] == pytest.approx(100 * spread(runs)["coverage"]) != 100
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_text_numbers_stand_beside_the_papers(task):
+    teacher, runs = returns()
+    frame = text_number_table(task, teacher, runs, cells=17).set_index("id")
+    prefix = PREFIX[task]
+    known = [name for name in frame.index if not pd.isna(frame.at[name, "paper"])]
+    printed = printed_text_numbers(task)["value"]
+    assert len(known) > 8 and all(frame.at[name, "paper"] == printed[name] for name in known)
+    results = [name for name in printed.dropna().index if re.match("(sg|mc)_(drl|ours)_|(sg|mc)_cells", name)]
+    assert len(results) > 15 and set(results) <= set(frame.index)  # none that the paper's text prints is left out
+    assert frame.at[f"{prefix}_cells", "here"] == 17 and frame.at[f"{prefix}_drl_mean", "here"] == teacher.mean()
+    means = runs.mean(axis=1)
+    assert frame.at[f"{prefix}_ours_lowest_run_mean", "here"] == means.min()
+    share = 100 * np.mean(means > teacher.mean())
+    assert frame.at[f"{prefix}_ours_runs_above_teacher_share", "here"] == pytest.approx(share)
+
+
+def test_readings_are_the_fields_that_the_papers_table_does_not_print():
+    frame = tables.interpretation_table(SIMPLEGOAL).set_index("reading")["default"]
+    assert frame["split_lookup"] == paper_preset(SIMPLEGOAL).split_lookup and "n_epochs" not in frame
+    others = [*printed_hyperparameters(SIMPLEGOAL), *EXTENSIONS]
+    assert sorted([*frame.index, *others]) == sorted(field.name for field in dataclasses.fields(Config))
+
+
+def test_a_frame_as_latex_is_what_the_table_holds(tmp_path):
+    shown = as_latex(FRAME)
+    assert shown.columns.tolist() == [r"name\_of", "value", "count", "gap"]
+    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "$-$2"]
+    assert shown["value"].tolist() == ["0.333", "0.0001"] and shown["count"].tolist() == ["10", "2000000"]
+    for name, latex in (("plain", None), ("given", shown)):
+        save_table(FRAME, name, caption="c", out=tmp_path, latex=latex)
+    (plain, _), (given, csv) = written(tmp_path, "plain"), written(tmp_path, "given")
+    assert plain.replace("plain", "given") == given and len(pd.read_csv(csv)) == 2
+
+
+def test_a_long_table_is_whole_in_the_csv_and_in_part_in_the_latex(tmp_path):
+    shown = save_table(FRAME, "some_table", caption="c", out=tmp_path, latex=as_latex(FRAME[["value"]][:1]))
+    tex, csv = written(tmp_path)
+    assert shown.shape == (1, 1) and "0.333" in tex and "a\\_b" not in tex and len(pd.read_csv(csv).columns) == 4
+
+
+@pytest.mark.parametrize(("rows", "environment"), [(40, "table"), (41, "longtable")])
+def test_a_table_of_more_than_a_page_is_a_longtable(tmp_path, rows, environment):
+    save_table(pd.DataFrame({"n": range(rows)}), "some_table", caption="Many numbers.", out=tmp_path)
+    tex, csv = written(tmp_path)
+    assert f"\\begin{{{environment}}}" in tex and ("longtable" in tex) == (environment == "longtable")
+    assert balanced(tex) and tex.count(r"\label{tab:some_table}") == 1 and tex.count(r"\caption{Many numbers.}") == 1
+    assert len(pd.read_csv(csv)) == rows and f"\n{rows - 1} \\\\\n" in tex
+
+
+def test_every_printed_value_can_stand_in_latex(tmp_path):
+    save_table(printed_module.printed_values().drop(columns="value"), "some_table", caption="c", out=tmp_path)
+    tex, _ = written(tmp_path)
+    assert balanced(tex) and not unescaped(tex) and r"73.19\%" in tex

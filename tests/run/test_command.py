@@ -1,0 +1,81 @@
+"""Commands end in one line for what their user can mend."""
+
+import argparse
+import errno
+import os
+import subprocess
+import sys
+
+import pytest
+
+from vsp.beyond.comparison import make_rows
+from vsp.paper import make_runs, runs
+from vsp.paper.studies import make_studies
+from vsp.run.atomic import ROOT, DamagedFile, MissingFile
+from vsp.run.command import in_one_line, jobs
+from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (WorkerDied("a worker"), "error: a worker"),
+        (UnlikeWorker("another"), "error: another"),
+        (NoScheduler("no one"), "error: no one"),
+        (DamagedFile("x.run: damaged"), "error: work: x.run: damaged"),
+        (MissingFile("x.run: no such file"), "error: work: x.run: no such file"),
+        (OSError(errno.ENOSPC, "No space", "a.run"), "error: work: a.run: No space: free some space, "),
+        (FileExistsError(errno.EEXIST, "File exists", "build"), "error: work: build: File exists: something else "),
+        (KeyboardInterrupt(), "error: work: interrupted. What is on disk stays"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
+)
+def test_what_a_user_can_mend_is_told_in_one_line(error, line):
+    with pytest.raises(SystemExit) as end, in_one_line("work"):
+        raise error
+    assert str(end.value).startswith(line) and "\n" not in str(end.value)
+    with pytest.raises(SystemExit) as end, in_one_line():
+        raise error
+    assert str(end.value).startswith(line.replace("work: ", ""))
+
+
+def test_a_bug_keeps_its_traceback():
+    for bug in (FileNotFoundError(errno.ENOENT, "No such file", "x"), ValueError("x"), TimeoutError("x")):
+        with pytest.raises(type(bug)), in_one_line():
+            raise bug
+
+
+@pytest.mark.parametrize(("text", "value"), [("3", 3), ("-1", -1), ("tcp://10.0.0.1:8786", "tcp://10.0.0.1:8786")])
+def test_jobs_are_a_number_or_an_address(text, value):
+    assert jobs(text) == value
+
+
+@pytest.mark.parametrize(
+    "text", ["0", "00", "-2", "1.5", "", "many", "9" * 7, "²", "tcp://host", "://host:1", "host:8786"]
+)
+def test_other_jobs_are_refused(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="expected a whole number from 1 on, -1 for one per core, or"):
+        jobs(text)
+
+
+@pytest.mark.parametrize("command", [make_runs, make_studies, make_rows], ids=lambda module: module.__name__)
+def test_commands_refuse_such_jobs_before_they_begin(monkeypatch, capsys, command):
+    monkeypatch.setattr("sys.argv", ["command", "--jobs", "0"])
+    with pytest.raises(SystemExit) as end:
+        command.main()
+    assert end.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith("command: error: argument --jobs: '0': expected a whole")
+
+
+@pytest.mark.parametrize("damage", ["rubbish", "FIFO"])
+def test_a_damaged_run_ends_the_command_in_one_line(tmp_path, damage):
+    experiment = runs.paper_experiment("SimpleGoal-v0", quick=True)
+    paths = [runs.run_path(experiment.folder(tmp_path / "data" / "runs"), seed) for seed in range(runs.QUICK_RUNS)]
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        os.mkfifo(path) if damage == "FIFO" else path.write_text(damage)
+    command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "1", "--out", tmp_path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 1 and line.startswith(f"error: {paths[0]}: ")
+    assert ("delete it" if damage == "rubbish" else "move it away") in line

@@ -1,0 +1,281 @@
+"""The Makefile and environment.sh, with a Python that notes what it is asked for and downloads nothing."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+
+import pytest
+
+from vsp.run.atomic import ROOT
+
+# Sets up a .venv that holds itself, "installs" empty packages, and as a notebook or a command makes what is expected.
+PYTHON = f"""#!/bin/sh
+site=.venv/lib/python3.11/site-packages
+case $* in
+-V) echo Python ${{FAKE_VERSION:-3.11.7}} ;;
+"-m venv .venv") mkdir -p .venv/bin $site; cp "$0" .venv/bin/python; test -z "${{FAKE_SLOW:-}}" || sleep 30 ;;
+*" install "*/dev/stdin)
+  test "${{FAKE_BROKEN:-}}" != install || exit 1
+  sed -n 's/^\\([a-z]*\\)==\\([0-9.]*\\).*/\\1-\\2.dist-info/p' | (cd $site && xargs mkdir -p); echo "$*" >> asked ;;
+*" download "*) mkdir .venv/torch; : > .venv/torch/torch.whl; echo "$*" >> asked ;;
+*" hash "*) echo "--hash=sha256:${{FAKE_HASH:-cccc}}" ;;
+*" pip "* | *font_manager) ;;
+*"-m vsp"*)
+  for argument in "$@"; do printf '<%s>' "$argument" >> asked; done; echo >> asked
+  case $* in *run_notebook*)
+    until test "$1" = --expect; do case $1 in --out=*) cd "${{1#--out=}}" ;; esac; shift; done; shift
+    for file in "$@"; do mkdir -p "${{file%/*}}"; echo made > "$file"; done ;;
+  esac ;;
+*) exec "{sys.executable}" "$@" ;;
+esac
+"""
+LOCK = """\
+## draw: to draw (1 MB of downloads)
+numpy==2.0 \\
+    --hash=sha256:aaaa
+## train: torch (3 GB of downloads)
+torch==2.13.0 \\
+    --hash=sha256:bbbb \\
+    --hash=sha256:cccc
+zebra==1.0 \\
+    --hash=sha256:dddd
+## test: tests
+pytest==9.0 \\
+    --hash=sha256:eeee
+## dask: a cluster
+dask==1.0 \\
+    --hash=sha256:ffff
+## site: the site
+sphinx==9.0 \\
+    --hash=sha256:0000
+"""
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """The Makefile and what it reads, without a .venv."""
+    folder = tmp_path / "größe und äpfel"
+    shutil.copytree(ROOT / "notebooks", folder / "notebooks")
+    for name in ("Makefile", "environment.sh", "vsp/__init__.py", "vsp/run/run_notebook.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
+    (folder / "environment.lock").write_text(LOCK)
+    (folder.parent / "python").write_text(PYTHON)
+    (folder.parent / "python").chmod(0o755)
+    return folder
+
+
+def start(checkout, *arguments, env=None):
+    environ = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("MAKE", "MFLAGS", "OUT", "JOBS", "DASK", "QUICK"))
+    }
+    command = ["make", f"PYTHON={checkout.parent / 'python'}", *arguments]
+    return subprocess.Popen(
+        command, cwd=checkout, env=environ | (env or {}), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def make(checkout, *arguments, **env):
+    process = start(checkout, *arguments, env=env)
+    said = process.communicate(timeout=60)[0]
+    return said, process.returncode
+
+
+def asked(checkout):
+    """What Python was asked for since the last time."""
+    path = checkout / "asked"
+    text = path.read_text() if path.exists() else ""
+    path.write_text("")
+    return text
+
+
+def packages(checkout):
+    return {path.name for path in checkout.glob(".venv/lib/python3*/site-packages/*.dist-info")}
+
+
+# Set-up
+
+
+def test_parts_are_added_when_they_are_asked_for_and_what_is_whole_is_left(checkout):
+    said, status = make(checkout, "venv")
+    assert status == 0 and packages(checkout) == {"numpy-2.0.dist-info"} and "to draw (1 MB of downloads)" in said
+    assert "--require-hashes" in asked(checkout)
+    assert make(checkout, "venv") == ("", 0) and asked(checkout) == ""
+    said, status = make(checkout, "venv-train")
+    assert status == 0 and "torch (3 GB of downloads)" in said and "Setting up" not in said
+    assert packages(checkout) == {"numpy-2.0.dist-info", "zebra-1.0.dist-info"}  # torch is installed from its own file
+    assert "download -qq --no-deps --dest .venv/torch torch==2.13.0" in asked(checkout)
+    assert make(checkout, "venv-train") == make(checkout, "venv") == ("", 0) and asked(checkout) == ""
+
+
+def test_torch_with_another_checksum_is_refused_and_the_first_part_goes_on_working(checkout):
+    make(checkout, "venv")
+    said, status = make(checkout, "venv-train", FAKE_HASH="beef")
+    assert status and "error: SHA-256 of torch.whl is not among those of torch==2.13.0 in environment.lock" in said
+    assert make(checkout, "venv") == ("", 0)
+    said, status = make(checkout, "venv-train")
+    assert status == 0 and "it is made anew" in said
+
+
+STALE = {
+    "lock": lambda folder: (folder / "environment.lock").write_text(LOCK + "# edited\n"),
+    "killed": lambda folder: (folder / ".venv/note").unlink(),
+    "torn note": lambda folder: (folder / ".venv/note").write_text("12"),
+    "python": lambda folder: (folder / ".venv/bin/python").unlink(),
+    "package": lambda folder: (folder / ".venv/lib/python3.11/site-packages/numpy-2.0.dist-info").rmdir(),
+    "another version": lambda folder: next(folder.glob(".venv/lib/*/*/numpy*")).rename(folder / ".venv/numpy-1.0"),
+    "moved": lambda folder: folder.rename(folder.parent / "elsewhere"),
+}
+
+
+@pytest.mark.parametrize("fault", STALE)
+def test_a_stale_environment_is_made_anew(checkout, fault):
+    make(checkout, "venv")
+    moved = STALE[fault](checkout)
+    here = moved if fault == "moved" else checkout
+    said, status = make(here, "venv", FAKE_BROKEN="install")
+    assert status and "stale or not whole" in said and "error: .venv is not whole, the next make begins anew" in said
+    said, status = make(here, "venv")
+    assert status == 0 and "stale or not whole" in said and packages(here) == {"numpy-2.0.dist-info"}
+    assert make(here, "venv") == ("", 0)
+
+
+def test_another_python_makes_it_anew_and_one_too_old_is_named(checkout):
+    make(checkout, "venv")
+    said, status = make(checkout, "venv", "PYTHON=no such python")
+    assert status and "tried no such python, expected Python 3.11, 3.12 or 3.13" in said and "make PYTHON=" in said
+    assert make(checkout, "venv") == ("", 0)
+    assert "stale" in make(checkout, "venv", FAKE_VERSION="3.12.1")[0]
+
+
+def test_a_killed_set_up_blocks_nobody(checkout):
+    """While it goes on, another make waits; after its end, or SIGKILL, the other one begins anew."""
+    first = start(checkout, "venv", env={"FAKE_SLOW": "1"})
+    assert first.stdout.readline().startswith("Setting up .venv with ")
+    second = start(checkout, "venv")
+    assert second.stdout.readline() == "another make is setting up .venv: waiting for it to end\n"
+    time.sleep(0.3)
+    assert second.poll() is None
+    os.killpg(first.pid, signal.SIGKILL)
+    said = second.communicate(timeout=20)[0]
+    assert second.returncode == 0 and "stale or not whole" in said
+    first.communicate()
+    assert make(checkout, "venv") == ("", 0)
+
+
+PARTS = {
+    "paper-figures quick lab course runs study lookup 01_teacher figures/ledger.pdf": {"draw"},
+    "all 06_beyond teachers short-teachers beyond beyond-long": {"draw", "train"},
+    "test bench faults": {"draw", "train", "test", "dask"},
+    "lint": {"draw", "test"},
+    "site": {"draw", "site"},
+}
+
+
+@pytest.mark.parametrize("targets", PARTS)
+def test_a_target_asks_for_the_parts_that_it_needs(checkout, targets):
+    for target in targets.split():
+        for dask in ("", "tcp://host:8786"):
+            said = make(checkout, "-n", target, *([f"DASK={dask}"] if dask else []))[0]
+            lines = re.findall(r"^sh environment.sh (.*)", said, re.MULTILINE)
+            assert set(" ".join(lines).split()) == PARTS[targets] | ({"dask"} if dask else set()), target
+
+
+def test_the_lock_has_what_the_project_asks_for_with_checksums():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    parts = re.split(r"^## ([a-z]+): .*\n", (ROOT / "environment.lock").read_text(), flags=re.MULTILINE)
+    locked = {
+        name: re.findall(r"^([a-z0-9-]+)==.*\n((?: +--hash.*\n)+)", text, re.M)
+        for name, text in zip(*[iter(parts[1:])] * 2)
+    }
+    for name, asked in (("draw", project["dependencies"]), *project["optional-dependencies"].items()):
+        there = {package for package, hashes in locked["draw"] + locked[name] if hashes}
+        assert {re.match(r"[\w-]+", one)[0] for one in asked} <= there
+    assert not {"torch", "stable-baselines3", "distributed"} & {package for package, _ in locked["draw"]}
+
+
+# What users set
+
+ODD = [
+    "Tim's results", 'a "b" c', "`touch hit`", "$(touch hit)", "$(shell touch hit)", "$HOME $$ ${x}", "a;touch hit",
+    "-x", "#5", "100 %", "back\\slash\\n", "* ?", "two\nlines", "tab\tand & | < >", "a=b:c", "größe",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_any_path_works(checkout, name):
+    make(checkout, "venv")
+    for out in (name, str(checkout.parent / name)):
+        there = set(checkout.iterdir())
+        asked(checkout)
+        said, status = make(checkout, "runs", "01_teacher", f"OUT={out}", "JOBS=3", "QUICK=1")
+        runs, notebook = asked(checkout).split("\n<-m>")
+        given = out if out.startswith("/") else f"./{out}"
+        assert (status, runs) == (0, f"<-m><vsp.paper.make_runs><--out={given}><--jobs=3><--quick>"), said
+        assert f"<--out={given}><-p><quick><true>" in notebook
+        assert {path.name for path in set(checkout.iterdir()) - there} <= {name, "asked"}
+        assert (checkout / out / "figures/environments.pdf").exists() and (checkout / out / "build/state/runs").exists()
+        make(checkout, "clean", f"OUT={out}")
+        assert not (checkout / out / "data/runs").exists()
+
+
+def test_any_path_reaches_the_makes_inside(checkout):
+    make(checkout, "venv")
+    said, status = make(checkout, "quick", "OUT=$(HOME) `touch hit` 'x\"", "DASK=`touch hit`")
+    given = asked(checkout)
+    assert "<--out=./$(HOME) `touch hit` 'x\"/build/quick><--jobs=`touch hit`><--quick>" in given, said
+    assert given.count("run_notebook") == 5 or status  # the results that one reads are not in this checkout
+    assert not (checkout / "hit").exists()
+
+
+def test_what_cannot_be_is_refused_in_one_line(checkout):
+    (checkout / "file").write_text("")
+    make(checkout, "venv")
+    for jobs in ("", "0", "03", "two", "2 3", "2`touch hit`"):
+        said, status = make(checkout, "runs", f"JOBS={jobs}")
+        assert status and said.startswith(f"error: JOBS is {jobs}, expected a number from 1 on\nmake: ***")
+    said, status = make(checkout, "runs", "OUT=file")
+    assert status and "error: ./file cannot be written: make it writable, or name another" in said
+    said, status = make(checkout, "runs", b"OUT=\xff")
+    assert status and said.startswith("error: OUT is not UTF-8\nmake: ***")
+    said, status = make(checkout, "runs", "OUT=")
+    assert status and "OUT is empty, expected a folder" in said
+    assert not (checkout / "hit").exists()
+
+
+# What is up to date
+
+
+def test_what_is_up_to_date_is_decided_by_content(checkout):
+    make(checkout, "venv")
+    figure, notebook = checkout / "figures" / "environments.pdf", checkout / "notebooks" / "01_teacher.ipynb"
+
+    def runs(target):
+        asked(checkout)
+        assert make(checkout, target)[1] == 0
+        return "run_notebook" in asked(checkout)
+
+    assert runs("01_teacher") and not runs("01_teacher") and not runs("figures/environments.pdf")
+    notebook.touch()
+    assert not runs("01_teacher")
+    for changed in (notebook, figure, checkout / "vsp" / "run" / "run_notebook.py", checkout / "environment.lock"):
+        changed.write_text(changed.read_text() + "# edited\n")
+        assert runs("figures/environments.pdf") and not runs("01_teacher")
+    figure.unlink()
+    assert runs("01_teacher")
+
+
+def test_the_inputs_are_looked_for_in_folders():
+    text = subprocess.run(["make", "-pn", "help"], cwd=ROOT, capture_output=True, text=True).stdout
+    inputs = re.search(r"^INPUTS := (.*)", text, re.MULTILINE)[1].split()
+    code = {path.relative_to(ROOT).as_posix() for path in (ROOT / "vsp").rglob("*.py")}
+    assert code < set(inputs) and {path.split("/")[0] for path in inputs} == {"vsp", "data", "environment.lock"}
+    assert all((ROOT / path).is_file() for path in inputs)

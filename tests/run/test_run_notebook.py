@@ -1,0 +1,360 @@
+"""vsp.run.run_notebook: a notebook succeeds as a whole or changes nothing, and says which cell was at fault."""
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+from support import alive, until
+
+from vsp.run import atomic, listed, run_notebook
+from vsp.run.notebook import nbformat
+
+DRAW = """\
+from pathlib import Path
+folder = Path(out) / "figures"
+folder.mkdir(parents=True)
+(folder / "a.txt").write_text(f"quick is {quick}")
+(folder / "b.txt").write_text("always the same")"""
+
+WIDGET = """\
+import ipywidgets
+class Explorer:
+    def _repr_mimebundle_(self, **kwargs):
+        return {**ipywidgets.IntSlider()._repr_mimebundle_(), "text/html": "strip"}
+Explorer()"""
+
+EXPLORER = """\
+import numpy as np
+from vsp.show.page import Explorer, Page
+class Small(Explorer):
+    "Small."
+    def strip(self):
+        return [Page(np.zeros((2, 3, 3), np.uint8), "black", "on this page")]
+Small()"""
+
+
+def write(folder: Path, *cells: str, parameters: str = 'out = ".."\nruns = "../data/runs"\nquick = False') -> Path:
+    """A notebook of code cells; a cell that begins with `# skip` is tagged so that it never runs."""
+    notebook = nbformat.v4.new_notebook()
+    notebook.metadata.kernelspec = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    for number, source in enumerate((parameters, *cells)):
+        cell = nbformat.v4.new_code_cell(source, id=f"cell-{number}")
+        cell.metadata.tags = (
+            ["parameters"] if number == 0 else ["skip-execution"] if source.startswith("# skip") else []
+        )
+        notebook.cells.append(cell)
+    path = folder / "story.ipynb"
+    nbformat.write(notebook, path)
+    return path
+
+
+def run(*arguments) -> None:
+    """The command line."""
+    run_notebook.main([str(argument) for argument in arguments])
+
+
+def refused(*arguments) -> str:
+    """What the command says where it fails."""
+    with pytest.raises(SystemExit) as end:
+        run(*arguments)
+    return end.value.code
+
+
+def tree(folder: Path) -> dict[str, tuple[bytes, int]]:
+    """Content and time of every file outside build/."""
+    files = (p for p in folder.rglob("*") if p.is_file() and "build" not in p.relative_to(folder).parts)
+    return {p.relative_to(folder).as_posix(): (p.read_bytes(), p.stat().st_mtime_ns) for p in files}
+
+
+def test_success_twice(tmp_path):
+    """Files arrive; the executed copy is clean; a second run touches nothing; another value changes one file."""
+    show = "print(Path(runs).name)\ndisplay(1)\nprint('two', flush=True)\nprint('three')\n40 + 2"
+    notebook, out = write(tmp_path, DRAW, "", show), tmp_path / "out with space"
+    run(notebook, "--out", out, "--expect", "figures/a.txt", "figures/b.txt")
+    first = tree(out)
+    assert set(first) == {"figures/a.txt", "figures/b.txt", "figures/executed/story.ipynb"}
+    executed = nbformat.read(out / "figures" / "executed" / "story.ipynb", as_version=4)
+    assert [cell.id for cell in executed.cells] == ["cell-0", "cell-1", "cell-2", "cell-3"]
+    assert [cell.execution_count for cell in executed.cells] == [1, 2, 3, 4]
+    assert [output.output_type for output in executed.cells[3].outputs] == [
+        "stream", "display_data", "stream", "execute_result"
+    ]  # fmt: skip
+    text = first["figures/executed/story.ipynb"][0].decode()
+    assert "papermill" not in text and str(tmp_path) not in text and "injected" not in text
+    assert run_notebook.run_notebook(notebook, out) == []
+    assert tree(out) == first
+    assert run_notebook.run_notebook(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
+    assert not list((out / "build" / "running").iterdir())
+
+
+def test_of_a_widget_its_still_picture_is_left(tmp_path):
+    """No view, which has a random name, no state, and nothing of widgets without a picture: the same bytes twice."""
+    bar = "from tqdm.auto import tqdm\nfor _ in tqdm(range(3)):\n    print('step')"
+    notebook = write(tmp_path, WIDGET, "display(Explorer())", "ipywidgets.IntSlider()", bar, "'text'")
+    copy = tmp_path / "figures" / "executed" / "story.ipynb"
+    assert run_notebook.run_notebook(notebook, tmp_path) == ["figures/executed/story.ipynb"]
+    executed = nbformat.read(copy, as_version=4)
+    outputs = [[output.get("data", output.get("text")) for output in cell.outputs] for cell in executed.cells]
+    still = {"text/html": "strip", "text/plain": "IntSlider(value=0)"}
+    assert outputs == [[], [still], [still], [], ["step\nstep\nstep\n"], [{"text/plain": "'text'"}]]
+    assert "widget" not in str(executed.metadata) and "widget-view" not in copy.read_text()
+    assert run_notebook.run_notebook(notebook, tmp_path) == []
+
+
+def test_of_an_explorer_its_strip_is_left_once(tmp_path):
+    """It shows two outputs: controls, and a strip for where they cannot answer."""
+    notebook = write(tmp_path, EXPLORER)
+    assert run_notebook.run_notebook(notebook, tmp_path) == ["figures/executed/story.ipynb"]
+    copy = tmp_path / "figures" / "executed" / "story.ipynb"
+    (output,) = nbformat.read(copy, as_version=4).cells[1].outputs
+    assert output.data["text/html"].endswith("<figcaption>on this page</figcaption></figure></div>")
+    assert "widget" not in copy.read_text() and output.data["text/plain"] == "Small."
+
+
+def test_results_are_listed_beside_those_of_others(tmp_path):
+    """Whether the notebook listed them in its staging folder or not; a line that a killed run lacks is made up for."""
+    results, staged = tmp_path / "data" / "results", tmp_path / "staging" / "data" / "results"
+
+    def publish():
+        listed.write_listed(staged / "a.csv", "a")
+        atomic.write_text(staged / "b.csv", "b")
+        return run_notebook._publish(tmp_path / "staging", tmp_path)
+
+    listed.write_listed(results / "other.csv", "x")
+    assert publish() == ["data/results/a.csv", "data/results/b.csv"]
+    assert [listed.read_listed(results / name) for name in ("a.csv", "b.csv", "other.csv")] == [b"a", b"b", b"x"]
+    (results / listed.MANIFEST).write_text("")
+    assert publish() == []
+    assert listed.read_listed(results / "a.csv") + listed.read_listed(results / "b.csv") == b"ab"
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x80\x04N.", b"{}", b"[]", b"3", b'{"cells": 3}', b"!!python/name:os.system"]
+)
+def test_a_file_that_is_no_notebook(tmp_path, content):
+    (tmp_path / "x.ipynb").write_bytes(content)
+    with pytest.raises(run_notebook.NotebookError, match="x.ipynb: "):
+        run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
+
+
+FAULTS = {
+    "failing cell": (["1 / 0"], "code cell 3 (1 / 0) failed: ZeroDivisionError"),
+    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell 3 (import os) did not end: DeadKernel"),
+    "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell 3 (import sys) failed: SystemExit"),
+    "sys.exit(0) at the end": (["import sys; sys.exit(0)"], "code cell 3 (import sys; sys.exit(0)) failed: SystemExit"),
+    "never ran": (["# skip", "2"], "code cell 3 (# skip) never ran"),
+    "too slow": (["import time; time.sleep(60)"], "code cell 3 (import time; time.sleep(60)) did not end: CellTimeout"),
+    "address": (["object()"], "code cell 3 (object()) shows 'at 0x"),
+    "warning": (["import warnings; warnings.warn('x')"], "shows 'ipykernel_"),
+    "path": (["print(out)"], "code cell 3 (print(out)) shows a folder of this machine"),
+    "hidden in a widget": (
+        ["import ipywidgets\nwith ipywidgets.Output():\n    1 / 0"],
+        "story.ipynb: a widget failed: ZeroDivisionError: division by zero",
+    ),
+    "shown, not raised": (
+        ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
+        "code cell 3 (try:) failed: ZeroDivisionError: division by zero",
+    ),
+    "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
+    "missing": (["2"], "did not make figures/c.pdf"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_leaves_previous_figures(tmp_path, fault):
+    cells, message = FAULTS[fault]
+    (tmp_path / "figures" / "executed").mkdir(parents=True)
+    for name in ("a.txt", "executed/story.ipynb"):
+        (tmp_path / "figures" / name).write_text("from an earlier run")
+    notebook = write(tmp_path, DRAW, *cells)
+    before = tree(tmp_path)
+    expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
+    error = refused(notebook, "--out", tmp_path, "--timeout", "3" if fault == "too slow" else "60", "--expect", *expect)
+    assert error.startswith("error: story.ipynb") and message in error
+    assert tree(tmp_path) == before
+
+
+DAMAGE = {
+    "damaged": ("vsp.run.sealed.read_sealed(runs + '/1.run')", "1.run: SHA-256 is "),
+    "missing": ("vsp.run.sealed.read_sealed(runs + '/2.run')", "2.run: no such file: `git checkout "),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damage_is_told_in_one_line(tmp_path, damage):
+    """With the file and a remedy; only an error of the notebook's own brings a traceback."""
+    call, message = DAMAGE[damage]
+    (tmp_path / "data" / "runs").mkdir(parents=True)
+    (tmp_path / "data" / "runs" / "1.run").write_text("rubbish")
+    error = refused(write(tmp_path, f"import vsp.run.sealed\n{call}"), "--out", tmp_path)
+    assert message in error and "\n" not in error
+    assert "Traceback" in refused(write(tmp_path, "1 / 0"), "--out", tmp_path)
+
+
+@pytest.mark.parametrize("place", ["story.ipynb", "build/locks/story", "data/results/MANIFEST.sha256"])
+def test_a_fifo_in_place_of_a_file_is_refused_in_one_line(tmp_path, place):
+    cell = "from vsp.run.atomic import write_text\nwrite_text(out + '/data/results/a.csv', 'a')"
+    story, fifo = write(tmp_path, cell), tmp_path / place
+    fifo.unlink(missing_ok=True)
+    fifo.parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(fifo)
+    command = [sys.executable, "-m", "vsp.run.run_notebook", story, "--out", tmp_path]
+    done = subprocess.run(command, cwd=atomic.ROOT, capture_output=True, text=True, timeout=60)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 1
+    assert line.startswith(f"error: story.ipynb: {fifo}: is a folder, a FIFO or a device, expected a file")
+
+
+@pytest.mark.parametrize(
+    "cell", ["open(out + '/large', 'w').write('x' * 100_000)", "print('x' * 100_000)"], ids=["cell", "copy"]
+)
+def test_limit_on_the_size_of_files(tmp_path, cell):
+    """In a cell and where the runner writes: one line, and the earlier files stay."""
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "a.txt").write_text("from an earlier run")
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, cell), "--out", tmp_path]
+    small = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (50_000, 50_000))
+    before, done = (
+        tree(tmp_path),
+        subprocess.run(command, cwd=atomic.ROOT, preexec_fn=small, capture_output=True, text=True),
+    )
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 1 and line.startswith("error: story.ipynb") and "File too large" in line
+    assert "ulimit -f" in line and tree(tmp_path) == before
+
+
+def test_all_or_nothing_where_one_folder_is_closed(tmp_path, monkeypatch):
+    """figures/ comes after data/, yet data/ stays as it was."""
+    both = (
+        DRAW + "\n(Path(out) / 'data' / 'results').mkdir(parents=True)\n(Path(out) / 'data/results/c').write_text('c')"
+    )
+    notebook = write(tmp_path, both)
+    before, access = tree(tmp_path), os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "figures" and access(path, mode))
+    error = refused(notebook, "--out", tmp_path)
+    assert "figures: Permission denied: " in error and "make it writable" in error
+    assert tree(tmp_path) == before
+
+
+def test_figures_on_another_disk(tmp_path, monkeypatch):
+    """A file cannot be renamed from one disk to another: it is copied, whole or not at all; what a kill left goes."""
+    replace = os.replace
+
+    def within(path, target):
+        if Path(path).parent != Path(target).parent:
+            raise OSError(errno.EXDEV, "Invalid cross-device link")
+        replace(path, target)
+
+    monkeypatch.setattr(os, "replace", within)
+    staging, out = tmp_path / "staging", tmp_path / "out"
+    staging.mkdir(), out.mkdir()
+    (out / ".story-12345678.ipynb").write_text("half")
+    story = write(staging).read_bytes()
+    run_notebook._publish(staging, out)
+    assert (out / "story.ipynb").read_bytes() == story
+    assert [path.name for path in out.iterdir()] == ["story.ipynb"]
+
+
+def test_nothing_comes_from_a_run_that_was_killed(tmp_path):
+    """What it left is removed, and an orphaned kernel that writes on does not write into the staging of the next."""
+    left = tmp_path / "build" / "running" / "story-left" / "out" / "figures"
+    left.mkdir(parents=True)
+    (left / ".a-12345678.txt").write_text("torn")
+    write_on = f"import os\nassert not os.path.exists({str(left)!r})\nos.makedirs({str(left)!r})"
+    assert run_notebook.run_notebook(write(tmp_path, write_on), tmp_path) == ["figures/executed/story.ipynb"]
+    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["executed"]
+
+
+WORKERS = """\
+import joblib, os, pathlib, tempfile, time
+import numpy as np
+tempfile.mkstemp()
+def wait(array, n):
+    (pathlib.Path(runs) / "ready").touch()
+    time.sleep(60 if os.environ.get("WAIT") else 0)
+(pathlib.Path(runs) / "kernel").write_text(str(os.getpid()))
+_ = joblib.Parallel(2)(joblib.delayed(wait)(np.zeros(10**6), n) for n in range(2))"""
+
+
+def test_a_killed_run_leaves_nothing_in_the_folders_of_others_and_the_next_removes_the_rest(tmp_path):
+    """Neither its connection file, nor what the kernel and its workers make for a while, lies in TMPDIR or /dev/shm."""
+    shared, runs, memory = tmp_path / "tmp", tmp_path / "data" / "runs", Path("/dev/shm")
+    shared.mkdir(), runs.mkdir(parents=True)
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, WORKERS), "--out", tmp_path]
+    environ = os.environ | {"TMPDIR": str(shared)}
+    process = subprocess.Popen(command, cwd=atomic.ROOT, start_new_session=True, env=environ | {"WAIT": "1"})
+    until((runs / "ready").exists)
+    kernel = int((runs / "kernel").read_text())
+    for group in (process.pid, kernel):
+        os.killpg(group, signal.SIGKILL)
+    process.wait()
+    for semaphore in memory.glob(f"sem.loky-{kernel}-*"):  # a kernel that ends when its runner does removes them
+        semaphore.unlink()
+    assert not list(shared.iterdir()) and not list(memory.glob(f"joblib*_{kernel}_*"))
+    (work,) = (tmp_path / "build" / "running").iterdir()
+    assert (work / "kernel.json").exists() and list((work / "tmp").iterdir())
+    subprocess.run(command, cwd=atomic.ROOT, env=environ, check=True)
+    assert not list((tmp_path / "build" / "running").iterdir()) and not list(shared.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"quik": True}, r"story.ipynb: unknown parameter 'quik', expected one of \['out', 'quick', 'runs'\]"),
+        ({"quick": 3}, "story.ipynb: parameter quick is 3, expected bool as False"),
+    ],
+)
+def test_wrong_parameter(tmp_path, given, message):
+    with pytest.raises(run_notebook.NotebookError, match=message):
+        run_notebook.run_notebook(write(tmp_path, DRAW), tmp_path / "out", parameters=given)
+    assert not (tmp_path / "out").exists()
+
+
+def test_unfit_notebook(tmp_path):
+    with pytest.raises(atomic.MissingFile, match="none.ipynb: no such file"):
+        run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
+    with pytest.raises(run_notebook.NotebookError, match="story.ipynb: unknown parameter 'out'"):
+        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="quick = False"), tmp_path)
+    with pytest.raises(run_notebook.NotebookError, match="parameters cell: expected `name = literal` lines"):
+        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="out = f()"), tmp_path)
+
+
+def test_end_by_signal_ends_kernel(tmp_path):
+    """SIGTERM to the runner: no kernel and no output is left, and its lock is free."""
+    pid = tmp_path / "pid"
+    wait = "import os, time\n(Path(out).parents[3] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, DRAW, wait), "--out", tmp_path]
+    process = subprocess.Popen(command, cwd=atomic.ROOT, stderr=subprocess.PIPE, text=True)
+    until(lambda: pid.exists() and pid.read_text())
+    process.send_signal(signal.SIGTERM)
+    assert "story.ipynb: interrupted" in process.communicate(timeout=30)[1]
+    assert process.returncode == 1
+    until(lambda: not alive(int(pid.read_text())))
+    assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
+
+
+def test_a_kernel_that_dies_before_the_first_cell(tmp_path, monkeypatch):
+    def dies(*arguments, **named):
+        raise RuntimeError("Kernel died before replying to kernel_info")  # jupyter_client's words
+
+    monkeypatch.setattr("nbclient.client.NotebookClient.start_new_kernel", dies)
+    with pytest.raises(run_notebook.KernelDied, match="story.ipynb did not end: RuntimeError: Kernel died"):
+        run_notebook.run_notebook(write(tmp_path, DRAW, "2"), tmp_path / "out")
+
+
+def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
+    """Which make would wait for, however long."""
+    started = "(Path(out).parents[3] / 'started').touch()\nimport time\ntime.sleep(120)"
+    other = write(tmp_path, DRAW, started).rename(tmp_path / "other.ipynb")
+    command = [sys.executable, "-m", "vsp.run.run_notebook", other, "--out", tmp_path]
+    process = subprocess.Popen(command, cwd=atomic.ROOT, stderr=subprocess.PIPE, text=True)
+    until((tmp_path / "started").exists)
+    killed = write(tmp_path, DRAW, "import os\nos.kill(os.getpid(), 9)")
+    assert "did not end: DeadKernelError" in refused(killed, "--out", tmp_path)
+    assert "other.ipynb: interrupted" in process.communicate(timeout=30)[1]

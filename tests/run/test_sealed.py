@@ -1,0 +1,80 @@
+"""Sealed files come back exactly, or are refused before anything is parsed."""
+
+import os
+
+import numpy as np
+import pytest
+
+from vsp.run.atomic import DamagedFile
+from vsp.run.sealed import load_arrays, read_sealed, save_arrays, write_sealed
+
+ARRAYS = {"a": np.arange(6.0).reshape(2, 3), "b": np.array([1, 2], dtype=np.int32), "none": np.zeros((0, 2))}
+ABOUT = {"kind": "Thing", "task": "x", "n": 3, "nested": {"list": [1.5, None, True]}}
+
+
+def test_a_sealed_file_comes_back_exactly(tmp_path):
+    path = tmp_path / "deep" / "er" / "x.run"
+    transposed = {"t": ARRAYS["a"].T, "s": ARRAYS["a"][:, ::2]}  # in other orders of memory
+    save_arrays(path, ARRAYS | transposed, ABOUT)
+    arrays, about = load_arrays(path, kind="Thing")
+    assert about == ABOUT and arrays.keys() == (ARRAYS | transposed).keys()
+    assert all(arrays[k].dtype == v.dtype and np.array_equal(arrays[k], v) for k, v in (ARRAYS | transposed).items())
+
+
+def test_the_same_content_gives_the_same_bytes(tmp_path):
+    save_arrays(tmp_path / "x", ARRAYS, ABOUT)
+    save_arrays(tmp_path / "y", ARRAYS, dict(reversed(ABOUT.items())))
+    assert (tmp_path / "x").read_bytes() == (tmp_path / "y").read_bytes()
+
+
+def test_one_flipped_bit_or_another_length_is_found(tmp_path):
+    path = tmp_path / "x"
+    save_arrays(path, ARRAYS, ABOUT)
+    content = path.read_bytes()
+    flipped = [bytes([*content[:n], content[n] ^ 1 << n % 8, *content[n + 1 :]]) for n in range(len(content))]
+    cut = [content[:n] for n in (0, 1, 63, 64, 65, 66, 200, len(content) - 1)]
+    for damaged in [*flipped, *cut, content + b"\0"]:
+        path.write_bytes(damaged)
+        with pytest.raises(DamagedFile, match="x: SHA-256 is [0-9a-f]{64}, its first line says b.*delete it") as found:
+            load_arrays(path, kind="Thing")
+        assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize("content", [b"hello", b"{}", os.urandom(5000), b"PK\x03\x04" + bytes(100)])
+def test_a_file_of_another_origin_is_refused(tmp_path, content):
+    (tmp_path / "x").write_bytes(content)
+    with pytest.raises(DamagedFile):
+        load_arrays(tmp_path / "x", kind="Thing")
+
+
+def test_another_kind_is_named(tmp_path):
+    save_arrays(tmp_path / "x", ARRAYS, ABOUT)
+    with pytest.raises(DamagedFile, match="holds a 'Thing', expected a 'Run'"):
+        load_arrays(tmp_path / "x", kind="Run")
+
+
+def safetensors(about: str) -> bytes:
+    from safetensors.numpy import save
+
+    return save({"a": np.zeros(1)}, metadata={"about": about})
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"",
+        b"\x80\x04N.",
+        b"\xff" * 8,
+        (2).to_bytes(8, "little") + b"{}",
+        (2).to_bytes(8, "little") + b"[]",
+        safetensors("[]"),
+        safetensors("null"),
+        safetensors("[" * 100_000),
+    ],
+    ids=range(8),
+)
+def test_a_seal_alone_does_not_make_a_file_ours(tmp_path, payload):
+    write_sealed(tmp_path / "x", payload)
+    assert read_sealed(tmp_path / "x") == payload
+    with pytest.raises(DamagedFile, match="x: sealed, but not what `save_arrays` writes"):
+        load_arrays(tmp_path / "x", kind="Thing")

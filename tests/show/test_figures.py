@@ -1,0 +1,418 @@
+import base64
+import io
+import re
+import subprocess
+import sys
+import zlib
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+import seaborn as sns
+from drawn import hexes, labels
+from PIL import Image, UnidentifiedImageError
+
+from vsp import geometry
+from vsp.paper import ledger
+from vsp.rollouts import Episode
+from vsp.run.atomic import ROOT
+from vsp.show import explanation, state_space, style
+from vsp.show.returns import (
+    _VERDICTS,
+    again,
+    box_plot,
+    boxes,
+    by_group,
+    histogram,
+    intervals,
+    ledger_gaps,
+    margin,
+    over_iterations,
+    reference,
+    run_means,
+    upper_bound,
+)
+from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
+from vsp.tasks.registry import get_task
+
+mpl.use("Agg")
+ALT = 'Two "cells" & their border <drawn> in grey'
+
+
+def drawn(seed=0):
+    """A figure with everything the paper's figures have: patches, arrows, images, colour bar, text, Greek, legend."""
+    rng = np.random.default_rng(seed)
+    fig, axes = panels(2)
+    x, y, states = state_space.grid(np.zeros(2), np.ones(2), 40)
+    codewords = rng.random((5, 2))
+    state_space.cells(axes[0], x, y, geometry.nearest(codewords, states), fill=True)
+    state_space.codewords(state_space.square(axes[0]), codewords, numbers=True)
+    coarse = state_space.grid(np.zeros(2), np.ones(2), 6)[2]
+    state_space.arrows(axes[0], coarse, rng.uniform(-1, 1, coarse.shape))
+    axes[0].legend()
+    state_space.force_bar(fig, state_space.force_map(axes[1], x, y, np.sin(5 * states[:, 0])), axes[1:])
+    letter(axes, [r"cells $\Delta x$", "force"])
+    return fig
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """The picture as it is shown, and its two files; the figure is closed."""
+    out = tmp_path_factory.mktemp("saved")
+    picture = save_figure(drawn(), "cells_example", alt=ALT, out=out)
+    assert not plt.get_fignums()
+    return picture, out / "figures" / "cells_example.pdf", out / "figures" / "cells_example.png"
+
+
+def streams(pdf):
+    """A PDF's text with its compressed parts unpacked."""
+    content = pdf.read_bytes()
+    for part in re.findall(rb"stream\r?\n(.*?)endstream", content, flags=re.S):
+        try:
+            content += zlib.decompress(part)
+        except zlib.error:
+            pass
+    return content
+
+
+def png_size(png):
+    header = png.read_bytes()[:24]
+    return int.from_bytes(header[16:20], "big"), int.from_bytes(header[20:24], "big")
+
+
+def test_the_picture_is_as_wide_as_a_page_of_the_proceedings(saved):
+    width, _ = png_size(saved[2])
+    assert abs(width - 12.2 / 2.54 * 300) <= 1 and TEXT_WIDTH == pytest.approx(12.2 / 2.54)
+    box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+) ?\]", saved[1].read_bytes())
+    assert float(box[1]) == pytest.approx(12.2 / 2.54 * 72, abs=0.1)
+
+
+def test_fonts_are_embedded_truetype(saved):
+    content = streams(saved[1])
+    assert b"/Type3" not in content and b"/Type 3" not in content
+    assert b"/FontFile2" in content and b"/BaseFont" in content
+    assert content.count(b"/FontDescriptor ") >= 1
+
+
+def test_no_dates_and_no_versions(saved):
+    _, pdf, png = saved
+    for content in (streams(pdf), png.read_bytes()):
+        assert b"CreationDate" not in content and b"ModDate" not in content and b"Software" not in content
+        assert mpl.__version__.encode() not in content and b"Matplotlib v" not in content
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path, monkeypatch):
+    for folder, epoch in (("a", "0"), ("b", "1000000000")):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+        save_figure(drawn(), "x", alt=ALT, out=tmp_path / folder)
+    save_figure(drawn(seed=1), "x", alt=ALT, out=tmp_path / "c")
+    for name in ("x.pdf", "x.png"):
+        a, b, c = ((tmp_path / folder / "figures" / name).read_bytes() for folder in "abc")
+        assert a == b != c
+
+
+def test_the_alternative_text_is_in_the_html_and_in_the_files(saved):
+    picture, pdf, png = saved
+    shown = picture._repr_html_()
+    assert "<figure>" in shown and 'alt="Two &quot;cells&quot; &amp; their border &lt;drawn&gt; in grey"' in shown
+    assert base64.b64decode(re.search(r"base64,([^\"]+)", shown)[1]) == png.read_bytes()
+    assert ALT.encode() in png.read_bytes() and b"border" in streams(pdf) and repr(picture) == ALT
+
+
+def test_an_embedded_picture_has_its_own_size_and_kind():
+    picture, file = Image.new("P", (30, 10)), io.BytesIO()
+    picture.save(file, "gif")
+    shown = style.embedded(file.getvalue(), 'a "b" <c>', width=600)
+    assert shown.startswith('<img alt="a &quot;b&quot; &lt;c&gt;" src="data:image/gif;base64,R0lG')
+    assert 'width="600" height="200" style="max-width: 100%; height: auto"' in shown
+    with pytest.raises(UnidentifiedImageError):
+        style.embedded(b"no image", "")
+
+
+def test_a_quick_figure_is_marked(tmp_path):
+    save_figure(drawn(), "x", alt=ALT, out=tmp_path / "full")
+    save_figure(drawn(), "x", alt=ALT, out=tmp_path / "quick", quick=True)
+    full, quick = (plt.imread(tmp_path / kind / "figures" / "x.png") for kind in ("full", "quick"))
+    middle = np.s_[full.shape[0] // 3 : -full.shape[0] // 3, full.shape[1] // 3 : -full.shape[1] // 3]
+    assert full.shape == quick.shape and (full[middle] != quick[middle]).any()
+
+
+def test_a_failed_save_leaves_the_previous_figure(saved, monkeypatch):
+    before = saved[1].read_bytes()
+    fig = drawn(seed=1)
+
+    def fail(path, **kwargs):
+        path.write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(fig, "savefig", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_figure(fig, "cells_example", alt=ALT, out=saved[1].parents[1])
+    plt.close(fig)
+    assert saved[1].read_bytes() == before and len(list(saved[1].parent.iterdir())) == 2
+
+
+def test_style_does_not_leak():
+    before = dict(mpl.rcParams)
+    plt.close(panels(2)[0])
+    assert dict(mpl.rcParams) == before
+
+
+# What is drawn
+
+
+def test_panels():
+    fig, axes = panels(3, height=1.5, sharey=True)
+    assert axes.shape == (3,) and fig.get_size_inches() == pytest.approx([12.2 / 2.54, 1.5])
+    letter(axes, ["one", "two", "three"])
+    assert [a.get_title(loc="left") for a in axes] == ["(a) one", "(b) two", "(c) three"]
+    plt.close(fig)
+
+
+def test_cell_borders_lie_between_the_codewords(ax):
+    x, y, states = state_space.grid(np.zeros(2), np.ones(2), 201)
+    index = geometry.nearest(np.array([[0.2, 0.5], [0.6, 0.5]]), states)
+    state_space.cells(ax, x, y, index)
+    corners = np.concatenate([path.vertices for c in ax.collections for path in c.get_paths()])
+    assert len(corners) and np.abs(corners[:, 0] - 0.4).max() < 0.01
+
+
+def test_one_cell_has_no_border(ax):
+    x, y, states = state_space.grid(np.zeros(2), np.ones(2), 20)
+    state_space.cells(ax, x, y, np.zeros(len(states), int), fill=True)
+    assert not ax.collections and len(ax.images) == 1
+
+
+def test_codewords_lie_where_they_are(ax):
+    points = np.array([[0.2, 0.5], [0.6, 0.1]])
+    state_space.codewords(ax, points, numbers=True)
+    assert np.allclose(ax.collections[0].get_offsets(), points)
+    assert [t.get_text() for t in ax.texts] == ["0", "1"]
+
+
+def test_the_square_shows_goal_and_pit(ax):
+    state_space.square(ax)
+    goal, pit = ax.patches
+    assert (goal.get_xy(), goal.get_width(), goal.get_height()) == ((0, 0), 0.1, 0.1)
+    assert pit.get_xy() == (0.4, 0.4) and pit.get_width() == pytest.approx(0.2)
+    assert ax.get_xlim() == ax.get_ylim() == (0, 1) and (ax.get_xlabel(), ax.get_ylabel()) == ("x", "y")
+
+
+def test_a_full_diagonal_action_spans_one_grid_step(ax):
+    states = state_space.grid(np.zeros(2), np.ones(2), 11)[2]
+    state_space.arrows(ax, states, np.tile([1.0, -1.0], (121, 1)))
+    quiver = ax.collections[0]
+    assert np.hypot(1, 1) / quiver.scale == pytest.approx(0.1, rel=0.02)
+    assert np.allclose(quiver.U, 1) and np.allclose(quiver.V, -1) and quiver.scale_units == quiver.angles == "xy"
+
+
+def test_the_force_map_has_pixels_centred_on_its_grid(ax):
+    x, y, states = state_space.grid(np.array([-1.2, -0.07]), np.array([0.6, 0.07]), 19)
+    image = state_space.force_map(ax, x, y, states[:, 0])
+    left, right, bottom, top = image.get_extent()
+    assert (left, right) == pytest.approx((-1.25, 0.65)) and bottom < -0.07 < 0.07 < top
+    assert image.get_clim() == (-1, 1) and image.origin == "lower"
+    assert image.get_array()[0, 0] == pytest.approx(-1.2) and image.get_array()[0, -1] == pytest.approx(0.6)
+
+
+def test_box_plots_show_the_quartiles_and_no_outliers(ax):
+    returns = {"TD3": np.append(np.arange(1.0, 10), 100), "distilled": np.arange(20.0).reshape(4, 5).ravel()}
+    box_plot(ax, returns)
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
+    heights = np.concatenate([line.get_ydata() for line in ax.lines])
+    assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
+
+
+def test_run_means_are_sorted_against_the_teacher(ax):
+    run_means(ax, np.array([3.0, 1.0, 2.0]), 2.5)
+    assert ax.lines[0].get_ydata().tolist() == [1, 2, 3] and set(ax.lines[1].get_ydata()) == {2.5}
+
+
+def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
+    episode = Episode(np.array([[0.5, 0.2], [0.4, 0.2]]), np.array([[-1.0, 0.0], [0.0, 0.5]]))
+    state_space.trail(ax, episode, get_task("SimpleGoal-v0"), color="k")
+    assert np.allclose(ax.lines[0].get_xydata(), [[0.5, 0.2], [0.4, 0.2], [0.4, 0.25]])
+    assert ax.lines[1].get_xydata().tolist() == [[0.5, 0.2]]
+
+
+def test_curves_and_histograms_show_their_numbers(ax):
+    over_iterations(ax, np.array([3.0, 1.0, 2.0]), ylabel="cells", log=True)
+    assert ax.lines[0].get_xydata().tolist() == [[0, 3], [1, 1], [2, 2]]
+    assert (ax.get_ylabel(), ax.get_yscale()) == ("cells", "log")
+    fig, (other,) = panels()
+    histogram(other, np.repeat([1.0, 2.0, 6.0], 10))
+    upper_bound(other, 7.0)
+    assert sum(bar.get_height() for bar in other.patches) == 30
+    assert [line.get_xdata()[0] for line in other.lines] == [3.0, 7.0]
+    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00", "bound 7.00"]
+    plt.close(fig)
+
+
+def test_written_out_colours_are_those_of_seaborn():
+    assert list(style.COLOURS) == sns.color_palette("colorblind").as_hex()
+    assert list(state_space._PASTEL) == sns.color_palette("pastel").as_hex()
+    assert explanation._TINT == sns.light_palette(style.DISTILLED, 8)[2]
+
+
+def test_importing_does_not_wait_for_what_few_notebooks_use():
+    code = "import sys, vsp.show; print(sys.modules.keys() & {'seaborn', 'ipywidgets', 'scipy.stats', 'scipy.ndimage'})"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True, cwd=ROOT).strip() == "set()"
+
+
+def test_things_have_colours_of_their_own():
+    rgb = np.array([mpl.colors.to_rgb(c) for c in (style.TEACHER, style.DISTILLED, style.GOAL, style.PIT)])
+    gaps = np.abs(rgb[:, None] - rgb).max(axis=2)[~np.eye(4, dtype=bool)]
+    assert gaps.min() > 0.1
+
+
+# Intervals, the ledger, the studies
+
+ROWS = pd.DataFrame(
+    {"here": [2.0, 5.0, 3.0], "low": [1.0, 4.5, 3.0], "high": [4.0, 6.0, 3.0]}, index=["one", "two", "three"]
+)
+
+
+def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
+    intervals(ax, ROWS, label="runs")
+    lines, dots = ax.collections
+    assert [s.tolist() for s in lines.get_segments()] == [[[1, 0], [4, 0]], [[4.5, 1], [6, 1]], [[3, 2], [3, 2]]]
+    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]] and dots.get_label() == "runs"
+    assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
+    assert ax.get_ylim() == (2.5, -0.5)
+    assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [style.DISTILLED]
+
+
+def test_intervals_have_colours_of_their_own(ax):
+    colours = [style.TEACHER, style.DISTILLED, style.GOAL]
+    intervals(ax, ROWS, color=colours)
+    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
+
+
+def test_a_second_measurement_is_drawn_over_the_first_and_may_be_missing(ax):
+    intervals(ax, ROWS)
+    again(ax, (ROWS + 1).drop("two").reindex(ROWS.index))
+    lines, dots = ax.collections[2:]
+    assert [s.tolist() for s in lines.get_segments() if s.size and not np.isnan(s).any()] == [
+        [[2, 0], [5, 0]],
+        [[4, 2], [4, 2]],
+    ]
+    assert dots.get_offsets()[[0, 2]].tolist() == [[3, 0], [4, 2]] and np.isnan(dots.get_offsets()[1, 0].filled(np.nan))
+    assert hexes(dots.get_facecolors()) == ["#ffffff"] and hexes(dots.get_edgecolors()) == ["#000000"]
+    assert min(lines.get_zorder(), dots.get_zorder()) > max(drawn.get_zorder() for drawn in ax.collections[:2])
+    assert labels(ax) == ["one", "two", "three"] and ax.get_ylim() == (2.5, -0.5)
+
+
+def test_texts_in_the_margin_stand_beside_their_rows(ax):
+    intervals(ax, ROWS)
+    margin(ax, ["1 %", "2 %", "3 %"], "fail")
+    assert [(t.get_text(), t.get_position()[1]) for t in ax.texts] == [("fail", -1), ("1 %", 0), ("2 %", 1), ("3 %", 2)]
+    assert all(t.get_position()[0] > 1 and t.get_va() == "center" for t in ax.texts)
+    ax.set_xlim(-1000, 1000)  # the place beside the axes does not depend on what they show
+    right, middle = ax.transData.transform((1000, 1)), ax.texts[2].get_transform().transform(ax.texts[2].get_position())
+    assert middle[0] > right[0] and middle[1] == pytest.approx(right[1])
+
+
+def test_a_reference_is_a_line_from_bottom_to_top(ax):
+    reference(ax, 2.5, "default", color="black", ls="--")
+    (line,) = ax.lines
+    assert (line.get_xdata(), line.get_ydata()) == ([2.5, 2.5], [0, 1])
+    assert line.get_transform() == ax.get_xaxis_transform(which="grid")  # 0 and 1 are the edges of the axes
+    assert (line.get_label(), line.get_color(), line.get_linestyle()) == ("default", "black", "--")
+    reference(ax, 1.0, "teacher")
+    assert (ax.lines[1].get_color(), ax.lines[1].get_linestyle()) == (style.TEACHER, "-")
+
+
+GAPS = pd.DataFrame(
+    {
+        "gap": [0.5, -300.0, 12.0, np.nan, -1.2],
+        "verdict": ["reproduced", "differs", "contradicts itself", np.nan, "reproduced"],
+        "wide": [False, False, False, np.nan, True],
+    },
+    index=["mean", "std", "q1", "absent", "max"],
+)
+
+
+def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
+    ledger_gaps(ax, GAPS, band=2**0.5)
+    shown = [dots for dots in ax.collections if len(dots.get_offsets())]
+    assert [dots.get_offsets().tolist() for dots in shown] == [[[0.5, 0], [-1.2, 4]], [[-300, 1]], [[12, 2]]]
+    named = {dots.get_label(): dots for dots in ax.collections if not len(dots.get_offsets())}  # for the legend
+    assert list(named) == ["reproduced", "differs", "contradicts itself"]
+    for dots, same in zip(shown, named.values(), strict=True):
+        assert set(hexes(dots.get_edgecolors())) == set(hexes(same.get_facecolors()))
+        assert dots.get_paths()[0].vertices.tolist() == same.get_paths()[0].vertices.tolist()
+    assert len({hexes(dots.get_facecolors())[0] for dots in named.values()}) == 3
+    assert len({dots.get_paths()[0].vertices.tobytes() for dots in named.values()}) == 3  # markers, for grey printers
+    assert labels(ax) == ["mean", "std", "q1", "absent", "max"] and ax.get_ylim() == (4.5, -0.5)
+
+
+def test_values_with_a_wide_interval_are_hollow(ax):
+    ledger_gaps(ax, GAPS, band=2**0.5)
+    reproduced, differs = (dots for dots in ax.collections if len(dots.get_offsets()) and dots.get_offsets()[0, 1] < 2)
+    colour = hexes(reproduced.get_edgecolors())[0]
+    assert hexes(reproduced.get_facecolors()) == [colour, "#ffffff"] and colour != "#ffffff"
+    assert set(hexes(differs.get_facecolors())) == set(hexes(differs.get_edgecolors()))
+
+
+def test_the_band_of_the_ledger_is_linear_and_the_rest_logarithmic(ax):
+    ledger_gaps(ax, GAPS, band=2**0.5)
+    (band,) = ax.patches
+    assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((-(2**0.5), 2**0.5))
+    assert (ax.get_xscale(), ax.xaxis.get_transform().linthresh) == ("symlog", 2**0.5)
+    place = ax.transData.transform([(x, 0) for x in (-(2**0.5), 0, 2**0.5, 20, 200, 2000)])[:, 0]
+    assert place[1] - place[0] == pytest.approx(place[2] - place[1])
+    assert place[4] - place[3] == pytest.approx(place[5] - place[4])
+    assert ax.lines[0].get_xdata() == [0, 0]
+    ax.figure.canvas.draw()
+    assert [t.get_text().replace("\u2212", "-") for t in ax.get_xticklabels()] == ["-1000", "-10", "0", "10", "1000"]
+
+
+def test_no_gap_of_the_ledger_is_cut_off(ax):
+    ledger_gaps(ax, GAPS.assign(gap=[0.5, -5e5, 12.0, np.nan, 2e4]), band=2**0.5)
+    left, right = ax.get_xlim()
+    assert left < -5e5 and 2e4 < right
+
+
+def test_every_verdict_with_a_gap_has_a_colour():
+    assert set(_VERDICTS) == set(ledger.VERDICTS) - {ledger.UNCHECKED}
+
+
+def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
+    quartiles = {"paper": (1.0, 2.0, 4.0), "here": (3.0, np.nan, 5.0)}
+    boxes(ax, quartiles, colours=[style.TEACHER, style.DISTILLED])
+    corners = [box.get_path().vertices for box in ax.patches]
+    assert [(c[:, 0].min(), c[:, 0].max()) for c in corners] == [(1, 4), (3, 5)]
+    assert [(c[:, 1].min() + c[:, 1].max()) / 2 for c in corners] == pytest.approx([0, 1])
+    assert hexes(box.get_facecolor() for box in ax.patches) == [style.TEACHER, style.DISTILLED]
+    x = [np.asarray(line.get_xdata(), dtype=float) for line in ax.lines]
+    whiskers = {(a, b) for a, b in (sorted(line) for line in x if len(line) == 2) if a < b}
+    assert whiskers == {(-3.5, 1), (4, 8.5), (0, 3), (5, 8)}  # 1.5 lengths of the box
+    assert any((line == 2).all() for line in x) and any(np.isnan(line).all() for line in x)
+    assert labels(ax) == ["paper", "here"] and ax.get_ylim()[0] > 1 > 0 > ax.get_ylim()[1]
+
+
+TEACHERS = pd.DataFrame({"teacher": ["shipped"] * 3 + ["seed 2"] * 2, "loss": [-1.0, -2.0, -6.0, 0.5, 1.5]})
+
+
+def test_groups_are_columns_of_dots_with_a_bar_at_their_mean(ax):
+    by_group(ax, TEACHERS, x="teacher", y="loss")
+    dots, bars = ax.collections[:2], ax.collections[2:]
+    assert [sorted(column.get_offsets()[:, 1]) for column in dots] == [[-6, -2, -1], [0.5, 1.5]]
+    assert all(np.abs(column.get_offsets()[:, 0] - k).max() < 0.3 for k, column in enumerate(dots))
+    (first,), (second,) = (bar.get_segments() for bar in bars)
+    assert [bar.get_label() for bar in bars if not bar.get_label().startswith("_")] == ["mean"]  # once in a legend
+    assert first.tolist() == [[-0.3, -3], [0.3, -3]] and second.tolist() == [[0.7, 1], [1.3, 1]]
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["shipped", "seed 2"]
+
+
+def test_a_legend_below_takes_its_place_from_the_panels(ax):
+    over_iterations(ax, np.arange(3.0), ylabel="cells")
+    ax.lines[0].set_label("one")
+    ax.figure.canvas.draw()
+    before = ax.get_position().y0
+    style.legend_below(ax.figure, ax)
+    ax.figure.canvas.draw()
+    (legend,) = ax.figure.legends
+    assert [t.get_text() for t in legend.get_texts()] == ["one"] and ax.get_position().y0 > before + 0.05

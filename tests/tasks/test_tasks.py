@@ -1,0 +1,352 @@
+import dataclasses
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, RandomPolicy
+
+import vsp
+from vsp.rollouts import collect_episodes, rollout
+from vsp.tasks import mountaincar, simplegoal
+from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
+from vsp.tasks.gym_adapter import gymnasium_task
+from vsp.tasks.registry import get_task, task_names
+from vsp.tasks.simplegoal import SimpleGoalEnv
+
+
+def step(state, action, **options):
+    (moved,), (reward,), (outcome,) = simplegoal.step(np.array([state]), np.array([action]), **options)
+    return moved.tolist(), reward, outcome
+
+
+# SimpleGoal by hand
+
+
+def test_a_step_moves_by_a_tenth_and_pays_ten_times_the_distance_gained():
+    moved, reward, outcome = step([0.3, 0.4], [0, 0.5])
+    assert moved == pytest.approx([0.3, 0.45]) and outcome == RUNNING
+    assert reward == pytest.approx(10 * (0.5 - np.hypot(0.3, 0.45)))
+    assert step([0.8, 0.0], [-1, 0])[1] == pytest.approx(1.0) and step([0.8, 0.0], [1, 0])[1] == pytest.approx(-1.0)
+
+
+def test_actions_are_limited_to_one_and_states_to_the_square():
+    assert step([0.5, 0.9], [-7, 3])[0] == pytest.approx([0.4, 1.0])
+    assert step([0.05, 0.7], [-1, 0])[0] == pytest.approx([0.0, 0.7])
+
+
+@pytest.mark.parametrize(
+    ("state", "action", "outcome", "bonus"),
+    [([0.15, 0.05], [-1, 0], GOAL, 10), ([0.3, 0.5], [1.0, 0], RUNNING, 0), ([0.35, 0.5], [1, 0], PIT, -10)],
+)
+def test_goal_reward_replaces_progress_or_comes_on_top(state, action, outcome, bonus):
+    moved, replaced, found = step(state, action)
+    progress = 10 * (np.hypot(*state) - np.hypot(*moved))
+    assert found == outcome and replaced == pytest.approx(bonus or progress)
+    assert step(state, action, goal_reward="add")[1] == pytest.approx(progress + bonus)
+
+
+def test_goal_reward_reaches_the_gymnasium_class_and_only_two_are_known():
+    progress = 10 * (np.hypot(0.15, 0.05) - np.hypot(0.05, 0.05))
+    for goal_reward, expected in (("replace", 10.0), ("add", 10.0 + progress)):
+        env = gymnasium.make(SIMPLEGOAL, goal_reward=goal_reward).unwrapped
+        env.reset(seed=0)
+        env.state = np.array([0.15, 0.05])
+        assert env.step(np.array([-1.0, 0.0], np.float32))[1] == pytest.approx(expected)
+    with pytest.raises(ValueError, match="'both', expected one of .*replace.*add"):
+        SimpleGoalEnv(goal_reward="both")
+
+
+@pytest.mark.parametrize(
+    ("state", "outcome"),
+    [
+        ([0.0, 0.0], GOAL), ([0.0999, 0.0999], GOAL), ([0.1, 0.05], RUNNING), ([0.05, 0.1], RUNNING),
+        ([0.4, 0.5], RUNNING), ([0.6, 0.5], RUNNING), ([0.5, 0.4], RUNNING), ([0.5, 0.6], RUNNING),
+        ([0.4001, 0.5999], PIT), ([0.5, 0.5], PIT), ([0.5, 0.61], RUNNING), ([0.05, 0.5], RUNNING),
+    ],
+)  # fmt: skip
+def test_borders_of_goal_and_pit_are_outside(state, outcome):
+    assert step(state, [0, 0])[2] == outcome
+
+
+def test_a_start_inside_the_pit_or_the_goal_is_legal():
+    env = gymnasium.make(SIMPLEGOAL)
+    for inside, away in (([0.55, 0.5], [1, 0]), ([0.05, 0.05], [1, 0])):
+        env.reset(seed=0)
+        env.unwrapped.state = np.array(inside)
+        _, reward, terminated, _, info = env.step(np.array(away, np.float32))
+        assert not terminated and info["outcome"] == "running" and abs(reward) < 1.5
+
+
+def test_starts_cover_the_whole_square_evenly():
+    starts = simplegoal.start(np.random.default_rng(0), 20_000)
+    counts, _, _ = np.histogram2d(*starts.T, bins=5, range=[[0, 1], [0, 1]])
+    assert starts.shape == (20_000, 2) and counts.sum() == 20_000 and 680 < counts.min() and counts.max() < 920
+
+
+# SimpleGoal for Gymnasium
+
+
+def test_check_env_has_nothing_to_say():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for options in ({}, {"render_mode": "rgb_array"}, {"goal_reward": "add"}):
+            check_env(gymnasium.make(SIMPLEGOAL, **options).unwrapped)
+
+
+def test_reset_repeats_with_its_seed_and_differs_without():
+    env = gymnasium.make(SIMPLEGOAL)
+    first, again, other = env.reset(seed=1)[0], env.reset(seed=1)[0], env.reset()[0]
+    assert np.array_equal(first, again) and not np.array_equal(first, other) and first.dtype == np.float32
+
+
+@pytest.mark.parametrize("state", [[0.8, 0.9], [0.44, 0.44]])  # the second stands before the pit
+def test_the_picture_shows_agent_goal_and_pit_in_their_places(state):
+    env = gymnasium.make(SIMPLEGOAL, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.unwrapped.state = np.array(state)
+    image = env.render()
+    assert image.dtype == np.uint8 and image.shape[2] == 3
+    height, width, _ = image.shape
+
+    def colour(x, y):
+        return tuple(int(c) for c in image[int((1 - y) * height), int(x * width)])
+
+    agent, goal, pit, free = colour(*state), colour(0.05, 0.05), colour(0.5, 0.5), colour(0.95, 0.05)
+    assert len({agent, goal, pit, free}) == 4
+    assert colour(0.09, 0.09) == goal and colour(0.12, 0.05) == free and colour(0.05, 0.12) == free
+    assert colour(0.41, 0.59) == pit and colour(0.38, 0.5) == free and colour(0.5, 0.62) == free
+    x, y = np.argwhere((image == agent).all(axis=2)).mean(axis=0)[::-1]
+    assert [x / width, 1 - y / height] == pytest.approx(state, abs=0.005)
+
+
+@pytest.mark.parametrize("action", [[np.nan, 0], [np.inf, 0], [0.0], [0, 0, 0], 0.5])
+def test_a_bad_action_is_refused(action):
+    env = SimpleGoalEnv()
+    env.reset(seed=0)
+    before = env.state.copy()
+    with pytest.raises(ValueError, match="expected"):
+        env.step(np.array(action))
+    assert np.array_equal(env.state, before)
+
+
+# Batched = Gymnasium, step by step
+
+
+def replay(env, task, start, actions):
+    """One episode in Gymnasium: states before each step and after the last, rewards, outcome."""
+    env.reset(seed=0)
+    env.unwrapped.state = np.array(start)
+    states, rewards = [start.astype(np.float32)], []
+    for action in actions:
+        state, reward, terminated, truncated, info = env.step(action)
+        states.append(state)
+        rewards.append(reward)
+        if terminated or truncated:
+            break
+    outcome = info.get("outcome", "goal") if terminated else "truncated" if truncated else "running"
+    return np.array(states), rewards, outcome
+
+
+def compare(name, n, **policy):
+    task = get_task(name)
+    starts = task.start(np.random.default_rng(7), n)
+    m = len(task.action_low)
+    episodes = collect_episodes(RandomPolicy(m, **policy), task, starts)
+    result = rollout(RandomPolicy(m, **policy), task, starts)
+    env = gymnasium.make(name, disable_env_checker=True)
+    for i, (start, episode) in enumerate(zip(starts, episodes)):
+        states, rewards, outcome = replay(env, task, start, episode.actions.astype(np.float32))
+        assert len(rewards) == len(episode.actions) == result.lengths[i]
+        assert outcome == OUTCOMES[result.outcomes[i]]
+        assert np.abs(states[:-1] - episode.states).max() <= 1e-3
+        assert sum(rewards) == pytest.approx(result.returns[i], abs=1e-3)
+    return result
+
+
+@pytest.mark.parametrize(
+    ("task", "n", "policy", "outcomes"),
+    [
+        (SIMPLEGOAL, 1000, {}, {GOAL, PIT, TRUNCATED}),
+        (MOUNTAINCAR, 300, {}, {TRUNCATED}),
+        (MOUNTAINCAR, 150, {"gain": 0.5, "seed": 1}, {GOAL}),
+        (MOUNTAINCAR, 150, {"gain": 0.9, "seed": 2}, {GOAL}),
+    ],
+)
+def test_batched_equals_step_by_step(task, n, policy, outcomes):
+    result = compare(task, n, **policy)
+    assert outcomes <= set(result.outcomes)
+    if outcomes == {GOAL}:
+        assert (result.outcomes == GOAL).mean() > 0.9 and result.returns.max() > 50
+
+
+def test_mountaincar_batched_equals_gymnasium_from_anywhere():
+    """Single steps from all over the box, walls and limits of speed and action included."""
+    task, env, rng = get_task(MOUNTAINCAR), gymnasium.make(MOUNTAINCAR).unwrapped, np.random.default_rng(8)
+    states = rng.uniform(task.low, task.high, size=(3000, 2))
+    states[:200, 0], states[200:400, 1], states[400:600, 1] = -1.2, -0.07, 0.07
+    states[600:800, 0] = rng.uniform(0.4, 0.6, 200)
+    actions = rng.uniform(-3, 3, size=(3000, 1))
+    moved, rewards, outcomes = mountaincar.step(states, actions)
+    env.reset(seed=0)
+    for i in range(3000):
+        env.state = states[i].copy()
+        state, reward, terminated, _, _ = env.step(actions[i])
+        assert np.abs(state - moved[i]).max() < 1e-6 and reward == pytest.approx(rewards[i])
+        assert terminated == (outcomes[i] == GOAL)
+    assert 10 < (outcomes == GOAL).sum() < 1000
+    assert np.array_equal(moved, moved.astype(np.float32))  # Gymnasium keeps the state in float32 from here on
+
+
+def test_mountaincar_starts_at_rest_in_the_valley():
+    starts = get_task(MOUNTAINCAR).start(np.random.default_rng(0), 5000)
+    assert -0.6 <= starts[:, 0].min() < -0.595 and -0.405 < starts[:, 0].max() <= -0.4 and not starts[:, 1].any()
+    assert starts.dtype == np.float64
+
+
+def test_pendulum_batched_equals_gymnasium_from_anywhere():
+    task, env, rng = get_task(PENDULUM), gymnasium.make(PENDULUM).unwrapped, np.random.default_rng(8)
+    states, actions = rng.uniform([-9, -8], [9, 8], size=(2000, 2)), rng.uniform(-3, 3, size=(2000, 1))
+    moved, rewards, outcomes = task.step(states, actions)
+    env.reset(seed=0)
+    for i in range(2000):
+        env.state = states[i].copy()
+        seen, reward, terminated, _, _ = env.step(actions[i])
+        assert np.abs(env.state - moved[i]).max() < 1e-12 and reward == pytest.approx(rewards[i], abs=1e-12)
+        assert np.array_equal(seen, task.observe(moved[i : i + 1])[0]) and not terminated
+    assert (outcomes == RUNNING).all() and np.abs(moved[:, 1]).max() == 8
+
+
+def test_pendulum_starts_as_in_gymnasium_and_always_plays_to_the_end():
+    task = get_task(PENDULUM)
+    starts = task.start(np.random.default_rng(0), 5000)
+    assert np.abs(starts).max(axis=0) == pytest.approx([np.pi, 1], abs=2e-3)
+    assert starts.mean(axis=0) == pytest.approx([0, 0], abs=0.1)
+    result = rollout(RandomPolicy(1), task, starts[:20])
+    assert (result.outcomes == TRUNCATED).all() and (result.lengths == 200).all() and (result.returns < -100).all()
+
+
+# Any environment of Gymnasium
+
+
+def test_lunarlander_is_gymnasium_step_by_step():
+    task = get_task(LUNARLANDER)
+    starts, policy = task.start(np.random.default_rng(0), 6), RandomPolicy(2, seed=3)
+    episodes, result = collect_episodes(policy, task, starts), rollout(RandomPolicy(2, seed=3), task, starts)
+    env = gymnasium.make(LUNARLANDER)
+    for i, episode in enumerate(episodes):
+        seen, total = [env.reset(seed=int(starts[i, 0]))[0]], 0.0
+        for action in episode.actions.astype(np.float32):
+            observation, reward, terminated, _, _ = env.step(action)
+            seen.append(observation)
+            total += reward
+        assert terminated and len(episode.actions) == result.lengths[i] and total == pytest.approx(result.returns[i])
+        assert np.array_equal(episode.states, np.array(seen[:-1], dtype=np.float64))
+        assert result.outcomes[i] == (GOAL if reward > 0 else PIT)
+    assert len({episode.states[0].tobytes() for episode in episodes}) == 6
+
+
+def test_a_task_of_gymnasiums_own_pendulum():
+    """The two ways to the same environment; the generic one starts from seeds."""
+    task, own = gymnasium_task(PENDULUM), get_task(PENDULUM)
+    assert (task.max_steps, task.low.tolist(), task.action_high.tolist()) == (200, own.low.tolist(), [2.0])
+    live = task.begin(task.start(np.random.default_rng(0), 4))
+    states, actions = np.array([one.env.state for one in live]), np.array([[0.5], [-1], [2], [0]])
+    assert np.allclose(task.see(live), own.see(states), atol=1e-7)
+    _, rewards, outcomes = task.step(live, actions)
+    moved, expected, _ = own.step(states, actions)
+    assert np.allclose(rewards, expected) and (outcomes == RUNNING).all()
+    assert np.array_equal(task.observe(live), own.observe(moved))
+
+
+def test_an_environment_without_a_limit_of_steps_is_refused(monkeypatch):
+    monkeypatch.setitem(gymnasium.registry, "Endless-v0", dataclasses.replace(gymnasium.spec(PENDULUM)))
+    gymnasium.registry["Endless-v0"].max_episode_steps = None
+    with pytest.raises(ValueError, match="None steps at most, expected limits for both"):
+        gymnasium_task("Endless-v0")
+
+
+# Registry
+
+
+@pytest.mark.parametrize("name", [*TASKS, PENDULUM, LUNARLANDER])
+def test_the_task_agrees_with_gymnasium(name):
+    task, env = get_task(name), gymnasium.make(name)
+    assert np.allclose(env.observation_space.low, task.low) and np.allclose(env.observation_space.high, task.high)
+    assert np.allclose(env.action_space.low, task.action_low) and np.allclose(env.action_space.high, task.action_high)
+    assert env.spec.max_episode_steps == task.max_steps
+    assert len(task.inputs) == len(task.input_labels) == len(task.low) and len(task.outputs) == len(task.action_low)
+    starts = task.start(np.random.default_rng(0), 100)
+    assert starts.shape == (100, task.start_size or len(task.low)) and starts.dtype == np.float64
+    seen = task.see(task.begin(starts))
+    assert (seen >= task.low).all() and (seen <= task.high).all() and seen.shape == (100, len(task.low))
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_states_stay_in_the_box_and_rows_do_not_mix(name):
+    task, rng = get_task(name), np.random.default_rng(0)
+    states = rng.uniform(task.low, task.high, size=(200, len(task.low)))
+    actions = rng.uniform(-2, 2, size=(200, len(task.action_low)))
+    moved, rewards, outcomes = task.step(states, actions)
+    assert (moved >= task.low - 1e-6).all() and (moved <= task.high + 1e-6).all()
+    alone = [task.step(states[i : i + 1], actions[i : i + 1]) for i in range(200)]
+    assert np.array_equal(moved, np.concatenate([a[0] for a in alone]))
+    assert np.array_equal(rewards, np.concatenate([a[1] for a in alone]))
+    assert np.array_equal(outcomes, np.concatenate([a[2] for a in alone]))
+
+
+def test_tasks_by_name():
+    assert task_names() == [*TASKS, PENDULUM, LUNARLANDER] == vsp.task_names()
+    assert all(isinstance(get_task(name), Task) and get_task(name).name == name for name in task_names())
+    task = get_task(SIMPLEGOAL)
+    assert get_task(task) is task and task.name == SIMPLEGOAL
+
+
+@pytest.mark.parametrize(
+    ("typo", "near"), [("simplegoal", SIMPLEGOAL), ("MountainCar", MOUNTAINCAR), ("SimpleGoal-v1", SIMPLEGOAL)]
+)
+def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
+    with pytest.raises(ValueError, match=f"unknown task '{typo}', expected one of .*did you mean '{near}'"):
+        get_task(typo)
+    with pytest.raises(ValueError, match="unknown task None"):
+        get_task(None)
+
+
+def test_a_task_of_gymnasium_that_does_not_fit_is_answered_with_the_nearest():
+    with pytest.raises(ValueError, match=f"actions of MountainCar-v0 are Discrete.*; did you mean '{MOUNTAINCAR}'"):
+        get_task("MountainCar-v0")
+
+
+def test_any_environment_of_boxes_is_a_task():
+    assert get_task("BipedalWalker-v3") is get_task("BipedalWalker-v3") is gymnasium_task("BipedalWalker-v3")
+    assert len(get_task("BipedalWalker-v3").low) == 24 and get_task("BipedalWalker-v3").max_steps == 1600
+
+
+# Signals of a controller
+
+
+def test_signals_by_hand():
+    car, pendulum = get_task(MOUNTAINCAR).signals, get_task(PENDULUM).signals
+    assert car.compute(np.array([0.45, 0.02])).tolist() == [0, -0.02]  # at the flag, moving on
+    assert car.compute(np.array([[-0.55, -0.01]])) == pytest.approx(np.array([[1.0, 0.01]]))
+    tilted = [np.cos(0.25), np.sin(0.25), -3.0]
+    assert pendulum.compute(np.array(tilted)) == pytest.approx([-0.25, 3.0])
+    assert get_task(SIMPLEGOAL).signals is None
+
+
+@pytest.mark.parametrize("name", [MOUNTAINCAR, PENDULUM])
+def test_the_derivative_is_the_change_of_the_error(name):
+    task, rng = get_task(name), np.random.default_rng(0)
+    states, pace = task.start(rng, 200) * 0.5, {PENDULUM: 0.05}.get(name, 1.0)  # seconds a step, or steps
+    moved, _, _ = task.step(states, np.zeros((200, 1)))
+    (error, _), (later, change) = (task.signals.compute(task.see(s)).T for s in (states, moved))
+    assert np.allclose(later - error, pace * change, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", [MOUNTAINCAR, PENDULUM])
+def test_the_code_of_a_signal_computes_it(name):
+    task, rng = get_task(name), np.random.default_rng(1)
+    for state in rng.uniform(task.low, task.high, size=(20, len(task.low))):
+        found = [eval(code, {"state": state, "atan2": np.arctan2}) for code in task.signals.code]
+        assert found == task.signals.compute(state).tolist()

@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+from support import PENDULUM, SIMPLEGOAL, CurvedTeacher
+
+import vsp
+from vsp.teachers.agents import agent
+
+STATES = np.random.default_rng(0).random((50, 2))
+
+
+def straight(obs):
+    return np.full((len(obs), 2), -0.5)
+
+
+def test_a_function_is_a_teacher():
+    actions, state = agent(straight).predict(STATES)
+    assert state is None and np.array_equal(actions, np.full((50, 2), -0.5))
+    policy, _ = vsp.distill(agent(straight), SIMPLEGOAL, vsp.Refinement(n_cells=1, n_generations=0).quick(), seed=0)
+    assert np.allclose(policy.predict(STATES)[0], -0.5, atol=1e-6)
+
+
+def test_what_predicts_is_asked_as_it_is():
+    one = agent(CurvedTeacher())
+    assert np.array_equal(one.predict(STATES)[0], CurvedTeacher().predict(STATES)[0]) and agent(one) is one
+
+
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC", "TD3"])
+def test_agents_of_stable_baselines_act_without_dice(algorithm):
+    import stable_baselines3
+
+    trained = getattr(stable_baselines3, algorithm)("MlpPolicy", PENDULUM, seed=0, policy_kwargs={"net_arch": [8]})
+    states = np.random.default_rng(1).uniform(-1, 1, (20, 3)).astype(np.float32)
+    expected = trained.predict(states, deterministic=True)[0]
+    first, second = (agent(trained).predict(states)[0] for _ in range(2))
+    assert np.array_equal(first, second) and np.array_equal(first, expected)
+    if algorithm != "TD3":
+        assert not np.array_equal(trained.predict(states)[0], expected)

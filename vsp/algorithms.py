@@ -1,0 +1,128 @@
+"""Algorithms 1, 2 and 3 of the paper, in this order: distil a teacher to linear policies in Voronoi cells.
+
+The teacher never sees the partition, so its episodes are rolled out in large batches ahead of the loop; the cells'
+models are stacked, so one step trains them all. Neither changes the algorithm. "l. 4" is a line of the algorithm as the
+paper prints it; "R4" is an open question, a field of `Config`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from .checks import check_count
+from .config import Config
+from .history import History
+from .partition import Partition
+from .policy import VoronoiPolicy
+from .rollouts import Episode, Policy, collect_episodes
+from .tasks import Task
+
+# Teacher episodes rolled out together. The last bits of a float32 network's actions depend on the batch, and a run may
+# depend on them: this number is part of what a seed stands for.
+EPISODES_AHEAD = 500
+VERSION = 1  # raise it when the same arguments give another policy
+
+
+@threadpool_limits.wrap(limits=1)  # the same sums in the same order on any machine
+def distill(teacher: Policy, task: Task, config: Config, *, seed: int) -> tuple[VoronoiPolicy, History]:
+    """Algorithm 1: imitate `teacher` by sub-policies, each valid in the Voronoi cell of its codeword.
+
+    Returns the policy and the history of the run. Same arguments, same policy. `vsp.distill` checks arguments first.
+    """
+    starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
+    partition, history = Partition(task, config), History(config.n_iterations)
+    for n, episode in enumerate(teacher_episodes(teacher, task, config.n_iterations, starts)):
+        if n == 0:
+            partition.add(episode.states[0], init)  # l. 1: the first state is the first codeword
+        partition.observe(episode)  # l. 3-12
+        loss = partition.train(batches)  # l. 13-15
+        if may_alter(n, config):  # l. 16
+            if due(n, config.n_split, config):  # l. 17-19
+                history.add_events(n, "split", split_regions(partition, episode, config, init))
+            if due(n, config.n_merge, config):  # l. 20-22
+                history.add_events(n, "merge", merge_regions(partition, config))
+        if due(n, config.n_reset, config) and config.periodic_reset == "buffers":  # R5
+            partition.clear()
+        history.observe(n, loss, partition)
+    return partition.policy(), history
+
+
+def split_regions(partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[np.ndarray]:
+    """Algorithm 2: walk along the episode and split each cell where the running mean loss is too high.
+
+    Returns the new codewords, each (d,).
+    """
+    cells, losses = partition.cells(episode.states), np.zeros(len(episode.states))
+    previous, first, added = None, 0, []  # the running loss is that of the states from `first` on
+    for t, (state, action) in enumerate(zip(episode.states, episode.actions)):
+        i = cells[t]  # l. 4
+        if i != previous:  # l. 5-8
+            previous, first = i, t
+        losses[t] = partition.loss(i, state, action)  # l. 9
+        if losses[first : t + 1].mean() > config.max_pol_loss and partition.far(i, state):  # l. 10
+            before = partition.neighbours()[i]
+            j = partition.add(state, rng)  # l. 11-12
+            near = np.append(before, False) if config.split_neighbours == "old" else partition.neighbours()[j]  # R13
+            near[i] |= config.split_reset == "cell_and_neighbours"  # R13
+            partition.reset(near)  # l. 13-14
+            added.append(state.copy())  # a view would keep all episodes that were rolled out with its own
+            if config.one_split:  # R4
+                break
+            if config.split_lookup == "refreshed":  # R2
+                cells = partition.cells(episode.states)
+            if config.loss_after_split == "reset":  # R14
+                first = t + 1
+    return added
+
+
+def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
+    """Algorithm 3: remove neighbours whose parameters agree with a cell's own. Returns the removed codewords."""
+    k = len(partition.codewords)
+    parameters = partition.comparable_parameters()
+    alive = np.ones(k, dtype=bool)
+    members, graph = alive, partition.neighbours()  # the graph of `members`, drawn anew only when these change
+    for i in range(k):  # l. 1
+        if not alive[i] and not config.merge_visits_removed:  # R6
+            continue
+        now = alive.copy()
+        now[i] = True
+        if not np.array_equal(now, members):
+            members, graph = now, partition.neighbours(now)
+        near = np.zeros(k, dtype=bool)
+        near[members] = graph[members[:i].sum()]  # l. 2
+        apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
+        similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
+        if not alive[i]:
+            similar[:i] = False  # those before it had their turn: two equal cells must not remove each other
+        if similar.any():
+            alive = alive & ~similar  # l. 5-6
+            near[i] |= config.merge_reset == "survivor_and_neighbours"  # R6
+            partition.reset(near)  # l. 7
+    removed = list(partition.codewords[~alive])
+    partition.keep(alive)
+    return removed
+
+
+def may_alter(n: int, config: Config) -> bool:
+    """R1: whether iteration n may split and merge."""
+    if config.freeze == "first_n_freeze":
+        return n < config.n_freeze
+    last = config.n_freeze if config.freeze == "last_n_freeze" else config.n_split
+    return n < config.n_iterations - last
+
+
+def due(n: int, every: int, config: Config) -> bool:
+    """R15: whether something that happens `every` so many iterations happens in iteration n."""
+    return n % every == 0 and (n > 0 or config.inclusive)
+
+
+def teacher_episodes(teacher: Policy, task: Task, n: int, rng: np.random.Generator) -> Iterator[Episode]:
+    """Yield n episodes of the teacher from random starts, rolled out `EPISODES_AHEAD` at a time."""
+    check_count("n", n, least=0)
+    while n > 0:
+        batch = collect_episodes(teacher, task, task.start(rng, EPISODES_AHEAD)[:n])
+        yield from batch
+        n -= len(batch)

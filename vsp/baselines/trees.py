@@ -1,0 +1,214 @@
+"""Trees to compare with the Voronoi partition: CART, and model trees with axis-aligned or oblique splits.
+
+All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
+They raise ValueError for arrays of a wrong shape, numbers that are not finite, and less than one leaf.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import check_array, check_count, check_data, check_seed
+from ..subpolicies import linear_outputs
+from ..tasks.registry import get_task
+
+
+class Tree:
+    """A regression tree (CART, Breiman et al. 1984) with at most `leaves` leaves, each with one constant action.
+
+    Grown best split first on the mean squared error of `actions` (n, m) at `states` (n, d), by scikit-learn.
+    """
+
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int):
+        from sklearn.tree import DecisionTreeRegressor
+
+        states, actions = check_data(states, actions)
+        check_count("leaves", leaves)
+        # scikit-learn asks for two leaves or more; a node of so few states is not split, so the root stays whole
+        options = {"max_leaf_nodes": max(2, leaves), "min_samples_split": 2 if leaves > 1 else len(states) + 1}
+        self.model = DecisionTreeRegressor(**options, random_state=0).fit(states, actions)
+        self._d, self._m = states.shape[1], actions.shape[1]
+
+    def __len__(self) -> int:
+        return self.model.get_n_leaves()
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d): means of the teacher's actions, so inside the action box."""
+        obs = check_array("observations", obs, (-1, self._d))
+        return (self.model.predict(obs) if len(obs) else np.zeros(0)).reshape(len(obs), self._m), None
+
+
+@dataclass(frozen=True)
+class Split:
+    """A hyperplane, and by how much it lowers the squared error of its node."""
+
+    gain: float
+    direction: np.ndarray  # (d,)
+    threshold: float
+
+    def right(self, inputs: np.ndarray) -> np.ndarray:
+        """Which of the inputs (n, d) lie beyond the hyperplane. (n,)"""
+        return inputs @ self.direction > self.threshold
+
+
+@dataclass(eq=False)
+class Node:
+    """A node of a `LinearTree`, a leaf if it has no children."""
+
+    rows: np.ndarray  # the training data that reach it
+    depth: int
+    split: Split | None = None  # the best split found
+    children: tuple[int, ...] = ()  # left and right
+
+
+class LinearTree:
+    """A model tree: splits along the axes and a least-squares map in each leaf (RETIS, Karalič 1992).
+
+    At most `leaves` leaves, grown best split first on standardised states. A split is judged by the error of a map on
+    either side, not of two constants. It lies at one of 255 quantiles of its node, and leaves on each side at least
+    twice as many states as a map has rows.
+    """
+
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str):
+        self.task = get_task(task)
+        states, actions = check_data(states, actions, len(self.task.low), len(self.task.action_low))
+        check_count("leaves", leaves)
+        self.centre, self.scale = standard(states)
+        inputs, self.nodes = self.inputs(states), [Node(np.arange(len(states)), 0)]
+        least = 1e-9 * np.square(actions).sum()  # smaller gains are rounding errors
+        for _ in range(leaves - 1):
+            for node in (ends := self.ends):
+                node.split = node.split or self.split(inputs[node.rows], actions[node.rows])
+            best = max(ends, key=lambda node: node.split.gain)
+            if best.split.gain <= least:
+                break
+            right, n = best.split.right(inputs[best.rows]), len(self.nodes)
+            best.children = (n, n + 1)
+            self.nodes += [Node(best.rows[side], best.depth + 1) for side in (~right, right)]
+        rows = np.column_stack([inputs, np.ones(len(inputs))])
+        maps = [np.linalg.lstsq(rows[node.rows], actions[node.rows], rcond=None)[0] for node in self.nodes]
+        self.maps = np.array(maps)  # (nodes, d + 1, m)
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    @property
+    def ends(self) -> list[Node]:
+        """The leaves."""
+        return [node for node in self.nodes if not node.children]
+
+    def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
+        """The best split of a node along an axis."""
+        return _linear_stump(inputs, actions, np.eye(inputs.shape[1]), cuts=255)
+
+    def inputs(self, states: np.ndarray) -> np.ndarray:
+        """Standardised states. (n, d)"""
+        return (states - self.centre) / self.scale
+
+    def apply(self, inputs: np.ndarray) -> np.ndarray:
+        """The leaf of each of the inputs (n, d), as an index of `nodes`. (n,)"""
+        found = np.zeros(len(inputs), dtype=np.intp)
+        for i, node in enumerate(self.nodes):  # parents come before their children
+            if node.children:
+                here = np.flatnonzero(found == i)
+                found[here] = np.take(node.children, node.split.right(inputs[here]))
+        return found
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        inputs = self.inputs(check_array("observations", obs, (-1, len(self.centre))))
+        raw = linear_outputs(inputs, self.maps[self.apply(inputs)])
+        return np.clip(raw, self.task.action_low, self.task.action_high), None
+
+
+def _linear_stump(inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int = 31) -> Split:
+    """The best split along one of `directions` (c, d) for a map on each side, from the moments between the cuts."""
+    m, rows = actions.shape[1], np.column_stack([inputs, np.ones(len(inputs)), actions])
+    (whole,), best = _squared_errors((rows.T @ rows)[None], m), Split(0.0, directions[0], 0.0)
+    for direction in directions:
+        places = inputs @ direction
+        borders = np.unique(np.quantile(places, np.linspace(0, 1, cuts + 2)[1:-1], method="lower"))
+        parts = np.searchsorted(borders, places)
+        bounds = np.cumsum(np.bincount(parts, minlength=len(borders) + 1))[:-1]
+        moments = [part.T @ part for part in np.split(rows[np.argsort(parts, kind="stable")], bounds)]
+        left, total = np.cumsum(moments[:-1], axis=0), np.sum(moments, axis=0)
+        errors = _squared_errors(left, m) + _squared_errors(total - left, m)
+        fewest = np.minimum(bounds, len(rows) - bounds)
+        gains = np.where(fewest >= 2 * (inputs.shape[1] + 1), whole - errors, 0.0)
+        if gains.max() > best.gain:
+            best = Split(gains.max(), direction, borders[gains.argmax()])
+    return best
+
+
+def _squared_errors(moments: np.ndarray, m: int) -> np.ndarray:
+    """Squared error of the best linear map, from sums of products of inputs and m actions (c, p, p). (c,)"""
+    q = moments.shape[1] - m
+    # A slight ridge, for variables that are constant in a node
+    inputs = moments[:, :q, :q] + 1e-9 * np.maximum(moments[:, q - 1, q - 1, None, None], 1) * np.eye(q)
+    maps = np.linalg.solve(inputs, moments[:, :q, q:])
+    return np.trace(moments[:, q:, q:], axis1=1, axis2=2) - (maps * moments[:, :q, q:]).sum(axis=(1, 2))
+
+
+class ObliqueLinearTree(LinearTree):
+    """A model tree with oblique splits: of all trees here the most similar to linear maps in Voronoi cells.
+
+    Engelhardt et al. (2023) extract rules from samples of a teacher by CART and by oblique predictive clustering trees
+    (SPYCT, Stepišnik & Kocev 2021). As in the latter, a hyperplane separates two clusters of a node's actions, here by
+    k-means and discriminant analysis. The axes, the principal components and the directions of least squares compete
+    with it. The best direction is perturbed at random (OC1, Murthy et al. 1994). Splits are judged by the maps on both
+    sides.
+    """
+
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int):
+        check_seed(seed)
+        self._rng = np.random.default_rng(seed)
+        super().__init__(states, actions, leaves=leaves, task=task)
+
+    def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
+        """The best split of a node for two maps."""
+        return _oblique(inputs, actions, self._rng)
+
+
+_SEARCHED, _TRIED, _ROUNDS = 2000, 12, 4  # states for comparing directions; directions per round; rounds
+
+
+def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> Split:
+    """The best split of a node among directions of several kinds, perturbed in rounds, by less in each."""
+    some = rng.permutation(len(inputs))[:_SEARCHED]
+    found = _linear_stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
+    for size in np.geomspace(1.0, 0.1, _ROUNDS):
+        moved = _unit(found.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
+        found = _linear_stump(inputs[some], actions[some], np.vstack([found.direction, moved]))
+    return _linear_stump(inputs, actions, found.direction[None])
+
+
+def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Directions of unit length across which a node may be split. (c, d)"""
+    from sklearn.cluster import KMeans
+
+    centred, d = inputs - inputs.mean(axis=0), inputs.shape[1]
+    covariance = centred.T @ centred + 1e-6 * len(inputs) * np.eye(d)
+    maps = np.linalg.solve(covariance, centred.T @ actions)
+    found = [np.eye(d), np.linalg.eigh(covariance)[1].T, maps.T]
+    if len(np.unique(actions, axis=0)) > 1:
+        cluster = KMeans(2, n_init=1, random_state=int(rng.integers(2**31))).fit_predict(actions)
+        gap = inputs[cluster == 1].mean(axis=0) - inputs[cluster == 0].mean(axis=0)
+        found.append(np.linalg.solve(covariance, gap)[None])
+    return _unit(np.vstack(found))
+
+
+def _unit(directions: np.ndarray) -> np.ndarray:
+    """The directions with length 1; a zero vector becomes the first axis."""
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.where(length > 0, directions / np.where(length > 0, length, 1.0), np.eye(directions.shape[1])[0])
+
+
+def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and deviation of `states` (n, d); a variable that never varies keeps its unit."""
+    states = check_array("states", states, (-1, -1))
+    if not states.size:
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
+    scale = states.std(axis=0)
+    return states.mean(axis=0), np.where(scale > 0, scale, 1.0)

@@ -1,0 +1,1 @@
+"""Beyond the paper: our own method (refinement), explanations, comparisons with other methods, and benchmarks."""

@@ -1,0 +1,13 @@
+"""The comparison of methods: how each row is made, what the committed rows say, and how long methods take."""
+
+from ...paper.results import RESULTS, read_results
+from .method_rows import TASKS
+from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good
+from .time_to_quality import ENOUGH, quickest
+
+
+def stale_results() -> list[str]:
+    """Which committed results were made with other settings, teachers or versions than today's, in words."""
+    from .stale import stale  # here, for `python -m` runs a module that nobody has imported
+
+    return stale()

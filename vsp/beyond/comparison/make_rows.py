@@ -1,0 +1,40 @@
+"""`make beyond` and `make beyond-long`: the rows of the comparison of methods, and how long methods take."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+from ...paper.results import write_results
+from ...run import command
+from .method_rows import LONG, TASKS, keep_simplest, make_all, rows
+from .time_to_quality import time_to_quality
+
+
+def main() -> None:
+    """Make the rows that are missing, and write data/results/beyond_<task>.csv and, with times, beyond_seconds.csv and
+    beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
+    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
+    parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
+    arguments = parser.parse_args()
+    out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
+    make_all(out / "build" / "beyond", jobs=arguments.jobs, tasks=tasks)
+    found = {task: rows(out / "build" / "beyond", task) for task in tasks}
+    for task, (frame, _) in found.items():
+        write_results(frame, f"beyond_{task}", out=out)
+    seconds = pd.concat([took for _, took in found.values()])
+    write_results(seconds, "beyond_seconds_long" if arguments.long else "beyond_seconds", out=out)
+    if arguments.long:
+        for task in tasks:
+            keep_simplest(task, out / "data" / "results" / f"beyond_{task}.policy")
+    else:
+        write_results(time_to_quality(), "beyond_race", out=out)
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

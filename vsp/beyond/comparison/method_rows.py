@@ -1,0 +1,202 @@
+"""The comparison beyond the paper: every method at every size, from the same teachers, budgets and starts, on disk.
+
+`make beyond` makes the rows that are missing; data/results/beyond_<task>.csv holds what came out, one row per method,
+size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv. Of
+tasks whose rows take hours, one simplified policy is kept too, beyond_<task>.policy.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cache, partial
+from pathlib import Path
+
+import pandas as pd
+
+from ...algorithms import VERSION
+from ...baselines import tdavq
+from ...config import Config, paper_preset
+from ...evaluation import start_states
+from ...paper import printed
+from ...paper.results import load_made, make_missing, provenance, provenance_folder
+from ...policy import VoronoiPolicy
+from ...rollouts import Policy, rollout
+from ...run import listed, sealed
+from ...tasks.registry import get_task
+from ...teachers.teacher import load_teacher
+from ..refinement.config import Refinement, best_preset
+from ..refinement.simplification import simplify
+from . import measure, methods
+from .methods import Budget
+
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
+LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
+SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
+LOSS = 0.02  # share of the teacher's mean return that the simplified policy of a long task may lose
+SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
+
+SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
+OWN = (0,)
+EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
+ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
+PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
+
+# `refined` that stays close to its teacher
+FAITHFUL = {"n_generations": 300, "n_tuning_episodes": 500, "tuning_step": 0.01, "error_penalty": 30.0}
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a policy is made: `make(budget, size, seed, **settings)`."""
+
+    make: Callable[..., Policy]
+    version: int = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
+    reads: tuple[str, ...] = ()  # settings of the budget that decide the policy
+    settings: dict = field(default_factory=dict)
+    sizes: tuple[int, ...] = SIZES  # cells or leaves; `OWN` where the method finds its own number
+    chance: bool = True  # whether the seed matters
+    tasks: tuple[str, ...] | None = None  # None: for all
+
+
+def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
+    settings = {"rounds": rounds, "n_restarts": n_restarts}
+    return Method(partial(methods.corrected, fit=methods.FITS[fit]), reads=EPISODES, settings=settings, sizes=sizes)
+
+
+def _by_teacher(fit: str, *, sizes: tuple[int, ...] = SIZES) -> Method:
+    return Method(partial(methods.alone, fit=methods.FITS[fit]), reads=EPISODES, sizes=sizes)
+
+
+METHODS = {
+    "refined": Method(methods.refined, reads=ALL),
+    "refined, not tuned": Method(methods.refined, reads=ALL, settings={"n_generations": 0}),
+    "refined, no teacher": Method(methods.no_teacher, reads=ALL, sizes=(3, 4)),  # those of presets
+    "refined, closest": Method(methods.imitated, reads=ALL, sizes=(13,)),
+    "refined, faithful": Method(methods.faithful, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]),
+    "k-means cells, DAgger": _by_dagger("k-means", n_restarts=3),
+    "CART": _by_teacher("tree"),
+    "CART, DAgger": _by_dagger("tree"),
+    "CART, linear leaves, DAgger": _by_dagger("linear tree"),
+    "oblique tree, linear leaves, DAgger": _by_dagger("oblique tree", n_restarts=2),
+    "soft tree, DAgger": _by_dagger("soft tree", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
+    "teacher": Method(methods.the_teacher, sizes=OWN, chance=False),
+    "one linear map": _by_teacher("one map", sizes=OWN),
+    "rule of thumb": Method(methods.by_thumb, sizes=OWN, chance=False, tasks=printed.TASKS),
+    "heuristic": Method(methods.by_hand, sizes=OWN, chance=False, tasks=("Pendulum-v1", *LONG)),
+    "TD-AVQ": Method(methods.td_avq, sizes=OWN, tasks=printed.TASKS[:1]),
+    "TD-AVQ, coarse": Method(methods.td_avq, settings=tdavq.COARSE, sizes=OWN, tasks=printed.TASKS[:1]),
+    "the paper's method": Method(methods.paper_method, version=VERSION, reads=PAPER, sizes=OWN, tasks=printed.TASKS),
+}
+
+# `refined` at the size of the preset, with one more part taken away
+ABLATION = {
+    "cold from the start": {"initial_temperature": 0.04},
+    "one beginning": {"n_restarts": 1},
+    "not corrected": {"n_corrections": 0},
+    "no leak": {"clip_slope": 1e-9},
+    "not tuned": {"n_generations": 0},
+    "failures at no price": {"failure_penalty": 0.0},
+    "no teacher": {},
+    "drawn by stakes": {"criticality": True},
+}
+
+
+@dataclass(frozen=True)
+class Job:
+    """One row to come: a method at a size, with a seed. Size 0: the method's own."""
+
+    task: str
+    method: str
+    size: int
+    seed: int
+
+    @property
+    def how(self) -> Method:
+        """The method, or `refined` with a part taken away."""
+        if self.method in METHODS:
+            return METHODS[self.method]
+        return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
+
+    @property
+    def provenance(self) -> dict[str, str | int]:
+        """What names the row beside its seed: settings (an id), teacher, version."""
+        how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
+        budget = (paper_preset if how.reads == PAPER else best_preset)(self.task)
+        about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
+        return provenance(about | {"measure": measure.settings()}, _digest(self.task), how.version)
+
+    def path(self, folder: str | os.PathLike) -> Path:
+        """Its file."""
+        return provenance_folder(folder, self.task, self.provenance) / f"{self.seed:04d}.row"
+
+    def about(self) -> dict:
+        """What its file names."""
+        return {**asdict(self), **self.provenance}
+
+
+@cache
+def _digest(task: str) -> str:
+    return load_teacher(task).digest
+
+
+def jobs_of(task: str) -> list[Job]:
+    """All rows of a task."""
+    found, several = [], FEW_SEEDS if task in LONG else SEEDS
+    for name, method in METHODS.items():
+        if method.tasks is None or task in method.tasks:
+            seeds = several if method.chance else several[:1]
+            found += [Job(task, name, size, seed) for size in method.sizes for seed in seeds]
+    size = best_preset(task).n_cells
+    names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS and task not in LONG]
+    return found + [Job(task, name, size, seed) for name in names for seed in several]
+
+
+def make_row(job: Job) -> tuple[dict, dict]:
+    """Distil and measure: what the file of the row holds, no arrays and about."""
+    budget = Budget(load_teacher(job.task), get_task(job.task), best_preset(job.task))
+    began = time.perf_counter()
+    policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
+    seconds = time.perf_counter() - began
+    row = measure.measure(policy, budget.teacher, budget.task)
+    return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
+
+
+def make_all(folder: str | os.PathLike, *, jobs: int | str = 1, tasks=TASKS) -> None:
+    """Make the rows that are missing in `folder`; `jobs` as in `workers`."""
+    work = {job.path(folder): (job,) for task in tasks for job in jobs_of(task)}
+    make_missing(make_row, work, "beyond", jobs=jobs, unit="rows")
+
+
+def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What came out for `task`, one row per job, and how long each took. Raises `atomic.DamagedFile`."""
+    found, took = [], []
+    for job in jobs_of(task):
+        _, about = load_made(job.path(folder), "Row", job.about())
+        what = {"method": job.method, "size": job.size, "seed": job.seed}
+        found.append({**what, **about["row"], **job.provenance})
+        took.append({"task": task, **what, "seconds": about["seconds"]})
+    return pd.DataFrame(found), pd.DataFrame(took)
+
+
+def simplest(task: str) -> VoronoiPolicy:
+    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
+    teacher, config = load_teacher(task), best_preset(task)
+    starts = start_states(get_task(task), config.n_validation, 0)
+    own = rollout(teacher, get_task(task), starts).returns.mean()
+    return simplify(teacher, task, config, tolerance=LOSS * abs(own), seed=0)[0]
+
+
+def keep_simplest(task: str, path: str | os.PathLike) -> None:
+    """Make `simplest`, and write it to `path` with its provenance; listed."""
+    simplest(task).save(path)
+    arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
+    sealed.save_arrays(path, arrays, about | simplest_provenance(task))
+    listed.list_file(path)
+
+
+def simplest_provenance(task: str) -> dict[str, str | int]:
+    """What decides the policy of `simplest`; its seed is 0."""
+    return provenance({"task": task, "loss": LOSS, **asdict(best_preset(task))}, _digest(task), SIMPLIFY_VERSION)

@@ -1,0 +1,129 @@
+"""The methods that are compared beyond the paper, each a function of a budget, a size and a seed.
+
+The budget is the teacher and the episodes of a `Refinement`. Fits to the teacher's own episodes alone get as many as
+the others get in all rounds. Methods that find their own size ignore the budget: the paper's method has the episodes of
+its own preset, and TD-AVQ has no teacher.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+from ...algorithms import distill
+from ...baselines import tdavq
+from ...baselines.dagger import dagger
+from ...baselines.simple import Heuristic, PumpAndBalance, ZeroPolicy, kmeans_cells, linear_map, rule_of_thumb
+from ...baselines.soft_tree import SoftTree
+from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
+from ...config import paper_preset
+from ...rollouts import Policy
+from ...tasks.base import Task
+from ..refinement.config import Refinement
+from ..refinement.imitate import imitate
+from ..refinement.refine import refine
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What every method may use: the teacher, its task, and the episodes and rounds of a `Refinement`."""
+
+    teacher: Policy
+    task: Task
+    config: Refinement
+
+
+# Our own
+
+
+def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
+    """`refine`, with some settings changed."""
+    config = replace(budget.config, n_cells=size, **changes)
+    return refine(budget.teacher, budget.task, config, seed=seed)[0]
+
+
+def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
+    """`refine` with a teacher that does nothing: what the tuning finds by itself."""
+    return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
+
+
+def imitated(budget: Budget, size: int, seed: int) -> Policy:
+    """The closest imitation of the teacher's own episodes: cells are relocated, nothing is corrected or tuned."""
+    config = budget.config
+    n = config.n_episodes + config.n_corrections * config.n_correction_episodes
+    config = replace(config, n_cells=size, n_episodes=n, n_restarts=3)
+    return imitate(budget.teacher, budget.task, config, seed=seed)
+
+
+def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
+    """`imitated`, then tuned gently, as long as the gain outweighs the distance from the teacher.
+
+    The teacher plays the episodes of one round for the tuning, and those of the other rounds for the fit.
+    """
+    config = budget.config
+    start = imitated(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
+    changes |= {"n_restarts": 1, "n_corrections": 0, "n_episodes": config.n_correction_episodes}
+    return refine(budget.teacher, budget.task, replace(config, n_cells=size, **changes), seed=seed, start=start)[0]
+
+
+# Fits to states x (n, d) and actions y (n, m), with so many cells or leaves
+FITS: dict[str, Callable[..., Policy]] = {
+    "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
+    "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
+    "oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(x, y, leaves=size, task=task, seed=seed),
+    "soft tree": lambda x, y, size, task, seed: SoftTree(x, y, leaves=size, seed=seed),
+    "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
+    "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
+}
+
+
+def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy], rounds: int, n_restarts: int):
+    """`fit` by DAgger, with as many corrected episodes as `refine` has, in more rounds: these fits are quick.
+
+    `n_restarts` fits with other random numbers; the best is kept.
+    """
+    n = budget.config.n_corrections * budget.config.n_correction_episodes
+    config = replace(budget.config, n_corrections=rounds, n_correction_episodes=n // rounds)
+    return _fitted(fit, config, budget, size, seed, n_restarts)
+
+
+def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -> Policy:
+    """`fit` to the teacher's own episodes, without corrections."""
+    config = budget.config
+    n = config.n_episodes + config.n_corrections * config.n_correction_episodes
+    return _fitted(fit, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
+
+
+def _fitted(fit, config: Refinement, budget: Budget, size: int, seed: int, n_restarts: int) -> Policy:
+    seeds = range(n_restarts * seed, n_restarts * (seed + 1))
+    fits = [partial(fit, size=size, task=budget.task, seed=one) for one in seeds]
+    return dagger(fits, budget.teacher, budget.task, rounds=config, seed=seed)
+
+
+# Methods that find their own size
+
+
+def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
+    """The teacher itself."""
+    return budget.teacher
+
+
+def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
+    """A rule that a person would write down."""
+    return rule_of_thumb(budget.task.name)[1]
+
+
+def by_hand(budget: Budget, size: int, seed: int) -> Policy:
+    """A controller that a person programs."""
+    return {"Pendulum-v1": PumpAndBalance, "LunarLanderContinuous-v3": Heuristic}[budget.task.name]()
+
+
+def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
+    """Learned from rewards."""
+    return tdavq.learn(budget.task, seed=seed, **settings)
+
+
+def paper_method(budget: Budget, size: int, seed: int) -> Policy:
+    """`distill` with the paper's preset."""
+    return distill(budget.teacher, budget.task, paper_preset(budget.task), seed=seed)[0]

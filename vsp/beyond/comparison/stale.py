@@ -1,0 +1,105 @@
+"""Which committed results were made with other settings, another teacher or another version than today's.
+
+`python -m vsp.beyond.comparison.stale` prints them, and nothing where all are up to date. Tables that
+`make paper-figures` writes anew each time are not among them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+
+from ...paper import results
+from ...paper.studies import interpretations, teachers
+from ...run import atomic, command, sealed
+from ..benchmarks import lookup
+from . import time_to_quality
+from .method_rows import LONG, TASKS, jobs_of, simplest_provenance
+
+
+def stale(folder: str | os.PathLike | None = None) -> list[str]:
+    """Which results, those in data/results or in another folder, differ from today's, in words; empty if none."""
+    found, folder = [], Path(folder or results.RESULTS)
+    for name, target, today in committed():
+        try:
+            differing = _differing(_provenance(folder / name), today)
+        except FileNotFoundError:
+            found.append(f"data/results/{name} is missing: `make {target}` makes it")
+        except atomic.DamagedFile as error:
+            found.append(str(error))
+        else:
+            if differing:
+                what = f"data/results/{name} was made with other {' and '.join(differing)}"
+                found.append(f"{what}: `make {target}` makes it anew")
+    return found
+
+
+def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[dict]]]]:
+    """Committed files: the name, the target that makes it, and what its rows would name today, given its rows."""
+    yield "readings.csv", "study", _readings
+    yield "teachers.csv", "study", _teachers
+    for task in TASKS:
+        yield f"beyond_{task}.csv", "beyond", partial(_rows, task)
+    yield "beyond_race.csv", "beyond", _race
+    for task in LONG:
+        yield f"beyond_{task}.csv", "beyond-long", partial(_rows, task)
+        yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
+    yield "lookup.csv", "lookup", lambda _: [lookup.made_with()]
+
+
+def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dict]]) -> list[str]:
+    """The columns in which the provenance of the rows differs from today's; none if it is up to date."""
+    now = pd.DataFrame(list(today(frame)))
+    columns = [name for name in (*results.PROVENANCE, "seed") if name in now]
+    now, then = now[columns].astype(str), frame.reindex(columns=columns).dropna(how="all").astype(str)
+    if set(map(tuple, now.to_numpy())) == set(map(tuple, then.to_numpy())):
+        return []
+    return [name for name in columns if set(now[name]) != set(then[name])] or ["rows"]
+
+
+def _provenance(path: Path) -> pd.DataFrame:
+    """The rows of a table, or what a policy names as one row."""
+    if path.suffix == ".policy":
+        return pd.DataFrame([sealed.load_arrays(path, kind="VoronoiPolicy")[1]])
+    frame = results.read_results(path.stem, path.parent)
+    return frame.assign(teacher=frame["checksum"]) if "checksum" in frame else frame
+
+
+def _readings(frame: pd.DataFrame) -> Iterable[dict]:
+    """All variants were ranked; which of them were confirmed is for the ranking to say."""
+    seeds = {"choosing": interpretations.CHOOSING, "confirming": interpretations.CONFIRMING}
+    confirmed = set(frame.loc[frame["phase"] == "confirming", "variant"])
+    for (name, _), experiment in interpretations.experiments(interpretations.variants()).items():
+        for phase in seeds if name in confirmed else ("choosing",):
+            yield interpretations.provenance_of(experiment, seeds[phase])
+
+
+def _teachers(frame: pd.DataFrame) -> Iterable[dict]:
+    for experiment in teachers.experiments().values():
+        yield from ({**teachers.provenance_of(experiment), "seed": seed} for seed in teachers.SEEDS)
+
+
+def _rows(task: str, frame: pd.DataFrame) -> Iterable[dict]:
+    return (job.about() for job in jobs_of(task))
+
+
+def _race(frame: pd.DataFrame) -> Iterable[dict]:
+    for method, (_, settings) in time_to_quality.METHODS.items():
+        for setting in settings:
+            made_with = time_to_quality.provenance_of(method, setting)
+            yield from ({**made_with, "seed": seed} for seed in time_to_quality.SEEDS)
+
+
+def main() -> None:
+    """Print which committed results are stale, one line each."""
+    for line in stale():
+        print(line)
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

@@ -1,0 +1,68 @@
+"""Tuning on the return by CMA-ES (Hansen 2016), and how candidates are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...rollouts import Outcomes, rollout, score
+from ...tasks.base import GOAL
+from .anneal import squared_error
+from .config import Refinement
+from .population import rollout_population
+from .units import Cells, Frame, LabelledStates
+
+SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is maximised: the mean return, minus penalties for failures and for differing from the teacher."""
+
+    failure_penalty: float
+    error_penalty: float = 0.0
+    seen: LabelledStates | None = None  # the states of the teacher, for the error penalty
+
+    def score(self, result: Outcomes, cells: Cells) -> float:
+        """The value for `cells` whose episodes ended as `result`."""
+        value = score(result, self.failure_penalty)
+        return value - self.error_penalty * squared_error(self.seen, cells) if self.error_penalty else value
+
+
+class Candidates:
+    """Candidates, scored by an `Objective` from the same starts; the first of the best is kept."""
+
+    def __init__(self, frame: Frame, starts: np.ndarray, objective: Objective):
+        self.rows, self.best, self.best_restart = [], None, 0
+        self._frame, self._starts, self._objective, self._best_score = frame, starts, objective, -np.inf
+
+    def add(self, stage: str, restart: int, cells: Cells) -> None:
+        """Score `cells` from the validation starts."""
+        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
+        mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
+        self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
+        if (value := self._objective.score(result, cells)) > self._best_score:
+            self._best_score, self.best, self.best_restart = value, cells, restart
+
+
+def tune(
+    frame: Frame, cells: Cells, config: Refinement, objective: Objective, rng: np.random.Generator
+) -> Iterator[Cells]:
+    """CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
+
+    Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
+    """
+    import cma
+
+    options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
+    search = cma.CMAEvolutionStrategy(cells.vector, config.tuning_step, options)
+    for i in range(config.n_generations):
+        starts = frame.task.start(rng, config.n_tuning_episodes)
+        vectors = search.ask()
+        candidates = [cells.like(vector) for vector in vectors]
+        results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
+        search.tell(vectors, [-objective.score(result, one) for result, one in zip(results, candidates)])
+        if (i + 1) * SNAPSHOTS // config.n_generations > i * SNAPSHOTS // config.n_generations:
+            yield cells.like(search.result.xfavorite)

@@ -1,0 +1,118 @@
+"""What is optimised, in units in which one step size fits all: inputs of mean 0 and deviation 1, actions in [-1, 1]."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...policy import VoronoiPolicy
+from ...rollouts import Policy
+from ...tasks.base import Task
+
+METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Converts between the units of the task and those of the optimisation."""
+
+    task: Task
+    centre: np.ndarray  # (d,) mean of the observations
+    scale: np.ndarray  # (d,) their standard deviation
+
+    @classmethod
+    def of(cls, task: Task, states: np.ndarray) -> Frame:
+        """The frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
+        scale = states.std(axis=0)
+        return cls(task, states.mean(axis=0), np.where(scale > 0, scale, 1.0))
+
+    @property
+    def _middle(self) -> np.ndarray:
+        return 0.5 * (self.task.action_high + self.task.action_low)
+
+    @property
+    def _half(self) -> np.ndarray:
+        return 0.5 * (self.task.action_high - self.task.action_low)
+
+    def inputs(self, states: np.ndarray) -> np.ndarray:
+        """Scaled states and a column of ones, (n, d + 1), of states (n, d)."""
+        return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
+
+    def outputs(self, actions: np.ndarray) -> np.ndarray:
+        """Actions (n, m) in units in which the limits are -1 and 1."""
+        return (actions - self._middle) / self._half
+
+    def policy(self, cells: Cells) -> VoronoiPolicy:
+        """`cells` as a policy in the units of the task."""
+        weights = cells.maps[:, :-1] * self._half / self.scale[:, None]
+        biases = cells.maps[:, -1] * self._half + self._middle - self.centre @ weights
+        coefficients = np.concatenate([weights, biases[:, None]], axis=1)
+        codewords = cells.codewords * self.scale + self.centre
+        return VoronoiPolicy(codewords, coefficients, task=self.task, metric=METRIC, scale=self.scale)
+
+    def cells(self, policy: VoronoiPolicy) -> Cells:
+        """The codewords and maps of `policy` in these units."""
+        weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
+        biases = (biases + self.centre @ weights - self._middle) / self._half
+        maps = np.concatenate([weights * self.scale[:, None] / self._half, biases[:, None]], axis=1)
+        return Cells((policy.codewords - self.centre) / self.scale, maps)
+
+    def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
+        """`states` (n, d) with the teacher's actions and, if asked for, their criticality."""
+        actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
+        weights = teacher.criticality(states) if criticality else None
+        return LabelledStates(self.inputs(states), self.outputs(actions), weights)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Codewords and linear maps in scaled units."""
+
+    codewords: np.ndarray  # (k, d)
+    maps: np.ndarray  # (k, d + 1, m): weights, then bias
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All numbers in one array."""
+        return np.concatenate([self.codewords.ravel(), self.maps.ravel()])
+
+    def like(self, vector: np.ndarray) -> Cells:
+        """Cells of the same shape with the numbers of `vector`."""
+        cut = self.codewords.size
+        return Cells(vector[:cut].reshape(self.codewords.shape), vector[cut:].reshape(self.maps.shape))
+
+    def closeness(self, states: np.ndarray) -> np.ndarray:
+        """How near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
+
+        |x|² - |x - c|² = 2 x·c - |c|²: one matrix product.
+        """
+        return 2 * self.codewords @ states.T - np.square(self.codewords).sum(axis=1)[:, None]
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions of every cell for `inputs` (n, d + 1), not limited. (k, m, n): states along whole rows, for speed"""
+        k, rows, m = self.maps.shape
+        return (self.maps.transpose(0, 2, 1).reshape(k * m, rows) @ inputs.T).reshape(k, m, -1)
+
+
+@dataclass(frozen=True)
+class LabelledStates:
+    """States in scaled units, with the teacher's actions there."""
+
+    inputs: np.ndarray  # (n, d + 1), the last column ones
+    actions: np.ndarray  # (n, m)
+    criticality: np.ndarray | None = None  # (n,) what a wrong action costs there; None: the same everywhere
+
+    def with_more(self, other: LabelledStates) -> LabelledStates:
+        """These states, then the others."""
+        pairs = ((self.inputs, other.inputs), (self.actions, other.actions), (self.criticality, other.criticality))
+        return LabelledStates(*(None if one is None else np.concatenate([one, more]) for one, more in pairs))
+
+    def draw(self, size: int, rng: np.random.Generator) -> Callable[[], np.ndarray]:
+        """A function that draws `size` rows, with probabilities in proportion to the criticality."""
+        n = len(self.inputs)
+        if self.criticality is None or not self.criticality.any():
+            return lambda: rng.integers(n, size=size)
+        edges = np.cumsum(self.criticality / self.criticality.sum())
+        return lambda: np.minimum(edges.searchsorted(rng.random(size), side="right"), n - 1)

@@ -1,0 +1,30 @@
+"""The reproduction of the paper: its printed values, our runs and tables, the ledger, the audit, the studies."""
+
+from .audit import audit_findings, audit_table, mean_inside
+from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison
+from .ledger import N_RESAMPLES, largest_gaps, ledger_table, left_out_by_quartiles, results_of, verdict_counts
+from .printed import (
+    SHORT,
+    TASKS,
+    printed_spread,
+    printed_spread_values,
+    printed_tdavq_comparison,
+    printed_value,
+    published_policy,
+)
+from .runs import EVALUATION_SEED, N_EPISODES, paper_results
+from .statistics import interval, quartiles_from_fences, spread
+from .tables import (
+    as_latex,
+    as_text,
+    equation_table,
+    hyperparameter_table,
+    interpretation_table,
+    run_overview,
+    save_table,
+    show_table,
+    spread_table,
+    teacher_beside_runs,
+    text_number_table,
+    write_summary,
+)

@@ -1,0 +1,236 @@
+"""The ledger: every value that the paper prints, compared with ours, with an interval and a verdict by stated rules.
+
+Rules:
+
+1. A value that is inconsistent with the paper's other values "contradicts itself" (`audit` has the arithmetic).
+2. A setting (a limit of a task, a hyperparameter, a count of the protocol) is "reproduced" if the code uses the same
+   number, else "differs".
+3. A result is "reproduced" if the printed value, give or take half a unit of its last digit, lies in the 95 % interval
+   of ours, widened by the square root of 2 because the paper's value comes from a sample of the same size; else it
+   "differs". Intervals come from 10,000 resamples: of runs for distilled policies, of start states for the one teacher.
+4. What no rerun can show, or what is not measured here (the parameters of one run, the machine), "cannot be checked".
+
+A verdict on a return is marked "wide" if the widened interval is longer than the standard deviation that the paper
+prints for these returns: then "reproduced" says little.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import gymnasium
+import numpy as np
+import pandas as pd
+
+from ..config import paper_preset
+from ..tasks import base, registry, simplegoal
+from . import audit, printed
+from .runs import SHARES, Results
+from .statistics import interval, outlier_numbers, resample, spread
+
+VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
+    "reproduced", "differs", "cannot be checked", "contradicts itself"
+)  # fmt: skip
+N_RESAMPLES = 10_000
+# Parts of the paper, by patterns of ids, of which the first that fits counts
+PARTS = {
+    "coefficients": "_cell_",
+    "results": "_(?:spread|drl|ours)_(?!episodes)|^.._(?:caption_)?cells$",
+    "settings": "",
+}
+COLUMNS = "id part task where quantity subject paper value here low high verdict wide cell".split()
+
+
+def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """One row per printed value, `COLUMNS`; `results` by task. The same results give the same rows.
+
+    `here` is NaN where we have no such value; `low` and `high` are NaN for settings. Column `cell` names the notebook
+    and the cell that computes ours.
+    """
+    found = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"]).assign(low=np.nan, high=np.nan)
+    parts = [found, *(measured(task, result, n_resamples=n_resamples) for task, result in results.items())]
+    frame = printed.printed_values().join(pd.concat(parts), on="id")
+    doubted = audit.in_doubt()
+    frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
+    frame["wide"] = _wide(frame)
+    frame["cell"] = frame["id"].map(cell)
+    frame["part"] = np.select([frame["id"].str.contains(pattern) for pattern in PARTS.values()], list(PARTS), "")
+    return frame[COLUMNS]
+
+
+def _wide(frame: pd.DataFrame) -> pd.Series:
+    """Whether the widened interval of a return is longer than the printed standard deviation of these returns."""
+    printed_std = frame["task"].map(printed.PREFIX) + "_spread_" + frame["subject"].str.lower() + "_std"
+    length = np.sqrt(2) * (frame["high"] - frame["low"])
+    of_returns = ~frame["id"].str.contains("share|coverage|cells|outliers$")
+    return of_returns & (length > printed_std.map(frame.set_index("id")["value"]))
+
+
+def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
+    """How many values of each part of the paper got which verdict."""
+    table = pd.crosstab(book["part"], book["verdict"])
+    return table.reindex(index=[*reversed(PARTS)], columns=list(VERDICTS), fill_value=0).rename_axis(columns=None)
+
+
+def verdict(row, *, in_doubt: bool = False) -> str:
+    """The verdict by this module's rules; `row` has paper (as printed), value, here, low and high."""
+    if in_doubt:
+        return CONTRADICTED
+    if np.isnan(row.here):
+        return UNCHECKED
+    if np.isnan(row.low):
+        return REPRODUCED if np.isclose(row.here, row.value, rtol=1e-9) else DIFFERS
+    half = 0.5 * last_digit(row.paper)
+    low, high = row.here - np.sqrt(2) * (row.here - row.low), row.here + np.sqrt(2) * (row.high - row.here)
+    return REPRODUCED if low - half <= row.value <= high + half else DIFFERS
+
+
+def last_digit(printed: str) -> float:
+    """One unit of the last digit of a number as printed: 0.01 for "12.30" and "86.17%"."""
+    return 10.0 ** -len(printed.rstrip("%").partition(".")[2])
+
+
+def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """Our results under the ids of the paper's values: columns here, low, high (95 %)."""
+    rows = {}
+    for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
+        here = outlier_numbers(returns) | spread(returns)
+        here["coverage"] *= 100
+        bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
+        for name in bounds.columns.intersection(list(here)):
+            known = not np.isnan(here[name])  # without outliers they have no mean
+            row = (here[name], *bounds[name]) if known else (np.nan, np.nan, np.nan)
+            rows[f"{printed.PREFIX[task]}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
+    cells = _best_cells(result)
+    rows |= {f"{printed.PREFIX[task]}_{name}": cells for name in ("cells", "caption_cells")}
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
+
+
+def _best_cells(result: Results) -> tuple[float, float, float]:
+    """Cells of the best run, and their interval for other samples of runs to choose the best from."""
+    runs = np.array([(run.validation_mean, len(run.policy)) for run in result.runs])
+    low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])
+    return len(result.best.policy), low, high
+
+
+def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
+    """The results in the ledger `book` for one task, the teacher's first; values of both table and text once."""
+    rows = book[(book["task"] == task) & (book["part"] == "results")]
+    statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
+    twice = ~rows["id"].str.contains("_spread_") & statistic.isin(["min", "max", "mean", "std"])
+    twice |= rows["id"].str.contains("caption")
+    rows = rows[~twice].assign(text=~rows["id"].str.contains("_spread_"))
+    return rows.sort_values(["subject", "text"], kind="stable").drop(columns="text")
+
+
+def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
+    """How far the printed values lie from ours, in half-widths of our intervals: gap, verdict, wide.
+
+    An interval without width (the smallest of all returns may be the same in every resample) counts as half a unit of
+    the last printed digit.
+    """
+    rows = rows[rows["low"].notna()]
+    value = rows["value"]
+    half = np.where(value > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
+    half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
+    statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
+    statistic = statistic.str.replace("whisker low", "lower bound").str.replace("whisker high", "upper bound")
+    name = rows["subject"].replace({"DRL": "TD3", "Ours": "distilled"}) + ": " + statistic
+    frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"], "wide": rows["wide"]})
+    return frame.set_index(pd.Index(name, name="statistic"))
+
+
+# Settings, read from the code that acts on them
+
+
+def _settings(results: dict[str, Results]) -> dict[str, float]:
+    """Our settings, under the ids of the paper's: limits, rewards, hyperparameters, counts."""
+    found = _environments() | {"initial_subpolicies": float(results[printed.TASKS[0]].runs[0].cells[0])}
+    for task, result in results.items():
+        prefix, (runs, episodes) = printed.PREFIX[task], result.returns.shape
+        counts = {"policies": runs, "episodes_per_policy": episodes, "total_episodes": runs * episodes}
+        counts["drl_episodes"] = len(result.teacher_returns)
+        found |= {f"{prefix}_{place}{name}": n for place in ("", "caption_", "text_") for name, n in counts.items()}
+        found |= {name: counts[name] for name in ("episodes_per_policy", "drl_episodes")}
+        found[f"{prefix}_algorithm_runs"] = runs
+        found[f"{prefix}_training_steps"] = result.experiment.teacher.card["recipe"]["steps"]
+        for name in printed.printed_hyperparameters(task):
+            found[f"{prefix}_hyper_{name}"] = float(getattr(paper_preset(task), name))
+    return found
+
+
+def _environments() -> dict[str, float]:
+    """Limits and rewards of both tasks; rewards are measured by taking steps."""
+    goal, car = (registry.get_task(task) for task in printed.TASKS)
+    found = {"state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps}
+    for axis, name in enumerate("xy"):
+        found[f"sg_size_{name}"] = goal.high[axis] - goal.low[axis]
+        found |= {f"sg_goal_{name}_high": simplegoal.GOAL_EDGE, f"sg_stride_{name}": simplegoal.STRIDE}
+        found |= {f"sg_pit_{name}_low": simplegoal.PIT_LOW, f"sg_pit_{name}_high": simplegoal.PIT_HIGH}
+    for axis, name in enumerate(("position", "velocity")):
+        found |= {f"mc_{name}_low": car.low[axis], f"mc_{name}_high": car.high[axis]}
+    for name, task in (("sg_action", goal), ("mc_force", car)):
+        found |= {f"{name}_low": task.action_low[0], f"{name}_high": task.action_high[0]}
+    found["sg_reward_factor"] = _reward(goal, [0.5, 0.0], [-1.0, 0.0]) / simplegoal.STRIDE
+    found["sg_goal_reward"] = _reward(goal, [0.15, 0.0], [-1.0, 0.0])
+    found["sg_pit_reward"] = _reward(goal, [0.35, 0.5], [1.0, 0.0])
+    full, half = (_reward(car, [-0.5, 0.0], [force]) for force in (1.0, 0.5))
+    found |= {"mc_force_reward_factor": full, "mc_force_reward_exponent": np.log2(full / half)}
+    found["mc_goal_reward"] = _reward(car, [0.449, 0.07], [0.0])
+    found["mc_goal_position"] = gymnasium.make(car.name).unwrapped.goal_position
+    return found
+
+
+def _reward(task: base.Task, state: list[float], action: list[float]) -> float:
+    return float(task.step(np.array([state]), np.array([action]))[1][0])
+
+
+_CELLS = {
+    "hyper": "04, hyperparameters", "cells": "03, best", "caption": "03, runs", "text": "03, runs",
+    "policies": "03, runs", "training": "01, scores",
+}  # fmt: skip
+
+
+def cell(id: str) -> str:
+    """The notebook and the cell that compute our number for the printed value `id`."""
+    prefix, kind = id.split("_")[:2]
+    task = {"sg": "simplegoal", "mc": "mountaincar"}.get(prefix)
+    if id.endswith("caption_cells"):
+        return _CELLS["cells"]
+    places = _CELLS | {"spread": f"04, {task}-spread", "drl": "04, text-numbers", "ours": "04, text-numbers"}
+    return places.get(kind, f"05, {'replay' if kind == 'cell' else 'ledger'}")
+
+
+# What the paper leaves out
+
+
+def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """Statistics that describe many runs better than mean and quartiles of all episodes: here, low, high, teacher.
+
+    One row per statistic, with 95 % intervals from resampled runs. The interquartile mean is the mean of the middle
+    half of the runs' means (Agarwal et al. 2021). A run "beats" its teacher with a higher mean return from the same
+    starts, an episode with a higher return. The interval for runs is the exact one of Clopper and Pearson, which has
+    a width even where all runs, or none, beat the teacher.
+    """
+    from scipy.stats import binomtest, trim_mean  # here: it takes long to import
+
+    own, means, middle = result.teacher_returns, result.returns.mean(axis=1), partial(trim_mean, proportiontocut=0.25)
+    cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
+    rows = {
+        "interquartile mean of the runs": (means, middle, own.mean()),
+        "probability that an episode does": ((result.returns > own).mean(axis=1), np.mean, np.nan),
+    }
+    for name, code in SHARES.items():
+        ours, teacher = (result.outcomes == code).mean(axis=1), np.mean(result.teacher_outcomes.outcomes == code)
+        if name != "pit" or task.name == "SimpleGoal-v0":  # the other task has none
+            rows[f"share of episodes: {name}"] = ours, np.mean, teacher
+    for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
+        rows[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
+    found = {}
+    for name, (values, statistic, teacher) in rows.items():
+        ends = interval(values, statistic, vectorized=True, n_resamples=n_resamples)
+        found[name] = (statistic(values, axis=0), *ends, teacher)
+    beats = binomtest(int(np.sum(means > own.mean())), len(means))
+    found["probability that a run beats its teacher"] = (beats.statistic, *beats.proportion_ci(0.95), np.nan)
+    frame = pd.DataFrame.from_dict(found, orient="index", columns=["here", "low", "high", "teacher"])
+    return frame.astype(float).rename_axis("statistic")

@@ -1,0 +1,154 @@
+"""What the paper (arXiv:2511.13322) prints: its tables, the numbers in its text, and its policies, ready to run.
+
+The values are in `data/paper/*.csv`, as printed; column `where` names the place in the paper. A file is read only if it
+is byte for byte the one in its folder's manifest, which was checked against the paper.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+from collections.abc import Iterable
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+
+from ..checks import check_choice
+from ..policy import VoronoiPolicy
+from ..run.atomic import ROOT
+from ..run.listed import read_listed
+
+FOLDER = ROOT / "data" / "paper"
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
+PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids of printed values
+SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
+
+_POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
+
+
+def printed_hyperparameters(task: str) -> dict[str, int | float | bool]:
+    """The hyperparameters of `task`, by the name that the paper gives them (appendix, first table)."""
+    column = check_task(task)
+    frame = _read("hyperparameters.csv")
+    return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
+
+
+def printed_spread(task: str) -> pd.DataFrame:
+    """How the returns on `task` spread: one row per metric (the index), columns drl, ours, unit, where.
+
+    Coverage, the share of episodes that are no outliers, is in percent; all else is in units of return.
+    """
+    frame = _read("spread.csv", numbers=["drl", "ours"])
+    return frame[frame["task"] == check_task(task)].drop(columns="task").set_index("metric")
+
+
+def printed_spread_values(task: str, subject: str) -> dict[str, float]:
+    """A column of T5 or T6, "drl" or "ours", under the names of `statistics.spread`; coverage in percent."""
+    check_choice("subject", subject, ("drl", "ours"))
+    return {metric.lower().partition("/")[0]: value for metric, value in printed_spread(task)[subject].items()}
+
+
+def printed_text_numbers(task: str | None = None) -> pd.DataFrame:
+    """The numbers in running text and captions: one row per number, its id as index.
+
+    Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
+    (NaN for a version or a name), unit, printed (the paper's spelling), where. With `task`, its rows and those of both.
+    """
+    frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
+    return frame if task is None else frame[frame["task"].isin([check_task(task), "both"])]
+
+
+def printed_value(id: str) -> float:
+    """The number called `id` in `printed_text_numbers()`; shares are in percent. Raises ValueError for other ids."""
+    frame = printed_text_numbers()
+    if not isinstance(id, str) or id not in frame.index:
+        raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
+    number = float(frame.at[id, "value"])
+    if np.isnan(number):
+        raise ValueError(f"{id!r} is the text {frame.at[id, 'printed']!r}, expected the id of a number")
+    return number
+
+
+def spread_id(task: str, subject: str, metric: str) -> str:
+    """The id of a value of T5 or T6: spread_id("SimpleGoal-v0", "ours", "Median/Q2") is "sg_spread_ours_median"."""
+    check_choice("subject", subject, ("drl", "ours"))
+    return f"{PREFIX[check_task(task)]}_spread_{subject}_{metric.lower().partition('/')[0]}"
+
+
+def printed_values() -> pd.DataFrame:
+    """Every number that the paper prints, in tables T2 to T6, text and captions: one row per value.
+
+    Columns: id, task, where, quantity, subject, paper (the paper's spelling), value (NaN for a version or a name).
+    """
+    text = _read("text_numbers.csv", numbers=["value"]).rename(columns={"printed": "paper"})
+    rows = []
+    for row in _read("spread.csv").to_dict("records"):
+        for subject, who in (("drl", "DRL"), ("ours", "Ours")):
+            name = spread_id(row["task"], subject, row["metric"])
+            rows.append((name, row["task"], row["where"], row["metric"], who, row[subject]))
+    for task in TASKS:
+        for row in _read("hyperparameters.csv").to_dict("records"):
+            name = row["hyperparameter"]
+            rows.append((f"{PREFIX[task]}_hyper_{name}", task, row["where"], name, "protocol", row[task]))
+        for k, row in enumerate(_read(_POLICIES[task]).to_dict("records"), start=1):
+            for name in _numbers(row):
+                if row[name] != "0":  # else the paper prints no such term
+                    rows.append((f"{PREFIX[task]}_cell_{k}_{name}", task, row["where"], name, "Ours", row[name]))
+    tables = pd.DataFrame(rows, columns=["id", "task", "where", "quantity", "subject", "paper"])
+    tables["value"] = [float(ast.literal_eval(printed)) for printed in tables["paper"]]
+    return pd.concat([text[tables.columns], tables], ignore_index=True)
+
+
+def printed_tdavq_comparison() -> pd.DataFrame:
+    """TD-AVQ beside the paper's method, in words: one row per aspect (the index), columns TD-AVQ, Ours, where."""
+    return _read("tdavq_comparison.csv").set_index("aspect")
+
+
+def linear_policies(task: str) -> pd.DataFrame:
+    """The best partition that the paper found for `task`: one row per cell, in the paper's order.
+
+    Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
+    such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
+    """
+    file = _POLICIES[check_task(task)]
+    frame = _read(file)
+    numbers = _numbers(frame.columns)
+    frame[numbers] = frame[numbers].astype(np.float64)
+    return frame
+
+
+def published_policy(task: str) -> VoronoiPolicy:
+    """The paper's best distilled policy for `task`, from its printed coefficients, ready to run."""
+    frame = linear_policies(task)
+    inputs = [name.removeprefix("codeword_") for name in frame if name.startswith("codeword_")]
+    outputs = [name.removesuffix("_printed") for name in frame if name.endswith("_printed")]
+    codewords = frame[[f"codeword_{name}" for name in inputs]].to_numpy()  # (k, d)
+    terms = [*inputs, "bias"]
+    coefficients = np.stack([frame[[f"{output}_{term}" for term in terms]] for output in outputs], axis=-1)
+    return VoronoiPolicy(codewords=codewords, coefficients=coefficients, task=task)  # (k, d + 1, m)
+
+
+def _numbers(columns: Iterable[str]) -> list[str]:
+    """The numeric columns of a table of linear policies."""
+    return [name for name in columns if not name.endswith(("_printed", "colour", "where"))]
+
+
+def check_task(task: str) -> str:
+    """`task`. Raises ValueError unless the paper treats it."""
+    if not isinstance(task, str) or task not in TASKS:
+        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no other")
+    return task
+
+
+def _read(file: str, numbers: list[str] | None = None) -> pd.DataFrame:
+    """The rows of `file` as text, the columns `numbers` as float64 (NaN where empty)."""
+    frame = _parse(read_listed(FOLDER / file)).copy()
+    for column in numbers or []:
+        frame[column] = pd.to_numeric(frame[column]).astype(np.float64)
+    return frame
+
+
+@lru_cache  # the audit and the ledger ask for the same few tables hundreds of times
+def _parse(content: bytes) -> pd.DataFrame:
+    return pd.read_csv(io.BytesIO(content), dtype=str, keep_default_na=False, encoding="utf-8")

@@ -1,0 +1,204 @@
+"""Many distillations: seeds, workers, one sealed file per run, resume, progress.
+
+A run lies in a folder named by its provenance (see `results`) and names it inside too, so a changed configuration,
+teacher or method never picks up old runs, nor a run that was copied to another place.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from functools import cache, cached_property
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..algorithms import VERSION, distill
+from ..config import Config, paper_preset
+from ..evaluation import rollout_from_seed
+from ..policy import VoronoiPolicy
+from ..rollouts import Outcomes
+from ..run import sealed
+from ..run.machine import cpu_type
+from ..tasks.base import GOAL, PIT, TRUNCATED
+from ..tasks.registry import get_task
+from ..teachers.teacher import Teacher, load_teacher
+from .results import load_made, make_missing, provenance, provenance_folder
+
+N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
+N_EPISODES = 1000
+EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states to report on, and to choose the best run on
+QUICK_RUNS, QUICK_EPISODES = 4, 100
+SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}  # the outcomes of episodes whose shares tables show
+
+
+@dataclass(frozen=True)
+class Run:
+    """One distillation and its evaluation."""
+
+    seed: int
+    policy: VoronoiPolicy
+    outcomes: Outcomes  # on the shared start states
+    validation_mean: float  # mean return on the validation starts
+    cells: np.ndarray  # number of cells after each iteration
+    splits: int
+    merges: int
+    cpu: str  # the type of processor that it was made on
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a set of runs has in common: task, configuration, teacher, and the episodes of the evaluation."""
+
+    task: str
+    config: Config
+    teacher: Teacher
+    n_episodes: int = N_EPISODES
+
+    @property
+    def settings(self) -> dict:
+        """All that decides the result of a run beside teacher, version and seed, as JSON-able values."""
+        return {
+            "task": self.task,
+            "config": self.config.settings(),
+            "n_episodes": self.n_episodes,
+            "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
+            "versions": {name: _version(name) for name in ("numpy", "scipy")},
+        }
+
+    @cached_property
+    def provenance(self) -> dict[str, str | int]:
+        """What names its runs: settings (an id), teacher, version."""
+        return provenance(self.settings, self.teacher.digest, VERSION)
+
+    def about(self, seed: int) -> dict:
+        """What a file of this experiment names, `seed` being that of the run or of the start states."""
+        return {"task": self.task, **self.provenance, "seed": seed}
+
+    def folder(self, runs: str | os.PathLike) -> Path:
+        """Where the runs of this experiment lie below the folder `runs`."""
+        return provenance_folder(runs, self.task, self.provenance)
+
+
+_version = cache(version)  # which takes milliseconds, and is asked for each run
+
+
+def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
+    """The paper's experiment on `task`: its hyperparameters, the shipped teacher, 1000 episodes."""
+    config, task = paper_preset(task), get_task(task).name
+    episodes = QUICK_EPISODES if quick else N_EPISODES
+    return Experiment(task, config.quick() if quick else config, load_teacher(task), episodes)
+
+
+def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int | str = 1) -> list[Run]:
+    """Distil once per seed, skip what is there, and return the runs in the order of `seeds`; `jobs` as in `workers`."""
+    seeds = list(seeds)
+    make_all([(experiment, seed) for seed in seeds], runs=runs, jobs=jobs, label=experiment.task)
+    return load_runs(experiment, seeds, runs=runs)
+
+
+def make_all(work: Iterable, *, runs: str | os.PathLike, jobs: int | str = 1, label: str) -> None:
+    """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
+    asked = {run_path(experiment.folder(runs), seed): (experiment, seed) for experiment, seed in work}
+    make_missing(make_run, asked, label, jobs=jobs, unit="runs")
+
+
+def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], dict]:
+    """One distillation, evaluated: what its sealed file holds, arrays and about."""
+    task, n = experiment.task, experiment.n_episodes
+    policy, history = distill(experiment.teacher, get_task(task), experiment.config, seed=seed)
+    result = rollout_from_seed(policy, task, n, seed=EVALUATION_SEED)
+    validation = rollout_from_seed(policy, task, n, seed=VALIDATION_SEED)
+    arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
+    arrays |= {**asdict(result), "cells": np.array(history.cells)}
+    changes = [event.kind for event in history.events]
+    about = {
+        "kind": "Run",
+        **experiment.about(seed),
+        "settings in full": experiment.settings,
+        "validation_mean": float(validation.returns.mean()),
+        "splits": changes.count("split"),
+        "merges": changes.count("merge"),
+        "cpu": cpu_type(),
+    }
+    return arrays, about
+
+
+def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
+    """Read one run. Raises `atomic.DamagedFile`, also for a run of another experiment or of a seed not in its name."""
+    arrays, about = load_made(path, "Run", experiment.about(int(Path(path).stem)))
+    codewords, coefficients, scale = (arrays.pop(name) for name in ("codewords", "coefficients", "scale"))
+    form = experiment.config.sub_policy
+    policy = VoronoiPolicy(codewords, coefficients, scale=scale, task=experiment.task, sub_policy=form)
+    cells = arrays.pop("cells")
+    known = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges", "cpu")}
+    return Run(policy=policy, outcomes=Outcomes(**arrays), cells=cells, **known)
+
+
+def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:
+    """The runs of these seeds. Raises as `load_run` does."""
+    return [load_run(run_path(experiment.folder(runs), seed), experiment) for seed in seeds]
+
+
+def outcome_shares(outcomes: np.ndarray) -> dict[str, float]:
+    """Shares of the episodes that reached the goal, fell into the pit and were truncated, by name."""
+    return {name: np.mean(outcomes == code) for name, code in SHARES.items()}
+
+
+@dataclass(frozen=True)
+class Results:
+    """The paper's experiment on one task, with everything that its figures and tables need."""
+
+    experiment: Experiment
+    runs: list[Run]
+    teacher_outcomes: Outcomes  # on the start states that the runs are evaluated on
+
+    @property
+    def teacher_returns(self) -> np.ndarray:
+        """Returns of the teacher. (n_episodes,)"""
+        return self.teacher_outcomes.returns
+
+    @property
+    def returns(self) -> np.ndarray:
+        """Returns of the distilled policies. (n_runs, n_episodes)"""
+        return np.stack([run.outcomes.returns for run in self.runs])
+
+    @property
+    def outcomes(self) -> np.ndarray:
+        """How their episodes ended, indices of `vsp.tasks.OUTCOMES`. (n_runs, n_episodes)"""
+        return np.stack([run.outcomes.outcomes for run in self.runs])
+
+    @property
+    def best(self) -> Run:
+        """The run with the highest mean return on the validation starts; the lowest seed among equals."""
+        return max(self.runs, key=lambda run: (run.validation_mean, -run.seed))
+
+
+def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = -1) -> Results:
+    """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
+    experiment = paper_experiment(task, quick=quick)
+    n = QUICK_RUNS if quick else N_RUNS[experiment.task]
+    made = make_runs(experiment, range(n), runs=runs, jobs=jobs)
+    return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+
+
+@threadpool_limits.wrap(limits=1)  # the same sums in the same order, also where no `make` limits threads
+def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
+    """The teacher's episodes from the shared start states, kept beside the runs.
+
+    Another CPU type rounds a network's sums differently, and an episode may end elsewhere. Tables made from the kept
+    files are the same there.
+    """
+    path, about = experiment.folder(runs) / "teacher.run", experiment.about(EVALUATION_SEED)
+    if not path.exists():
+        own = rollout_from_seed(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+        sealed.save_arrays(path, asdict(own), {"kind": "Teacher", **about})
+    return Outcomes(**load_made(path, "Teacher", about)[0])
+
+
+def run_path(folder: str | os.PathLike, seed: int) -> Path:
+    """Where the run with this seed lies in the folder of its experiment."""
+    return Path(folder) / f"{seed:04d}.run"

@@ -1,0 +1,279 @@
+"""Statistics of returns: the paper's spread metrics, intervals that resample policies, and what summary numbers imply.
+
+Standard deviations divide by n - 1 for samples (`spread`) and by n for the identities on parts of a sample
+(`remaining_std` and the like). In the identities NaN gives NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from decimal import Decimal
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
+
+from ..checks import check_array, check_count, check_finite, check_number, check_seed
+from ..evaluation import fences
+
+
+def spread(returns: np.ndarray) -> dict[str, float]:
+    """How returns of any shape spread: the metrics of the paper's tables T5 and T6, and what its text adds.
+
+    Keys, in units of return: min, max, mean, std (of the sample, n - 1), q1, median, q3, iqr; lower_fence and
+    upper_fence, 1.5 interquartile ranges beyond the quartiles, which the paper calls bounds; outliers_below and
+    outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError for no returns
+    or some that are not finite.
+    """
+    returns = check_finite("returns", returns).ravel()
+    if not len(returns):
+        raise ValueError("no returns, expected at least one")
+    q1, median, q3 = np.percentile(returns, [25, 50, 75])
+    lower, upper = fences(q1, q3)
+    below, above, moments = returns < lower, returns > upper, _moments(returns)
+    found = {name: moments[name] for name in ("min", "max", "mean", "std")}
+    found |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
+    found |= {"coverage": 1.0 - (below | above).mean(), "lower_fence": lower, "upper_fence": upper}
+    return found | {"outliers_below": int(below.sum()), "outliers_above": int(above.sum())}
+
+
+def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
+    """What the paper's text says about outliers, under the names that end its ids in `data/paper/text_numbers.csv`.
+
+    Means, standard deviations and ranges of a set without members are NaN. Raises ValueError as `spread` does.
+    """
+    facts, returns = spread(returns), np.ravel(returns)
+    below = returns[returns < facts["lower_fence"]]
+    above = returns[returns > facts["upper_fence"]]
+    outside = np.concatenate([below, above])
+    numbers = {name: facts[name] for name in ("mean", "std", "min", "max")}
+    numbers |= {"whisker_low": facts["lower_fence"], "whisker_high": facts["upper_fence"], "outliers": len(outside)}
+    numbers |= {f"outliers_{name}": value for name, value in _moments(outside).items()}
+    for side, values in (("below", below), ("above", above)):
+        moments = _moments(values)
+        numbers[f"outliers_{side}_share"] = 100 * len(values) / len(outside) if len(outside) else np.nan
+        numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
+    return numbers
+
+
+def _moments(values: np.ndarray) -> dict[str, float]:
+    if not len(values):
+        return dict.fromkeys(("mean", "std", "min", "max"), np.nan)
+    deviation = values.std(ddof=1) if len(values) > 1 else 0.0
+    return {"mean": values.mean(), "std": deviation, "min": values.min(), "max": values.max()}
+
+
+def bootstrap_draws(n_rows: int, n_resamples: int, seed: int) -> np.ndarray:
+    """Indices of the rows that each resample draws, with replacement: as many as there are. (n_resamples, n_rows)
+
+    Every interval over policies resamples in this way; the same seed draws the same rows.
+    """
+    check_count("n_resamples", n_resamples)
+    check_seed(seed)
+    return np.random.default_rng(seed).integers(n_rows, size=(n_resamples, n_rows))
+
+
+def percentile_interval(values: np.ndarray) -> tuple[float, float]:
+    """The middle 95 % of `values`: a percentile interval where they are the statistic of each resample."""
+    low, high = np.percentile(values, [2.5, 97.5])
+    return float(low), float(high)
+
+
+def interval(
+    returns: np.ndarray, statistic: Callable, *, vectorized: bool = False, n_resamples: int = 10_000, seed: int = 0
+) -> tuple[float, float]:
+    """Percentile bootstrap interval (95 %) of `statistic(returns)` that resamples policies, rows of `returns` (p, ...).
+
+    All policies share start states, so single episodes are not independent and are never resampled on their own.
+    `vectorized` calls `statistic(returns, axis=1)` once, for all resamples of one number per policy (p,).
+    Raises ValueError for no returns or some that are not finite.
+    """
+    returns = check_finite("returns", returns)
+    if not returns.size or not returns.ndim:
+        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
+    draws = bootstrap_draws(len(returns), n_resamples, seed)
+    return percentile_interval(
+        statistic(returns[draws], axis=1) if vectorized else [statistic(returns[draw]) for draw in draws]
+    )
+
+
+def crossed_interval(values: np.ndarray) -> tuple[float, float]:
+    """Percentile bootstrap interval (95 %) of the mean of `values` (p, n) that resamples policies *and* start states.
+
+    Policies may be so alike (twenty fits to much the same data) that the starts matter most. How often a row or column
+    is drawn is multinomial: the same law as counting `bootstrap_draws`, without drawing p + n indices a resample.
+    """
+    rng = np.random.default_rng(0)
+    policies, starts = (rng.multinomial(k, np.full(k, 1 / k), size=2000) for k in values.shape)
+    return percentile_interval(np.einsum("rn,rn->r", policies @ values, starts) / values.size)
+
+
+def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0, jobs: int = -1) -> pd.DataFrame:
+    """Bootstrap of everything that `spread` and `outlier_numbers` give: one row per resample, one column per statistic.
+
+    Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
+    that a resample leaves empty is NaN. `jobs` threads (-1: one per core) give the same numbers as one. Raises
+    ValueError for no returns or some that are not finite.
+    """
+    returns = check_array("returns", returns, (-1, -1))
+    if not returns.size:
+        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
+    draws = bootstrap_draws(len(returns), n_resamples, seed)
+    sample = _SortedReturns(np.ascontiguousarray(returns))
+    batches = [draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH)]
+    work = (delayed(sample.statistics)(batch) for batch in batches)
+    with threadpool_limits(1):
+        found = Parallel(n_jobs=jobs, prefer="threads")(work)  # NumPy's loops run side by side
+    return pd.DataFrame({name: np.concatenate([batch[name] for batch in found]) for name in found[0]})
+
+
+_BATCH = 25  # resamples at a time, so that their arrays stay in the cache
+
+
+class _SortedReturns:
+    """Returns (p, n) of policies, sorted once, so that no resample needs sorting.
+
+    A resample counts each policy, with all its returns, some number of times. Its order statistics are found in
+    cumulative counts: first the block of sorted returns, then the return inside it.
+    """
+
+    def __init__(self, returns: np.ndarray):
+        (p, n), self.block = returns.shape, math.ceil(math.sqrt(returns.size))
+        order = returns.argsort(axis=None, kind="stable")
+        self.values, self.policy = returns.ravel()[order], order // n
+        cells = self.policy * self.block + np.arange(p * n) // self.block
+        in_block = np.bincount(cells, minlength=p * self.block).reshape(p, self.block)
+        # Returns of each policy before each block
+        self.until = np.pad(in_block.cumsum(axis=1), ((0, 0), (1, 0))).astype(float)
+        means = returns.mean(axis=1)
+        squares = np.square(returns - means[:, None]).sum(axis=1)
+        self.by_policy = _Parts(np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1))
+
+    def statistics(self, draws: np.ndarray) -> dict[str, np.ndarray]:
+        """What `resample` has, for the resamples that draw these policies (r, p)."""
+        counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
+        q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
+        lower, upper = fences(q1, q3)
+        below, above = self._outliers(counts, lower, upper)
+        drawn = self.by_policy._replace(size=counts * self.by_policy.size, squares=counts * self.by_policy.squares)
+        parts = {"": drawn, "outliers_below_": below, "outliers_above_": above}
+        parts["outliers_"] = _Parts(*(np.hstack(pair) for pair in zip(below, above)))
+        numbers = {prefix + name: x for prefix, part in parts.items() for name, x in part.moments().items()}
+        outliers = (below.size + above.size)[:, 0]
+        some = np.where(outliers > 0, outliers, np.nan)
+        numbers |= {"outliers_below_share": 100 * below.size[:, 0] / some}
+        numbers |= {"outliers_above_share": 100 * above.size[:, 0] / some}
+        numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
+        return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / len(self.values))}
+
+    def _quantiles(self, counts: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
+        """Linear interpolation between order statistics, as `np.percentile` has it; an array (r,) per share."""
+        until = counts @ self.until
+        found = []
+        for place in np.multiply(shares, len(self.values) - 1):
+            below, above = (self._ranked(counts, until, rank) for rank in (math.floor(place), math.ceil(place)))
+            found.append(below + (place - math.floor(place)) * (above - below))
+        return found
+
+    def _ranked(self, counts: np.ndarray, until: np.ndarray, rank: int) -> np.ndarray:
+        """The value of each resample with this rank, 0 for the smallest; `until` are values before each block. (r,)"""
+        block = (until[:, 1:] <= rank).sum(axis=1, keepdims=True)
+        places = np.minimum(block * self.block + np.arange(self.block), len(self.values) - 1)
+        inside = np.take_along_axis(counts, self.policy[places], axis=1).cumsum(axis=1)
+        passed = np.take_along_axis(until, block, axis=1) + inside <= rank
+        return self.values[block[:, 0] * self.block + passed.sum(axis=1)]
+
+    def _outliers(self, counts: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[_Parts, _Parts]:
+        """The returns below and above the fences (r,) of each resample."""
+        n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
+        below, above = np.arange(max(1, low.max())), np.arange(min(n - 1, high.min()), n)  # in any resample
+        return (
+            self._part(below, counts[:, self.policy[below]] * (below < low[:, None])),
+            self._part(above, counts[:, self.policy[above]] * (above >= high[:, None])),
+        )
+
+    def _part(self, places: np.ndarray, weights: np.ndarray) -> _Parts:
+        """The sorted returns at `places` (k,), each there `weights` (r, k) times."""
+        values, size, there = self.values[places], weights.sum(axis=1), weights > 0
+        mean = values[0] + np.einsum("rk,k->r", weights, values - values[0]) / np.maximum(1, size)
+        squares = np.einsum("rk,rk->r", weights, np.square(values - mean[:, None]))
+        low, high = values[there.argmax(axis=1)], values[::-1][there[:, ::-1].argmax(axis=1)]
+        return _Parts(*(x[:, None] for x in (size, mean, squares, low, high)))
+
+
+class _Parts(NamedTuple):
+    """Parts of resamples, as arrays (r, parts) or, where all resamples have the same, (parts,)."""
+
+    size: np.ndarray  # where it is 0, the others mean nothing
+    mean: np.ndarray
+    squares: np.ndarray  # sum of squared deviations from the mean
+    low: np.ndarray
+    high: np.ndarray
+
+    def moments(self) -> dict[str, np.ndarray]:
+        """Moments and range of the parts together, NaN where all are empty. (r,)"""
+        n = self.size.sum(axis=1)
+        mean = (self.size * self.mean).sum(axis=1) / np.maximum(1, n)
+        squares = (self.squares + self.size * np.square(self.mean - mean[:, None])).sum(axis=1)
+        least = np.where(self.size > 0, self.low, np.inf).min(axis=1)
+        most = np.where(self.size > 0, self.high, -np.inf).max(axis=1)
+        found = {"mean": mean, "std": np.sqrt(squares / np.maximum(1, n - 1)), "min": least, "max": most}
+        return {name: np.where(n > 0, x, np.nan) for name, x in found.items()}
+
+
+Groups = Sequence[tuple[float, float, float]]  # (count, low, high): so many values lie in [low, high]
+Part = namedtuple("Part", "size mean std low high")  # some of the returns, and the range that they lie in
+
+
+def quartiles_from_fences(low: float, high: float) -> tuple[float, float]:
+    """Q1 and Q3 with these fences, which lie 1.5 + 1 + 1.5 interquartile ranges apart."""
+    iqr = (high - low) / (1.5 + 1 + 1.5)
+    return low + 1.5 * iqr, high - 1.5 * iqr
+
+
+def remaining_mean(n: float, mean: float, parts: Sequence[Part]) -> float:
+    """Mean of what is left of n values with this `mean` when `parts` are taken away."""
+    return (n * mean - sum(p.size * p.mean for p in parts)) / (n - sum(p.size for p in parts))
+
+
+def remaining_std(n: float, mean: float, std: float, parts: Sequence[Part]) -> float:
+    """Standard deviation of what is left when `parts` are taken away; NaN if no values have such moments."""
+    squares = n * (std**2 + mean**2) - sum(p.size * (p.std**2 + p.mean**2) for p in parts)
+    variance = squares / (n - sum(p.size for p in parts)) - remaining_mean(n, mean, parts) ** 2
+    return math.sqrt(variance) if variance >= 0 else math.nan
+
+
+def quarters(n: float, marks: Sequence[float], below: float = 0, above: float = 0) -> Groups:
+    """Where those of n values lie that are no outliers; `marks` are their lowest, Q1, median, Q3 and their highest.
+
+    The quartiles count all values: outliers take their places in the first (`below`) and the last quarter (`above`).
+    """
+    return list(zip((n / 4 - below, n / 4, n / 4, n / 4 - above), marks[:-1], marks[1:], strict=True))
+
+
+def mean_range(groups: Groups) -> tuple[float, float]:
+    """The least and the greatest mean that values in these ranges can have."""
+    n = sum(count for count, _, _ in groups)
+    return sum(count * low for count, low, _ in groups) / n, sum(count * high for count, _, high in groups) / n
+
+
+def least_std(mean: float, groups: Groups) -> float:
+    """A lower bound on the standard deviation of such values: each is at least as far from their mean as its range."""
+    squares = sum(count * float(np.max((low - mean, mean - high, 0))) ** 2 for count, low, high in groups)
+    return math.sqrt(squares / sum(count for count, _, _ in groups))
+
+
+def greatest_std(mean: float, low: float, high: float) -> float:
+    """An upper bound on the standard deviation of values in [low, high] with this mean (Bhatia and Davis 2000)."""
+    return math.sqrt(max((high - mean) * (mean - low), 0))
+
+
+def rounds_to(number: float, printed: float) -> bool:
+    """Whether `number` may be printed as `printed`, to the last decimal of this; NaN may not."""
+    check_number("printed", printed)
+    decimals = max(0, -Decimal(repr(float(printed))).normalize().as_tuple().exponent)
+    return bool(abs(number - printed) <= 0.5 / 10**decimals + 1e-9)

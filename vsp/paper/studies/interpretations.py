@@ -1,0 +1,229 @@
+"""The study of the readings: what each choice that the paper leaves open does to the result.
+
+Every reading is tried on its own, and those that change the result most in all combinations too. One set of seeds ranks
+them; another checks the first few against the default.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+
+import numpy as np
+import pandas as pd
+
+from ...evaluation import rollout_from_seed
+from ...rollouts import Outcomes
+from .. import printed
+from ..results import settings_id
+from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
+from ..statistics import percentile_interval, quartiles_from_fences, resample, spread
+
+VERSION = 1  # raise it when the same runs give other rows
+CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first
+N_RESAMPLES = 1000  # of an interval
+N_CONFIRMED = 5  # variants that are checked, beside the default and the nearest one of each task
+
+# Every reading on its own: fields of `Config` and the values that are not their defaults
+READINGS = {
+    "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
+    "R2": [{"split_lookup": "kept"}],
+    "R3": [{"split_metric": "euclidean"}],
+    "R4": [{"one_split": True}],
+    "R5": [{"periodic_reset": "off"}],
+    "R6": [{"merge_reset": "neighbours"}, {"merge_visits_removed": True}],
+    "R7": [
+        {"batch_size": 16}, {"batch_size": 256}, {"n_minibatches": 2}, {"n_minibatches": 5},
+        {"learning_rate": 3e-4}, {"learning_rate": 3e-3}, {"learning_rate": 1e-2},
+        {"initial": "zeros"}, {"adam_on_reset": "restart"},
+    ],
+    "R8": [{"scale": "box"}],
+    "R9": [{"neighbours": "lookup"}],
+    "R10": [{"split_loss": "clipped"}],
+    "R12": [{"merge_parameters": "weights"}],
+    "R13": [{"split_reset": "neighbours"}, {"split_neighbours": "new"}],
+    "R14": [{"loss_after_split": "kept"}],
+    "R15": [{"inclusive": True}],
+}  # fmt: skip
+# Readings that change the number of cells or how fast the maps learn, in all combinations
+FACTORS = {
+    "R2": {"split_lookup": "kept"},
+    "R3": {"split_metric": "euclidean"},
+    "R4": {"one_split": True},
+    "R7 rate": {"learning_rate": 3e-3},
+    "R7 zeros": {"initial": "zeros"},
+}
+# What Algorithms 1 to 3 print where the prose around them says something else
+AS_PRINTED = {
+    "freeze": "first_n_freeze", "merge_reset": "neighbours", "merge_visits_removed": True, "split_reset": "neighbours",
+    "split_neighbours": "new", "loss_after_split": "kept", "inclusive": True,
+}  # fmt: skip
+
+
+def variants() -> dict[str, dict]:
+    """What is tried, by name: the default, each reading on its own, the algorithms as printed, all combinations."""
+    tried = {"default": {}}
+    tried |= {f"{number} {name_of(change)}": change for number, changes in READINGS.items() for change in changes}
+    tried["algorithms as printed"] = AS_PRINTED
+    for size in range(2, len(FACTORS) + 1):
+        for chosen in itertools.combinations(FACTORS, size):
+            if not {"R2", "R4"} <= set(chosen):  # after one split a pass needs no second look-up
+                tried[" + ".join(chosen)] = {name: v for part in chosen for name, v in FACTORS[part].items()}
+    return tried
+
+
+def name_of(change: dict) -> str:
+    """How a change of one field is written: "one_split", "learning_rate 0.01"."""
+    ((name, value),) = change.items()
+    return name if value is True else f"{name} {value}"
+
+
+def experiments(tried: dict[str, dict]) -> dict[tuple[str, str], Experiment]:
+    """The paper's experiment with the readings of each variant, by name of the variant and task."""
+    usual = {task: paper_experiment(task) for task in printed.TASKS}
+    return {
+        (name, task): dataclasses.replace(one, config=dataclasses.replace(one.config, **change))
+        for name, change in tried.items()
+        for task, one in usual.items()
+    }
+
+
+# How far from the paper
+
+
+def landmarks(task: str) -> dict[str, float]:
+    """Where the paper's distilled policies stand from its own teacher: see `standing`.
+
+    MountainCar's quartiles come from the whisker bounds of the text, since T6 repeats the teacher's (see `audit`).
+    """
+    teacher, ours = (printed.printed_spread_values(task, who) for who in ("drl", "ours"))
+    if task == "MountainCarContinuous-v0":
+        bounds = printed.printed_value("mc_ours_whisker_low"), printed.printed_value("mc_ours_whisker_high")
+        ours["q1"], ours["q3"] = quartiles_from_fences(*bounds)
+    return standing(ours, teacher)
+
+
+def standing(policies: dict[str, float], teacher: dict[str, float]) -> dict[str, float]:
+    """Mean and quartiles of the return as differences to the teacher's mean, in units of its standard deviation, and
+    the logarithm of the ratio of the standard deviations."""
+    scaled = {name: (policies[name] - teacher["mean"]) / teacher["std"] for name in ("mean", "q1", "q3")}
+    return {**scaled, "std": float(np.log(policies["std"] / teacher["std"]))}
+
+
+def distance(here: dict[str, float], there: dict[str, float]) -> float:
+    """Root mean square difference of two standings."""
+    return float(np.sqrt(np.mean([(here[name] - there[name]) ** 2 for name in there])))
+
+
+def provenance_of(experiment: Experiment, seeds: range) -> dict[str, str | int]:
+    """The provenance of the row of an experiment in one phase; the version is that of the paper's method."""
+    settings = {"runs": experiment.settings, "seeds": list(seeds), "resamples": N_RESAMPLES, "study": VERSION}
+    return experiment.provenance | {"settings": settings_id(settings)}
+
+
+# The study
+
+
+def study(runs: str | os.PathLike, *, jobs: int | str = 1, tried: dict | None = None) -> pd.DataFrame:
+    """Every variant with the seeds CHOOSING, and the nearest to the paper with the seeds CONFIRMING: a data frame.
+
+    One row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
+    """
+    tried = variants() if tried is None else tried
+    chosen = _phase("choosing", tried, CHOOSING, runs, jobs)
+    first = ["default", *(name for name in ranking(chosen) if name != "default")][: N_CONFIRMED + 1]
+    first = list(dict.fromkeys([*first, *(ranking(chosen, task)[0] for task in printed.TASKS)]))
+    confirmed = _phase("confirming", {name: tried[name] for name in first}, CONFIRMING, runs, jobs)
+    return pd.concat([chosen, confirmed], ignore_index=True)
+
+
+def ranking(frame: pd.DataFrame, task: str = "both") -> list[str]:
+    """The variants from the nearest to the paper to the farthest."""
+    rows = frame[frame["task"] == task]
+    return rows.sort_values("distance", kind="stable")["variant"].tolist()
+
+
+def _phase(phase: str, tried: dict, seeds, runs, jobs: int | str) -> pd.DataFrame:
+    work = experiments(tried)
+    make_all(list(itertools.product(work.values(), seeds)), runs=runs, jobs=jobs, label=f"readings, {phase}")
+    teachers = {task: work["default", task].teacher for task in printed.TASKS}
+    own = {task: rollout_from_seed(teacher, task, seed=EVALUATION_SEED) for task, teacher in teachers.items()}
+    rows, away = [], {}
+    for (name, task), one in work.items():
+        row, away[name, task] = _row(load_runs(one, seeds, runs=runs), own[task], landmarks(task))
+        rows.append({"phase": phase, "variant": name, "task": task, **provenance_of(one, seeds), **row})
+    single = pd.DataFrame(rows).astype({"version": "Int64"})  # whole numbers, beside rows without one
+    return pd.concat([single, _joint(phase, away, printed.TASKS)], ignore_index=True)
+
+
+def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
+    """What the runs of one variant come to, with 95 % intervals over runs; and their distances to the paper, the
+    measured one first, then one per resample."""
+    returns = np.stack([run.outcomes.returns for run in made])
+    codes = np.stack([run.outcomes.outcomes for run in made])
+    cells = np.array([len(run.policy) for run in made])
+    facts, own, draws = spread(returns), spread(teacher.returns), resample(returns, n_resamples=N_RESAMPLES)
+    away = [distance(standing(drawn, own), there) for drawn in (facts, *draws.to_dict("records"))]
+    row = {"runs": len(made), "cells": cells.mean(), "cells_min": cells.min(), "cells_max": cells.max()}
+    row |= {name: facts[name] for name in ("mean", "std", "q1", "median", "q3")}
+    row["mean_low"], row["mean_high"] = percentile_interval(draws["mean"])
+    row |= outcome_shares(codes)
+    row["runs_above_teacher"] = np.mean(returns.mean(axis=1) > own["mean"])
+    return row | _with_interval("distance", np.array(away)), np.array(away)
+
+
+def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.DataFrame:
+    """The distance averaged over the tasks, and how much larger it is than the default's ("gap"), for each variant.
+
+    Variants share seeds, and every variant's resamples draw the same of them, so gaps are taken resample by resample.
+    """
+    names = list(dict.fromkeys(name for name, _ in away))
+    joint = {name: np.mean([away[name, task] for task in tasks], axis=0) for name in names}
+    rows = [
+        {"phase": phase, "variant": name, "task": "both"}
+        | _with_interval("distance", joint[name])
+        | _with_interval("gap", joint[name] - joint["default"])
+        for name in names
+    ]
+    return pd.DataFrame(rows)
+
+
+def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
+    """A measured value and the 95 % interval of its resamples; `values` holds the one, then the others."""
+    low, high = percentile_interval(values[1:])
+    return {name: values[0], f"{name}_low": low, f"{name}_high": high}
+
+
+# What the notebook shows of it
+
+PANELS = [  # a panel of the figure: task, what is shown of it, label of the axis, its limits
+    ("SimpleGoal-v0", "mean", "mean return", (12.3, 16)),
+    ("MountainCarContinuous-v0", "mean", "mean return", (81, 96)),
+    ("SimpleGoal-v0", "distance", "distance", (0.04, 1.5)),
+    ("MountainCarContinuous-v0", "distance", "distance", (0.6, 40)),
+]
+
+
+def as_intervals(frame: pd.DataFrame, task: str, column: str, phase: str = "choosing") -> pd.DataFrame:
+    """One column of a phase with its interval, by variant: columns here, low, high."""
+    rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant")
+    return rows[[column, f"{column}_low", f"{column}_high"]].set_axis(["here", "low", "high"], axis=1)
+
+
+def shown_variants(frame: pd.DataFrame, n_combinations: int = 4) -> list[str]:
+    """The default, every reading on its own, the algorithms as printed, and the nearest of the combinations."""
+    every = variants()
+    alone = [name for name, change in every.items() if len(change) < 2 or change is AS_PRINTED]
+    ranked = ranking(frame[frame["phase"] == "choosing"])
+    return [*alone, *[name for name in ranked if name not in alone][:n_combinations]]
+
+
+def interpretation_summary(frame: pd.DataFrame) -> pd.DataFrame:
+    """The choosing phase, one row per variant, the tasks (SG, MC) side by side, the nearest to the paper first."""
+    shown = ["cells", "mean", "std", "failing", "distance"]
+    rows = frame[frame["phase"] == "choosing"].assign(failing=lambda rows: 100 * (1 - rows["goal"]))
+    wide = rows.pivot(index="variant", columns="task", values=shown)
+    wide = wide.loc[ranking(rows), [*itertools.product(shown, printed.TASKS), ("distance", "both")]]
+    wide.columns = [f"{printed.PREFIX.get(task, task).upper()} {name}" for name, task in wide.columns]
+    return wide.rename(columns=lambda name: name.replace("failing", "failing (%)")).round(3).reset_index()

@@ -1,0 +1,102 @@
+"""The study of the teachers: how much of the result depends on the one teacher that all runs of a task share."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ...baselines.simple import linear_map
+from ...evaluation import rollout_from_seed
+from ...teachers.teacher import SHIPPED, load_teacher
+from .. import printed
+from ..beside import teacher_data
+from ..results import settings_id
+from ..runs import EVALUATION_SEED, Experiment, load_runs, make_all, outcome_shares, paper_experiment
+
+VERSION = 1  # raise it when the same runs give other rows
+SEEDS = range(1000, 1010)  # of the distillations of each teacher
+
+
+def teachers(task: str) -> dict[str, Path]:
+    """The teachers of `task` by name: the shipped one, and those of shorter training."""
+    others = sorted((SHIPPED / "short").glob(f"{task}-*.safetensors"))
+    return {"shipped": SHIPPED / f"{task}.safetensors"} | {f"seed {path.stem.split('-')[-1]}": path for path in others}
+
+
+def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) -> pd.DataFrame:
+    """Distil every teacher with the seeds SEEDS: one row per run. The column `teacher` is the name of the teacher,
+    `checksum` what other tables call so."""
+    work = experiments(tasks)
+    make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
+    rows = []
+    for (task, name), experiment in work.items():
+        own = rollout_from_seed(experiment.teacher, task, seed=EVALUATION_SEED).returns
+        made_with = provenance_of(experiment)
+        about = {"task": task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"]}
+        about |= {"version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"]}
+        about |= {"linear_error": linear_error(experiment)}
+        for run in load_runs(experiment, SEEDS, runs=runs):
+            returns = run.outcomes.returns
+            scores = {"mean": returns.mean(), "std": returns.std(ddof=1), "teacher_mean": own.mean()}
+            scores["teacher_std"] = own.std(ddof=1)
+            shares = outcome_shares(run.outcomes.outcomes)
+            rows.append({**about, "seed": run.seed, "cells": len(run.policy), **scores, **shares})
+    return pd.DataFrame(rows)
+
+
+def provenance_of(experiment: Experiment) -> dict[str, str | int]:
+    """The provenance of the rows of an experiment; the version is that of the paper's method."""
+    settings = {"runs": experiment.settings, "linear error of seed": SEEDS[0], "study": VERSION}
+    return experiment.provenance | {"settings": settings_id(settings)}
+
+
+def linear_error(experiment: Experiment) -> float:
+    """Root mean square error, in units of the action, of one linear map for all that the teacher does on its way."""
+    states, actions = teacher_data(experiment, SEEDS[0])
+    error = linear_map(states, actions, experiment.task).linear(states) - actions
+    return float(np.sqrt(np.square(error).mean()))
+
+
+def experiments(tasks=printed.TASKS) -> dict[tuple[str, str], Experiment]:
+    """The paper's experiment with each teacher, by task and name of the teacher."""
+    return {
+        (task, name): dataclasses.replace(paper_experiment(task), teacher=load_teacher(path))
+        for task in tasks
+        for name, path in teachers(task).items()
+    }
+
+
+def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
+    """Variance of `values` between and within groups of equal size: one-way random effects.
+
+    Keys: between, within (variances, by moments; between is cut at zero), share (of between in the sum), share_low and
+    share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6). Raises ValueError for unequal groups.
+    """
+    from scipy.stats import f  # here: it takes long to import
+
+    table = values.groupby(groups)
+    size, means = table.size(), table.mean()
+    k, n = len(size), size.iloc[0]
+    if size.nunique() != 1 or k < 2 or n < 2:
+        raise ValueError(f"sizes of the groups are {size.to_dict()}, expected two or more groups of one size, above 1")
+    within = table.var().mean()
+    if not within:
+        raise ValueError("no variance within the groups, expected values that differ")
+    ratio = n * means.var() / within
+    low, high = (ratio / f.ppf(q, k - 1, k * (n - 1)) for q in (0.975, 0.025))
+    shares = {name: max(0.0, (x - 1) / (x + n - 1)) for name, x in (("", ratio), ("_low", low), ("_high", high))}
+    between = max(0.0, means.var() - within / n)
+    return {"between": between, "within": within} | {f"share{name}": share for name, share in shares.items()}
+
+
+def teacher_summary(frame: pd.DataFrame) -> pd.DataFrame:
+    """One row per teacher: its own return, and over its runs the mean, its deviation, cells and failed episodes."""
+    groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)
+    means = groups[["steps", "linear_error", "teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
+    means.insert(5, "deviation between runs", groups["mean"].std())
+    return means.reset_index()

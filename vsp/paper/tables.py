@@ -1,0 +1,216 @@
+"""Tables: frames in, LaTeX (booktabs) and CSV out. The CSV holds the numbers, the LaTeX what a reader sees."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+
+from ..checks import check_array, check_count
+from ..config import EXTENSIONS, paper_preset
+from ..export import codeword_latex, equations_latex, symbol
+from ..policy import VoronoiPolicy
+from ..run import atomic, listed
+from ..show.style import FORCE_MAP
+from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
+from .results import write_results
+from .runs import SHARES, Experiment, Results, Run, outcome_shares
+from .statistics import interval, outlier_numbers, spread
+
+if TYPE_CHECKING:
+    from IPython.display import HTML
+
+MISSING = "–"  # in print, where the paper gives no number
+PAGE = 40  # rows that fit on one
+
+
+def save_table(
+    frame: pd.DataFrame, name: str, *, caption: str, out: str | os.PathLike, latex: pd.DataFrame | None = None
+) -> pd.DataFrame:
+    """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
+
+    `latex` is the table as LaTeX code, for equations, or a part of it where the whole is too long for a page; without
+    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor, and longtable for more than `PAGE`
+    rows.
+    """
+    path = Path(out) / "figures" / "tables" / name
+    rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
+    atomic.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
+    shown = as_text(frame) if latex is None else latex
+    code = as_latex(frame) if latex is None else latex
+    place = {"environment": "longtable"} if len(code) > PAGE else {"position": "t", "position_float": "centering"}
+    body = code.style.hide(axis="index").to_latex(hrules=True, caption=caption, label=f"tab:{name}", **place)
+    atomic.write_text(path.with_suffix(".tex"), body)
+    return shown
+
+
+def as_latex(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame as text that LaTeX prints as it stands: floats with three decimals, a minus as long as a plus."""
+    return as_text(frame).map(_escape).rename(columns=_escape)
+
+
+def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
+    """T2 as configured here, beside what the paper prints: one row per hyperparameter, two columns per task."""
+    names = printed_hyperparameters(tasks[0])
+    columns = {"hyperparameter": list(names)}
+    for task in tasks:
+        printed, here = printed_hyperparameters(task), paper_preset(task)
+        columns[f"{SHORT[task]}, paper"] = [printed[name] for name in names]
+        columns[f"{SHORT[task]}, here"] = [getattr(here, name) for name in names]
+    return pd.DataFrame(columns, dtype=object)
+
+
+def interpretation_table(task: str) -> pd.DataFrame:
+    """What the paper leaves open: one row per field of the configuration that T2 does not print, with its default."""
+    here, known = paper_preset(task), printed_hyperparameters(task).keys() | EXTENSIONS
+    fields = {field.name: getattr(here, field.name) for field in dataclasses.fields(here) if field.name not in known}
+    return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
+
+
+def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: bool = False) -> pd.DataFrame:
+    """T3 and T4: one row per cell, the codeword and an equation per action in LaTeX.
+
+    `swatch` puts a patch before the equation, in the force map's colour of the action at the codeword (one action).
+    """
+    rows = []
+    for i, codeword in enumerate(policy.codewords):
+        row = {"codeword": codeword_latex(policy, i, digits)}
+        patches = [_patch(action) if swatch else "" for action in policy.predict(codeword)[0]]
+        for output, patch, equation in zip(policy.task.outputs, patches, equations_latex(policy, i, digits)):
+            row[f"${symbol(output)}$"] = patch + equation
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
+    """T5 and T6: the paper's columns beside ours; `teacher` (n,) and `runs` (p, n) are returns. Coverage in percent."""
+    printed, columns = printed_spread(task), {}
+    teacher, runs = _returns(teacher, runs)
+    for name, values in (("drl", teacher), ("ours", runs)):
+        here = spread(values) | {"median/q2": spread(values)["median"]}
+        found = [here[metric.lower()] * (100 if metric == "Coverage" else 1) for metric in printed.index]
+        label = {"drl": "TD3", "ours": "distilled"}[name]
+        columns |= {f"{label}, paper": printed[name].to_numpy(), f"{label}, here": found}
+    return pd.DataFrame({"metric": printed.index, **columns})
+
+
+def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
+    """N: the numbers of the running text beside ours; NaN where the paper gives none.
+
+    `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
+    """
+    known, rows = printed_text_numbers(check_task(task)), []
+    teacher, runs = _returns(teacher, runs)
+    check_count("cells", cells)
+    printed = known["value"]
+    for subject, values in (("drl", teacher), ("ours", runs)):
+        numbers = outlier_numbers(values)
+        if subject == "ours":
+            means = runs.mean(axis=1)
+            numbers |= {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
+            numbers["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
+        rows += [(task, f"{PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
+    rows.append((task, f"{PREFIX[task]}_cells", cells))
+    rows = [(task, name, _like(printed.get(name, np.nan), value), value) for task, name, value in rows]
+    frame = pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
+    for place, column in ((2, "subject"), (3, "quantity")):
+        frame.insert(place, column, frame["id"].map(known[column]).fillna(""))
+    return frame
+
+
+def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns of the teacher (n,) and of the runs (p, n), checked. Raises ValueError."""
+    return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
+
+
+def _like(printed: float, here: float) -> float | int:
+    """The paper's value, as an integer where ours is a count."""
+    return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
+
+
+def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
+    """The frame as text: floats with `digits` decimals, or none in a column of whole numbers; all else as it is."""
+    check_count("digits", digits, least=0)
+    return frame.apply(lambda column: column.map(lambda value: _text(value, 0 if _whole(column) else digits)))
+
+
+def _whole(column: pd.Series) -> bool:
+    """Whether all floats of a column are whole numbers: counts become floats beside a missing one."""
+    return all(value.is_integer() for value in column if isinstance(value, float) and not np.isnan(value))
+
+
+def show_table(frame: pd.DataFrame) -> HTML:
+    """The frame as text, as a notebook shows it, without an index."""
+    from IPython.display import HTML
+
+    return HTML(as_text(frame).to_html(index=False))
+
+
+def _text(value: object, digits: int) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    if np.isnan(value):
+        return MISSING
+    if value and abs(value) < 0.001:
+        return np.format_float_positional(value, 2, fractional=False)
+    return f"{value:.{digits}f}"
+
+
+def _escape(text: str) -> str:
+    text = text.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&")
+    return re.sub(r"^-(?=\d)", "$-$", text)
+
+
+def _patch(force: float) -> str:
+    colour = mpl.colors.to_hex(mpl.colormaps[FORCE_MAP]((force + 1) / 2)).lstrip("#").upper()
+    return rf"\textcolor[HTML]{{{colour}}}{{\rule{{1.2em}}{{1.4ex}}}} "
+
+
+def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
+    """One row per run: seed, cells, splits, merges, spread of the returns and shares of the outcomes."""
+    rows = []
+    for run in runs:
+        counts = {"seed": run.seed, "cells": len(run.policy), "splits": run.splits, "merges": run.merges}
+        scores = {"validation_mean": run.validation_mean, **spread(run.outcomes.returns)}
+        rows.append({**experiment.provenance, **counts, **scores, **outcome_shares(run.outcomes.outcomes)})
+    return pd.DataFrame(rows)
+
+
+def run_overview(results: Results) -> pd.DataFrame:
+    """Mean, lowest and highest value over the runs, one row per property of a run."""
+    frame = run_summary(results.runs, results.experiment)
+    return frame[["cells", "splits", "merges", "mean", *SHARES]].agg(["mean", "min", "max"]).T
+
+
+def teacher_beside_runs(results: Results) -> dict[str, float]:
+    """Teacher against distilled policies: means, and 95 % intervals that resample policies.
+
+    The difference is taken start by start. "± if independent" is what the half-width would be if all episodes were
+    independent of each other, which they are not.
+    """
+    teacher, runs = results.teacher_returns, results.returns
+    means = runs.mean(axis=1)
+    low, high = interval(means, np.mean, vectorized=True)
+    gap_low, gap_high = interval((runs - teacher).mean(axis=1), np.mean, vectorized=True)
+    return {
+        "TD3, mean": teacher.mean(), "distilled, mean": runs.mean(),
+        "95 % interval from": low, "to": high, "± of it": (high - low) / 2,
+        "± if independent": 1.96 * runs.std(ddof=1) / np.sqrt(runs.size),
+        "difference, from": gap_low, "difference, to": gap_high,
+        "runs above TD3": np.mean(means > teacher.mean()),
+        "lowest run": means.min(), "median run": np.median(means), "highest run": means.max(),
+    }  # fmt: skip
+
+
+def write_summary(results: Results, *, out: str | os.PathLike) -> None:
+    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them beside it."""
+    folder, task = Path(out) / "data" / "results", results.experiment.task
+    write_results(run_summary(results.runs, results.experiment), task, out=out)
+    cpus = sorted({run.cpu for run in results.runs})
+    listed.write_listed(folder / "made_on.txt", "".join(f"{cpu}\n" for cpu in cpus))

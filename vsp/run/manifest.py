@@ -1,0 +1,27 @@
+"""Accept files as they are, for somebody who changed one on purpose: `python -m vsp.run.manifest [FOLDER ...]`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .atomic import ROOT
+from .command import in_one_line
+from .listed import MANIFEST, list_folder
+
+FOLDERS = tuple(ROOT / "data" / name for name in ("paper", "teachers", "teachers/short", "results"))
+
+
+def main() -> None:
+    """Write the manifests of the folders anew: every file there, as it is."""
+    parser = argparse.ArgumentParser(prog="python -m vsp.run.manifest", description=main.__doc__)
+    parser.add_argument("folders", nargs="*", type=Path, help="if none is given, those of data/")
+    for folder in parser.parse_args().folders or FOLDERS:
+        if not folder.is_dir():
+            parser.error(f"{folder}: no such folder")
+        print(f"{folder / MANIFEST}: {list_folder(folder)} files")
+
+
+if __name__ == "__main__":
+    with in_one_line():
+        main()

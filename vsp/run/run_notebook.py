@@ -1,0 +1,343 @@
+"""Run one notebook headless and strictly: it succeeds as a whole, or nothing that lies in `out` changes.
+
+    python -m vsp.run.run_notebook notebooks/01_teacher.ipynb --out . -p quick true --expect figures/environments.pdf
+
+A notebook has a cell tagged `parameters` that holds nothing but `name = literal` lines, one of them `out`: the folder
+that it writes `figures/` and `data/results/` into. It gets a staging folder there, and what it wrote is moved to the
+real `out` only after every cell ran without an error. `runs`, if it has one, is set to the real `out`/data/runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import errno
+import filecmp
+import json
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from .atomic import ROOT, atomic_path, disk_hint, read_bytes, remove_leftovers, write_text
+from .command import CommandError, in_one_line
+from .listed import MANIFEST, list_file
+from .locks import file_lock, terminate_peers
+from .notebook import NotebookNode, nbformat
+
+KERNEL = "python3"
+KERNEL_FOLDERS = {  # where a kernel writes, by variable; the next run removes what a killed one left there
+    "TMPDIR": "tmp",
+    "JOBLIB_TEMP_FOLDER": "tmp",
+    "IPYTHONDIR": "ipython",  # nobody's start-up files
+    "JUPYTER_RUNTIME_DIR": "jupyter",
+    "MPLCONFIGDIR": "matplotlib",
+}
+KERNEL_SETTINGS = {
+    "OMP_NUM_THREADS": "1",  # the same sums in the same order, also without make
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "VECLIB_MAXIMUM_THREADS": "1",
+    "SDL_VIDEODRIVER": "dummy",  # no search for a screen, nor words about it on standard error
+    "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no note of the debugger's on standard error
+}
+_VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
+_SYSTEM_ERROR = re.compile(r"\[Errno (\d+)\] ")
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_MENDABLE = ("DamagedFile", "MissingFile", "WorkerDied", "UnlikeWorker", "NoScheduler")  # errors of `vsp.run`
+_WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
+_WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
+
+
+class NotebookError(CommandError):
+    """A notebook that did not run as a whole; the message names it and the cell."""
+
+
+class KernelDied(NotebookError):
+    """A notebook whose kernel was killed."""
+
+
+def run_notebook(
+    notebook: str | os.PathLike,
+    out: str | os.PathLike,
+    *,
+    parameters: dict[str, object] | None = None,
+    expect: Sequence[str] = (),
+    timeout: int = 1800,
+) -> list[str]:
+    """Run `notebook` with `parameters` and move what it made to `out`; returns the files that changed there.
+
+    `expect` names files, relative to `out`, that the notebook must make; `timeout` is in seconds, for each cell. An
+    executed copy without anything that varies from run to run goes to figures/executed. Runs of one notebook into one
+    `out` wait for each other. Raises NotebookError, DamagedFile, MissingFile, or OSError for a disk that is full or
+    closed; the earlier files of `out` stay.
+    """
+    notebook, out = Path(notebook).resolve(), Path(out).resolve()
+    source, declared = _read(notebook)
+    values = {**(parameters or {}), "out": str(out)}
+    if "runs" in declared:
+        values.setdefault("runs", str(out / "data" / "runs"))
+    _check_parameters(notebook, declared, values)
+    running = out / "build" / "running"
+    with file_lock(out / "build" / "locks" / notebook.stem, f"of {notebook.stem} writes into {out}"):
+        for left in running.glob(f"{notebook.stem}-*"):
+            shutil.rmtree(left, ignore_errors=True)  # of a run that was killed
+        running.mkdir(exist_ok=True)
+        work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))  # not where an orphaned kernel may write
+        staging = work / "out"
+        try:
+            staging.mkdir()
+            cells = _execute(notebook, source, values, work, timeout)
+            _write_copy(source, cells, staging / "figures" / "executed" / notebook.name)
+            _check_files(notebook, staging, expect)
+            return _publish(staging, out)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+
+
+def _read(notebook: Path) -> tuple[NotebookNode, dict[str, object]]:
+    """The notebook and the defaults of its parameters."""
+    content = read_bytes(notebook)
+    try:
+        cells = json.loads(content)["cells"]
+        source = nbformat.reads(content.decode(), as_version=4)
+        tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
+    except (nbformat.ValidationError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise NotebookError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
+    if any("id" not in cell for cell in cells):
+        raise NotebookError(f"{notebook.name}: has cells without an id, expected format 4.5: save it in JupyterLab")
+    if len(tagged) != 1:
+        raise NotebookError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
+    try:
+        lines = [line for line in ast.parse(tagged[0].source).body if not isinstance(line, ast.Expr)]
+        return source, {line.targets[0].id: ast.literal_eval(line.value) for line in lines}
+    except (AttributeError, SyntaxError, ValueError) as error:
+        raise NotebookError(f"{notebook.name}: parameters cell: expected `name = literal` lines: {error}") from error
+
+
+def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[str, object]) -> None:
+    for name, value in values.items():
+        if name not in declared:
+            raise NotebookError(f"{notebook.name}: unknown parameter {name!r}, expected one of {sorted(declared)}")
+        if type(value) is not type(declared[name]):
+            kind = type(declared[name]).__name__
+            raise NotebookError(
+                f"{notebook.name}: parameter {name} is {value!r}, expected {kind} as {declared[name]!r}"
+            )
+
+
+def _execute(notebook: Path, source: NotebookNode, values: dict, work: Path, timeout: int) -> list[NotebookNode]:
+    """The code cells after papermill ran them with `values` for the parameters, but `work`/out for `out`."""
+    import papermill
+    from papermill.engines import papermill_engines
+
+    seen: list[NotebookNode] = []  # the notebook under way, which tells how far it came
+    papermill_engines.register("vsp", _engine(seen, work, timeout))
+    stopped: Exception | None = None
+    try:
+        papermill.execute_notebook(
+            copy.deepcopy(source),
+            None,
+            {**values, "out": str(work / "out")},
+            engine_name="vsp",
+            kernel_name=KERNEL,
+            language="python",
+            cwd=notebook.parent,  # as in JupyterLab
+            progress_bar=sys.stderr.isatty(),
+        )
+    except papermill.PapermillExecutionError:
+        pass  # a cell failed, as its outputs say
+    except Exception as error:
+        if disk_hint(getattr(error, "errno", None)):
+            raise
+        stopped = error
+    code = [cell for one in seen for cell in one.cells if cell.cell_type == "code"]
+    cells = [cell for cell in code if "injected-parameters" not in cell.metadata.get("tags", [])]
+    firsts = [cell.source.strip().partition("\n")[0] for cell in cells]
+    names = [f"{notebook.name}, code cell {number} ({first})" for number, first in enumerate(firsts, 1)]
+    begun = [(name, cell) for name, cell in zip(names, cells) if cell.metadata.papermill.get("start_time")]
+    if stopped:
+        kind = KernelDied if "Kernel died" in str(stopped) else NotebookError  # in a cell, or before the first
+        where = begun[-1][0] if begun else notebook.name
+        raise kind(f"{where} did not end: {type(stopped).__name__}: {stopped}") from stopped
+    for name, cell in zip(names, cells):
+        _check_cell(name, cell, values["out"])
+    widgets = seen[0].metadata.get("widgets", {}).get(_WIDGET_STATE, {}).get("state", {})
+    for widget in widgets.values():  # an `Output` widget keeps the errors of its block to itself
+        _check_errors(f"{notebook.name}: a widget", widget["state"].get("outputs", []))
+    return cells
+
+
+def _engine(seen: list[NotebookNode], work: Path, timeout: int) -> type:
+    """An engine of papermill with a kernel of this Python; it puts the notebook under way into `seen`."""
+    from papermill.clientwrap import PapermillNotebookClient
+    from papermill.engines import NBClientEngine
+
+    class Engine(NBClientEngine):
+        @classmethod
+        def execute_managed_notebook(cls, nb_man, kernel_name, **_):
+            seen.append(nb_man.nb)
+            quiet = ["--log-level=CRITICAL"]  # the kernel's own chatter on standard error
+            client = PapermillNotebookClient(nb_man, kernel_name=kernel_name, timeout=timeout, extra_arguments=quiet)
+            manager = client.create_kernel_manager()
+            manager.connection_file = str(work / "kernel.json")
+            manager.kernel_spec_manager.kernel_dirs = []  # no other Python's, whatever else is installed
+            return client.execute(env=_environment(work))
+
+    return Engine
+
+
+def _environment(work: Path) -> dict[str, str]:
+    """The kernel's variables: nobody's settings, and nothing is written outside `work`."""
+    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # pictures are outputs
+    for name, folder in KERNEL_FOLDERS.items():
+        (work / folder).mkdir(exist_ok=True)
+        environment[name] = str(work / folder)
+    for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # which the set-up made
+        shutil.copy(fonts, work / "matplotlib")
+    return environment | KERNEL_SETTINGS
+
+
+def _check_cell(where: str, cell: NotebookNode, out: str) -> None:
+    """It ran without an error, and shows nothing that differs between two runs or two machines."""
+    _check_errors(where, cell.outputs)
+    if cell.source.strip() and cell.execution_count is None:
+        raise NotebookError(f"{where} never ran")
+    for output in cell.outputs:
+        shown = output.get("text") or json.dumps(output.get("data", {}))
+        if found := _VARIES.search(shown):
+            raise NotebookError(
+                f"{where} shows {found[0]!r}, which differs between runs: heed the warning, or end with `;`"
+            )
+        for folder in (out, str(ROOT), sys.prefix):
+            if folder in shown:
+                raise NotebookError(f"{where} shows a folder of this machine: {folder}")
+
+
+def _check_errors(where: str, outputs: list[NotebookNode]) -> None:
+    for output in outputs:
+        if output["output_type"] == "error":
+            raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
+
+
+def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookError:
+    """In one line what a user can mend, such as a damaged file; else with the traceback."""
+    number = _SYSTEM_ERROR.match(message)
+    if kind in _MENDABLE:
+        end = ""
+    elif number and (hint := disk_hint(int(number[1]))):
+        end = f": {hint}"
+    else:
+        end = "\n" + _COLOUR.sub("", traceback)
+    return NotebookError(f"{where} failed: {kind}: {message}{end}")
+
+
+def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> None:
+    """The source with the outputs of its run: whatever else a run leaves in a notebook varies."""
+    result = copy.deepcopy(source)
+    result.metadata = {
+        "kernelspec": {"name": KERNEL, "display_name": "Python 3", "language": "python"},
+        "language_info": {"name": "python"},
+    }
+    targets = [cell for cell in result.cells if cell.cell_type == "code"]
+    for number, (target, cell) in enumerate(zip(targets, cells, strict=True), 1):
+        target.outputs, target.execution_count = clean_outputs(cell.outputs, number), number
+    write_text(path, nbformat.writes(result) + "\n")
+
+
+def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode]:
+    """The outputs of code cell `number`, the same for every run: text in one piece, widgets as static images.
+
+    A widget without a static image, such as a progress bar, leaves nothing.
+    """
+    result: list[NotebookNode] = []
+    for output in outputs:
+        data = output.get("data", {})
+        if data.pop(_WIDGET_VIEW, None) and set(data) <= {"text/plain"}:
+            continue
+        if "execution_count" in output:
+            output.execution_count = number
+        if output.output_type == "stream" and result and result[-1].get("name") == output.name:
+            result[-1].text += output.text
+        else:
+            result.append(output)
+    return result
+
+
+def _check_files(notebook: Path, staging: Path, expect: Sequence[str]) -> None:
+    missing = [name for name in expect if not (staging / name).is_file() or not (staging / name).stat().st_size]
+    if missing:
+        raise NotebookError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
+    for path in staging.rglob("*"):
+        place = path.relative_to(staging).as_posix()
+        if path.is_file() and not place.startswith(("figures/", "data/results/")):
+            raise NotebookError(f"{notebook.name}: wrote {place}, expected files in figures/ and data/results/ only")
+
+
+def _publish(staging: Path, out: Path) -> list[str]:
+    """Move each staged file to its place in `out`; a file with the same bytes stays untouched. Results are listed."""
+    found = (path.relative_to(staging).as_posix() for path in staging.rglob("*") if path.is_file())
+    names = sorted(name for name in found if Path(name).name != MANIFEST)
+    same = {name for name in names if (out / name).is_file() and filecmp.cmp(staging / name, out / name, shallow=False)}
+    changed = [name for name in names if name not in same]
+    for folder in {(out / name).parent for name in changed}:  # all of them before the first file: all or nothing
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+    for name in changed:
+        _move(staging / name, out / name)
+    for name in names:
+        if name.startswith("data/results/"):
+            list_file(out / name)  # also one that stays: a run may have been killed before this line
+    return changed
+
+
+def _move(path: Path, target: Path) -> None:
+    try:
+        os.replace(path, target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        remove_leftovers(target)
+        with atomic_path(target) as beside:  # figures/ or data/ lie on another disk
+            shutil.copyfile(path, beside)
+
+
+def _value(text: str) -> object:
+    """A parameter from the command line: JSON where it is JSON (true, 3, 0.5), else the text itself."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m vsp.run.run_notebook", description="Run one notebook, strictly.")
+    parser.add_argument("notebook")
+    parser.add_argument("--out", default=".", help="folder for figures/ and data/results/ (%(default)s)")
+    parser.add_argument("-p", dest="parameters", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"))
+    parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files, in OUT, that it must make")
+    parser.add_argument("--timeout", type=int, default=1800, help="seconds for each cell (%(default)s)")
+    given = parser.parse_args(arguments)
+    began, name = time.monotonic(), Path(given.notebook).name
+    with in_one_line(name):
+        print(f"{name}: running", flush=True)
+        parameters = {key: _value(text) for key, text in given.parameters}
+        try:
+            changed = run_notebook(
+                given.notebook, given.out, parameters=parameters, expect=given.expect, timeout=given.timeout
+            )
+        except KernelDied:
+            terminate_peers(Path(given.out) / "build" / "locks")  # make would wait for the others, minutes
+            raise
+        print(f"{name}: done in {time.monotonic() - began:.0f} s, {len(changed)} files changed", flush=True)
+
+
+if __name__ == "__main__":
+    main()

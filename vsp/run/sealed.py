@@ -1,0 +1,62 @@
+"""Sealed files: the first line is the checksum of the rest, which is compared before anything is parsed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+
+import numpy as np
+
+from .atomic import DamagedFile, atomic_path, read_bytes, remedy
+
+
+def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
+    """Write one line with the SHA-256 of `payload`, then `payload`, atomically."""
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(hashlib.sha256(payload).hexdigest().encode() + b"\n")
+        file.write(payload)
+
+
+def read_sealed(path: str | os.PathLike) -> bytes:
+    """The payload of a file that `write_sealed` wrote. Raises `MissingFile` or `DamagedFile`."""
+    content = read_bytes(path)
+    seal, payload = content[:65], content[65:]
+    found = hashlib.sha256(payload).hexdigest()
+    if seal != found.encode() + b"\n":
+        raise DamagedFile(
+            f"{path}: SHA-256 is {found}, its first line says {seal!r}: delete it to have it made again; {remedy(path)}"
+        )
+    return payload
+
+
+def save_arrays(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: dict) -> None:
+    """Write `arrays` and the JSON-able `about` to one sealed file, as safetensors."""
+    from safetensors.numpy import save
+
+    about_text = json.dumps(about, sort_keys=True, allow_nan=False)
+    contiguous = {name: np.ascontiguousarray(a) for name, a in arrays.items()}
+    write_sealed(path, save(contiguous, metadata={"about": about_text}))
+
+
+def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.ndarray], dict]:
+    """Read a file that `save_arrays` wrote with `about["kind"] == kind`: its arrays and `about`.
+
+    Raises `MissingFile` or `DamagedFile`.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    payload = read_sealed(path)
+    try:
+        arrays = load(payload)
+        header = json.loads(payload[8 : 8 + int.from_bytes(payload[:8], "little")])
+        about = json.loads(header["__metadata__"]["about"])
+        found = about.get("kind")
+    except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
+        raise DamagedFile(
+            f"{path}: sealed, but not what `save_arrays` writes: {error!r:.300}: delete it; {remedy(path)}"
+        ) from error
+    if found != kind:
+        raise DamagedFile(f"{path}: holds a {found!r}, expected a {kind!r}: delete it; {remedy(path)}")
+    return arrays, about

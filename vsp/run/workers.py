@@ -1,0 +1,132 @@
+"""Many jobs at once, in processes of this machine or by the workers of a Dask cluster. Results come as they end.
+
+Workers write nothing: a cluster needs no shared folder, and every file on disk was written by one process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import platform
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from .atomic import ROOT
+from .command import CommandError
+from .listed import MANIFEST
+from .machine import cpu_type
+from .progress import progress
+
+ANSWER = 10  # seconds within which a scheduler answers
+IDLE = 20  # seconds after which a worker without work ends, whatever became of the process that started it
+PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma")  # whose versions may decide a result
+
+
+class UnlikeWorker(CommandError):
+    """A worker of a cluster whose code or libraries are not those of the one who asks."""
+
+
+class WorkerDied(CommandError):
+    """A worker process was killed; the message says how far the work had come."""
+
+
+class NoScheduler(CommandError):
+    """An address where no Dask scheduler answers."""
+
+
+def results(
+    work: Callable, arguments: Sequence[tuple], label: str, *, jobs: int | str, total: int, unit: str
+) -> Iterator[tuple[int, object]]:
+    """Yield (i, work(*arguments[i])) for every i, in the order in which they end, and show how many are done.
+
+    `total` counts those that were done before, too. `jobs` is the number of worker processes (-1: one per core) or the
+    address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; its owner can run code here and on the workers. Every
+    job runs with one thread. Raises what `work` raises, WorkerDied (on a cluster, after one job killed four workers),
+    UnlikeWorker and NoScheduler.
+    """
+    if not arguments:
+        return
+    done = total - len(arguments)
+    try:
+        for result in progress(_finished(work, arguments, jobs), label, total=total, unit=unit, done=done):
+            yield result
+            done += 1
+    except Exception as error:
+        if type(error).__name__ == "TimeoutError" and isinstance(jobs, str):
+            raise NoScheduler(
+                f"the Dask scheduler at {jobs!r} has no workers, expected one or more: start some"
+            ) from error
+        if type(error).__name__ not in ("TerminatedWorkerError", "KilledWorker"):  # loky's and Dask's
+            raise
+        how = re.search(r"\{(.*)\}", str(error))
+        raise WorkerDied(
+            f"{label}: a worker process was killed{f' ({how[1]})' if how else ''} with {done} of {total} {unit} done. "
+            "What is on disk stays: the same command goes on from there. If memory ran out, use fewer: JOBS=1"
+        ) from error
+
+
+def _finished(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> Iterator[tuple[int, object]]:
+    from joblib import Parallel, delayed, parallel_config
+
+    calls = [delayed(_call)(identity(), work, i, *one) for i, one in enumerate(arguments)]
+    with contextlib.ExitStack() as stack:
+        if isinstance(jobs, str):
+            client = stack.enter_context(_client(jobs))
+            stack.enter_context(parallel_config("dask", client=client, scatter=_shared(arguments), n_jobs=-1))
+        else:
+            # No memory maps, hence no folders in /dev/shm that outlive a kill: jobs are given 1 MB or so
+            options = {"max_nbytes": None, "temp_folder": tempfile.gettempdir(), "idle_worker_timeout": IDLE}
+            stack.enter_context(parallel_config("loky", inner_max_num_threads=1, n_jobs=jobs, **options))
+        yield from Parallel(return_as="generator_unordered")(calls)
+
+
+def _call(expected: dict[str, str], work: Callable, i: int, *one) -> tuple[int, object]:
+    if (found := identity()) != expected:
+        raise UnlikeWorker(
+            f"the worker on {platform.node()} has {found}, expected {expected}: give it the same checkout and .venv"
+        )
+    with threadpool_limits(1):  # the same sums in the same order on any machine
+        return i, work(*one)
+
+
+@cache
+def identity() -> dict[str, str]:
+    """What decides a result beside its arguments: code, teachers, type of processor, and the versions of packages."""
+    code = hashlib.sha256(b"".join(path.read_bytes() for path in _deciding_files())).hexdigest()[:10]
+    found = {"code": code, "processor": cpu_type(), "python": platform.python_version()}
+    for name in PACKAGES:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+def _deciding_files() -> list[Path]:
+    """All code of the package, and the manifests of the teachers."""
+    return [*sorted((ROOT / "vsp").rglob("*.py")), *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
+
+
+def _client(address: str):
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise NoScheduler(f"{address!r} asks for a Dask cluster, which needs the package `distributed`") from error
+    try:
+        return Client(address, timeout=ANSWER, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise NoScheduler(
+            f"no Dask scheduler answers at {address!r}, expected one as in tcp://host:8786: {error}"
+        ) from error
+
+
+def _shared(arguments: Sequence[tuple]) -> list:
+    """What several jobs share, such as a teacher: every worker gets it once."""
+    objects = {id(part): part for one in arguments for part in one if not isinstance(part, int | str)}
+    counts = Counter(id(part) for one in arguments for part in one)
+    return [part for key, part in objects.items() if counts[key] > 1]

@@ -1,0 +1,36 @@
+"""Figures (arrays in, `Axes` out), animations, and widgets that replay a distillation or run one anew.
+
+Make a figure with `panels`, draw on its axes, save it with `save_figure`.
+"""
+
+import importlib
+
+from .animation import save_growth
+from .benchmarks import kills, shares_over, times_over_dimension
+from .explanation import contributions, whereabouts
+from .methods import against_time, method_comparison, return_over_cells, simplified
+from .returns import (
+    again,
+    box_plot,
+    boxes,
+    by_group,
+    histogram,
+    intervals,
+    learning_curve,
+    ledger_gaps,
+    margin,
+    over_iterations,
+    phase,
+    reference,
+    run_means,
+    upper_bound,
+)
+from .state_space import arrows, cells, codewords, error_map, force_bar, force_map, grid, square, trail
+from .style import DISTILLED, OTHER, TEACHER, Picture, legend_below, letter, panels, save_figure
+
+
+def __getattr__(name: str) -> type:
+    """Import `Replay` and `Laboratory` on first use: most notebooks have no widgets, which take long to import."""
+    if name in ("Replay", "Laboratory"):
+        return getattr(importlib.import_module(f".{name.lower()}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,59 @@
+"""Figures of benchmarks: the time of look-ups and neighbour graphs, and what a kill costs."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.ticker import PercentFormatter
+
+from .methods import ticks_at
+from .style import COLOURS, DISTILLED, GOAL, OTHER, TEACHER
+
+# The methods that `beyond.benchmarks.lookup` measures, a colour each; dashed for the Manhattan distance
+_METHODS = {"cdist": OTHER, "matrix product": GOAL, "kd-tree": COLOURS[4]}
+_METHODS |= {"witnesses": GOAL, "linear programmes": OTHER, "Delaunay": COLOURS[3]}
+
+
+def times_over_dimension(ax: Axes, frame: pd.DataFrame, *, limit: float | None = None) -> Axes:
+    """Seconds over the number of dimensions, both logarithmic: a line per method and metric.
+
+    `frame` has rows of `beyond.benchmarks.lookup` for one number of codewords. A missing time means more than `limit`
+    seconds: a cross marks the first one of each line.
+    """
+    for (method, metric), rows in frame.groupby(["method", "metric"], sort=False):
+        dashed, color = metric == "manhattan", _METHODS[method]
+        name = f"{method}, Manhattan" if dashed else method
+        ax.plot(rows["d"], rows["seconds"], "--" if dashed else "-", marker=".", ms=3, color=color, label=name)
+        given_up = rows.loc[rows["seconds"].isna(), "d"]
+        if len(given_up) and limit:
+            ax.plot(given_up.min(), limit, "x", color=color, ms=5, mew=1.2, clip_on=False, zorder=5)
+    ax.set(xscale="log", yscale="log", xlabel="dimensions", ylabel="seconds")
+    return ticks_at(ax, frame["d"])
+
+
+def shares_over(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, by: str) -> Axes:
+    """A share over a number, logarithmic: a line per value of the column `by`, darker by its rank."""
+    groups = list(frame.dropna(subset=y).sort_values(x).groupby(by))
+    colours = mpl.colormaps["viridis_r"](np.linspace(0, 1, len(groups) + 3)[2:-1])
+    for color, (value, rows) in zip(colours, groups, strict=True):
+        ax.plot(rows[x], rows[y], marker=".", ms=3, color=color, label=f"{by} = {value}")
+    ax.set(xscale="log", ylim=(0, 1.03), xlabel=x, ylabel=y)
+    ax.legend(frameon=False, fontsize=7, handlelength=1.0, labelspacing=0.15, borderaxespad=0.1)
+    return ticks_at(ax, frame[x])
+
+
+def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
+    """Time of the re-run over the moment of the kill, both as shares of the time of an undisturbed run."""
+    moment, again = frame["moment"] / frame["undisturbed"], frame["again"] / frame["undisturbed"]
+    held = frame["wrong"].isna()
+    ax.axhline(1, color=TEACHER, lw=0.8, label="undisturbed, from nothing")
+    ax.plot(moment[held], again[held], "o", color=DISTILLED, ms=3, label="the same bytes")
+    if not held.all():
+        ax.plot(moment[~held], again[~held], "X", color=COLOURS[3], ms=5, label="other bytes")
+    ax.set(xlabel="moment of the kill", ylabel="time of the re-run", xlim=(0, 1), ylim=(0, None))
+    ax.xaxis.set_major_formatter(PercentFormatter(1))
+    ax.yaxis.set_major_formatter(PercentFormatter(1))
+    ax.legend(loc="lower left", frameon=False)
+    return ax

@@ -1,0 +1,125 @@
+"""Figures over a two-dimensional state: cells, codewords, arrows, force maps, episodes."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import Rectangle
+
+from ..checks import check_array, check_count, check_data, check_finite
+from ..rollouts import Episode
+from ..tasks import simplegoal
+from ..tasks.base import Task
+from .style import BORDER, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
+
+_PASTEL = (  # seaborn's palette of this name
+    "#a1c9f4", "#ffb482", "#8de5a1", "#ff9f9b", "#d0bbff", "#debb9b", "#fab0e4", "#cfcfcf", "#fffea3", "#b9f2f0",
+)  # fmt: skip
+
+
+def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6) -> Axes:
+    """Borders of Voronoi cells, `width` points wide; `fill` colours the cells. `index`: the cell of each grid point."""
+    index = _on_grid("cells", x, y, index).astype(int)
+    if fill:
+        shades = mpl.colors.to_rgba_array(_PASTEL)[index % len(_PASTEL)]
+        image(ax, x, y, shades, interpolation="nearest", zorder=0)
+    for i in np.unique(index):
+        inside = (index == i).astype(float)
+        if inside.min() < 1:
+            ax.contour(x, y, inside, levels=[0.5], colors=BORDER, linewidths=width)
+    return ax
+
+
+def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False) -> Axes:
+    """Codewords (k, 2) as black dots with a white rim."""
+    points = check_array("codewords", points, (-1, 2))
+    ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label, clip_on=False)
+    if numbers:
+        for i, point in enumerate(points):
+            ax.annotate(str(i), point, xytext=(3, 3), textcoords="offset points", fontsize=6, zorder=6)
+    return ax
+
+
+def square(ax: Axes) -> Axes:
+    """The unit square of SimpleGoal with goal and pit."""
+    goal, pit = simplegoal.GOAL_EDGE, simplegoal.PIT_HIGH - simplegoal.PIT_LOW
+    ax.add_patch(Rectangle((0, 0), goal, goal, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
+    corner = (simplegoal.PIT_LOW, simplegoal.PIT_LOW)
+    ax.add_patch(Rectangle(corner, pit, pit, color=PIT, alpha=0.4, lw=0, zorder=1, label="pit"))
+    ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x", ylabel="y", aspect="equal", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
+    return ax
+
+
+def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
+    """An arrow for each action (n, 2) at its state (n, 2), on a grid; a full diagonal action spans one grid step."""
+    states, actions = check_data(states, actions, 2, 2)
+    step = np.diff(np.unique(states[:, 0]))[0]
+    scale = {"angles": "xy", "scale_units": "xy", "scale": 1.4 / step}
+    ax.quiver(*states.T, *actions.T, color=color, width=0.006, zorder=3, **scale)
+    return ax
+
+
+def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, *, aspect="auto", **look) -> AxesImage:
+    """Draw an image whose pixel centres are the points of a `grid`."""
+    return ax.imshow(pixels, origin="lower", extent=extent(x, y), aspect=aspect, **look)
+
+
+def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray) -> AxesImage:
+    """Force in [-1, 1] over position and velocity. Returns the image, for `force_bar`."""
+    ax.set(xlabel="position", ylabel="velocity (per step)")
+    return image(ax, x, y, _on_grid("force", x, y, force), cmap=FORCE_MAP, vmin=-1, vmax=1)
+
+
+def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
+    """One colour bar for all force maps of a figure."""
+    bar = fig.colorbar(drawn, ax=list(axes), label="force", ticks=[-1, 0, 1], aspect=30)
+    bar.ax.set_yticklabels(["−1 (left)", "0", "+1 (right)"])
+
+
+def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str) -> AxesImage:
+    """A non-negative quantity over a two-dimensional state, darker where larger, with a colour bar. Returns it."""
+    drawn = image(ax, x, y, _on_grid("error", x, y, error), cmap="Greys", vmin=0)
+    ax.figure.colorbar(drawn, ax=ax, label=label)
+    return drawn
+
+
+def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
+    """The states of one episode, joined: from a ring at the start to the state after the last action."""
+    last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
+    way = np.concatenate([episode.states, last])
+    ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
+    ax.plot(*way[0], color=color, marker="o", mfc="white", ms=5, zorder=5)
+    return ax
+
+
+def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
+    """The outer edges (left, right, bottom, top) of an image whose pixel centres are the points of a `grid`."""
+    x, y = _grid(x, y)
+    dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
+    return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
+
+
+def _grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    x = check_array("x", x, (-1, -1))
+    if min(x.shape) < 2:
+        raise ValueError(f"the grid has shape {x.shape}, expected two points or more along each axis")
+    return x, check_array("y", y, x.shape)
+
+
+def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """`values`, one for each grid point, in the shape of the grid. Raises ValueError for another number of values."""
+    (x, _), values = _grid(x, y), check_finite(what, values)
+    if values.size != x.size:
+        raise ValueError(f"{what} have shape {values.shape}, expected one for each point of the grid {x.shape}")
+    return values.reshape(x.shape)
+
+
+def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A grid over a two-dimensional box, for drawing: x (r, r), y (r, r), and its points as states (r * r, 2)."""
+    low, high = check_array("low", low, (2,)), check_array("high", high, (2,))
+    check_count("resolution", resolution)
+    x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))
+    return x, y, np.column_stack([x.ravel(), y.ravel()])

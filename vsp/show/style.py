@@ -1,0 +1,114 @@
+"""Style of all figures: one colour for each thing, used everywhere, and one `save_figure`.
+
+The force map runs from purple (push left) to orange (push right).
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import os
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from ..run import atomic
+
+TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
+COLOURS = (  # seaborn's "colorblind" palette, written out: importing seaborn takes a second
+    "#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#fbafe4", "#949494", "#ece133", "#56b4e9",
+)  # fmt: skip
+TEACHER, DISTILLED, GOAL, PIT = COLOURS[0], COLOURS[1], COLOURS[2], "0.35"
+BORDER, CODEWORD, OTHER = "0.25", "black", "0.4"
+FORCE_MAP = "PuOr_r"
+
+_STYLE = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.0,
+    "figure.dpi": 150,
+    "figure.facecolor": "white",
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,  # TrueType fonts, embedded
+    "svg.hashsalt": "vsp",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+
+
+def panels(
+    n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, stacked: bool = False, **subplots
+) -> tuple[Figure, np.ndarray]:
+    """A figure with n panels in a row, or `stacked` in a column, as wide as an LNCS page; sizes in inches.
+
+    Returns the figure and its axes (n,). Sets the style for everything drawn afterwards.
+    """
+    mpl.rcParams.update(_STYLE)
+    shape = (n, 1) if stacked else (1, n)
+    fig, axes = plt.subplots(*shape, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
+    return fig, axes.ravel()
+
+
+def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
+    """The bytes of an image file as an HTML element, `width` pixels wide or as wide as there is room.
+
+    Width and height are stated so that the page does not jump while it loads; decoding is synchronous so that replacing
+    a picture does not flicker. Raises PIL.UnidentifiedImageError if `image` is no image.
+    """
+    with Image.open(io.BytesIO(image)) as opened:
+        kind, height = opened.get_format_mimetype(), round(width * opened.height / opened.width)
+    size = f'width="{width}" height="{height}" style="max-width: 100%; height: auto"'
+    data = base64.b64encode(image).decode()
+    return f'<img alt="{html.escape(alt)}" src="data:{kind};base64,{data}" {size} decoding="sync">'
+
+
+class Picture:
+    """A saved figure as a notebook shows it: HTML, because nbconvert drops the alternative text of a plain image."""
+
+    def __init__(self, png: bytes, alt: str):
+        self.png, self.alt = png, alt
+
+    def _repr_html_(self) -> str:
+        return f"<figure>{embedded(self.png, self.alt)}</figure>"
+
+    def __repr__(self) -> str:
+        return self.alt
+
+
+def save_figure(fig: Figure, name: str, *, alt: str, out: str | os.PathLike, quick: bool = False) -> Picture:
+    """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show.
+
+    `alt` describes the figure for readers who cannot see it; both files contain it. `quick` adds a watermark. The files
+    contain no dates or version numbers, so the same figure gives the same bytes.
+    """
+    if quick:
+        fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
+    path = Path(out) / "figures" / name
+    undated = {"CreationDate": None, "Creator": None, "Producer": None}
+    for suffix, about in ((".pdf", {"Subject": alt, **undated}), (".png", {"Description": alt, "Software": None})):
+        with atomic.atomic_path(path.with_suffix(suffix)) as temporary:
+            fig.savefig(temporary, metadata={"Title": name, **about})
+    plt.close(fig)
+    return Picture(path.with_suffix(".png").read_bytes(), alt)
+
+
+def letter(axes: np.ndarray, titles: list[str]) -> None:
+    """Title the panels (a), (b), ..."""
+    for ax, mark, title in zip(axes, "abcdefgh", titles):
+        ax.set_title(f"({mark}) {title}", loc="left")
+
+
+def legend_below(fig: Figure, ax: Axes, *, ncol: int = 3) -> None:
+    """A legend for `ax` below the whole figure."""
+    fig.legend(*ax.get_legend_handles_labels(), frameon=False, loc="outside lower center", ncol=ncol)

@@ -1,0 +1,123 @@
+"""`PolicyClass`: what one sub-policy computes from a state and its parameters (p, m): a column per action, the last row
+the bias."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ..checks import check_array, check_count
+from ..tasks.base import Task
+
+Pullback = Callable[[np.ndarray], np.ndarray]
+
+# Functions that `PolicyClass.code` may use: C and Python's math have them by the same names
+SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs")
+_CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d)|[-+*/(),. \d])+")
+
+
+@dataclass(frozen=True)
+class PolicyClass:
+    """A class of sub-policy that is linear in its parameters: output = features @ weights + bias.
+
+    Features are in the units of the task, so that equations are too. Training divides them by `sizes`, so that one step
+    size fits all.
+    """
+
+    name: str
+    terms: tuple[str, ...]  # symbols of the q features
+    code: tuple[str, ...]  # the features, as C and Python compute them from an array `state`
+    sizes: np.ndarray  # (q,) largest absolute value of each feature in the state box; 1 for raw features
+    features: Callable[[np.ndarray], np.ndarray]  # states (..., d) to features (..., q)
+
+    # One action from its parameters, `row`, and the features with a 1 at the end, INPUTS numbers
+    OUTPUT_IN_PYTHON = """
+def output(row, features):
+    return sum(w * f for w, f in zip(row, features))
+"""
+    OUTPUT_IN_C = """
+static double output(const double *row, const double *features) {
+    double sum = 0.0;
+    for (int i = 0; i < INPUTS; i++) sum += row[i] * features[i];
+    return sum;
+}
+"""
+
+    def feature_code(self) -> str:
+        """The features and a 1, as C and Python compute them. Raises ValueError for code that does anything else."""
+        for code in self.code:
+            if not _CODE.fullmatch(code):
+                raise ValueError(f"code {code!r}, expected arithmetic with state[0], ... and functions of {SHARED}")
+        return ", ".join([*self.code, "1.0"])
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the p rows of the parameters."""
+        return (*self.terms, "bias")
+
+    @property
+    def units(self) -> np.ndarray:
+        """Factors from parameters to their values in training. (p, 1)"""
+        return np.append(self.sizes, 1.0)[:, None]
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Initial parameters are uniform in +- this / `units`: 1 / sqrt(inputs), as in torch.nn.Linear. (p, 1)"""
+        return np.full((len(self.rows), 1), 1.0 / np.sqrt(max(1, len(self.terms))))
+
+    def outputs(self, features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """Actions (..., m) at features (..., q) with parameters (..., p, m), not limited to the action box."""
+        return linear_outputs(features, parameters)
+
+    def batch(self, inputs: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, Pullback]:
+        """Outputs (c, B, m) of c cells with parameters (c, p, m) at `inputs` (c, B, q + 1), features and a 1.
+
+        Also returns the function from the gradient of the loss by these outputs to that by the parameters."""
+        return inputs @ parameters, lambda error: inputs.transpose(0, 2, 1) @ error
+
+    def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
+        """Summands of the output at `state` (d,): a row per action (m,), a column per feature and the bias."""
+        return pd.DataFrame(parameters.T * np.append(self.features(state), 1.0), columns=list(self.rows))
+
+    def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
+        """One action's output as text, for parameters (p,); `symbol` prints a variable's name."""
+        return expression(column, tuple(symbol(term) for term in self.terms), digits)
+
+
+def linear_outputs(features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Features (..., q) times weights plus bias, for parameters (..., q + 1, m). (..., m)"""
+    return np.einsum("...q,...qm->...m", features, parameters[..., :-1, :]) + parameters[..., -1, :]
+
+
+def state_code(task: Task) -> tuple[str, ...]:
+    """The inputs, as C and Python read them."""
+    return tuple(f"state[{i}]" for i in range(len(task.inputs)))
+
+
+def reach(task: Task) -> np.ndarray:
+    """Largest absolute value of each input in the state box; 1 where it has no limit. (d,)"""
+    reach = np.maximum(np.abs(task.low), np.abs(task.high))
+    return np.where(np.isfinite(reach) & (reach > 0), reach, 1.0)
+
+
+def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | None = 3) -> str:
+    """A linear expression as text: coefficients (q + 1,), the last one the bias, of the variables `names` (q,).
+
+    `digits` are decimals; None: each number exactly, as short as it can be written, and no term that is zero.
+    """
+    coefficients = check_array("coefficients", coefficients, (len(names) + 1,))
+    terms = [(c, name) for c, name in zip(coefficients, [*names, ""]) if c or digits is not None]
+    parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
+    text = " ".join(parts)
+    return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
+
+
+def number(value: float, digits: int | None) -> str:
+    """A number with `digits` decimals; None: exactly, as short as it can be written."""
+    if digits is not None:
+        check_count("digits", digits, least=0)
+    return np.format_float_positional(value, trim="-") if digits is None else f"{value:.{digits}f}"

@@ -1,0 +1,47 @@
+"""Classes of sub-policy that are linear in their parameters. The paper's is `linear`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..tasks.base import Task
+from .base import PolicyClass, reach, state_code
+
+
+def constant(task: Task) -> PolicyClass:
+    """One action for the whole cell, as in a table."""
+    return PolicyClass("constant", (), (), np.ones(0), lambda states: states[..., :0])
+
+
+def linear(task: Task) -> PolicyClass:
+    """Linear in the raw state, as in the paper."""
+    return PolicyClass("linear", task.inputs, state_code(task), np.ones(len(task.inputs)), lambda states: states)
+
+
+def quadratic(task: Task) -> PolicyClass:
+    """Linear in the inputs, their squares and their products in pairs."""
+    pairs = np.triu_indices(len(task.inputs))
+    squares = [f"({name})²" if " " in name else f"{name}²" for name in task.inputs]
+    terms = [squares[i] if i == j else f"{task.inputs[i]}·{task.inputs[j]}" for i, j in zip(*pairs)]
+    code = [f"state[{i}] * state[{j}]" for i, j in zip(*pairs)]
+
+    def features(states: np.ndarray) -> np.ndarray:
+        return np.concatenate([states, states[..., pairs[0]] * states[..., pairs[1]]], axis=-1)
+
+    return PolicyClass("quadratic", (*task.inputs, *terms), (*state_code(task), *code), features(reach(task)), features)
+
+
+def pid(task: Task) -> PolicyClass:
+    """A PID controller: linear in an error and its derivative, the task's `signals`.
+
+    A function of the state has no memory, hence no integral. Where the error settles, the integral settles too, at the
+    action that holds the state there: the bias of each cell takes its place. Raises ValueError for a task without
+    signals.
+    """
+    signals = task.signals
+    if signals is None:
+        raise ValueError(
+            f"{task.name} names no error and so has no sub_policy 'pid', expected a task with `signals`, such as "
+            "MountainCarContinuous-v0 or Pendulum-v1: give the task signals or take another sub_policy"
+        )
+    return PolicyClass("pid", signals.names, signals.code, np.array(signals.sizes), signals.compute)

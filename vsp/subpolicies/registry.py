@@ -1,0 +1,19 @@
+"""The classes of sub-policy by name. To add one, write a function of the task that returns its `PolicyClass`."""
+
+from __future__ import annotations
+
+from ..checks import check_choice
+from ..tasks.base import Task
+from .base import PolicyClass
+from .linear import constant, linear, pid, quadratic
+from .network import network
+
+
+def policy_class(sub_policy: str, task: Task) -> PolicyClass:
+    """The class of sub-policy of that name, for `task`. Raises ValueError for an unknown name, and for "pid" where
+    the task has no signals."""
+    check_choice("sub_policy", sub_policy, POLICY_CLASSES)
+    return POLICY_CLASSES[sub_policy](task)
+
+
+POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic, "pid": pid, "network": network}

@@ -1,0 +1,80 @@
+"""The sub-policies of all cells, stacked in one array, so that one step trains them all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .base import PolicyClass
+
+BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam (Kingma & Ba 2015), its published constants
+RIDGE = 1e-6  # weight of the present parameters in a fit, in states
+
+
+class SubPolicies:
+    """One sub-policy of a class per cell, trained on the mean squared error of its actions (m,)."""
+
+    def __init__(self, policy_class: PolicyClass, m: int, *, initial: str = "uniform"):
+        self.policy_class, self.initial = policy_class, initial
+        self.parameters = np.zeros((0, len(policy_class.rows), m))  # (k, p, m)
+        self._mean = np.zeros_like(self.parameters)  # Adam's moments
+        self._square = np.zeros_like(self.parameters)
+        self._steps = np.zeros(0, dtype=np.int64)
+        self._units = policy_class.units
+
+    def add(self, rng: np.random.Generator) -> None:
+        """Append an untrained cell."""
+        shape = (1, *self.parameters.shape[1:])
+        bounds = self.policy_class.bounds / self._units if self.initial == "uniform" else np.zeros((shape[1], 1))
+        self.parameters = np.concatenate([self.parameters, rng.uniform(-bounds, bounds, size=shape)])
+        self._mean = np.concatenate([self._mean, np.zeros(shape)])
+        self._square = np.concatenate([self._square, np.zeros(shape)])
+        self._steps = np.append(self._steps, 0)
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Drop all cells but those of the mask `kept` (k,)."""
+        self.parameters, self._steps = self.parameters[kept], self._steps[kept]
+        self._mean, self._square = self._mean[kept], self._square[kept]
+
+    def restart_adam(self, cells: np.ndarray | slice) -> None:
+        """Forget the moments of `cells` (c,)."""
+        self._mean[cells] = self._square[cells] = 0.0
+        self._steps[cells] = 0
+
+    def predict(self, cell: int, state: np.ndarray) -> np.ndarray:
+        """Action (m,) of one cell at one state (d,), not limited to the action box."""
+        return self.policy_class.outputs(self.policy_class.features(state), self.parameters[cell])
+
+    def comparable(self) -> np.ndarray:
+        """The parameters in the units of the training, in which one limit on their distance fits all. (k, p, m)"""
+        return self.parameters * self._units
+
+    def train(self, cells: np.ndarray, inputs: np.ndarray, actions: np.ndarray, *, learning_rate: float) -> np.ndarray:
+        """One Adam step of each of `cells` (c,) on its own minibatch of B states.
+
+        `inputs` (c, B, q + 1) are features and end in a column of ones, `actions` are (c, B, m). Returns the mean
+        squared error of each minibatch before the step. (c,)
+        """
+        chosen = slice(None) if len(cells) == len(self.parameters) else cells  # of all cells, views instead of copies
+        theta, mean, square = self.parameters[chosen], self._mean[chosen], self._square[chosen]
+        outputs, pull_back = self.policy_class.batch(inputs, theta)
+        error = outputs - actions
+        gradient = (2.0 / error[0].size) * pull_back(error)
+        mean = BETA1 * mean + (1 - BETA1) * gradient
+        square = BETA2 * square + (1 - BETA2) * gradient**2
+        steps = self._steps[chosen] + 1
+        rate = (learning_rate / (1 - BETA1**steps))[:, None, None]
+        spread = np.sqrt(square / (1 - BETA2**steps)[:, None, None]) + EPSILON
+        self.parameters[chosen] = theta - rate * mean / spread / self._units
+        self._mean[chosen], self._square[chosen], self._steps[chosen] = mean, square, steps
+        return np.square(error).sum(axis=(1, 2)) / error[0].size
+
+    def solve(self, cells: np.ndarray, products: np.ndarray, targets: np.ndarray) -> None:
+        """Least squares for each of `cells` (c,) from `SufficientStatistics`: X'X (c, p, p) and X'y (c, p, m).
+
+        A slight ridge pulls towards the present parameters, so that parameters which the states do not determine keep
+        their values. Repeated for the same sums, the result converges to plain least squares.
+        """
+        theta, units = self.parameters[cells], self._units
+        slope = (targets - products @ theta) / units
+        ridged = products / units / units.T + RIDGE * np.eye(len(units))
+        self.parameters[cells] = theta + np.linalg.solve(ridged, slope) / units

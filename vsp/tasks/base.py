@@ -1,0 +1,63 @@
+"""The protocol of a task: dynamics on arrays of states, so that a thousand episodes advance in one call.
+
+Every function that moves states takes a batch of n and returns a batch. To add a task, write a module like
+`mountaincar.py` and enter its `TASK` in `registry.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+RUNNING, GOAL, PIT, TRUNCATED = range(4)
+OUTCOMES = ("running", "goal", "pit", "truncated")
+
+Step = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def _unchanged(states: np.ndarray) -> np.ndarray:
+    """The same array: in most tasks starts, states and observations are the same."""
+    return states
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The q inputs of a PID controller of a task, computed from observations."""
+
+    names: tuple[str, ...]  # symbols, "e" the error and "ė" its derivative
+    compute: Callable[[np.ndarray], np.ndarray]  # observations (..., d) to signals (..., q)
+    code: tuple[str, ...]  # the same, as C and Python compute them from an array `state`
+    sizes: tuple[float, ...]  # their largest absolute values in the box of the observations
+
+
+@dataclass(frozen=True)
+class Task:
+    """A continuous-control task whose observations and actions are boxes.
+
+    `start(rng, n)` draws n starts (n, s) in float64. `begin` turns starts into states, a batch of n. `step(states,
+    actions)` takes actions (n, m) and returns the next states, the rewards (n,) and the outcomes (n,), codes of
+    `OUTCOMES`; the caller counts steps and truncates. `see` turns states into observations (n, d). In most tasks start,
+    state and observation are the same array (n, d).
+    """
+
+    name: str
+    inputs: tuple[str, ...]  # symbols of the d observed variables, as the paper prints them
+    outputs: tuple[str, ...]  # symbols of the m actions
+    input_labels: tuple[str, ...]  # axis labels, with units
+    low: np.ndarray  # (d,) box of the observations
+    high: np.ndarray  # (d,)
+    action_low: np.ndarray  # (m,) box of the actions
+    action_high: np.ndarray  # (m,)
+    max_steps: int  # an episode is truncated after this many steps
+    start: Callable[[np.random.Generator, int], np.ndarray]
+    step: Step
+    see: Callable[[np.ndarray], np.ndarray] = _unchanged
+    begin: Callable[[np.ndarray], np.ndarray] = _unchanged
+    start_size: int | None = None  # s, where it is not d
+    signals: Signals | None = None  # None: the task has no natural error
+
+    def observe(self, states: np.ndarray) -> np.ndarray:
+        """Observations of `states` in float32, as Gymnasium returns them. (n, d)"""
+        return self.see(states).astype(np.float32)

@@ -1,0 +1,79 @@
+"""Any Gymnasium environment as a `Task`, one copy per episode: for physics engines, which step one state at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, partial
+
+import gymnasium
+import numpy as np
+
+from .base import GOAL, PIT, RUNNING, Task
+
+
+@dataclass
+class _Live:
+    """A running episode: an environment and its last observation."""
+
+    env: gymnasium.Env
+    observation: np.ndarray
+
+
+def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Seeds for `reset` as starts: whole numbers in float64. (n, 1)"""
+    return rng.integers(2**32, size=(n, 1)).astype(np.float64)
+
+
+def _begin_live(name: str, starts: np.ndarray) -> np.ndarray:
+    """A freshly reset environment per start. (n,) objects"""
+    live = np.empty(len(starts), dtype=object)
+    for i, (seed,) in enumerate(starts):
+        env = gymnasium.make(name).unwrapped  # without the limit of steps: the caller counts
+        live[i] = _Live(env, env.reset(seed=int(seed))[0])
+    return live
+
+
+def _see_live(states: np.ndarray) -> np.ndarray:
+    return np.array([live.observation for live in states], dtype=np.float64)
+
+
+def _step_live(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A step of every environment. An episode that ends with a positive reward reached a goal, otherwise a pit."""
+    rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
+    for i, (live, action) in enumerate(zip(states, actions)):
+        live.observation, rewards[i], ended, _, _ = live.env.step(action.astype(live.env.action_space.dtype))
+        if ended:
+            outcomes[i] = GOAL if rewards[i] > 0 else PIT
+    return states, rewards, outcomes
+
+
+@cache
+def gymnasium_task(name: str) -> Task:
+    """The `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
+
+    Raises ValueError for other spaces, an action box without limits, or an environment without a limit of steps.
+    """
+    env = gymnasium.make(name)
+    seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
+    env.close()
+    for what, space in (("observations", seen), ("actions", acts)):
+        if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
+            raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension")
+    if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()) or most is None:
+        raise ValueError(f"{name} has actions {acts} and {most} steps at most, expected limits for both")
+    return Task(
+        name=name,
+        inputs=(inputs := tuple(f"s{i}" for i in range(seen.shape[0]))),
+        outputs=tuple(f"a{j}" for j in range(acts.shape[0])),
+        input_labels=inputs,
+        low=seen.low.astype(np.float64),
+        high=seen.high.astype(np.float64),
+        action_low=acts.low.astype(np.float64),
+        action_high=acts.high.astype(np.float64),
+        max_steps=most,
+        start=_draw_seeds,
+        step=_step_live,
+        see=_see_live,
+        begin=partial(_begin_live, name),
+        start_size=1,
+    )

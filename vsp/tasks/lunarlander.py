@@ -1,0 +1,17 @@
+"""LunarLanderContinuous-v3: Gymnasium's environment, stepped by its physics engine, with names for its variables."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .base import Task
+from .gym_adapter import gymnasium_task
+
+NAME = "LunarLanderContinuous-v3"
+LABELS = ("x (half widths)", "height above the pad", "vx", "vy", "angle (rad)", "ω", "left leg down", "right leg down")
+
+
+def make() -> Task:
+    """The task. Opens an environment."""
+    inputs = ("x", "y", "vx", "vy", "θ", "ω", "l", "r")
+    return replace(gymnasium_task(NAME), inputs=inputs, outputs=("main", "side"), input_labels=LABELS)

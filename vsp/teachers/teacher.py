@@ -1,0 +1,141 @@
+"""Teachers: load a trained TD3 actor and act with it in batches, in NumPy alone: three matrix products."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..checks import check_array, check_observations
+from ..run import atomic, listed
+from ..tasks.base import Task
+from ..tasks.registry import get_task, task_names
+from .agent_zip import part_of, read_zip
+
+SHIPPED = atomic.ROOT / "data" / "teachers"
+MOST_WEIGHT = 1e6  # size of a tensor's numbers: with it three layers of 1000 units stay far below float32's 3e38
+
+
+class Teacher:
+    """A deterministic TD3 actor as arrays: ReLU layers and a tanh, scaled to the action box.
+
+    `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays, `critic` likewise
+    ("qf0.0.weight", ...); only `criticality` needs it. Raises ValueError when the actor does not fit the task,
+    and for numbers that are not finite or beyond `MOST_WEIGHT`.
+    """
+
+    def __init__(
+        self,
+        weights: dict[str, np.ndarray],
+        task: str | Task,
+        *,
+        card: dict | None = None,
+        critic: dict[str, np.ndarray] | None = None,
+    ):
+        self.task, self.card = get_task(task), card or {}
+        self.layers = _layers(weights, "mu")
+        if not self.layers:
+            raise ValueError(
+                f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
+            )
+        self._critics = [layers for i in range(2) if (layers := _layers(critic or {}, f"qf{i}"))]
+        inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
+        d, m = len(self.task.low), len(self.task.action_low)
+        if (inputs, outputs) != (d, m):
+            raise ValueError(
+                f"the teacher has {inputs} inputs and {outputs} outputs, {self.task.name} has {d} and {m}: "
+                "load it for the task it was trained on"
+            )
+        self._centre = (0.5 * (self.task.action_high + self.task.action_low)).astype(np.float32)
+        self._half = (0.5 * (self.task.action_high - self.task.action_low)).astype(np.float32)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the actor's weights: the identity of a teacher."""
+        return hashlib.sha256(b"".join(part.tobytes() for layer in self.layers for part in layer)).hexdigest()
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) or (m,) in float32 for observations (n, d) or (d,)."""
+        states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
+        return self._centre + self._half * np.tanh(_forward(self.layers, states)), None
+
+    def criticality(self, obs: np.ndarray) -> np.ndarray:
+        """Cost of a wrong action in the states (n, d), the weights of VIPER (Bastani et al. 2018). (n,)
+
+        The value of the teacher's own action minus that of the worst corner of the action box, by the lower of its two
+        critics, in units of the discounted return; at least 0. Raises ValueError for a teacher without critics.
+        """
+        if not self._critics:
+            raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: set criticality to False")
+        states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
+        corners = np.array(list(itertools.product((-1, 1), repeat=len(self._half))), dtype=np.float32)
+        own = (self.predict(states)[0] - self._centre) / self._half
+        worst = np.min([self._value(states, np.broadcast_to(corner, own.shape)) for corner in corners], axis=0)
+        return np.maximum(self._value(states, own) - worst, 0.0).astype(np.float64)
+
+    def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """The lower of the critics' values of `actions` (n, m), scaled to [-1, 1]. (n,)"""
+        inputs = np.column_stack([states, actions])
+        return np.min([_forward(layers, inputs)[:, 0] for layers in self._critics], axis=0)
+
+
+def _forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) -> np.ndarray:
+    for weight, bias in layers[:-1]:
+        hidden = np.maximum(hidden @ weight + bias, 0.0)
+    weight, bias = layers[-1]
+    return hidden @ weight + bias
+
+
+def _layers(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Weight and bias of every layer of the network called `name`; none if there is no such network."""
+    found = (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors)
+    indices = sorted(int(match[1]) for match in found if match)
+    layers = [
+        (_tensor(tensors, f"{name}.{i}.weight", 2).T.copy(), _tensor(tensors, f"{name}.{i}.bias", 1)) for i in indices
+    ]
+    shapes, biases = [weight.shape for weight, _ in layers], [len(bias) for _, bias in layers]
+    given, taken = [out for _, out in shapes], [width for width, _ in shapes]
+    if biases != given or given[:-1] != taken[1:]:
+        raise ValueError(
+            f"the layers of {name} are {shapes} (inputs, outputs) with {biases} biases, expected one for each output, "
+            "and as many inputs as the layer before has outputs"
+        )
+    return layers
+
+
+def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
+    if name not in weights:
+        raise ValueError(f"expected a tensor {name} among {sorted(weights)[:6]}")
+    return check_array(name, weights[name], (-1,) * ndim, most=MOST_WEIGHT).astype(np.float32)
+
+
+def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
+    """A teacher ready to act: the shipped one of a task by its name, or one from a file.
+
+    `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` that Stable-Baselines3
+    saved; for a zip, `task` names the task. Only tensors are read: no code from the file runs. Raises ValueError for an
+    unknown task or a teacher that does not fit, FileNotFoundError, `run.atomic.DamagedFile`.
+    """
+    path = Path(source)
+    if path.suffix == ".zip":
+        if task is None:
+            raise ValueError(f'{path}: name the task of the agent: load_teacher("{path}", "{task_names()[0]}")')
+        return Teacher(read_zip(path), task)
+    if path.suffix and path.suffix != ".safetensors":
+        raise ValueError(f"{path}: expected a .safetensors file, a .zip, or the name of a task, one of {task_names()}")
+    if not path.suffix:
+        path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    content, card = listed.read_carded(path)
+    try:
+        tensors = load(content)
+    except SafetensorError as error:
+        raise atomic.DamagedFile(f"{path}: not a safetensors file: {error}") from error
+    critic = part_of(tensors, "critic")
+    return Teacher(part_of(tensors, "actor"), task or card.get("task"), card=card, critic=critic)
