@@ -13,6 +13,7 @@ import traceback
 from pathlib import Path
 from typing import Literal, get_origin, get_type_hints
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -185,7 +186,9 @@ def weights(**changes):
 
 @functools.cache
 def ax(function):
-    return style.panels()[1][0]
+    fig, axes = style.panels()
+    plt.close(fig)  # it lives on, but no other test finds it open
+    return axes[0]
 
 
 def of_ax(function, **fixed):
