@@ -137,6 +137,6 @@ def test_the_committed_measurement_is_whole():
 def test_the_command_writes_what_was_measured(tmp_path, monkeypatch):
     frame = pd.DataFrame({"what": ["look-up"], "d": [2], "seconds": [0.123456], "machine": ["some"]})
     monkeypatch.setattr(lookup, "study", lambda: frame)
-    monkeypatch.setattr("sys.argv", ["lookup_study", "--out", str(tmp_path)])
+    monkeypatch.setattr("sys.argv", ["lookup", "--out", str(tmp_path)])
     lookup.main()
     assert (tmp_path / "data/results/lookup.csv").read_text() == "what,d,seconds,machine\nlook-up,2,0.1235,some\n"
