@@ -14,6 +14,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, distilled_elsewhere, threads
 
 import vsp
+from vsp import algorithms
 from vsp.paper.runs import N_RUNS, make_runs, paper_experiment, run_path
 from vsp.rollouts import visited_states
 from vsp.run.atomic import ROOT
@@ -94,14 +95,14 @@ def test_batched_or_one_by_one(record):
 def test_a_network_in_a_batch_and_alone(record, monkeypatch):
     """Matrix products are summed in another order for another number of rows: in float32 actions differ in the last
     bits, and where one tips a split, a partition: the size of the batch is part of what a seed stands for."""
-    module, gaps, same = importlib.import_module("vsp.distill"), [], []
+    gaps, same = [], []
     for task, seed in itertools.product(TASKS, range(3)):
         teacher, known = vsp.load_teacher(task), vsp.get_task(task)
         states = visited_states(teacher, known, known.start(np.random.default_rng(seed), 20))
         gaps.append(np.abs(teacher.predict(states)[0] - [teacher.predict(state)[0] for state in states]).max())
         made = []
         for ahead in (1, 500):
-            monkeypatch.setattr(module, "EPISODES_AHEAD", ahead)
+            monkeypatch.setattr(algorithms, "EPISODES_AHEAD", ahead)
             made.append(vsp.distill(teacher, task, seed=seed)[0])
         alone, batched = made
         same.append(
@@ -123,20 +124,20 @@ def test_a_network_in_a_batch_and_alone(record, monkeypatch):
 def made(tmp_path_factory):
     """All runs of the paper, and the tables made of them."""
     out = tmp_path_factory.mktemp("full")
-    python("-m", "vsp.experiments", "--out", out, "--jobs", "1")
+    python("-m", "vsp.paper.make_runs", "--out", out, "--jobs", "1")
     draw(out)
     return out
 
 
 def draw(out, **environment):
     for name in NOTEBOOKS:
-        python("-m", "vsp.runner", f"notebooks/{name}.ipynb", "--out", out, **environment)
+        python("-m", "vsp.run.run_notebook", f"notebooks/{name}.ipynb", "--out", out, **environment)
 
 
 @pytest.mark.parametrize("core", ["Prescott", "Sandybridge"])
 def test_tables_of_the_same_runs_on_another_cpu_type(core, made, tmp_path, record):
     limits = cpu(core, without=found() if core == "Prescott" else [])
-    probe = "from vsp import machine; print(machine.cpu_type())"
+    probe = "from vsp.run import machine; print(machine.cpu_type())"
     assert python("-c", probe, **limits) != python("-c", probe), "the limits have no effect here"
     shutil.copytree(made / "data" / "runs", tmp_path / "data" / "runs")
     draw(tmp_path, **limits)
@@ -148,7 +149,7 @@ def test_tables_of_the_same_runs_on_another_cpu_type(core, made, tmp_path, recor
 
 
 def test_runs_made_anew_on_another_cpu_type(tmp_path, record, monkeypatch):
-    python("-m", "vsp.experiments", "--out", tmp_path, "--jobs", "1", **cpu("Prescott", without=found()))
+    python("-m", "vsp.paper.make_runs", "--out", tmp_path, "--jobs", "1", **cpu("Prescott", without=found()))
     monkeypatch.chdir(ROOT)
     spec = importlib.util.spec_from_file_location("compare", ROOT / ".ci" / "compare.py")
     compare = importlib.util.module_from_spec(spec)

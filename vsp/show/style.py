@@ -96,11 +96,13 @@ def save_figure(fig: Figure, name: str, *, alt: str, out: str | os.PathLike, qui
         fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
     path = Path(out) / "figures" / name
     undated = {"CreationDate": None, "Creator": None, "Producer": None}
-    for suffix, about in ((".pdf", {"Subject": alt, **undated}), (".png", {"Description": alt, "Software": None})):
-        with atomic.atomic_path(path.with_suffix(suffix)) as temporary:
-            fig.savefig(temporary, metadata={"Title": name, **about})
+    for form, about in (("pdf", {"Subject": alt, **undated}), ("png", {"Description": alt, "Software": None})):
+        drawn = io.BytesIO()  # on a full disk, matplotlib's PDF writer would replace the disk's error by one of zlib's
+        fig.savefig(drawn, format=form, metadata={"Title": name, **about})
+        with atomic.atomic_path(path.with_suffix(f".{form}")) as temporary:
+            temporary.write_bytes(drawn.getvalue())
     plt.close(fig)
-    return Picture(path.with_suffix(".png").read_bytes(), alt)
+    return Picture(drawn.getvalue(), alt)
 
 
 def letter(axes: np.ndarray, titles: list[str]) -> None:
