@@ -4,7 +4,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TINY, tiny
 
 import vsp
-from vsp.beyond.refinement.config import Refinement
+from vsp.beyond.refinement.config import Faithful, Refinement
 from vsp.config import EXTENSIONS, Config, paper_preset
 from vsp.paper.printed import printed_hyperparameters
 from vsp.tasks.registry import task_names
@@ -122,7 +122,7 @@ def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
 def test_every_task_has_a_best_preset():
     for task in task_names():
         assert isinstance(vsp.preset(task, "best"), Refinement) and vsp.preset(task, "best").n_cells <= 5
-    with pytest.raises(ValueError, match="kind is 'finest', expected one of \\['paper', 'best'\\]"):
+    with pytest.raises(ValueError, match="kind is 'finest', expected one of \\['paper', 'best', 'faithful'\\]"):
         vsp.preset(TASKS[0], "finest")
 
 
@@ -147,7 +147,30 @@ def test_a_quick_refinement_keeps_its_cells_and_what_is_off():
     assert Refinement(n_cells=3, n_episodes=4).quick().n_episodes == 1
 
 
-@pytest.mark.parametrize("kind", [Config, Refinement])
+def test_the_faithful_presets_have_few_cells():
+    for task in ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"):
+        assert isinstance(vsp.preset(task, "faithful"), Faithful) and vsp.preset(task, "faithful").n_cells <= 8
+    with pytest.raises(ValueError, match="no preset for task 'LunarLanderContinuous-v3', .*write a Faithful"):
+        vsp.preset("LunarLanderContinuous-v3", "faithful")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"n_cells": 0}, {"tolerance": 0}, {"tolerance": float("inf")}, {"margin": float("nan")}, {"n_restarts": True},
+     {"n_generations": -1}, {"failure_penalty": -1.0}, {"n_states": 10.0}],
+)  # fmt: skip
+def test_a_faithful_out_of_range_is_refused(change):
+    ((name, value),) = change.items()
+    with pytest.raises(ValueError, match=f"{name} is {value}, expected"):
+        Faithful(**{"n_cells": 3, "tolerance": 1.0, **change})
+
+
+def test_a_quick_faithful_keeps_its_cells_and_what_is_off():
+    quick = Faithful(n_cells=3, tolerance=1.0, n_generations=0, n_restarts=4).quick()
+    assert (quick.n_cells, quick.n_restarts, quick.n_episodes, quick.n_generations) == (3, 1, 600, 0)
+
+
+@pytest.mark.parametrize("kind", [Config, Refinement, Faithful])
 def test_every_field_says_what_it_is(kind):
     import ast
     import inspect

@@ -28,7 +28,7 @@ from vsp import algorithms, evaluation, export, geometry, policy, rollouts
 from vsp.baselines import dagger, simple, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
-from vsp.beyond.refinement import config, imitate, refine, simplification
+from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.config import Config, paper_preset
 from vsp.paper import printed, statistics, tables
 from vsp.show import state_space, style
@@ -140,7 +140,7 @@ def settings_of(kind, good):
         elif hint is int:
             fields[name] = count(value, least=0 if optional else 1)
         else:
-            fields[name] = number(value, least=0.0)
+            fields[name] = number(value, least=-math.inf if name == "margin" else 0.0)
     return fields
 
 
@@ -156,6 +156,10 @@ SHORT = tiny(n_epochs=24, n_freeze=4)
 REFINEMENT = config.Refinement(
     n_cells=2, n_episodes=2, n_restarts=1, n_steps=4, n_corrections=1, n_correction_episodes=2, n_generations=1,
     n_tuning_episodes=2, n_validation=2,
+)  # fmt: skip
+FAITHFUL = config.Faithful(
+    n_cells=2, tolerance=1.0, n_episodes=2, n_states=20, n_restarts=1, n_generations=1, n_tuning_episodes=2,
+    n_validation=2,
 )  # fmt: skip
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 RULES = [
@@ -214,6 +218,7 @@ lookup = points | {"states": states}
 digits = Argument(3, count(3, least=0).bad.filter(lambda one: one is not None))  # None: as many as it takes
 cell = count(1, least=0, most=1)
 leaves = count(3)
+intent = Argument(FAITHFUL, st.sampled_from([3, "faithful", SHORT, REFINEMENT, {}, np.nan]))
 budget = Argument(REFINEMENT, st.sampled_from([3, "best", SHORT, {}, np.nan]))
 x_y = {"x": Argument(GRID[0], numbers(GRID[0], free=()).bad), "y": Argument(GRID[1], numbers(GRID[1], free=()).bad)}
 values_on_grid = numbers(np.arange(9.0) % 2, free=(), any_shape=True, also=[np.zeros(8), np.zeros((3, 4))])
@@ -240,6 +245,13 @@ CASES = {
     "baselines.simple.rule_of_thumb": (simple.rule_of_thumb, {"task": task}),
     "config.Config": (Config, settings_of(Config, SHORT)),
     "beyond.refinement.config.Refinement": (config.Refinement, settings_of(config.Refinement, REFINEMENT)),
+    "beyond.refinement.config.Faithful": (config.Faithful, settings_of(config.Faithful, FAITHFUL)),
+    "beyond.refinement.config.check_faithful": (config.check_faithful, {"config": intent}),
+    "beyond.refinement.config.faithful_preset": (config.faithful_preset, {"task": task}),
+    "beyond.refinement.faithful.distill_faithfully": (
+        faithful.distill_faithfully,
+        {"teacher": teacher, "task": task, "config": intent, "seed": seed},
+    ),
     "beyond.refinement.config.check_refinement": (config.check_refinement, {"config": budget}),
     "config.paper_preset": (paper_preset, {"task": task}),
     "beyond.refinement.config.best_preset": (config.best_preset, {"task": task}),
@@ -539,9 +551,10 @@ EXEMPT = {
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
         tasks.base tasks.mountaincar tasks.pendulum tasks.simplegoal.SimpleGoalEnv.reset tasks.simplegoal.start
         tasks.simplegoal.step""",
-    "the inside of `refine` and of `imitate`, which check what comes in": """
-        beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune beyond.refinement.population
-        beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
+    "the inside of `refine`, `imitate` and `distill_faithfully`, which check what comes in": """
+        beyond.refinement.search beyond.refinement.faithful.by_visits beyond.refinement.faithful.needed_only
+        beyond.refinement.faithful.variance beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
+        beyond.refinement.population beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
     "the inside of trees, of `dagger` and of `learn`, which check what comes in": """
         baselines.dagger.Rounds baselines.tdavq.DiscretePolicy baselines.tdavq.ParallelEpisodes baselines.tdavq.merge
         baselines.tdavq.split baselines.tdavq.update baselines.trees.LinearTree.apply baselines.trees.LinearTree.inputs

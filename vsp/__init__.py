@@ -16,7 +16,7 @@ import pandas as pd
 
 from . import algorithms
 from .algorithms import merge_regions, split_regions, teacher_episodes
-from .beyond.refinement import Refinement, best_preset, simplify
+from .beyond.refinement import Faithful, Refinement, best_preset, faithful_preset, simplify
 from .beyond.refinement.refine import refine
 from .checks import check_choice, check_seed
 from .config import Config, paper_preset
@@ -32,31 +32,41 @@ from .teachers import agent, load_teacher
 
 
 def distill(
-    teacher: Policy, task: str | Task, config: Config | Refinement | None = None, *, seed: int
+    teacher: Policy, task: str | Task, config: Config | Refinement | Faithful | None = None, *, seed: int
 ) -> tuple[VoronoiPolicy, History | pd.DataFrame]:
-    """Distil `teacher` to a `VoronoiPolicy`: by the paper's method for a `Config`, by ours for a `Refinement`.
+    """Distil `teacher` to a `VoronoiPolicy`: by the paper's method for a `Config`, by ours for a `Refinement`
+    (few cells that return much) or a `Faithful` (few cells that act like the teacher, and return what it returns).
 
     `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
     of the task. Returns the policy and its history: a `History` that lets a notebook replay the run, or a row for each
-    candidate of `refine`. Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its
+    candidate of our methods. Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its
     states or actions are not finite, or `seed` is no integer from 0 on.
     """
     check_seed(seed)
     task = get_task(task)
     if isinstance(config, Refinement):
         return refine(teacher, task, config, seed=seed)
+    if isinstance(config, Faithful):
+        from .beyond.refinement.faithful import distill_faithfully  # which takes a while to import
+
+        return distill_faithfully(teacher, task, config, seed=seed)
     if config is not None and not isinstance(config, Config):
-        raise ValueError(f"config is {config!r}, expected a Config or a Refinement, such as vsp.preset({task.name!r})")
+        raise ValueError(
+            f"config is {config!r}, expected a Config, a Refinement or a Faithful, such as vsp.preset({task.name!r})"
+        )
     return algorithms.distill(teacher, task, config or paper_preset(task), seed=seed)
 
 
-def preset(task: str | Task, kind: Literal["paper", "best"] = "paper") -> Config | Refinement:
-    """The settings for `task`: the paper's (table T2, with the default readings) or the best we know.
+def preset(task: str | Task, kind: Literal["paper", "best", "faithful"] = "paper") -> Config | Refinement | Faithful:
+    """The settings for `task`: the paper's (table T2, with the default readings), or ours.
 
-    Raises ValueError for an unknown task or kind, and for a task without such settings.
+    Ours are "best", for a high return, and "faithful", for actions like the teacher's. Raises ValueError for an unknown
+    task or kind, and for a task without such settings.
     """
-    check_choice("kind", kind, ("paper", "best"))
-    return paper_preset(task) if kind == "paper" else best_preset(task)
+    check_choice("kind", kind, ("paper", "best", "faithful"))
+    if kind == "paper":
+        return paper_preset(task)
+    return best_preset(task) if kind == "best" else faithful_preset(task)
 
 
 def __getattr__(name: str) -> ModuleType:

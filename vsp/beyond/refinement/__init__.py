@@ -1,8 +1,8 @@
-"""Our own method: `refine` optimises a few cells and their maps together, `simplify` reduces cells and numbers.
+"""Our own methods: `refine` optimises a few cells and their maps for the return, `distill_faithfully` for actions like
+the teacher's as well, `imitate` for these alone; `simplify` reduces cells and numbers.
 
-`imitate` fits the teacher's actions alone. `refine` and `imitate` are also modules here, so import the functions from
-these, or `vsp.refine`.
+`refine` and `imitate` are also modules here, so import the functions from these.
 """
 
-from .config import Refinement, best_preset
+from .config import Faithful, Refinement, best_preset, faithful_preset
 from .simplification import gathered, simplify

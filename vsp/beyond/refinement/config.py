@@ -6,6 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import get_type_hints
 
+from ...checks import check_number
 from ...config import check_field
 from ...tasks import Task, get_task
 
@@ -59,8 +60,7 @@ class Refinement:
         for name, kind in get_type_hints(type(self)).items():
             value = getattr(self, name)
             optional = name.endswith("_penalty") or name in ("n_corrections", "n_generations")
-            zero = value == 0 and isinstance(value, int | kind) and not isinstance(value, bool)
-            if not (optional and zero):  # 0 switches the part off
+            if not (optional and _is_off(value, kind)):
                 check_field(name, value, kind)
         first, last = self.initial_temperature, self.final_temperature
         if last > first:
@@ -68,9 +68,86 @@ class Refinement:
 
     def quick(self) -> Refinement:
         """The same method in a tenth of the steps: for a first look, not for results."""
-        shrunk = ("n_episodes", "n_steps", "n_correction_episodes", "n_generations", "n_validation")
-        values = {name: getattr(self, name) for name in shrunk}
-        return dataclasses.replace(self, **{name: value and max(1, value // 10) for name, value in values.items()})
+        return _tenth(self, "n_episodes", "n_steps", "n_correction_episodes", "n_generations", "n_validation")
+
+
+@dataclass(frozen=True)
+class Faithful:
+    """How `distill_faithfully` finds few cells that act like the teacher. Raises ValueError for a value out of
+    range."""
+
+    n_cells: int
+    """Cells of the policy, at most."""
+    tolerance: float
+    """What a mean return may be lower than it should be, in units of return: half of it is accepted."""
+    margin: float = 0.0
+    """What the mean return should be above the teacher's, from the same starts."""
+    failure_penalty: float = 0.0
+    """Subtracted from the mean return per failed episode, as in `Refinement`."""
+    n_episodes: int = 6000
+    """Episodes of the teacher that the fit sees."""
+    n_states: int = 30_000
+    """States of these episodes that are kept, drawn at random."""
+    n_restarts: int = 32
+    """Descents from other random initial cells; the closest imitation is kept."""
+    n_generations: int = 250
+    """Generations of CMA-ES that raise the return where it is below the teacher's."""
+    n_tuning_episodes: int = 500
+    """Episodes, from fresh starts, that each candidate of a generation plays, and the teacher."""
+    n_validation: int = 5000
+    """Episodes that decide which candidate is kept."""
+
+    def __post_init__(self) -> None:
+        for name, kind in get_type_hints(type(self)).items():
+            value = getattr(self, name)
+            if name == "margin":
+                check_number(name, value)
+            elif not (name in ("failure_penalty", "n_generations") and _is_off(value, kind)):
+                check_field(name, value, kind)
+
+    def quick(self) -> Faithful:
+        """The same method in a tenth of the work: for a first look, not for results."""
+        return _tenth(self, "n_episodes", "n_restarts", "n_generations", "n_validation")
+
+
+def _is_off(value: object, kind: type) -> bool:
+    """Whether `value` is 0, which switches a part off."""
+    return value == 0 and isinstance(value, int | kind) and not isinstance(value, bool)
+
+
+def _tenth(config, *names: str):
+    """`config` with a tenth of each of these numbers, at least 1 where it is not 0."""
+    values = {name: getattr(config, name) for name in names}
+    return dataclasses.replace(config, **{name: value and max(1, value // 10) for name, value in values.items()})
+
+
+def check_faithful(config: Faithful) -> None:
+    """Raise ValueError for anything else, such as a `Refinement`."""
+    if not isinstance(config, Faithful):
+        raise ValueError(f"config is {config!r}, expected a Faithful, such as vsp.preset('SimpleGoal-v0', 'faithful')")
+
+
+_FAITHFUL = {
+    "SimpleGoal-v0": Faithful(n_cells=6, tolerance=0.03, failure_penalty=100.0),
+    "MountainCarContinuous-v0": Faithful(
+        n_cells=2, tolerance=0.1, margin=0.1, failure_penalty=100_000.0, n_episodes=400, n_states=20_000,
+        n_generations=60, n_tuning_episodes=60, n_validation=2000,
+    ),
+    "Pendulum-v1": Faithful(
+        n_cells=8, tolerance=1.0, n_episodes=400, n_states=40_000, n_generations=60, n_tuning_episodes=100,
+        n_validation=1000,
+    ),
+}  # fmt: skip
+
+
+def faithful_preset(task: str | Task) -> Faithful:
+    """The settings of `distill_faithfully` for `task`. Raises ValueError for a task without any."""
+    name = get_task(task).name
+    if name not in _FAITHFUL:
+        raise ValueError(
+            f"no preset for task {name!r}, expected one of {list(_FAITHFUL)}: write a Faithful of your own"
+        )
+    return _FAITHFUL[name]
 
 
 def check_refinement(config: Refinement) -> None:

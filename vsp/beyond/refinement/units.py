@@ -104,6 +104,12 @@ class LabelledStates:
     actions: np.ndarray  # (n, m)
     criticality: np.ndarray | None = None  # (n,) what a wrong action costs there; None: the same everywhere
 
+    def some(self, n: int, rng: np.random.Generator) -> LabelledStates:
+        """At most n of the states, drawn without replacement."""
+        rows = rng.permutation(len(self.inputs))[:n]
+        weights = None if self.criticality is None else self.criticality[rows]
+        return LabelledStates(self.inputs[rows], self.actions[rows], weights)
+
     def with_more(self, other: LabelledStates) -> LabelledStates:
         """These states, then the others."""
         pairs = ((self.inputs, other.inputs), (self.actions, other.actions), (self.criticality, other.criticality))

@@ -1,0 +1,97 @@
+"""`least_error`: the cells that act most like the teacher on given states, by L-BFGS from many beginnings.
+
+The error has many local minima, and no slope where an action lies beyond its limits. So descents begin with soft cells
+and a leak beyond the limits, and both fall step by step (deterministic annealing, Rose 1998). Descents that are behind
+on the way are given up (successive halving, Jamieson & Talwalkar 2016).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+
+from .anneal import expected_loss, squared_error
+from .units import Cells, LabelledStates
+
+N_STAGES = 16
+TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
+LEAKS = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
+N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last round
+FIRST_STATES = 5000  # that the rounds before the last one see
+# (stages, how many descents go on); the last round sees all states, and warms up by a stage before
+ROUNDS = ((range(0, 6), 8), (range(6, 12), 4))
+LAST = range(11, N_STAGES)
+RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state
+
+
+def least_error(seen: LabelledStates, n_cells: int, n_beginnings: int, rng: np.random.Generator) -> Cells:
+    """The cells with the least `squared_error` on `seen` that `n_beginnings` descents find."""
+    some = seen.some(FIRST_STATES, rng)
+    live = [local_maps(some, n_cells, rng) for _ in range(n_beginnings)]
+    for stages, n_kept in ROUNDS:
+        ends = [descend(some, cells, stages) for cells in live]
+        live = sorted(ends, key=lambda cells: squared_error(some, cells))[:n_kept]
+    ends = [descend(seen, cells, LAST, n_iterations=N_LAST) for cells in live]
+    return min(ends, key=lambda cells: squared_error(seen, cells))
+
+
+def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+    """k codewords at states drawn from `seen`, each with the least-squares map of the states in its cell."""
+    d, inputs = seen.inputs.shape[1] - 1, seen.inputs
+    common = np.linalg.lstsq(inputs, seen.actions, rcond=None)[0]
+    codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
+    cells = Cells(codewords, np.tile(common, (k, 1, 1)))
+    own = cells.closeness(inputs[:, :d]).argmax(axis=0)
+    for i in range(k):  # a weak pull to the map of all states, for cells with few
+        rows = np.vstack([inputs[own == i], np.eye(d + 1)])
+        cells.maps[i] = np.linalg.lstsq(rows, np.vstack([seen.actions[own == i], common]), rcond=None)[0]
+    return cells
+
+
+def descend(seen: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
+    """`cells` after L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
+    uncorrelated."""
+    states, k = seen.inputs[:, :-1], len(cells.codewords)
+    unit = (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
+    for stage in stages:
+        temperature, leak = unit * TEMPERATURES[stage], LEAKS[stage]
+        closeness = cells.closeness(states) / temperature
+        shares = np.exp(closeness - closeness.max(axis=0))
+        move, pull_back = moves(cells, uncorrelated(seen, shares / shares.sum(axis=0)), np.sqrt(TEMPERATURES[stage]))
+
+        def loss(step, move=move, pull_back=pull_back, temperature=temperature, leak=leak):
+            value, gradient = expected_loss(
+                move(step), seen.inputs, seen.actions, temperature=temperature, clip_slope=leak
+            )
+            return value, pull_back(gradient)
+
+        options = {"maxiter": n_iterations, "maxcor": 20}
+        found = minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options)
+        cells = move(found.x)
+    return cells
+
+
+def uncorrelated(seen: LabelledStates, shares: np.ndarray) -> np.ndarray:
+    """Bases of the maps in which a step of length 1 changes the mean squared output of a cell by about 1. (k, p, p)
+
+    `shares` (k, n) say how much of each state belongs to each cell.
+    """
+    p = seen.inputs.shape[1]
+    products = np.stack([(seen.inputs * share[:, None]).T @ seen.inputs for share in shares]) / len(seen.inputs)
+    return np.linalg.cholesky(np.linalg.inv(products + RIDGE * np.eye(p)))
+
+
+def moves(cells: Cells, bases: np.ndarray, codeword_units: np.ndarray | float):
+    """Two functions: from a step in these units to the moved cells, and from a gradient by `Cells.vector` to that by
+    the step."""
+    cut, shape = cells.codewords.size, cells.maps.shape
+
+    def move(step: np.ndarray) -> Cells:
+        codewords = cells.codewords + (codeword_units * step[:cut]).reshape(cells.codewords.shape)
+        return Cells(codewords, cells.maps + bases @ step[cut:].reshape(shape))
+
+    def pull_back(gradient: np.ndarray) -> np.ndarray:
+        by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
+        return np.concatenate([codeword_units * gradient[:cut], by_maps.ravel()])
+
+    return move, pull_back
