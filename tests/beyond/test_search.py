@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from vsp.beyond.refinement import search
 from vsp.beyond.refinement.anneal import expected_loss, squared_error
 from vsp.beyond.refinement.search import LAST, N_STAGES, ROUNDS, descend, least_error, local_maps, moves, uncorrelated
 from vsp.beyond.refinement.units import Cells, LabelledStates
@@ -31,6 +32,15 @@ def test_a_descent_lowers_the_error_and_stays_at_the_best():
     begun = local_maps(seen, 3, np.random.default_rng(3))
     assert squared_error(seen, descend(seen, begun, range(N_STAGES))) < 0.5 * squared_error(seen, begun)
     assert squared_error(seen, descend(seen, cells, range(N_STAGES - 2, N_STAGES))) < 1e-4
+
+
+def test_the_loss_in_parts_is_that_of_all(monkeypatch):
+    cells, seen = planted(n=1000)
+    about = {"temperature": 0.2, "clip_slope": 0.1}
+    monkeypatch.setattr(search, "AT_ONCE", 300)  # the last part is smaller
+    value, gradient = search.whole_loss(cells, seen, **about)
+    whole = expected_loss(cells, seen.inputs, seen.actions, **about)
+    assert value == pytest.approx(whole[0], rel=1e-12) and gradient == pytest.approx(whole[1], abs=1e-12)
 
 
 def test_every_stage_has_its_turn():

@@ -21,6 +21,7 @@ FIRST_STATES = 5000  # that the rounds before the last one see
 # (stages, how many descents go on); the last round sees all states, and warms up by a stage before
 ROUNDS = ((range(0, 6), 8), (range(6, 12), 4))
 LAST = range(11, N_STAGES)
+AT_ONCE = 2000  # states whose loss is computed together
 RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state
 
 
@@ -60,15 +61,24 @@ def descend(seen: LabelledStates, cells: Cells, stages: range, *, n_iterations: 
         move, pull_back = moves(cells, uncorrelated(seen, shares / shares.sum(axis=0)), np.sqrt(TEMPERATURES[stage]))
 
         def loss(step, move=move, pull_back=pull_back, temperature=temperature, leak=leak):
-            value, gradient = expected_loss(
-                move(step), seen.inputs, seen.actions, temperature=temperature, clip_slope=leak
-            )
+            value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=leak)
             return value, pull_back(gradient)
 
         options = {"maxiter": n_iterations, "maxcor": 20}
         found = minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options)
         cells = move(found.x)
     return cells
+
+
+def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
+    """`expected_loss` of all states, some at a time: their arrays then fit into the cache, which is three times as
+    fast."""
+    n, value, gradient = len(seen.inputs), 0.0, np.zeros(cells.vector.size)
+    for i in range(0, n, AT_ONCE):
+        inputs, actions = seen.inputs[i : i + AT_ONCE], seen.actions[i : i + AT_ONCE]
+        part, its_gradient = expected_loss(cells, inputs, actions, **about)
+        value, gradient = value + len(inputs) / n * part, gradient + len(inputs) / n * its_gradient
+    return value, gradient
 
 
 def uncorrelated(seen: LabelledStates, shares: np.ndarray) -> np.ndarray:
