@@ -26,7 +26,7 @@ def squared_errors(seen: LabelledStates, cells: Cells) -> np.ndarray:
 
 def squared_error(seen: LabelledStates, cells: Cells) -> float:
     """Mean squared error of the limited action of each state's own cell, over all states."""
-    own = cells.closeness(seen.inputs[:, :-1]).argmax(axis=0)
+    own = cells.nearest(seen.inputs[:, :-1])
     return float(squared_errors(seen, cells)[own, np.arange(len(own))].mean())
 
 
@@ -47,12 +47,9 @@ def anneal(seen: LabelledStates, cells: Cells, config: Refinement, rng: np.rando
     """Optimise codewords and maps by Adam while the temperature falls from the initial to the final one of `config`.
 
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance, and the
-    temperature says how fast. The last tenth of the steps stays at the final temperature. The unit of temperatures is
-    the variance of the states inside one of k cells: much above it, codewords collapse onto each other and stay there.
+    temperature says how fast. The last tenth of the steps stays at the final temperature.
     """
-    states = seen.inputs[:, :-1]
-    variance = states.var(axis=0).sum() or 1.0  # a single state has none
-    unit = variance * len(cells.codewords) ** (-2 / states.shape[1])
+    unit = temperature_unit(seen, len(cells.codewords))
     first, n_steps = config.initial_temperature, config.n_steps
     theta, mean, square, draw = cells.vector, 0.0, 0.0, seen.draw(config.batch_size, rng)
     for i in range(n_steps):
@@ -68,6 +65,15 @@ def anneal(seen: LabelledStates, cells: Cells, config: Refinement, rng: np.rando
     return cells.like(theta)
 
 
+def temperature_unit(seen: LabelledStates, k: int) -> float:
+    """The variance of the states inside one of k cells: much hotter, codewords collapse onto each other and stay there.
+
+    A single state has none; its unit is 1.
+    """
+    states = seen.inputs[:, :-1]
+    return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
+
+
 def expected_loss(
     cells: Cells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
@@ -81,9 +87,7 @@ def expected_loss(
     error = limited + clip_slope * (raw - limited) - actions.T
     losses = np.square(error).mean(axis=1)
 
-    closeness = cells.closeness(states) / temperature
-    shares = np.exp(closeness - closeness.max(axis=0))
-    shares /= shares.sum(axis=0)
+    shares = cells.shares(states, temperature)
     loss = (shares * losses).sum(axis=0)
 
     by_raw = (2 / (n * m)) * shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)

@@ -19,9 +19,9 @@ from ...tasks.base import Task
 from ...tasks.registry import get_task
 from .anneal import squared_error
 from .config import Faithful, check_faithful
-from .imitate import nearest_two
 from .population import rollout_population
 from .search import least_error, moves, uncorrelated
+from .tune import cma_es, is_snapshot
 from .units import Cells, Frame, LabelledStates
 
 SNAPSHOTS = 25  # candidates that a tuning yields, evenly spread over its generations
@@ -102,13 +102,10 @@ def _tune(
 
     Steps have units in which each raises the error by as much: so the search goes where fidelity costs little.
     """
-    import cma
-
     move, _ = moves(cells, *_units(seen, cells))
     whole, price = variance(seen), PRICE / config.tolerance
     step = np.sqrt(FIRST_STEP * max(squared_error(seen, cells), 1e-6) / cells.vector.size)
-    options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
-    search = cma.CMAEvolutionStrategy(np.zeros(cells.vector.size), step, options)
+    search = cma_es(np.zeros(cells.vector.size), step, rng)
     for i in range(config.n_generations):
         starts, steps = frame.task.start(rng, config.n_tuning_episodes), search.ask()
         aim = score(rollout(teacher, frame.task, starts), config.failure_penalty) + config.margin
@@ -116,13 +113,13 @@ def _tune(
         results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
         missed = [max(0.0, aim - score(result, config.failure_penalty)) for result in results]
         search.tell(steps, [squared_error(seen, one) / whole + price * less for one, less in zip(candidates, missed)])
-        if (i + 1) * SNAPSHOTS // config.n_generations > i * SNAPSHOTS // config.n_generations:
+        if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
 
 
 def _units(seen: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     """Bases of the maps and units of the codewords for `moves`, by the curvature of the error."""
-    own = cells.closeness(seen.inputs[:, :-1]).argmax(axis=0)
+    own = cells.nearest(seen.inputs[:, :-1])
     here, vector, units = squared_error(seen, cells), cells.vector, np.empty(cells.codewords.size)
     for j in range(len(units)):
         nudge = np.zeros_like(vector)
@@ -149,6 +146,6 @@ def _without(cells: Cells, i: int) -> Cells:
 
 def by_visits(cells: Cells, seen: LabelledStates) -> Cells:
     """The same cells, the one with the most states of `seen` first."""
-    visits = np.bincount(nearest_two(seen, cells)[0], minlength=len(cells.codewords)) if len(cells.codewords) > 1 else 0
-    order = np.argsort(-np.atleast_1d(visits), kind="stable")
+    visits = np.bincount(cells.nearest(seen.inputs[:, :-1]), minlength=len(cells.codewords))
+    order = np.argsort(-visits, kind="stable")
     return Cells(cells.codewords[order], cells.maps[order])

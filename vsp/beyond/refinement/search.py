@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
-from .anneal import expected_loss, squared_error
+from .anneal import expected_loss, squared_error, temperature_unit
 from .units import Cells, LabelledStates
 
 N_STAGES = 16
@@ -42,7 +42,7 @@ def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
     common = np.linalg.lstsq(inputs, seen.actions, rcond=None)[0]
     codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
     cells = Cells(codewords, np.tile(common, (k, 1, 1)))
-    own = cells.closeness(inputs[:, :d]).argmax(axis=0)
+    own = cells.nearest(inputs[:, :d])
     for i in range(k):  # a weak pull to the map of all states, for cells with few
         rows = np.vstack([inputs[own == i], np.eye(d + 1)])
         cells.maps[i] = np.linalg.lstsq(rows, np.vstack([seen.actions[own == i], common]), rcond=None)[0]
@@ -52,27 +52,27 @@ def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
 def descend(seen: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
     """`cells` after L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
-    states, k = seen.inputs[:, :-1], len(cells.codewords)
-    unit = (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
+    unit = temperature_unit(seen, len(cells.codewords))
     for stage in stages:
-        temperature, leak = unit * TEMPERATURES[stage], LEAKS[stage]
-        closeness = cells.closeness(states) / temperature
-        shares = np.exp(closeness - closeness.max(axis=0))
-        move, pull_back = moves(cells, uncorrelated(seen, shares / shares.sum(axis=0)), np.sqrt(TEMPERATURES[stage]))
-
-        def loss(step, move=move, pull_back=pull_back, temperature=temperature, leak=leak):
-            value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=leak)
-            return value, pull_back(gradient)
-
-        options = {"maxiter": n_iterations, "maxcor": 20}
-        found = minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options)
-        cells = move(found.x)
+        cells = _cooler(seen, cells, unit, stage, n_iterations)
     return cells
 
 
+def _cooler(seen: LabelledStates, cells: Cells, unit: float, stage: int, n_iterations: int) -> Cells:
+    temperature = unit * TEMPERATURES[stage]
+    bases = uncorrelated(seen, cells.shares(seen.inputs[:, :-1], temperature))
+    move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
+
+    def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
+        value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=LEAKS[stage])
+        return value, pull_back(gradient)
+
+    options = {"maxiter": n_iterations, "maxcor": 20}
+    return move(minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options).x)
+
+
 def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
-    """`expected_loss` of all states, some at a time: their arrays then fit into the cache, which is three times as
-    fast."""
+    """`expected_loss` of all states, some at a time, so that their arrays fit into the cache."""
     n, value, gradient = len(seen.inputs), 0.0, np.zeros(cells.vector.size)
     for i in range(0, n, AT_ONCE):
         inputs, actions = seen.inputs[i : i + AT_ONCE], seen.actions[i : i + AT_ONCE]

@@ -54,15 +54,25 @@ def tune(
 
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
     """
-    import cma
-
-    options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
-    search = cma.CMAEvolutionStrategy(cells.vector, config.tuning_step, options)
+    search = cma_es(cells.vector, config.tuning_step, rng)
     for i in range(config.n_generations):
         starts = frame.task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
         candidates = [cells.like(vector) for vector in vectors]
         results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
         search.tell(vectors, [-objective.score(result, one) for result, one in zip(results, candidates)])
-        if (i + 1) * SNAPSHOTS // config.n_generations > i * SNAPSHOTS // config.n_generations:
+        if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)
+
+
+def cma_es(start: np.ndarray, step: float, rng: np.random.Generator):
+    """The library's search from `start` with this first standard deviation, with the draws of `rng`."""
+    import cma  # which few need
+
+    options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
+    return cma.CMAEvolutionStrategy(start, step, options)
+
+
+def is_snapshot(i: int, n: int, n_snapshots: int) -> bool:
+    """Whether generation i of n is one of `n_snapshots` that are evenly spread; the last one is."""
+    return (i + 1) * n_snapshots // n > i * n_snapshots // n

@@ -90,6 +90,17 @@ class Cells:
         """
         return 2 * self.codewords @ states.T - np.square(self.codewords).sum(axis=1)[:, None]
 
+    def nearest(self, states: np.ndarray) -> np.ndarray:
+        """The cell of each of `states` (n, d). (n,)"""
+        return self.closeness(states).argmax(axis=0)
+
+    def shares(self, states: np.ndarray, temperature: float) -> np.ndarray:
+        """How much of each of `states` (n, d) belongs to each cell: in the cold, all of it to the nearest. (k, n)"""
+        closeness = self.closeness(states) / temperature
+        shares = np.exp(closeness - closeness.max(axis=0))
+        shares /= shares.sum(axis=0)
+        return shares
+
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
         """Actions of every cell for `inputs` (n, d + 1), not limited. (k, m, n): states along whole rows, for speed"""
         k, rows, m = self.maps.shape
