@@ -25,7 +25,7 @@ import vsp
 
 # BARE moments
 from vsp import algorithms, evaluation, export, geometry, policy, rollouts
-from vsp.baselines import dagger, simple, tdavq, trees
+from vsp.baselines import dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
@@ -515,6 +515,14 @@ CASES = {
         trees.ObliqueLinearTree,
         pairs | {"leaves": leaves, "task": task, "seed": seed},
     ),
+    "baselines.small_network.SmallNetwork": (
+        small_network.SmallNetwork,
+        pairs | {"units": leaves, "task": task, "seed": seed},
+    ),
+    "baselines.small_network.SmallNetwork.predict": (
+        small_network.SmallNetwork(STATES, ACTIONS, units=2, task=SIMPLEGOAL, seed=0).predict,
+        {"obs": states},
+    ),
     "baselines.soft_tree.SoftTree": (
         QuickSoftTree,
         {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()}
@@ -559,7 +567,7 @@ EXEMPT = {
         baselines.dagger.Rounds baselines.tdavq.DiscretePolicy baselines.tdavq.ParallelEpisodes baselines.tdavq.merge
         baselines.tdavq.split baselines.tdavq.update baselines.trees.LinearTree.apply baselines.trees.LinearTree.inputs
         baselines.trees.LinearTree.split baselines.trees.Node baselines.trees.ObliqueLinearTree.split
-        baselines.trees.Split beyond.explain.rules.Rule""",
+        baselines.small_network.units_for baselines.trees.Split beyond.explain.rules.Rule""",
     "holds what another function found": "history.Event rollouts.Outcomes policy.Explanation paper.statistics.Part",
     "hands on what the reader's own function takes and gives, or is but a protocol": """
         teachers.agents.Agent rollouts.Policy beyond.refinement.simplification.prune beyond.explain.rules.RulePolicy""",

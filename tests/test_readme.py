@@ -130,10 +130,7 @@ def test_counts_of_the_readme_are_those_of_the_ledger():
 
 
 def test_results_are_those_of_the_tables():
-    tables = {
-        name: read_table(f"{name.lower()}_spread", index_col="metric")
-        for name in ("SimpleGoal", "MountainCar")
-    }
+    tables = {name: read_table(f"{name.lower()}_spread", index_col="metric") for name in ("SimpleGoal", "MountainCar")}
     rows = re.findall(r"^\| (SimpleGoal|MountainCar), ([a-z]+)[^|]* \| (.*) \|$", RESULTS, flags=re.M)
     assert len(rows) == 8
     for task, metric, cells in rows:

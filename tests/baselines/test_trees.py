@@ -46,6 +46,24 @@ def test_one_leaf_is_the_root(kind):
     assert len(tree) == 1 and np.allclose(tree.predict(states)[0], expected)
 
 
+@pytest.mark.parametrize("make", [LinearTree, lambda *data, **about: ObliqueLinearTree(*data, **about, seed=0)])
+def test_constant_leaves_hold_the_mean_action_of_their_states(make):
+    states, actions = examples(SIMPLEGOAL)
+    tree = make(states, actions, leaves=5, task=SIMPLEGOAL, constant=True)
+    assert len(tree) == 5
+    for node in tree.ends:
+        own = np.clip(actions[node.rows].mean(axis=0), -1, 1)
+        assert np.allclose(tree.predict(states[node.rows])[0], own)
+
+
+def test_constant_leaves_along_the_axes_are_nearly_those_of_cart():
+    """They differ in where a cut may lie: at a quantile, or between any two states."""
+    states, actions = examples(SIMPLEGOAL)
+    own = LinearTree(states, actions, leaves=5, task=SIMPLEGOAL, constant=True)
+    own, cart = (np.square(one.predict(states)[0] - actions).mean() for one in (own, Tree(states, actions, leaves=5)))
+    assert own == pytest.approx(cart, rel=0.05)
+
+
 def test_the_linear_leaves_are_fitted_to_their_states():
     states, actions = examples(SIMPLEGOAL)
     tree, other = LinearTree(states, actions, leaves=4, task=SIMPLEGOAL), examples(SIMPLEGOAL, seed=1)[0]

@@ -6,7 +6,20 @@ import pytest
 from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
 
 from vsp.beyond.comparison import make_rows, measure, method_rows
-from vsp.beyond.comparison.method_rows import ABLATION, METHODS, TASKS, Job, jobs_of, make_all, make_row, rows, simplest
+from vsp.beyond.comparison.method_rows import (
+    ABLATION,
+    METHODS,
+    SEEDS,
+    TASKS,
+    TUNED_SIZES,
+    UNTUNED,
+    Job,
+    jobs_of,
+    make_all,
+    make_row,
+    rows,
+    simplest,
+)  # fmt: skip
 from vsp.beyond.comparison.method_summary import read_rows
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.refinement.config import Refinement, best_preset
@@ -32,6 +45,8 @@ def small(monkeypatch):
     monkeypatch.setattr(method_rows, "best_preset", lambda task: SMALL)
     two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
     monkeypatch.setattr(method_rows, "METHODS", two)
+    for module in (method_rows, make_rows):
+        monkeypatch.setattr(module, "TABLES", {"beyond": two})
     monkeypatch.setattr(method_rows, "ABLATION", {})
     return monkeypatch
 
@@ -58,6 +73,24 @@ def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
         assert {(best_preset(task).n_cells, seed) for seed in range(20)} <= own
 
 
+@pytest.mark.parametrize("task", TASKS)
+def test_every_rival_is_tuned_at_every_size_and_untuned_too(task):
+    found = jobs_of(task, "tuned")
+    for name in UNTUNED:
+        sizes = {(job.size, job.seed) for job in found if job.method == f"{name}, tuned"}
+        assert sizes == {(size, seed) for size in ((0,) if name == "one linear map" else TUNED_SIZES) for seed in SEEDS}
+        assert name in METHODS or any(job.method == name for job in found)
+    assert not {job.method for job in found} & {job.method for job in jobs_of(task)}
+
+
+def test_a_tuned_row_depends_on_the_settings_of_the_tuning(small):
+    jobs = [Job(SIMPLEGOAL, name, 3, 0) for name in ("CART, DAgger", "CART, DAgger, tuned", "refined")]
+    small.setattr(method_rows, "METHODS", METHODS)
+    before = [job.provenance for job in jobs]
+    small.setattr(method_rows, "best_preset", lambda task: dataclasses.replace(SMALL, tuning_step=0.2))
+    assert [job.provenance == known for job, known in zip(jobs, before)] == [True, False, False]
+
+
 def test_methods_that_know_one_task_are_not_asked_about_others():
     own = {task: {job.method for job in jobs_of(task)} for task in TASKS}
     assert all(("the paper's method" in own[task]) == (task in printed.TASKS) for task in TASKS)
@@ -79,16 +112,16 @@ def test_a_row_holds_what_is_measured(small):
 
 
 def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
-    make_all(tmp_path, tasks=[SIMPLEGOAL])
-    frame, seconds = rows(tmp_path, SIMPLEGOAL)
+    make_all(tmp_path, jobs_of(SIMPLEGOAL))
+    frame, seconds = rows(tmp_path, jobs_of(SIMPLEGOAL))
     assert len(frame) == 2 * 2 + 1 == len(seconds) and frame["method"].tolist() == ["CART"] * 4 + ["teacher"]
     assert frame[["settings", "teacher", "version"]].to_dict("records") == [j.provenance for j in jobs_of(SIMPLEGOAL)]
     assert (seconds["task"] == SIMPLEGOAL).all()
     made, original = [], make_row
     small.setattr(method_rows, "make_row", lambda job: (made.append(job), original(job))[1])
     jobs_of(SIMPLEGOAL)[2].path(tmp_path).unlink()
-    make_all(tmp_path, tasks=[SIMPLEGOAL])
-    assert made == [jobs_of(SIMPLEGOAL)[2]] and rows(tmp_path, SIMPLEGOAL)[0].equals(frame)
+    make_all(tmp_path, jobs_of(SIMPLEGOAL))
+    assert made == [jobs_of(SIMPLEGOAL)[2]] and rows(tmp_path, jobs_of(SIMPLEGOAL))[0].equals(frame)
 
 
 @pytest.mark.parametrize(
@@ -97,11 +130,11 @@ def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
      (Job(SIMPLEGOAL, "teacher", 0, 0), "method 'teacher', expected 'CART'")],
 )  # fmt: skip
 def test_a_file_of_another_row_is_refused(small, tmp_path, of, why):
-    make_all(tmp_path, tasks=[SIMPLEGOAL])
+    make_all(tmp_path, jobs_of(SIMPLEGOAL))
     path = Job(SIMPLEGOAL, "CART", 3, 0).path(tmp_path)
     shutil.copy(of.path(tmp_path), path)
     with pytest.raises(atomic.DamagedFile, match=f"{path.name}: made with {why}: delete it"):
-        rows(tmp_path, SIMPLEGOAL)
+        rows(tmp_path, jobs_of(SIMPLEGOAL))
 
 
 def test_other_settings_and_other_versions_are_other_rows(small):

@@ -7,6 +7,7 @@ They raise ValueError for arrays of a wrong shape, numbers that are not finite, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -68,11 +69,11 @@ class LinearTree:
 
     At most `leaves` leaves, grown best split first on standardised states. A split is judged by the error of a map on
     either side, not of two constants. It lies at one of 255 quantiles of its node, and leaves on each side at least
-    twice as many states as a map has rows.
+    twice as many states as a map has rows. `constant`: one action per leaf instead of a map.
     """
 
-    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str):
-        self.task = get_task(task)
+    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, constant: bool = False):
+        self.task, self.constant = get_task(task), constant
         states, actions = check_data(states, actions, len(self.task.low), len(self.task.action_low))
         check_count("leaves", leaves)
         self.centre, self.scale = standard(states)
@@ -87,7 +88,7 @@ class LinearTree:
             right, n = best.split.right(inputs[best.rows]), len(self.nodes)
             best.children = (n, n + 1)
             self.nodes += [Node(best.rows[side], best.depth + 1) for side in (~right, right)]
-        rows = np.column_stack([inputs, np.ones(len(inputs))])
+        rows = np.column_stack([np.zeros_like(inputs) if constant else inputs, np.ones(len(inputs))])
         maps = [np.linalg.lstsq(rows[node.rows], actions[node.rows], rcond=None)[0] for node in self.nodes]
         self.maps = np.array(maps)  # (nodes, d + 1, m)
 
@@ -101,7 +102,7 @@ class LinearTree:
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
         """The best split of a node along an axis."""
-        return _linear_stump(inputs, actions, np.eye(inputs.shape[1]), cuts=255)
+        return _stump(inputs, actions, np.eye(inputs.shape[1]), cuts=255, constant=self.constant)
 
     def inputs(self, states: np.ndarray) -> np.ndarray:
         """Standardised states. (n, d)"""
@@ -123,9 +124,12 @@ class LinearTree:
         return np.clip(raw, self.task.action_low, self.task.action_high), None
 
 
-def _linear_stump(inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int = 31) -> Split:
+def _stump(
+    inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int = 31, constant: bool = False
+) -> Split:
     """The best split along one of `directions` (c, d) for a map on each side, from the moments between the cuts."""
-    m, rows = actions.shape[1], np.column_stack([inputs, np.ones(len(inputs)), actions])
+    features = np.column_stack([inputs[:, : 0 if constant else None], np.ones(len(inputs))])
+    m, rows = actions.shape[1], np.column_stack([features, actions])
     (whole,), best = _squared_errors((rows.T @ rows)[None], m), Split(0.0, directions[0], 0.0)
     for direction in directions:
         places = inputs @ direction
@@ -136,7 +140,7 @@ def _linear_stump(inputs: np.ndarray, actions: np.ndarray, directions: np.ndarra
         left, total = np.cumsum(moments[:-1], axis=0), np.sum(moments, axis=0)
         errors = _squared_errors(left, m) + _squared_errors(total - left, m)
         fewest = np.minimum(bounds, len(rows) - bounds)
-        gains = np.where(fewest >= 2 * (inputs.shape[1] + 1), whole - errors, 0.0)
+        gains = np.where(fewest >= 2 * features.shape[1], whole - errors, 0.0)
         if gains.max() > best.gain:
             best = Split(gains.max(), direction, borders[gains.argmax()])
     return best
@@ -161,27 +165,29 @@ class ObliqueLinearTree(LinearTree):
     sides.
     """
 
-    def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int):
+    def __init__(
+        self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int, constant: bool = False
+    ):
         check_seed(seed)
         self._rng = np.random.default_rng(seed)
-        super().__init__(states, actions, leaves=leaves, task=task)
+        super().__init__(states, actions, leaves=leaves, task=task, constant=constant)
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
         """The best split of a node for two maps."""
-        return _oblique(inputs, actions, self._rng)
+        return _oblique(inputs, actions, self._rng, constant=self.constant)
 
 
 _SEARCHED, _TRIED, _ROUNDS = 2000, 12, 4  # states for comparing directions; directions per round; rounds
 
 
-def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> Split:
+def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, constant: bool) -> Split:
     """The best split of a node among directions of several kinds, perturbed in rounds, by less in each."""
-    some = rng.permutation(len(inputs))[:_SEARCHED]
-    found = _linear_stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
+    some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, constant=constant)
+    found = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
     for size in np.geomspace(1.0, 0.1, _ROUNDS):
         moved = _unit(found.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
-        found = _linear_stump(inputs[some], actions[some], np.vstack([found.direction, moved]))
-    return _linear_stump(inputs, actions, found.direction[None])
+        found = stump(inputs[some], actions[some], np.vstack([found.direction, moved]))
+    return stump(inputs, actions, found.direction[None])
 
 
 def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:

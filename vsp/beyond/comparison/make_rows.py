@@ -9,23 +9,26 @@ import pandas as pd
 
 from ...paper.results import write_results
 from ...run import command
-from .method_rows import LONG, TASKS, keep_simplest, make_all, rows
+from .method_rows import LONG, TABLES, TASKS, jobs_of, keep_simplest, make_all, rows
 from .time_to_quality import time_to_quality
 
 
 def main() -> None:
-    """Make the rows that are missing, and write data/results/beyond_<task>.csv and, with times, beyond_seconds.csv and
-    beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy."""
+    """Make the rows that are missing, and write data/results/beyond_<task>.csv and tuned_<task>.csv and, with times,
+    beyond_seconds.csv and beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and
+    beyond_<task>.policy."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
+    parser.add_argument("--tables", nargs="+", choices=TABLES, default=list(TABLES), help="default: all of them")
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
-    make_all(out / "build" / "beyond", jobs=arguments.jobs, tasks=tasks)
-    found = {task: rows(out / "build" / "beyond", task) for task in tasks}
-    for task, (frame, _) in found.items():
-        write_results(frame, f"beyond_{task}", out=out)
+    wanted = {(table, task): jobs_of(task, table) for table in arguments.tables for task in tasks}
+    make_all(out / "build" / "beyond", [job for some in wanted.values() for job in some], jobs=arguments.jobs)
+    found = {name: rows(out / "build" / "beyond", some) for name, some in wanted.items()}
+    for (table, task), (frame, _) in found.items():
+        write_results(frame, f"{table}_{task}", out=out)
     seconds = pd.concat([took for _, took in found.values()])
     write_results(seconds, "beyond_seconds_long" if arguments.long else "beyond_seconds", out=out)
     if arguments.long:

@@ -40,7 +40,9 @@ SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
 OWN = (0,)
+TUNED_SIZES = (2, 3, 4, 8, 13)  # of rivals that are tuned as ours is
 EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
+TUNING = ("n_restarts", "n_generations", "n_tuning_episodes", "tuning_step")
 ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
 PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
 
@@ -62,12 +64,18 @@ class Method:
 
 
 def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
-    settings = {"rounds": rounds, "n_restarts": n_restarts}
-    return Method(partial(methods.corrected, fit=methods.FITS[fit]), reads=EPISODES, settings=settings, sizes=sizes)
+    settings, make = {"rounds": rounds, "n_restarts": n_restarts}, partial(methods.corrected, fit=methods.FITS[fit])
+    return Method(make, reads=EPISODES, settings=settings, sizes=sizes)
 
 
 def _by_teacher(fit: str, *, sizes: tuple[int, ...] = SIZES) -> Method:
     return Method(partial(methods.alone, fit=methods.FITS[fit]), reads=EPISODES, sizes=sizes)
+
+
+def _tuned(fit: Method) -> Method:
+    """`fit`, then tuned; sizes of one leaf are left out, since one linear map stands for them."""
+    sizes = OWN if fit.sizes == OWN else TUNED_SIZES
+    return replace(fit, make=partial(methods.tuned_fit, imitation=fit.make), reads=EPISODES + TUNING, sizes=sizes)
 
 
 METHODS = {
@@ -91,6 +99,18 @@ METHODS = {
     "the paper's method": Method(methods.paper_method, version=VERSION, reads=PAPER, sizes=OWN, tasks=printed.TASKS),
 }
 
+# Rivals, tuned as `refined` is
+UNTUNED = {
+    "oblique tree, constant leaves, DAgger": _by_dagger("constant oblique tree", n_restarts=2, sizes=TUNED_SIZES),
+    "small network, DAgger": _by_dagger("small network", n_restarts=2, sizes=TUNED_SIZES),
+} | {
+    name: METHODS[name]
+    for name in ("CART, DAgger", "CART, linear leaves, DAgger", "oblique tree, linear leaves, DAgger",
+                 "k-means cells, DAgger", "one linear map")
+}  # fmt: skip
+RIVALS = {f"{name}, tuned": _tuned(method) for name, method in UNTUNED.items()}
+RIVALS |= {name: method for name, method in UNTUNED.items() if name not in METHODS}
+
 # `refined` at the size of the preset, with one more part taken away
 ABLATION = {
     "cold from the start": {"initial_temperature": 0.04},
@@ -102,6 +122,8 @@ ABLATION = {
     "no teacher": {},
     "drawn by stakes": {"criticality": True},
 }
+
+TABLES = {"beyond": METHODS, "tuned": RIVALS}  # data/results/<table>_<task>.csv
 
 
 @dataclass(frozen=True)
@@ -116,8 +138,8 @@ class Job:
     @property
     def how(self) -> Method:
         """The method, or `refined` with a part taken away."""
-        if self.method in METHODS:
-            return METHODS[self.method]
+        if self.method in METHODS | RIVALS:
+            return (METHODS | RIVALS)[self.method]
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
     @property
@@ -142,16 +164,17 @@ def _digest(task: str) -> str:
     return load_teacher(task).digest
 
 
-def jobs_of(task: str) -> list[Job]:
-    """All rows of a task."""
+def jobs_of(task: str, table: str = "beyond") -> list[Job]:
+    """All rows of a task in a table, a key of `TABLES`."""
     found, several = [], FEW_SEEDS if task in LONG else SEEDS
-    for name, method in METHODS.items():
+    for name, method in TABLES[table].items():
         if method.tasks is None or task in method.tasks:
             seeds = several if method.chance else several[:1]
             found += [Job(task, name, size, seed) for size in method.sizes for seed in seeds]
-    size = best_preset(task).n_cells
-    names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS and task not in LONG]
-    return found + [Job(task, name, size, seed) for name in names for seed in several]
+    if table != "beyond" or task in LONG:
+        return found
+    names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS]
+    return found + [Job(task, name, best_preset(task).n_cells, seed) for name in names for seed in several]
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
@@ -164,20 +187,20 @@ def make_row(job: Job) -> tuple[dict, dict]:
     return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
 
 
-def make_all(folder: str | os.PathLike, *, jobs: int | str = 1, tasks=TASKS) -> None:
-    """Make the rows that are missing in `folder`; `jobs` as in `workers`."""
-    work = {job.path(folder): (job,) for task in tasks for job in jobs_of(task)}
-    make_missing(make_row, work, "beyond", jobs=jobs, unit="rows")
+def make_all(folder: str | os.PathLike, todo: list[Job], *, jobs: int | str = 1) -> None:
+    """Make the rows of `todo` that are missing in `folder`, the first seeds first; `jobs` as in `workers`."""
+    todo = sorted(todo, key=lambda job: job.seed)
+    make_missing(make_row, {job.path(folder): (job,) for job in todo}, "beyond", jobs=jobs, unit="rows")
 
 
-def rows(folder: str | os.PathLike, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """What came out for `task`, one row per job, and how long each took. Raises `atomic.DamagedFile`."""
+def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """What came out, one row per job, and how long each took. Raises `atomic.DamagedFile`."""
     found, took = [], []
-    for job in jobs_of(task):
+    for job in wanted:
         _, about = load_made(job.path(folder), "Row", job.about())
         what = {"method": job.method, "size": job.size, "seed": job.seed}
         found.append({**what, **about["row"], **job.provenance})
-        took.append({"task": task, **what, "seconds": about["seconds"]})
+        took.append({"task": job.task, **what, "seconds": about["seconds"]})
     return pd.DataFrame(found), pd.DataFrame(took)
 
 

@@ -15,6 +15,7 @@ from ...algorithms import distill
 from ...baselines import tdavq
 from ...baselines.dagger import dagger
 from ...baselines.simple import Heuristic, PumpAndBalance, ZeroPolicy, kmeans_cells, linear_map, rule_of_thumb
+from ...baselines.small_network import SmallNetwork, units_for
 from ...baselines.soft_tree import SoftTree
 from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
 from ...config import paper_preset
@@ -23,6 +24,7 @@ from ...tasks.base import Task
 from ..refinement.config import Refinement
 from ..refinement.imitate import imitate
 from ..refinement.refine import refine
+from .tuning import tuned
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,12 @@ FITS: dict[str, Callable[..., Policy]] = {
     "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
     "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
     "oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(x, y, leaves=size, task=task, seed=seed),
+    "constant oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(
+        x, y, leaves=size, task=task, seed=seed, constant=True
+    ),
+    "small network": lambda x, y, size, task, seed: SmallNetwork(
+        x, y, units=units_for(numbers_of(size, task), task), task=task, seed=seed
+    ),
     "soft tree": lambda x, y, size, task, seed: SoftTree(x, y, leaves=size, seed=seed),
     "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
     "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
@@ -93,6 +101,20 @@ def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
     return _fitted(fit, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
+
+
+def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:
+    """`imitation`, tuned on the return as `refine` tunes its cells. Fits with random numbers have as many restarts."""
+    if settings.get("n_restarts", 1) > 1:
+        settings["n_restarts"] = budget.config.n_restarts
+    start = imitation(budget, size, seed, **settings)
+    return tuned(start, budget.teacher, budget.task, budget.config, seed)
+
+
+def numbers_of(cells: int, task: Task) -> int:
+    """How many numbers linear maps in Voronoi cells have."""
+    d, m = len(task.low), len(task.action_low)
+    return cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
 
 
 def _fitted(fit, config: Refinement, budget: Budget, size: int, seed: int, n_restarts: int) -> Policy:

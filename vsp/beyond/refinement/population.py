@@ -7,18 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from ...policy import VoronoiPolicy
-from ...rollouts import Outcomes, rollout
+from ...rollouts import Outcomes, Policy, rollout
 from ...subpolicies import linear_outputs
 from ...tasks.base import Task
 
 
-def rollout_population(policies: list[VoronoiPolicy], task: Task, starts: np.ndarray) -> list[Outcomes]:
-    """`rollout` for Euclidean policies of one shape and scale: in one batch, unless the task has a physics engine."""
+def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -> list[Outcomes]:
+    """`rollout` for policies of one kind, in one batch, unless the task has a physics engine; Voronoi policies are
+    Euclidean, of one shape and scale."""
     if task.begin(one := starts[:1]) is not one:
         return [rollout(policy, task, starts) for policy in policies]
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])
-    result = rollout(PolicyBatch(policies), numbered(task, len(policies)), all_starts)
+    batch = PolicyBatch if isinstance(policies[0], VoronoiPolicy) else InTurn
+    result = rollout(batch(policies), numbered(task, len(policies)), all_starts)
     parts = (np.split(part, len(policies)) for part in (result.returns, result.lengths, result.outcomes))
     return [Outcomes(*of_one) for of_one in zip(*parts)]
 
@@ -38,6 +40,19 @@ def numbered(task: Task, n: int) -> Task:
         see=lambda states: np.column_stack([task.see(states[:, :-1]), states[:, -1]]),
         step=step,
     )
+
+
+class InTurn:
+    """Several policies as one, each asked for its own states: observations as for `PolicyBatch`."""
+
+    def __init__(self, policies: list[Policy]):
+        self._policies = policies
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations and indices (n, d + 1)."""
+        cuts = np.searchsorted(obs[:, -1], np.arange(1, len(self._policies)))
+        parts = np.split(obs[:, :-1], cuts)
+        return np.concatenate([one.predict(part)[0] for one, part in zip(self._policies, parts)]), None
 
 
 class PolicyBatch:

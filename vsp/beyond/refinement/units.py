@@ -44,6 +44,14 @@ class Frame:
         """Actions (n, m) in units in which the limits are -1 and 1."""
         return (actions - self._middle) / self._half
 
+    def actions(self, outputs: np.ndarray) -> np.ndarray:
+        """`outputs` (n, m) in the units of the task, limited to its box."""
+        return np.clip(outputs, -1.0, 1.0) * self._half + self._middle
+
+    def maps(self, maps: np.ndarray) -> np.ndarray:
+        """Maps (..., p + 1, m) to actions as maps to `outputs`."""
+        return np.concatenate([maps[..., :-1, :] / self._half, self.outputs(maps[..., -1:, :])], axis=-2)
+
     def policy(self, cells: Cells) -> VoronoiPolicy:
         """`cells` as a policy in the units of the task."""
         weights = cells.maps[:, :-1] * self._half / self.scale[:, None]

@@ -1,0 +1,187 @@
+"""The same tuning for everyone: CMA-ES on all numbers of a tree, a partition or a network, its structure fixed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from ...baselines.small_network import SmallNetwork
+from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
+from ...policy import VoronoiPolicy
+from ...rollouts import Policy, visited_states
+from ...subpolicies import linear_outputs
+from ...tasks.base import Task
+from ..refinement.config import Refinement
+from ..refinement.tune import Candidates, Objective, tune
+from ..refinement.units import Frame
+from .measure import cost
+
+
+class Numbers(Protocol):
+    """What is tuned: a policy in the units of a `Frame`, whose structure is fixed."""
+
+    @property
+    def vector(self) -> np.ndarray: ...  # all its numbers
+
+    def like(self, vector: np.ndarray) -> Numbers: ...  # the same structure with these numbers
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray: ...  # (n, m), not limited, of inputs (n, d + 1)
+
+
+@dataclass(frozen=True)
+class TreeNumbers:
+    """The cuts and the maps of a tree. One leaf is one linear map."""
+
+    sides: np.ndarray  # (leaves, nodes): 1 where the way to a leaf turns right, -1 where it turns left, else 0
+    directions: np.ndarray  # (nodes, d)
+    thresholds: np.ndarray  # (nodes,) a state beyond turns right
+    maps: np.ndarray  # (leaves, d + 1, m): weights, then bias
+    oblique: bool  # whether directions are tuned
+    constant: bool  # whether leaves have biases alone
+
+    @classmethod
+    def one_leaf(cls, maps: np.ndarray) -> TreeNumbers:
+        """One linear map, `maps` (1, d + 1, m)."""
+        d = maps.shape[1] - 1
+        return cls(np.zeros((1, 0)), np.zeros((0, d)), np.zeros(0), maps, oblique=False, constant=False)
+
+    @property
+    def vector(self) -> np.ndarray:
+        return np.concatenate([part.ravel() for part in self._parts])
+
+    @property
+    def _parts(self) -> list[np.ndarray]:
+        directions = [self.directions] if self.oblique else []
+        return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
+
+    def like(self, vector: np.ndarray) -> TreeNumbers:
+        shapes = [part.shape for part in self._parts]
+        cuts = np.cumsum([part.size for part in self._parts])[:-1]
+        *directions, thresholds, maps = (part.reshape(shape) for part, shape in zip(np.split(vector, cuts), shapes))
+        if self.constant:
+            maps = np.concatenate([np.zeros_like(self.maps[:, :-1]), maps[:, None]], axis=1)
+        new = {"directions": directions[0]} if directions else {}
+        return replace(self, thresholds=thresholds, maps=maps, **new)
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        turns = np.where(inputs[:, :-1] @ self.directions.T > self.thresholds, 1.0, -1.0)
+        wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf whose turns are all taken
+        return linear_outputs(inputs[:, :-1], self.maps[wrong.argmin(axis=1)])
+
+
+@dataclass(frozen=True)
+class NetworkNumbers:
+    """The weights of a network with one hidden layer of tanh units."""
+
+    hidden: np.ndarray  # (d + 1, units): weights, then biases
+    output: np.ndarray  # (units + 1, m)
+
+    @property
+    def vector(self) -> np.ndarray:
+        return np.concatenate([self.hidden.ravel(), self.output.ravel()])
+
+    def like(self, vector: np.ndarray) -> NetworkNumbers:
+        cut = self.hidden.size
+        return NetworkNumbers(vector[:cut].reshape(self.hidden.shape), vector[cut:].reshape(self.output.shape))
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
+
+
+class Tunable:
+    """The policy of `numbers` in the units of `frame`; as large and as costly as `start`."""
+
+    def __init__(self, frame: Frame, numbers: Numbers, start: Policy):
+        self.frame, self.numbers, self.COST = frame, numbers, cost(start)
+        self._size = len(start) if hasattr(start, "__len__") else 0
+
+    def __len__(self) -> int:
+        return self._size
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        return self.frame.actions(self.numbers.outputs(self.frame.inputs(obs))), None
+
+
+@dataclass(frozen=True)
+class TunableFrame(Frame):
+    """A `Frame` for the numbers of another policy than Voronoi cells."""
+
+    start: Policy
+
+    def policy(self, cells: Numbers) -> Tunable:
+        return Tunable(self, cells, self.start)
+
+
+def tuned(start: Policy, teacher: Policy, task: Task, config: Refinement, seed: int) -> Policy:
+    """`start`, tuned on the return as `refine` tunes its cells: by the same search from as many starts, with the same
+    penalty. The best of as many snapshots by the validation starts is kept, or `start` itself."""
+    streams = np.random.SeedSequence(seed).spawn(5)  # as in `refine`
+    starts, _, _, validation, search = map(np.random.default_rng, streams)
+    states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    frame, numbers = in_units(start, Frame.of(task, states))
+    objective = Objective(config.failure_penalty)
+    candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
+    candidates.add("fit", 0, numbers)
+    for one in tune(frame, numbers, config, objective, search):
+        candidates.add("tune", 0, one)
+    return frame.policy(candidates.best)
+
+
+def in_units(policy: Policy, frame: Frame) -> tuple[Frame, Numbers]:
+    """The numbers of `policy`, and the frame that makes policies of them: its own scale where it has one, else that of
+    `frame`. Raises TypeError for a kind of policy that has no numbers to tune."""
+    scale = getattr(policy, "scale", frame.scale)
+    if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
+        own = replace(frame, scale=scale)
+        return own, own.cells(policy)
+    own = TunableFrame(frame.task, getattr(policy, "centre", frame.centre), scale, policy)
+    if isinstance(policy, VoronoiPolicy):
+        own = replace(own, scale=frame.scale)
+        return own, TreeNumbers.one_leaf(own.cells(policy).maps)
+    if isinstance(policy, Tree):
+        return own, _of_cart(policy.model.tree_, own)
+    if isinstance(policy, LinearTree):
+        return own, _of_tree(policy, own)
+    if isinstance(policy, SmallNetwork):
+        hidden, output = (np.vstack(layer) for layer in policy.layers)
+        return own, NetworkNumbers(hidden, own.maps(output))
+    raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
+
+
+def _of_tree(tree: LinearTree, frame: Frame) -> TreeNumbers:
+    nodes = [node.children for node in tree.nodes]
+    inner, ends, sides = _ways(nodes)
+    splits = [tree.nodes[i].split for i in inner]
+    directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
+    thresholds = np.array([split.threshold for split in splits])
+    oblique = isinstance(tree, ObliqueLinearTree)
+    return TreeNumbers(sides, directions, thresholds, frame.maps(tree.maps[ends]), oblique, tree.constant)
+
+
+def _of_cart(tree, frame: Frame) -> TreeNumbers:
+    """Of the arrays in which scikit-learn keeps a tree."""
+    pairs = zip(tree.children_left.tolist(), tree.children_right.tolist())
+    inner, ends, sides = _ways([pair if pair[0] >= 0 else () for pair in pairs])
+    axes, m, d = tree.feature[inner], tree.value.shape[1], len(frame.centre)
+    thresholds = (tree.threshold[inner] - frame.centre[axes]) / frame.scale[axes]
+    maps = np.zeros((len(ends), d + 1, m))
+    maps[:, -1] = frame.outputs(tree.value[ends, :, 0])
+    return TreeNumbers(sides, np.eye(d)[axes], thresholds, maps, oblique=False, constant=True)
+
+
+def _ways(children: list[tuple[int, ...]]) -> tuple[list[int], list[int], np.ndarray]:
+    """Inner nodes and leaves of a tree, and the sides to which the way to each leaf turns (leaves, nodes).
+
+    `children` holds the left and the right child of every node, none for a leaf; parents come before their children.
+    """
+    inner = [i for i, pair in enumerate(children) if pair]
+    ends = [i for i, pair in enumerate(children) if not pair]
+    sides = np.zeros((len(children), len(inner)))
+    for column, i in enumerate(inner):
+        for child, side in zip(children[i], (-1, 1)):
+            sides[child] = sides[i]
+            sides[child, column] = side
+    return inner, ends, sides[ends]
