@@ -23,11 +23,14 @@ class Numbers(Protocol):
     """What is tuned: a policy in the units of a `Frame`, whose structure is fixed."""
 
     @property
-    def vector(self) -> np.ndarray: ...  # all its numbers
+    def vector(self) -> np.ndarray:
+        """All its numbers."""
 
-    def like(self, vector: np.ndarray) -> Numbers: ...  # the same structure with these numbers
+    def like(self, vector: np.ndarray) -> Numbers:
+        """The same structure with other numbers."""
 
-    def outputs(self, inputs: np.ndarray) -> np.ndarray: ...  # (n, m), not limited, of inputs (n, d + 1)
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class TreeNumbers:
 
     @property
     def vector(self) -> np.ndarray:
+        """All that is tuned."""
         return np.concatenate([part.ravel() for part in self._parts])
 
     @property
@@ -57,6 +61,7 @@ class TreeNumbers:
         return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
 
     def like(self, vector: np.ndarray) -> TreeNumbers:
+        """The same structure with the numbers of `vector`."""
         shapes = [part.shape for part in self._parts]
         cuts = np.cumsum([part.size for part in self._parts])[:-1]
         *directions, thresholds, maps = (part.reshape(shape) for part, shape in zip(np.split(vector, cuts), shapes))
@@ -66,6 +71,7 @@ class TreeNumbers:
         return replace(self, thresholds=thresholds, maps=maps, **new)
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
         turns = np.where(inputs[:, :-1] @ self.directions.T > self.thresholds, 1.0, -1.0)
         wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf whose turns are all taken
         return linear_outputs(inputs[:, :-1], self.maps[wrong.argmin(axis=1)])
@@ -80,13 +86,16 @@ class NetworkNumbers:
 
     @property
     def vector(self) -> np.ndarray:
+        """All that is tuned."""
         return np.concatenate([self.hidden.ravel(), self.output.ravel()])
 
     def like(self, vector: np.ndarray) -> NetworkNumbers:
+        """The same structure with the numbers of `vector`."""
         cut = self.hidden.size
         return NetworkNumbers(vector[:cut].reshape(self.hidden.shape), vector[cut:].reshape(self.output.shape))
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
         return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
 
 
@@ -112,6 +121,7 @@ class TunableFrame(Frame):
     start: Policy
 
     def policy(self, cells: Numbers) -> Tunable:
+        """`cells` as a policy in the units of the task."""
         return Tunable(self, cells, self.start)
 
 
