@@ -150,14 +150,30 @@ def test_a_quick_refinement_keeps_its_cells_and_what_is_off():
 def test_the_faithful_presets_have_few_cells():
     for task in ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"):
         assert isinstance(vsp.preset(task, "faithful"), Faithful) and vsp.preset(task, "faithful").n_cells <= 8
-    with pytest.raises(ValueError, match="no preset for task 'LunarLanderContinuous-v3', .*write a Faithful"):
-        vsp.preset("LunarLanderContinuous-v3", "faithful")
+
+
+def test_any_task_has_faithful_settings_that_suit_its_size():
+    """A physics engine steps one state at a time: fewer episodes there."""
+    walker, pendulum = vsp.preset("BipedalWalker-v3", "faithful"), vsp.preset("Pendulum-v1", "faithful")
+    assert walker.n_episodes == 100 < pendulum.n_episodes and walker.n_tuning_episodes < pendulum.n_tuning_episodes
+    copy = dataclasses.replace(vsp.get_task("Pendulum-v1"), name="My-v0")
+    assert vsp.preset(copy, "faithful").n_episodes == 300_000 // 200 and vsp.preset(copy, "faithful").tolerance is None
+
+
+def test_two_numbers_choose_a_faithful_policy():
+    config = vsp.preset("Pendulum-v1", "faithful", n_cells=3, min_r2=0.9)
+    assert config == dataclasses.replace(vsp.preset("Pendulum-v1", "faithful"), n_cells=3, min_r2=0.9)
+    with pytest.raises(ValueError, match="n_cells and min_r2 choose a 'faithful' policy, but kind is 'best'"):
+        vsp.preset("Pendulum-v1", "best", n_cells=3)
+    with pytest.raises(ValueError, match="n_cells is 0, expected an integer from 1 to 1000"):
+        vsp.preset("Pendulum-v1", "faithful", n_cells=0)
 
 
 @pytest.mark.parametrize(
     "change",
     [{"n_cells": 0}, {"tolerance": 0}, {"tolerance": float("inf")}, {"margin": float("nan")}, {"n_restarts": True},
-     {"n_generations": -1}, {"failure_penalty": -1.0}, {"n_states": 10.0}],
+     {"n_generations": -1}, {"failure_penalty": -1.0}, {"n_states": 10.0}, {"min_r2": 1.01}, {"n_cells": 10**9},
+     {"n_episodes": 10**12}],
 )  # fmt: skip
 def test_a_faithful_out_of_range_is_refused(change):
     ((name, value),) = change.items()
@@ -167,7 +183,7 @@ def test_a_faithful_out_of_range_is_refused(change):
 
 def test_a_quick_faithful_keeps_its_cells_and_what_is_off():
     quick = Faithful(n_cells=3, tolerance=1.0, n_generations=0, n_restarts=4).quick()
-    assert (quick.n_cells, quick.n_restarts, quick.n_episodes, quick.n_generations) == (3, 1, 600, 0)
+    assert (quick.n_cells, quick.n_restarts, quick.n_episodes, quick.n_generations) == (3, 1, 3000, 0)
 
 
 @pytest.mark.parametrize("kind", [Config, Refinement, Faithful])

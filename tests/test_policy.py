@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
+import vsp
 from vsp.baselines.simple import refit
 from vsp.beyond.comparison.measure import cost
 from vsp.beyond.explain.lime import compare_maps
@@ -268,17 +269,37 @@ def test_save_and_load_are_exact(policy, tmp_path):
     assert (tmp_path / "p.voronoi").read_bytes() == (tmp_path / "q.voronoi").read_bytes()
 
 
+def test_a_policy_of_a_task_that_is_not_registered_acts_with_its_names(tmp_path):
+    names = {"name": "Nowhere-v0", "inputs": ("east", "north"), "outputs": ("push", "pull")}
+    policy = random_policy(task=dataclasses.replace(get_task(SIMPLEGOAL), **names))
+    policy.save(tmp_path / "p.vsp")
+    back = VoronoiPolicy.load(tmp_path / "p.vsp")
+    states = np.random.default_rng(0).random((9, 2))
+    assert np.array_equal(back.predict(states)[0], policy.predict(states)[0])
+    assert back.to_text() == policy.to_text() and "east" in back.to_text() and "push" in back.to_c()
+    with pytest.raises(ValueError, match="Nowhere-v0 is not registered here, so its policy acts but cannot be played"):
+        vsp.evaluate(back, back.task, seed=0)
+
+
+def test_the_names_of_a_saved_policy_win(tmp_path):
+    policy = random_policy(task=dataclasses.replace(get_task(SIMPLEGOAL), outputs=("push", "pull")))
+    policy.save(tmp_path / "p.vsp")
+    back = VoronoiPolicy.load(tmp_path / "p.vsp")
+    assert back.task.outputs == ("push", "pull") and len(vsp.evaluate(back, back.task, n_episodes=3, seed=0)) == 3
+
+
 @pytest.mark.parametrize(
     "change",
     [
         {"codewords": np.full((6, 2), 1e300)}, {"coefficients": np.full((6, 3, 2), np.nan)}, {"scale": [5e-324, 1.0]},
-        {"codewords": np.zeros((6, 2))}, {"other": np.zeros(1)}, {"task": "Nowhere-v0"}, {"sub_policy": "spline"},
+        {"codewords": np.zeros((6, 2))}, {"other": np.zeros(1)}, {"sub_policy": "spline"}, {"low": np.zeros(3)},
+        {"low": np.full(2, -9.0)}, {"action_high": np.ones((2, 1))}, {"inputs": "x, y"}, {"task": "Pendulum-v1"},
     ],
 )  # fmt: skip
 def test_a_sealed_file_that_holds_no_policy_is_refused(change, tmp_path):
     policy = random_policy()
-    arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
-    about = {"kind": "VoronoiPolicy", "task": SIMPLEGOAL, "metric": "manhattan", "sub_policy": "linear"}
+    policy.save(tmp_path / "p.vsp")
+    arrays, about = sealed.load_arrays(tmp_path / "p.vsp", kind="VoronoiPolicy")
     arrays |= {name: np.asarray(value) for name, value in change.items() if not isinstance(value, str)}
     about |= {name: value for name, value in change.items() if isinstance(value, str)}
     sealed.save_arrays(tmp_path / "p.vsp", arrays, about)

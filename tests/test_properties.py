@@ -557,8 +557,8 @@ EXEMPT = {
         partition.Partition.neighbours partition.Partition.reset partition.Partition.scaled partition.Partition.train
         rollouts.score""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
-        tasks.base tasks.mountaincar tasks.pendulum tasks.simplegoal.SimpleGoalEnv.reset tasks.simplegoal.start
-        tasks.simplegoal.step""",
+        tasks.base tasks.lunarlander.landed tasks.mountaincar tasks.pendulum tasks.simplegoal.SimpleGoalEnv.reset
+        tasks.simplegoal.start tasks.simplegoal.step""",
     "the inside of `refine`, `imitate` and `distill_faithfully`, which check what comes in": """
         beyond.refinement.search beyond.refinement.faithful.by_visits beyond.refinement.faithful.needed_only
         beyond.refinement.faithful.variance beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
@@ -571,6 +571,8 @@ EXEMPT = {
     "holds what another function found": "history.Event rollouts.Outcomes policy.Explanation paper.statistics.Part",
     "hands on what the reader's own function takes and gives, or is but a protocol": """
         teachers.agents.Agent rollouts.Policy beyond.refinement.simplification.prune beyond.explain.rules.RulePolicy""",
+    "names and what was saved: see the tests of own tasks and of saved policies": """
+        tasks.registry.register tasks.registry.saved_task""",
     "takes a path: see the tests of damaged files": """
         policy.VoronoiPolicy.save policy.VoronoiPolicy.load paper.results teachers.agent_zip""",
     "takes a policy, a task or runs, which are good by construction, and no more than digits for `number`": """

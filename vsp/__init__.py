@@ -19,7 +19,7 @@ from .algorithms import merge_regions, split_regions, teacher_episodes
 from .beyond.refinement import Faithful, Refinement, best_preset, faithful_preset, simplify
 from .beyond.refinement.refine import refine
 from .checks import check_choice, check_seed
-from .config import Config, paper_preset
+from .config import PAPER_TASKS, Config, paper_preset
 from .evaluation import evaluate, rollout_from_seed, start_states
 from .export import distances_latex
 from .geometry import nearest
@@ -27,7 +27,7 @@ from .history import History
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .rollouts import Policy, collect_episodes, rollout, visited_states
-from .tasks import Task, get_task, task_names
+from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
 
 
@@ -37,13 +37,17 @@ def distill(
     """Distil `teacher` to a `VoronoiPolicy`: by the paper's method for a `Config`, by ours for a `Refinement`
     (few cells that return much) or a `Faithful` (few cells that act like the teacher, and return what it returns).
 
-    `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset
-    of the task. Returns the policy and its history: a `History` that lets a notebook replay the run, or a row for each
-    candidate of our methods. Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its
-    states or actions are not finite, or `seed` is no integer from 0 on.
+    `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset,
+    and for a task that the paper does not treat to `preset(task, "faithful")`, which is then printed. Returns the
+    policy and its history: a `History` that lets a notebook replay the run, or a row for each candidate of our methods.
+    Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its states or actions are not
+    finite, or `seed` is no integer from 0 on.
     """
     check_seed(seed)
     task = get_task(task)
+    if config is None and task.name not in PAPER_TASKS:
+        config = faithful_preset(task)
+        print(f"{task.name} is not in the paper: distilling by vsp.preset({task.name!r}, 'faithful')")
     if isinstance(config, Refinement):
         return refine(teacher, task, config, seed=seed)
     if isinstance(config, Faithful):
@@ -57,16 +61,26 @@ def distill(
     return algorithms.distill(teacher, task, config or paper_preset(task), seed=seed)
 
 
-def preset(task: str | Task, kind: Literal["paper", "best", "faithful"] = "paper") -> Config | Refinement | Faithful:
+def preset(
+    task: str | Task,
+    kind: Literal["paper", "best", "faithful"] = "paper",
+    *,
+    n_cells: int | None = None,
+    min_r2: float | None = None,
+) -> Config | Refinement | Faithful:
     """The settings for `task`: the paper's (table T2, with the default readings), or ours.
 
-    Ours are "best", for a high return, and "faithful", for actions like the teacher's. Raises ValueError for an unknown
-    task or kind, and for a task without such settings.
+    Ours are "faithful", for actions like the teacher's, of any task, and "best", for a high return. Two numbers choose
+    between faithful policies: `n_cells`, at most, and `min_r2`, how much of the teacher's actions the policy has to
+    explain; it then returns as much as it can. Raises ValueError for an unknown task or kind, for a task without such
+    settings, and for numbers that are out of range or of another kind.
     """
     check_choice("kind", kind, ("paper", "best", "faithful"))
-    if kind == "paper":
-        return paper_preset(task)
-    return best_preset(task) if kind == "best" else faithful_preset(task)
+    if kind == "faithful":
+        return faithful_preset(task, n_cells=n_cells, min_r2=min_r2)
+    if (n_cells, min_r2) != (None, None):
+        raise ValueError(f"n_cells and min_r2 choose a 'faithful' policy, but kind is {kind!r}")
+    return paper_preset(task) if kind == "paper" else best_preset(task)
 
 
 def __getattr__(name: str) -> ModuleType:

@@ -167,6 +167,8 @@ _PRESETS = {
     ),
 }
 
+PAPER_TASKS = tuple(_PRESETS)  # that the paper treats
+
 
 def paper_preset(task: str | Task) -> Config:
     """The paper's settings for `task`: table T2 and the default answers to R1 to R15.

@@ -14,7 +14,7 @@ from .run import sealed
 from .run.atomic import DamagedFile
 from .subpolicies.registry import policy_class
 from .tasks.base import Task
-from .tasks.registry import get_task
+from .tasks.registry import BOX, get_task, saved_task
 
 _STEPS = 200  # points of an axis that are tried at once for a border
 MOST, LEAST_SCALE = 1e50, 1e-50  # of a policy's numbers: squared distances and products stay below 1e308
@@ -186,16 +186,21 @@ class VoronoiPolicy:
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""
         arrays = {"codewords": self.codewords, "coefficients": self.coefficients, "scale": self.scale}
+        arrays |= {limit: getattr(self.task, limit) for limit in BOX}
         about = {"task": self.task.name, "metric": self.metric, "sub_policy": self.policy_class.name}
+        about |= {"inputs": self.task.inputs, "outputs": self.task.outputs}
         sealed.save_arrays(path, arrays, {"kind": "VoronoiPolicy", **about})
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> VoronoiPolicy:
-        """Read a policy that `save` wrote. Raises FileNotFoundError, and `run.atomic.DamagedFile` where a bit is
-        missing or altered, or the file holds no policy."""
+        """Read a policy that `save` wrote, with the names and the box of its task. It acts also where the task is not
+        registered. Raises FileNotFoundError, and `run.atomic.DamagedFile` where a bit is missing or altered, or the
+        file holds no policy."""
         arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
         try:
-            return cls(**arrays, task=about["task"], metric=about["metric"], sub_policy=about["sub_policy"])
+            box = {limit: arrays.pop(limit) for limit in BOX}
+            task = saved_task(about["task"], about["inputs"], about["outputs"], box)
+            return cls(**arrays, task=task, metric=about["metric"], sub_policy=about["sub_policy"])
         except (KeyError, TypeError, ValueError) as error:
             raise DamagedFile(f"{path}: sealed, but no policy that can act: {error}") from error
 

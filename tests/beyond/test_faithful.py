@@ -9,9 +9,9 @@ from vsp.beyond.refinement import faithful
 from vsp.beyond.refinement.anneal import squared_error
 from vsp.beyond.refinement.config import Faithful
 from vsp.beyond.refinement.faithful import by_visits, distill_faithfully, needed_only, variance
-from vsp.beyond.refinement.units import Cells, LabelledStates
+from vsp.beyond.refinement.units import Cells, Frame, LabelledStates
 from vsp.evaluation import rollout_from_seed
-from vsp.rollouts import visited_states
+from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
 
 SMALL = Faithful(
@@ -75,8 +75,33 @@ def test_without_tuning_the_closest_imitation_is_kept():
 def test_the_closest_of_those_that_return_enough_is_kept(gaps, r2s, kept):
     judge = faithful._Judge.__new__(faithful._Judge)
     judge.rows = [{"gap": gap, "r2": one} for gap, one in zip(gaps, r2s)]
-    judge._config, judge._cells = SMALL, ["a", "b", "c"]
+    judge._config, judge._cells, judge.tolerance = SMALL, ["a", "b", "c"], 0.1
     assert judge.best == "abc"[kept] and judge.frame()["kept"].tolist() == [i == kept for i in range(3)]
+
+
+@pytest.mark.parametrize(("r2s", "kept"), [([0.95, 0.91, 0.7], 1), ([0.7, 0.8, 0.6], 1)])
+def test_with_a_least_r2_the_highest_return_of_those_that_reach_it_is_kept(r2s, kept):
+    """If none reaches it, the closest."""
+    judge = faithful._Judge.__new__(faithful._Judge)
+    judge.rows = [{"gap": gap, "r2": one} for gap, one in zip([-0.5, 0.2, 3.0], r2s)]
+    judge._config, judge._cells, judge.tolerance = dataclasses.replace(SMALL, min_r2=0.9), ["a", "b", "c"], 0.1
+    assert judge.best == "abc"[kept]
+
+
+def test_a_lower_r2_buys_return(distilled):
+    """On the way from the teacher's actions to the best return."""
+    config = dataclasses.replace(SMALL, min_r2=0.7, n_generations=40)
+    policy, history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)
+    kept = history[history["kept"]].iloc[0]
+    assert kept["r2"] >= 0.7 and kept["gap"] > distilled[1].loc[distilled[1]["kept"], "gap"].item() + 0.05
+
+
+def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():
+    frame, seen = Frame.of(get_task(SIMPLEGOAL), np.random.default_rng(0).random((50, 2))), None
+    starts = get_task(SIMPLEGOAL).start(np.random.default_rng(0), 200)
+    judge = faithful._Judge(frame, CurvedTeacher(), seen, dataclasses.replace(SMALL, tolerance=None), starts)
+    own = rollout(CurvedTeacher(), SIMPLEGOAL, starts).returns.mean()
+    assert judge.tolerance == pytest.approx(0.02 * own)
 
 
 # What is made of the cells at the end

@@ -3,7 +3,17 @@ import pytest
 
 from vsp.beyond.refinement import search
 from vsp.beyond.refinement.anneal import expected_loss, squared_error
-from vsp.beyond.refinement.search import LAST, N_STAGES, ROUNDS, descend, least_error, local_maps, moves, uncorrelated
+from vsp.beyond.refinement.search import (
+    LAST,
+    N_STAGES,
+    ROUNDS,
+    descend,
+    least_error,
+    local_maps,
+    moves,
+    spread,
+    uncorrelated,
+)
 from vsp.beyond.refinement.units import Cells, LabelledStates
 
 
@@ -87,3 +97,25 @@ def test_a_step_and_its_gradient_by_finite_differences():
     gradient = pull_back(expected_loss(move(step), seen.inputs, seen.actions, **about)[1])
     assert gradient == pytest.approx((values[:, 0] - values[:, 1]) / 2e-6, abs=1e-6)
     assert np.array_equal(move(np.zeros(len(step))).vector, cells.vector)
+
+
+# States that stand for all
+
+
+@pytest.mark.parametrize("n", [1, 7, 100, 250])
+def test_rows_are_spread_over_where_the_points_lie(n):
+    points = np.random.default_rng(0).random((1000, 2)) ** 2
+    rows = spread(points, n, np.random.default_rng(1))
+    assert len(rows) == len(set(rows)) == n and rows.min() >= 0 and rows.max() < 1000
+
+
+def test_a_spread_is_as_dense_as_the_points_with_less_chance_than_draws():
+    points = np.random.default_rng(0).random((5000, 2)) ** 2
+    rng, left = np.random.default_rng(1), points[:, 0] < 0.1
+    spreads = np.array([left[spread(points, 100, rng)].mean() for _ in range(200)])
+    draws = np.array([left[rng.permutation(5000)[:100]].mean() for _ in range(200)])
+    assert spreads.mean() == pytest.approx(left.mean(), abs=0.01) and spreads.std() < 0.6 * draws.std()
+
+
+def test_a_spread_over_few_points_is_all_of_them():
+    assert spread(np.zeros((3, 2)), 5, np.random.default_rng(0)).tolist() == [0, 1, 2]

@@ -4,5 +4,5 @@ To add one, write a module like `mountaincar.py` with its `TASK`, and enter it i
 is; `gym_adapter` makes one of any Gymnasium environment.
 """
 
-from .base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Signals, Task
-from .registry import SLOW, get_task, render, task_names
+from .base import ENDED, GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Signals, Task
+from .registry import SLOW, get_task, register, render, task_names

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-RUNNING, GOAL, PIT, TRUNCATED = range(4)
-OUTCOMES = ("running", "goal", "pit", "truncated")
+RUNNING, GOAL, PIT, TRUNCATED, ENDED = range(5)
+OUTCOMES = ("running", "goal", "pit", "truncated", "ended")  # the last where nobody has said what a success is
 
 Step = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
@@ -57,6 +57,7 @@ class Task:
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
     start_size: int | None = None  # s, where it is not d
     signals: Signals | None = None  # None: the task has no natural error
+    has_goal: bool = True  # whether it is known which episodes succeed; if not, failures are not defined
 
     def observe(self, states: np.ndarray) -> np.ndarray:
         """Observations of `states` in float32, as Gymnasium returns them. (n, d)"""

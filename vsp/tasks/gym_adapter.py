@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 
 import gymnasium
 import numpy as np
 
-from .base import GOAL, PIT, RUNNING, Task
+from .base import ENDED, GOAL, PIT, RUNNING, Task
+
+Outcome = Callable[[np.ndarray, float, dict], bool]  # of the last observation, reward and info: whether it succeeded
+
+# The ways out for spaces that do not fit
+FLATTEN = "gymnasium.wrappers.FlattenObservation makes one of most"
+CONTINUOUS = "linear maps give continuous actions, so choose another environment"
 
 
 @dataclass
@@ -37,30 +44,37 @@ def _see_live(states: np.ndarray) -> np.ndarray:
     return np.array([live.observation for live in states], dtype=np.float64)
 
 
-def _step_live(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A step of every environment. An episode that ends with a positive reward reached a goal, otherwise a pit."""
+def _step_live(
+    outcome: Outcome | None, states: np.ndarray, actions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A step of every environment."""
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (live, action) in enumerate(zip(states, actions)):
-        live.observation, rewards[i], ended, _, _ = live.env.step(action.astype(live.env.action_space.dtype))
-        if ended:
-            outcomes[i] = GOAL if rewards[i] > 0 else PIT
+        live.observation, rewards[i], ended, _, info = live.env.step(action.astype(live.env.action_space.dtype))
+        if ended and outcome is None:
+            outcomes[i] = ENDED
+        elif ended:
+            outcomes[i] = GOAL if outcome(live.observation, rewards[i], info) else PIT
     return states, rewards, outcomes
 
 
 @cache
-def gymnasium_task(name: str) -> Task:
+def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
     """The `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
 
-    Raises ValueError for other spaces, an action box without limits, or an environment without a limit of steps.
+    `outcome` says of an episode that ended whether it succeeded; None: that is not defined. Raises ValueError for other
+    spaces, an action box without limits, or an environment without a limit of steps.
     """
     env = gymnasium.make(name)
     seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
     env.close()
-    for what, space in (("observations", seen), ("actions", acts)):
+    for what, space, remedy in (("observations", seen, FLATTEN), ("actions", acts, CONTINUOUS)):
         if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
-            raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension")
-    if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()) or most is None:
-        raise ValueError(f"{name} has actions {acts} and {most} steps at most, expected limits for both")
+            raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension: {remedy}")
+    if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()):
+        raise ValueError(f"actions of {name} are {acts}, expected limits: gymnasium.wrappers.RescaleAction sets some")
+    if most is None:
+        raise ValueError(f"{name} has no limit of steps, expected one: give gymnasium.register max_episode_steps")
     return Task(
         name=name,
         inputs=(inputs := tuple(f"s{i}" for i in range(seen.shape[0]))),
@@ -72,8 +86,9 @@ def gymnasium_task(name: str) -> Task:
         action_high=acts.high.astype(np.float64),
         max_steps=most,
         start=_draw_seeds,
-        step=_step_live,
+        step=partial(_step_live, outcome),
         see=_see_live,
         begin=partial(_begin_live, name),
         start_size=1,
+        has_goal=outcome is not None,
     )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from .base import Task
 from .gym_adapter import gymnasium_task
 
@@ -11,7 +13,12 @@ NAME = "LunarLanderContinuous-v3"
 LABELS = ("x (half widths)", "height above the pad", "vx", "vy", "angle (rad)", "ω", "left leg down", "right leg down")
 
 
+def landed(observation: np.ndarray, reward: float, info: dict) -> bool:
+    """Whether the episode ended at rest, for which the last reward is 100, and not in a crash, for which it is -100."""
+    return reward > 0
+
+
 def make() -> Task:
     """The task. Opens an environment."""
     inputs = ("x", "y", "vx", "vy", "θ", "ω", "l", "r")
-    return replace(gymnasium_task(NAME), inputs=inputs, outputs=("main", "side"), input_labels=LABELS)
+    return replace(gymnasium_task(NAME, landed), inputs=inputs, outputs=("main", "side"), input_labels=LABELS)

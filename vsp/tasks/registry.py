@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import difflib
 import os
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache, partial
+from typing import NoReturn
 
 import gymnasium
 import numpy as np
@@ -12,8 +15,10 @@ import numpy as np
 from ..checks import check_array
 from . import lunarlander, mountaincar, pendulum, simplegoal
 from .base import Task
-from .gym_adapter import gymnasium_task
+from .gym_adapter import Outcome, gymnasium_task
 
+BOX = ("low", "high", "action_low", "action_high")  # the limits of a task
+_ADDED: dict[str, Task] = {}  # by `register`
 _TASKS = {module.TASK.name: module.TASK for module in (simplegoal, mountaincar, pendulum)}
 _LATER = {lunarlander.NAME: cache(lunarlander.make)}  # made on request: it opens an environment
 
@@ -21,26 +26,91 @@ gymnasium.register("SimpleGoal-v0", entry_point="vsp.tasks.simplegoal:SimpleGoal
 
 
 def task_names() -> list[str]:
-    """Names of the tasks that vsp knows."""
-    return [*_TASKS, *_LATER]
+    """Names of the tasks that vsp knows: its own, and those that `register` added."""
+    return [*_TASKS, *_LATER, *_ADDED]
 
 
 def get_task(name: str | Task) -> Task:
-    """The `Task` called `name`: one of ours, or any environment in Gymnasium's registry. A `Task` passes through.
+    """The `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry. A `Task` passes
+    through.
 
     Raises ValueError with the nearest name for a typo, and as `gymnasium_task` does.
     """
     if isinstance(name, Task):
         return name
-    if isinstance(name, str) and name in _TASKS:
-        return _TASKS[name]
-    (near,) = difflib.get_close_matches(str(name), task_names(), n=1, cutoff=0.0)
+    if isinstance(name, str) and (found := _TASKS.get(name) or _ADDED.get(name)):
+        return found
     if not isinstance(name, str) or name not in gymnasium.registry:
-        raise ValueError(f"unknown task {name!r}, expected one of {task_names()}; did you mean {near!r}?")
+        known = f"expected one of {task_names()} or of Gymnasium's registry"
+        raise ValueError(f"unknown task {name!r}, {known}; did you mean {_nearest(str(name))!r}?")
+    return _LATER.get(name, partial(gymnasium_task, name))()
+
+
+def _nearest(name: str) -> str:
+    """The task that is called most like `name`: one of ours if it is near, else of all that are registered."""
+    ours, every = task_names(), [*task_names(), *gymnasium.registry]
+    return (difflib.get_close_matches(name, ours) or difflib.get_close_matches(name, every, cutoff=0.0))[0]
+
+
+def register(
+    name: str,
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    outcome: Outcome | None = None,
+) -> Task:
+    """Tell vsp about an environment in Gymnasium's registry, for this process; returns its `Task`.
+
+    `inputs` and `outputs` are the names of its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
+    `outcome(observation, reward, info)` says of an episode that ended whether it succeeded; None: failures are not
+    defined. Raises ValueError for one of vsp's own tasks, names that are too few, too many or not distinct, and as
+    `get_task` does.
+    """
+    if name in (*_TASKS, *_LATER):
+        raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another environment")
+    if outcome is not None and not callable(outcome):
+        raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
+    plain = get_task(name) if name not in gymnasium.registry else gymnasium_task(name, outcome)
+    inputs = _names("inputs", inputs, plain.inputs)
+    _ADDED[name] = replace(plain, inputs=inputs, input_labels=inputs, outputs=_names("outputs", outputs, plain.outputs))
+    return _ADDED[name]
+
+
+def _names(what: str, given: Sequence[str] | None, plain: tuple[str, ...]) -> tuple[str, ...]:
+    if given is None:
+        return plain
+    names = () if isinstance(given, str) else tuple(given)
+    if len(names) != len(plain) or len({name for name in names if isinstance(name, str) and name}) != len(plain):
+        raise ValueError(f"{what} are {given!r}, expected {len(plain)} different names")
+    return names
+
+
+def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: dict[str, np.ndarray]) -> Task:
+    """The task of a saved policy, with the names and the `BOX` it was saved with.
+
+    Where no such environment is registered, it has no dynamics: its policy acts, but cannot be played. Raises
+    ValueError for an environment of that name with another box.
+    """
+    for names, low, high in ((inputs, box["low"], box["high"]), (outputs, box["action_low"], box["action_high"])):
+        if not all(isinstance(one, str) for one in names) or not low.shape == high.shape == (len(names),):
+            raise ValueError(f"the names {names} have limits {low} and {high}, expected two each")
+    labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
     try:
-        return _LATER.get(name, partial(gymnasium_task, name))()
-    except ValueError as error:
-        raise ValueError(f"{error}; did you mean {near!r}?") from error
+        known = get_task(name)
+    except ValueError:
+        absent = partial(_absent, name)
+        return Task(name, **labels, **box, max_steps=1, start=absent, step=absent, has_goal=False)
+    for limit in BOX:
+        if not np.array_equal(getattr(known, limit), box[limit]):
+            raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, and was {box[limit]}")
+    same = (known.inputs, known.outputs) == (labels["inputs"], labels["outputs"])
+    return known if same else replace(known, **labels)
+
+
+def _absent(name: str, *_) -> NoReturn:
+    raise ValueError(
+        f"{name} is not registered here, so its policy acts but cannot be played: import what registers it"
+    )
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:

@@ -6,9 +6,13 @@ import dataclasses
 from dataclasses import dataclass
 from typing import get_type_hints
 
-from ...checks import check_number
+import numpy as np
+
+from ...checks import check_count, check_number
 from ...config import check_field
 from ...tasks import Task, get_task
+
+MOST_CELLS, MOST = 1000, 10**8  # cells that a person could look at, and numbers of anything else: beyond lies a slip
 
 
 @dataclass(frozen=True)
@@ -78,16 +82,20 @@ class Faithful:
 
     n_cells: int
     """Cells of the policy, at most."""
-    tolerance: float
-    """What a mean return may be lower than it should be, in units of return: half of it is accepted."""
+    tolerance: float | None = None
+    """What a mean return may be lower than it should be, in units of return: half of it is accepted. None: 2 % of the
+    teacher's mean return."""
     margin: float = 0.0
     """What the mean return should be above the teacher's, from the same starts."""
     failure_penalty: float = 0.0
     """Subtracted from the mean return per failed episode, as in `Refinement`."""
-    n_episodes: int = 6000
+    min_r2: float | None = None
+    """None: as like the teacher as its return allows. Otherwise the highest return of all policies whose R² is this or
+    more: a point on the way from the teacher's actions to the best return."""
+    n_episodes: int = 30_000
     """Episodes of the teacher that the fit sees."""
-    n_states: int = 30_000
-    """States of these episodes that are kept, drawn at random."""
+    n_states: int = 60_000
+    """States of these episodes that are kept, evenly over where they lie."""
     n_restarts: int = 32
     """Descents from other random initial cells; the closest imitation is kept."""
     n_generations: int = 250
@@ -98,12 +106,16 @@ class Faithful:
     """Episodes that decide which candidate is kept."""
 
     def __post_init__(self) -> None:
-        for name, kind in get_type_hints(type(self)).items():
-            value = getattr(self, name)
-            if name == "margin":
-                check_number(name, value)
-            elif not (name in ("failure_penalty", "n_generations") and _is_off(value, kind)):
-                check_field(name, value, kind)
+        check_count("n_cells", self.n_cells, most=MOST_CELLS)
+        for name in ("n_episodes", "n_states", "n_restarts", "n_tuning_episodes", "n_validation"):
+            check_count(name, getattr(self, name), most=MOST)
+        check_count("n_generations", self.n_generations, least=0, most=MOST)
+        check_number("margin", self.margin)
+        check_number("failure_penalty", self.failure_penalty, least=0.0)
+        if self.tolerance is not None:
+            check_field("tolerance", self.tolerance, float)
+        if self.min_r2 is not None:
+            check_number("min_r2", self.min_r2, least=0.0, most=1.0)
 
     def quick(self) -> Faithful:
         """The same method in a tenth of the work: for a first look, not for results."""
@@ -128,26 +140,38 @@ def check_faithful(config: Faithful) -> None:
 
 
 _FAITHFUL = {
-    "SimpleGoal-v0": Faithful(n_cells=6, tolerance=0.03, failure_penalty=100.0),
+    "SimpleGoal-v0": Faithful(n_cells=7, tolerance=0.03, failure_penalty=100.0, n_validation=20_000),
     "MountainCarContinuous-v0": Faithful(
-        n_cells=2, tolerance=0.1, margin=0.1, failure_penalty=100_000.0, n_episodes=400, n_states=20_000,
+        n_cells=2, tolerance=0.1, margin=0.1, failure_penalty=100_000.0, n_episodes=2000,
         n_generations=60, n_tuning_episodes=60, n_validation=2000,
     ),
     "Pendulum-v1": Faithful(
-        n_cells=8, tolerance=1.0, n_episodes=400, n_states=40_000, n_generations=60, n_tuning_episodes=100,
+        n_cells=8, tolerance=1.0, n_episodes=1500, n_generations=60, n_tuning_episodes=100,
         n_validation=1000,
     ),
 }  # fmt: skip
 
 
-def faithful_preset(task: str | Task) -> Faithful:
-    """The settings of `distill_faithfully` for `task`. Raises ValueError for a task without any."""
-    name = get_task(task).name
-    if name not in _FAITHFUL:
-        raise ValueError(
-            f"no preset for task {name!r}, expected one of {list(_FAITHFUL)}: write a Faithful of your own"
-        )
-    return _FAITHFUL[name]
+def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: float | None = None) -> Faithful:
+    """The settings of `distill_faithfully` for any task; `n_cells` and `min_r2` as in `Faithful`.
+
+    Of a task that nobody has tried they follow from its dimensions, its length, and whether it has a physics engine,
+    which steps one state at a time.
+    """
+    task = get_task(task)
+    found = _FAITHFUL.get(task.name) or _by_size(task)
+    return dataclasses.replace(found, n_cells=found.n_cells if n_cells is None else n_cells, min_r2=min_r2)
+
+
+def _by_size(task: Task) -> Faithful:
+    d, engine = len(task.low), task.start_size == 1 and task.begin(np.zeros((0, 1))).dtype == object
+    steps = 60_000 if engine else 300_000  # of the teacher, if episodes are as long as may be
+    episodes = int(np.clip(steps // task.max_steps, 100, 30_000))
+    tuning, validation = (20, 200) if engine else (100, 1000)
+    return Faithful(
+        n_cells=6, n_episodes=episodes, n_restarts=32 if d <= 8 else 16, n_generations=40 if engine else 100,
+        n_tuning_episodes=tuning, n_validation=validation,
+    )  # fmt: skip
 
 
 def check_refinement(config: Refinement) -> None:

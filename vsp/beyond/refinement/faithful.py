@@ -7,6 +7,7 @@ least error. The return is a constraint, not the aim: beyond the teacher's it ea
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from ...tasks.registry import get_task
 from .anneal import squared_error
 from .config import Faithful, check_faithful
 from .population import rollout_population
-from .search import least_error, moves, uncorrelated
+from .search import least_error, moves, spread, uncorrelated
 from .tune import cma_es, is_snapshot
 from .units import Cells, Frame, LabelledStates
 
@@ -28,6 +29,8 @@ SNAPSHOTS = 25  # candidates that a tuning yields, evenly spread over its genera
 TUNING_STATES = 8000  # on which the error of a candidate is measured
 FIRST_STEP = 0.02  # of the tuning: its candidates have about so much more error, relatively
 NUDGE = 0.05  # of a codeword, for the curvature of the error; in deviations of the states
+SHARE = 0.02  # of the teacher's mean return: the tolerance, if none is given
+BEYOND = 0.001  # unexplained variance beyond that of `min_r2` that weighs as much as a tolerance of return
 PRICE = 0.03  # of a return that is missed by the whole tolerance, in units of the unexplained variance, 1 - R²
 
 
@@ -46,14 +49,15 @@ def distill_faithfully(
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
-    states = states[init.permutation(len(states))[: config.n_states]]
     frame = Frame.of(task, states)
-    seen = frame.labelled(teacher, states)
+    seen = frame.labelled(teacher, states[spread(states / frame.scale, config.n_states, init)])
     judge = _Judge(frame, teacher, seen, config, task.start(validation, config.n_validation))
 
     cells = least_error(seen, config.n_cells, config.n_restarts, init)
     judge.add("fit", cells)
-    for tuned in _tune(frame, teacher, seen.some(TUNING_STATES, init), cells, config, search):
+    some = seen.rows(spread(seen.inputs[:, :-1], TUNING_STATES, init))
+    config = replace(config, tolerance=judge.tolerance)
+    for tuned in _tune(frame, teacher, some, cells, config, search):
         judge.add("tune", tuned)
     return frame.policy(by_visits(needed_only(judge.best, seen), seen)), judge.frame()
 
@@ -64,7 +68,9 @@ class _Judge:
     def __init__(self, frame: Frame, teacher: Policy, seen: LabelledStates, config: Faithful, starts: np.ndarray):
         self.rows, self._cells = [], []
         self._frame, self._seen, self._config, self._starts = frame, seen, config, starts
-        self._own = score(rollout(teacher, frame.task, starts), config.failure_penalty)
+        own = rollout(teacher, frame.task, starts)
+        self._own = score(own, config.failure_penalty)
+        self.tolerance = config.tolerance or max(SHARE * abs(float(own.returns.mean())), 1e-9)
 
     def add(self, stage: str, cells: Cells) -> None:
         result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
@@ -75,11 +81,10 @@ class _Judge:
 
     @property
     def _best(self) -> int:
-        least = self._config.margin - 0.5 * self._config.tolerance
-        accepted = [i for i, row in enumerate(self.rows) if row["gap"] >= least]
-        if accepted:
-            return max(accepted, key=lambda i: self.rows[i]["r2"])
-        return max(range(len(self.rows)), key=lambda i: self.rows[i]["gap"])
+        r2, gap = (np.array([row[name] for row in self.rows]) for name in ("r2", "gap"))
+        if self._config.min_r2 is not None:
+            return _first_by(gap, r2 >= self._config.min_r2, else_by=r2)
+        return _first_by(r2, gap >= self._config.margin - 0.5 * self.tolerance, else_by=gap)
 
     @property
     def best(self) -> Cells:
@@ -87,6 +92,11 @@ class _Judge:
 
     def frame(self) -> pd.DataFrame:
         return pd.DataFrame(self.rows).assign(kept=np.arange(len(self.rows)) == self._best)
+
+
+def _first_by(value: np.ndarray, accepted: np.ndarray, *, else_by: np.ndarray) -> int:
+    """The accepted candidate with the highest value; if none is accepted, that with the highest `else_by`."""
+    return int(np.where(accepted, value, -np.inf).argmax() if accepted.any() else else_by.argmax())
 
 
 def variance(seen: LabelledStates) -> float:
@@ -103,7 +113,7 @@ def _tune(
     Steps have units in which each raises the error by as much: so the search goes where fidelity costs little.
     """
     move, _ = moves(cells, *_units(seen, cells))
-    whole, price = variance(seen), PRICE / config.tolerance
+    whole = variance(seen)
     step = np.sqrt(FIRST_STEP * max(squared_error(seen, cells), 1e-6) / cells.vector.size)
     search = cma_es(np.zeros(cells.vector.size), step, rng)
     for i in range(config.n_generations):
@@ -111,10 +121,22 @@ def _tune(
         aim = score(rollout(teacher, frame.task, starts), config.failure_penalty) + config.margin
         candidates = [move(one) for one in steps]
         results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
-        missed = [max(0.0, aim - score(result, config.failure_penalty)) for result in results]
-        search.tell(steps, [squared_error(seen, one) / whole + price * less for one, less in zip(candidates, missed)])
+        missed = np.array([aim - score(result, config.failure_penalty) for result in results])
+        errors = np.array([squared_error(seen, one) / whole for one in candidates])
+        search.tell(steps, (_cost(errors, missed, config)).tolist())
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
+
+
+def _cost(errors: np.ndarray, missed: np.ndarray, config: Faithful) -> np.ndarray:
+    """What is minimised, of unexplained variances and of what the returns miss (p,).
+
+    The error and the price of a return that is missed; with `min_r2`, what is missed and the price of an error beyond
+    it.
+    """
+    if config.min_r2 is None:
+        return errors + PRICE / config.tolerance * np.maximum(0.0, missed)
+    return missed / config.tolerance + np.maximum(0.0, errors - (1.0 - config.min_r2)) / BEYOND
 
 
 def _units(seen: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:

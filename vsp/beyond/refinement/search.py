@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.spatial import KDTree
 
 from .anneal import expected_loss, squared_error, temperature_unit
 from .units import Cells, LabelledStates
@@ -16,24 +17,31 @@ from .units import Cells, LabelledStates
 N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
 LEAKS = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
-N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last round
-FIRST_STATES = 5000  # that the rounds before the last one see
-# (stages, how many descents go on); the last round sees all states, and warms up by a stage before
-ROUNDS = ((range(0, 6), 8), (range(6, 12), 4))
-LAST = range(11, N_STAGES)
+N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last descent
+FEW = 8000  # states that the rounds see; too few, and the rare states decide by chance
+ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))  # stages, and how many descents go on
+LAST = range(12, N_STAGES)  # of the last descent, which sees all states
 AT_ONCE = 2000  # states whose loss is computed together
 RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state
 
 
 def least_error(seen: LabelledStates, n_cells: int, n_beginnings: int, rng: np.random.Generator) -> Cells:
     """The cells with the least `squared_error` on `seen` that `n_beginnings` descents find."""
-    some = seen.some(FIRST_STATES, rng)
+    some = seen.rows(spread(seen.inputs[:, :-1], FEW, rng))
     live = [local_maps(some, n_cells, rng) for _ in range(n_beginnings)]
     for stages, n_kept in ROUNDS:
         ends = [descend(some, cells, stages) for cells in live]
-        live = sorted(ends, key=lambda cells: squared_error(some, cells))[:n_kept]
-    ends = [descend(seen, cells, LAST, n_iterations=N_LAST) for cells in live]
-    return min(ends, key=lambda cells: squared_error(seen, cells))
+        live = sorted(ends, key=lambda cells: squared_error(seen, cells))[:n_kept]
+    return descend(seen, live[0], LAST, n_iterations=N_LAST)
+
+
+def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
+    """The rows of n of the `points`, as dense as all of them, but with less chance than draws: one of each n-th part
+    in the order of a k-d tree. All rows, if there are no more."""
+    if len(points) <= n:
+        return np.arange(len(points))
+    order = KDTree(points, leafsize=max(1, len(points) // n)).indices
+    return order[((np.arange(n) + rng.random(n)) * len(points) / n).astype(np.intp)]
 
 
 def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:

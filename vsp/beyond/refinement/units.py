@@ -123,9 +123,8 @@ class LabelledStates:
     actions: np.ndarray  # (n, m)
     criticality: np.ndarray | None = None  # (n,) what a wrong action costs there; None: the same everywhere
 
-    def some(self, n: int, rng: np.random.Generator) -> LabelledStates:
-        """At most n of the states, drawn without replacement."""
-        rows = rng.permutation(len(self.inputs))[:n]
+    def rows(self, rows: np.ndarray) -> LabelledStates:
+        """Some of the states."""
         weights = None if self.criticality is None else self.criticality[rows]
         return LabelledStates(self.inputs[rows], self.actions[rows], weights)
 

@@ -1,0 +1,154 @@
+"""A reader's own environment and pilot, through the public face alone."""
+
+import ctypes
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import own_tasks
+import pytest
+from test_export import compiled
+
+import vsp
+from vsp.tasks import registry
+
+NAMES = {
+    "Dock-v0": (["east", "north", "ve", "vn"], ["push e", "push n"]),
+    "Arm-v0": (["q1", "q2", "w1", "w2", "g1", "g2"], ["t1", "t2"]),
+    "Tank-v0": (["level", "mark"], ["valve"]),
+}
+PILOTS = {"Dock-v0": own_tasks.dock_pilot, "Arm-v0": own_tasks.arm_pilot, "Tank-v0": own_tasks.tank_pilot}
+
+
+def docked(observation, reward, info):
+    return info["docked"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forgotten():
+    """What these tests register is not there for others."""
+    before = dict(registry._ADDED)
+    yield
+    registry._ADDED.clear()
+    registry._ADDED.update(before)
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def distilled(request):
+    """The task, its pilot and the policy that is distilled quickly."""
+    inputs, outputs = NAMES[request.param]
+    outcome = docked if request.param == "Dock-v0" else None
+    task = vsp.register(request.param, inputs=inputs, outputs=outputs, outcome=outcome)
+    pilot = vsp.agent(PILOTS[request.param])
+    policy, history = vsp.distill(pilot, request.param, vsp.preset(request.param, "faithful").quick(), seed=0)
+    return task, pilot, policy, history
+
+
+def test_the_policy_acts_like_the_pilot(distilled):
+    task, pilot, policy, history = distilled
+    states = vsp.visited_states(pilot, task, vsp.start_states(task, 20, seed=9))
+    actions = pilot.predict(states)[0]
+    error = np.square(policy.predict(states)[0] - actions).mean() / actions.var(axis=0).mean()
+    assert error < 0.1 and len(policy) <= 6 and history["kept"].sum() == 1
+
+
+def test_it_explains_itself_by_the_names_that_were_given(distilled):
+    task, _, policy, _ = distilled
+    explained = policy.explain(0.5 * np.ones(len(task.low)))
+    assert list(explained.contributions.columns[:-1]) == list(task.inputs) == NAMES[task.name][0]
+    assert [text.split(" =")[0] for text in explained.equations] == NAMES[task.name][1]
+
+
+def test_it_is_saved_with_names_and_box_and_acts_where_nobody_knows_the_task(distilled, tmp_path):
+    task, _, policy, _ = distilled
+    policy.save(tmp_path / "own.vsp")
+    code = "import sys, vsp; print(vsp.VoronoiPolicy.load(sys.argv[1]).to_json())"
+    elsewhere = subprocess.run([sys.executable, "-c", code, tmp_path / "own.vsp"], capture_output=True, text=True)
+    assert elsewhere.stdout.strip() == policy.to_json().strip() and NAMES[task.name][0][0] in elsewhere.stdout
+    assert vsp.VoronoiPolicy.load(tmp_path / "own.vsp").task is task
+
+
+def test_the_c_code_acts_alike(distilled, tmp_path):
+    task, pilot, policy, _ = distilled
+    library = compiled(policy, tmp_path)
+    action = (ctypes.c_double * len(task.action_low))()
+    for state in vsp.visited_states(pilot, task, vsp.start_states(task, 2, seed=4)):
+        library.vsp_act((ctypes.c_double * len(state))(*state), action)
+        assert np.allclose(action, policy.predict(state)[0], atol=1e-9)
+
+
+def test_failures_are_defined_where_a_success_is(distilled):
+    task, pilot, _, _ = distilled
+    expected = {"Dock-v0": "goal"}.get(task.name, "truncated")
+    assert set(vsp.evaluate(pilot, task, n_episodes=20, seed=1)["outcome"]) == {expected}
+    assert task.has_goal == (expected == "goal")
+
+
+def test_without_an_outcome_an_episode_just_ends(monkeypatch):
+    """Its last reward decides nothing."""
+    monkeypatch.setattr("vsp.tasks.registry._ADDED", {})
+    assert set(vsp.evaluate(vsp.agent(own_tasks.dock_pilot), "Dock-v0", n_episodes=5, seed=1)["outcome"]) == {"ended"}
+
+
+def test_faithful_is_the_default_and_one_sentence_says_so(monkeypatch, capsys):
+    quick = vsp.preset("Tank-v0", "faithful").quick()
+    monkeypatch.setattr(vsp, "faithful_preset", lambda task: quick)
+    vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
+    assert capsys.readouterr().out == "Tank-v0 is not in the paper: distilling by vsp.preset('Tank-v0', 'faithful')\n"
+
+
+# What does not fit
+
+
+@pytest.mark.parametrize(
+    ("about", "why"),
+    [
+        ({"inputs": ["level"]}, r"inputs are \['level'\], expected 2 different names"),
+        ({"inputs": ["level", "level"]}, "inputs are .*, expected 2 different names"),
+        ({"outputs": "valve"}, "outputs are 'valve', expected 1 different names"),
+        ({"outputs": [3]}, "outputs are .*, expected 1 different names"),
+        ({"outcome": True}, "outcome is True, expected a function"),
+    ],
+)
+def test_bad_names_and_outcomes_are_refused(about, why):
+    with pytest.raises(ValueError, match=why):
+        vsp.register("Tank-v0", **about)
+
+
+def test_our_own_tasks_keep_their_names():
+    with pytest.raises(ValueError, match="'Pendulum-v1' is one of vsp's own tasks"):
+        vsp.register("Pendulum-v1", outputs=["torque"])
+    with pytest.raises(ValueError, match="unknown task 'Tonk-v0', .* did you mean 'Tank-v0'"):
+        vsp.register("Tonk-v0")
+
+
+def test_an_agent_with_a_memory_is_refused():
+    class Recurrent:
+        def predict(self, obs, state=None, episode_start=None, deterministic=False):
+            return np.zeros((len(obs), 1)), np.zeros(3)
+
+    with pytest.raises(ValueError, match="the agent keeps a state between steps, .* train one without memory"):
+        vsp.distill(vsp.agent(Recurrent()), "Tank-v0", vsp.preset("Tank-v0", "faithful").quick(), seed=0)
+
+
+@pytest.mark.parametrize(
+    ("act", "why"),
+    [
+        (lambda obs: np.full((len(obs), 1), np.nan), "the policy's actions hold nan"),
+        (lambda obs: np.zeros((len(obs), 3)), r"actions have shape .*, expected .* for Tank-v0"),
+        (lambda obs: obs[:, 7:8], "actions have shape|fails on the 2 inputs of Tank-v0"),
+    ],
+)
+def test_a_pilot_that_does_not_fit_is_one_clear_error(act, why):
+    with pytest.raises(ValueError, match=why):
+        vsp.distill(vsp.agent(act), "Tank-v0", vsp.preset("Tank-v0", "faithful").quick(), seed=0)
+
+
+def test_a_task_that_never_ends_is_refused():
+    gymnasium.register("Endless-v0", entry_point="own_tasks:Tank")
+    try:
+        with pytest.raises(ValueError, match="Endless-v0 has no limit of steps, expected one: give gymnasium.register"):
+            vsp.distill(vsp.agent(own_tasks.tank_pilot), "Endless-v0", seed=0)
+    finally:
+        del gymnasium.registry["Endless-v0"]
