@@ -18,10 +18,10 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
-from vsp.beyond.comparison import measure, method_rows, methods, time_to_quality
-from vsp.beyond.comparison.method_rows import METHODS, RIVALS
+from vsp.beyond.comparison import measure, method_rows, time_to_quality
+from vsp.beyond.comparison.method_rows import LIKE, METHODS, RIVALS
 from vsp.beyond.comparison.methods import Budget
-from vsp.beyond.refinement.config import Refinement
+from vsp.beyond.refinement.config import Faithful, Refinement
 from vsp.beyond.refinement.simplification import simplify
 from vsp.paper import beside
 from vsp.paper.runs import Experiment, Run
@@ -36,6 +36,14 @@ SMALL = Refinement(
     n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
     n_generations=1, n_tuning_episodes=10, n_validation=20,
 )  # fmt: skip
+PRESETS = {
+    "best": SMALL,
+    "paper": tiny(n_epochs=40, n_freeze=10),
+    "faithful": Faithful(
+        n_cells=3, tolerance=0.1, n_episodes=100, n_states=1000, n_restarts=4, n_generations=3, n_tuning_episodes=10,
+        n_validation=50,
+    ),
+}  # fmt: skip
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SHORTER = {  # settings of methods that would take long
     "refined, faithful": {"n_generations": 1, "n_tuning_episodes": 10},
@@ -55,7 +63,6 @@ AT_LENGTH = {  # numbers that decide on a policy and are made small here
 def shorter(monkeypatch):
     monkeypatch.setattr(SoftTree, "N_STEPS", 50)
     monkeypatch.setattr(imitate, "N_MOVES", 1)
-    monkeypatch.setattr(methods, "paper_preset", lambda task: tiny(n_epochs=40, n_freeze=10))
 
 
 def states(task):
@@ -71,9 +78,9 @@ def actions(policy, task):
 
 def by_method(name):
     """Actions on every task that the method is for, SimpleGoal if it is for all."""
-    method, found = (METHODS | RIVALS)[name], {"at length": AT_LENGTH.get(name, 0)}
+    method, found = (METHODS | RIVALS | LIKE)[name], {"at length": AT_LENGTH.get(name, 0)}
     for task in method.tasks or (SIMPLEGOAL,):
-        budget = Budget(TEACHERS.get(task), get_task(task), SMALL)
+        budget = Budget(TEACHERS.get(task), get_task(task), PRESETS[method.preset])
         found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
     return found
 
@@ -105,7 +112,7 @@ def by_measure():
 
 CASES = {
     f"{table}[{name!r}]": (functools.partial(by_method, name), method.version)
-    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS}.items()
+    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE}.items()
     for name, method in known.items()
 } | {
     "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),

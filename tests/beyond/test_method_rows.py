@@ -1,6 +1,7 @@
 import dataclasses
 import shutil
 
+import numpy as np
 import pandas as pd
 import pytest
 from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
@@ -8,6 +9,7 @@ from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
 from vsp.beyond.comparison import make_rows, measure, method_rows
 from vsp.beyond.comparison.method_rows import (
     ABLATION,
+    LIKE,
     METHODS,
     SEEDS,
     TASKS,
@@ -22,7 +24,7 @@ from vsp.beyond.comparison.method_rows import (
 )  # fmt: skip
 from vsp.beyond.comparison.method_summary import read_rows
 from vsp.beyond.comparison.methods import Budget
-from vsp.beyond.refinement.config import Refinement, best_preset
+from vsp.beyond.refinement.config import Faithful, Refinement, best_preset
 from vsp.evaluation import start_states
 from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
@@ -179,6 +181,24 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
     assert (results / "beyond_race.csv").read_text() == "seconds\n0.500000\n"
     listed.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
     assert read_rows("Pendulum-v1", results)["failing"].isna().all()
+
+
+def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
+    quick = Faithful(
+        n_cells=3, tolerance=0.1, n_episodes=50, n_restarts=2, n_generations=1, n_tuning_episodes=5, n_validation=20
+    )
+    like = {"faithful": dataclasses.replace(LIKE["faithful"], sizes=(1, 2))}
+    small.setattr(method_rows, "faithful_preset", lambda task: quick)
+    small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
+    small.setattr(make_rows, "time_to_quality", lambda: pd.DataFrame({"seconds": [0.5]}))
+    for module in (method_rows, make_rows):
+        small.setattr(module, "TABLES", {"faithful": like})
+    small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1", "--tables", "faithful"])
+    make_rows.main()
+    found, same = (pd.read_csv(tmp_path / f"data/results/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
+    assert found["size"].tolist() == [1, 1, 2, 2] and found["r2"].between(-1, 1).all() and (found["cells"] <= 2).all()
+    assert same[["size", "seed", "other"]].to_numpy().tolist() == [[1, 0, 1], [2, 0, 1]]
+    assert np.isnan(same["index"][0]) and (same["ratio"] < 2).all()
 
 
 def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):

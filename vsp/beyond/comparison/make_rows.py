@@ -9,14 +9,15 @@ import pandas as pd
 
 from ...paper.results import write_results
 from ...run import command
-from .method_rows import LONG, TABLES, TASKS, jobs_of, keep_simplest, make_all, rows
+from .method_rows import LONG, TABLES, TASKS, jobs_of, keep_simplest, make_all, pairs, rows
 from .time_to_quality import time_to_quality
 
 
 def main() -> None:
-    """Make the rows that are missing, and write data/results/beyond_<task>.csv and tuned_<task>.csv and, with times,
-    beyond_seconds.csv and beyond_race.csv; or the rows that take hours, their times in beyond_seconds_long.csv, and
-    beyond_<task>.policy."""
+    """Make the rows that are missing, and write the tables of the three quick tasks, data/results/beyond_<task>.csv,
+    tuned_<task>.csv, faithful_<task>.csv and same_<task>.csv and, with times, beyond_seconds.csv and beyond_race.csv;
+    or those of the tasks whose rows take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy.
+    """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
@@ -29,6 +30,8 @@ def main() -> None:
     found = {name: rows(out / "build" / "beyond", some) for name, some in wanted.items()}
     for (table, task), (frame, _) in found.items():
         write_results(frame, f"{table}_{task}", out=out)
+        if table == "faithful":
+            write_results(pairs(out / "build" / "beyond", wanted[table, task]), f"same_{task}", out=out)
     seconds = pd.concat([took for _, took in found.values()])
     write_results(seconds, "beyond_seconds_long" if arguments.long else "beyond_seconds", out=out)
     if arguments.long:

@@ -19,11 +19,17 @@ from ...tasks.registry import SLOW
 VERSION = 1  # raise it when the same policy gets other numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # of the start states: for returns, and for action errors
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
+N_COMMON = 10_000  # states on which actions and cells are compared
 
 
 def settings() -> dict:
     """What decides the numbers of a policy, as JSON-able values."""
     return {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
+
+
+def common() -> dict:
+    """What decides the numbers of `fidelity` beside, as JSON-able values."""
+    return {"states": N_COMMON}
 
 
 def measure(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
@@ -50,6 +56,26 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
     half = 0.5 * (task.action_high - task.action_low)
     gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
     return float(np.sqrt(np.square(gaps).mean()))
+
+
+def fidelity(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
+    """R² of the actions, all coordinates pooled, and of the worst coordinate, on `common_states`; the share of them
+    where an action is off by more than a tenth of its range."""
+    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
+    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
+    errors = np.square(policy.predict(states)[0] / half - wanted)
+    spread = np.square(wanted - wanted.mean(axis=0))
+    varies = spread.any(axis=0)  # R² is not defined of a coordinate that is constant
+    worst = (errors.mean(axis=0)[varies] / spread.mean(axis=0)[varies]).max()
+    off = float((errors > 0.2**2).any(axis=1).mean())
+    return {"r2": float(1 - errors.sum() / spread.sum()), "r2_worst": float(1 - worst), "off": off}
+
+
+def common_states(teacher: Policy, task: Task) -> np.ndarray:
+    """10,000 states of the teacher's own episodes from starts that no fit, choice or tuning has seen."""
+    episodes = N_REPORTED // SLOW.get(task.name, 1)
+    states = visited_states(teacher, task, start_states(task, episodes, ERROR_SEED))
+    return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
 
 
 def cost(policy: Policy) -> tuple[int, float]:

@@ -27,10 +27,12 @@ from ...rollouts import Policy, rollout
 from ...run import listed, sealed
 from ...tasks.registry import get_task
 from ...teachers.teacher import load_teacher
-from ..refinement.config import Refinement, best_preset
+from ..refinement.config import Faithful, Refinement, best_preset, faithful_preset
 from ..refinement.simplification import simplify
+from ..refinement.units import METRIC
 from . import measure, methods
 from .methods import Budget
+from .sameness import sameness
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
@@ -44,6 +46,7 @@ TUNED_SIZES = (2, 3, 4, 8, 13)  # of rivals that are tuned as ours is
 EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
 TUNING = ("n_restarts", "n_generations", "n_tuning_episodes", "tuning_step")
 ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
+OF_FAITHFUL = tuple(field.name for field in fields(Faithful) if field.name != "n_cells")
 PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
 
 # `refined` that stays close to its teacher
@@ -61,6 +64,7 @@ class Method:
     sizes: tuple[int, ...] = SIZES  # cells or leaves; `OWN` where the method finds its own number
     chance: bool = True  # whether the seed matters
     tasks: tuple[str, ...] | None = None  # None: for all
+    preset: str = "best"  # the kind of preset whose settings are the budget
 
 
 def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
@@ -96,7 +100,9 @@ METHODS = {
     "heuristic": Method(methods.by_hand, sizes=OWN, chance=False, tasks=("Pendulum-v1", *LONG)),
     "TD-AVQ": Method(methods.td_avq, sizes=OWN, tasks=printed.TASKS[:1]),
     "TD-AVQ, coarse": Method(methods.td_avq, settings=tdavq.COARSE, sizes=OWN, tasks=printed.TASKS[:1]),
-    "the paper's method": Method(methods.paper_method, version=VERSION, reads=PAPER, sizes=OWN, tasks=printed.TASKS),
+    "the paper's method": Method(
+        methods.paper_method, version=VERSION, reads=PAPER, sizes=OWN, tasks=printed.TASKS, preset="paper"
+    ),
 }
 
 # Rivals, tuned as `refined` is
@@ -123,7 +129,10 @@ ABLATION = {
     "drawn by stakes": {"criticality": True},
 }
 
-TABLES = {"beyond": METHODS, "tuned": RIVALS}  # data/results/<table>_<task>.csv
+FAITHFUL_SIZES = (1, 2, 3, 4, 6, 7, 8, 13)
+LIKE = {"faithful": Method(methods.faithfully, reads=OF_FAITHFUL, sizes=FAITHFUL_SIZES, preset="faithful")}
+
+TABLES = {"beyond": METHODS, "tuned": RIVALS, "faithful": LIKE}  # data/results/<table>_<task>.csv
 
 
 @dataclass(frozen=True)
@@ -138,17 +147,18 @@ class Job:
     @property
     def how(self) -> Method:
         """The method, or `refined` with a part taken away."""
-        if self.method in METHODS | RIVALS:
-            return (METHODS | RIVALS)[self.method]
+        if self.method in (known := METHODS | RIVALS | LIKE):
+            return known[self.method]
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
     @property
     def provenance(self) -> dict[str, str | int]:
         """What names the row beside its seed: settings (an id), teacher, version."""
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
-        budget = (paper_preset if how.reads == PAPER else best_preset)(self.task)
+        budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
-        return provenance(about | {"measure": measure.settings()}, _digest(self.task), how.version)
+        about["measure"] = measure.settings() | (measure.common() if how.preset == "faithful" else {})
+        return provenance(about, _digest(self.task), how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
         """Its file."""
@@ -157,6 +167,11 @@ class Job:
     def about(self) -> dict:
         """What its file names."""
         return {**asdict(self), **self.provenance}
+
+
+def preset(task: str, kind: str) -> Refinement | Faithful | Config:
+    """The settings that a method of this kind has for `task`."""
+    return {"best": best_preset, "paper": paper_preset, "faithful": faithful_preset}[kind](task)
 
 
 @cache
@@ -179,12 +194,16 @@ def jobs_of(task: str, table: str = "beyond") -> list[Job]:
 
 def make_row(job: Job) -> tuple[dict, dict]:
     """Distil and measure: what the file of the row holds, no arrays and about."""
-    budget = Budget(load_teacher(job.task), get_task(job.task), best_preset(job.task))
+    budget = Budget(load_teacher(job.task), get_task(job.task), preset(job.task, job.how.preset))
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
     row = measure.measure(policy, budget.teacher, budget.task)
-    return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
+    if not isinstance(policy, VoronoiPolicy):
+        return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
+    row |= measure.fidelity(policy, budget.teacher, budget.task) if job.how.preset == "faithful" else {}
+    arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
+    return arrays, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
 
 
 def make_all(folder: str | os.PathLike, todo: list[Job], *, jobs: int | str = 1) -> None:
@@ -202,6 +221,20 @@ def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd
         found.append({**what, **about["row"], **job.provenance})
         took.append({"task": job.task, **what, "seconds": about["seconds"]})
     return pd.DataFrame(found), pd.DataFrame(took)
+
+
+def pairs(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
+    """How alike the policies of different seeds are, one row per size and pair, for rows whose files keep policies."""
+    found, by_size = [], {}
+    for job in wanted:
+        arrays, _ = load_made(job.path(folder), "Row", job.about())
+        policy = VoronoiPolicy(**arrays, task=job.task, metric=METRIC)
+        by_size.setdefault((job.task, job.size), {})[job.seed] = policy
+    for (task, size), policies in by_size.items():
+        frame = sameness(policies, load_teacher(task), get_task(task))
+        frame.insert(0, "size", size)
+        found.append(frame)
+    return pd.concat(found, ignore_index=True)
 
 
 def simplest(task: str) -> VoronoiPolicy:

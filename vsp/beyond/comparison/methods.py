@@ -18,10 +18,11 @@ from ...baselines.simple import Heuristic, PumpAndBalance, ZeroPolicy, kmeans_ce
 from ...baselines.small_network import SmallNetwork, units_for
 from ...baselines.soft_tree import SoftTree
 from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
-from ...config import paper_preset
+from ...config import Config
 from ...rollouts import Policy
 from ...tasks.base import Task
-from ..refinement.config import Refinement
+from ..refinement.config import Faithful, Refinement
+from ..refinement.faithful import distill_faithfully
 from ..refinement.imitate import imitate
 from ..refinement.refine import refine
 from .tuning import tuned
@@ -29,11 +30,12 @@ from .tuning import tuned
 
 @dataclass(frozen=True)
 class Budget:
-    """What every method may use: the teacher, its task, and the episodes and rounds of a `Refinement`."""
+    """What a method may use: the teacher, its task, and the settings of its preset; of those that imitate or tune, the
+    episodes and rounds of a `Refinement`."""
 
     teacher: Policy
     task: Task
-    config: Refinement
+    config: Refinement | Faithful | Config
 
 
 # Our own
@@ -48,6 +50,11 @@ def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
 def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """`refine` with a teacher that does nothing: what the tuning finds by itself."""
     return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
+
+
+def faithfully(budget: Budget, size: int, seed: int) -> Policy:
+    """`distill_faithfully`, by the faithful preset."""
+    return distill_faithfully(budget.teacher, budget.task, replace(budget.config, n_cells=size), seed=seed)[0]
 
 
 def imitated(budget: Budget, size: int, seed: int) -> Policy:
@@ -148,4 +155,4 @@ def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
 
 def paper_method(budget: Budget, size: int, seed: int) -> Policy:
     """`distill` with the paper's preset."""
-    return distill(budget.teacher, budget.task, paper_preset(budget.task), seed=seed)[0]
+    return distill(budget.teacher, budget.task, budget.config, seed=seed)[0]
