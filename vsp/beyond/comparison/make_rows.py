@@ -14,30 +14,32 @@ from .time_to_quality import time_to_quality
 
 
 def main() -> None:
-    """Make the rows that are missing, and write the tables of the three quick tasks, data/results/beyond_<task>.csv,
-    tuned_<task>.csv, faithful_<task>.csv and same_<task>.csv and, with times, beyond_seconds.csv and beyond_race.csv;
-    or those of the tasks whose rows take hours, their times in beyond_seconds_long.csv, and beyond_<task>.policy.
+    """Make the rows that are missing, and write data/results/<table>_<task>.csv, same_<task>.csv beside the faithful
+    table and, with times, <table>_seconds.csv and beyond_race.csv; or those of the tasks whose rows take hours, their
+    times in <table>_seconds_long.csv, and beyond_<task>.policy.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
-    parser.add_argument("--tables", nargs="+", choices=TABLES, default=list(TABLES), help="default: all of them")
+    parser.add_argument("--tables", nargs="+", choices=TABLES, default=["beyond"], help="default: beyond")
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
+    rows_in = out / "build" / "beyond"
     wanted = {(table, task): jobs_of(task, table) for table in arguments.tables for task in tasks}
-    make_all(out / "build" / "beyond", [job for some in wanted.values() for job in some], jobs=arguments.jobs)
-    found = {name: rows(out / "build" / "beyond", some) for name, some in wanted.items()}
-    for (table, task), (frame, _) in found.items():
-        write_results(frame, f"{table}_{task}", out=out)
-        if table == "faithful":
-            write_results(pairs(out / "build" / "beyond", wanted[table, task]), f"same_{task}", out=out)
-    seconds = pd.concat([took for _, took in found.values()])
-    write_results(seconds, "beyond_seconds_long" if arguments.long else "beyond_seconds", out=out)
-    if arguments.long:
+    make_all(rows_in, [job for some in wanted.values() for job in some], jobs=arguments.jobs)
+    for table in arguments.tables:
+        found = {task: rows(rows_in, wanted[table, task]) for task in tasks}
+        for task, (frame, _) in found.items():
+            write_results(frame, f"{table}_{task}", out=out)
+            if table == "faithful":
+                write_results(pairs(rows_in, wanted[table, task]), f"same_{task}", out=out)
+        seconds = pd.concat([took for _, took in found.values()])
+        write_results(seconds, f"{table}_seconds{'_long' * arguments.long}", out=out)
+    if "beyond" in arguments.tables and arguments.long:
         for task in tasks:
             keep_simplest(task, out / "data" / "results" / f"beyond_{task}.policy")
-    else:
+    elif "beyond" in arguments.tables:
         write_results(time_to_quality(), "beyond_race", out=out)
 
 
