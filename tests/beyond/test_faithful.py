@@ -75,7 +75,7 @@ def test_without_tuning_the_closest_imitation_is_kept():
 def test_the_closest_of_those_that_return_enough_is_kept(gaps, r2s, kept):
     judge = faithful._Judge.__new__(faithful._Judge)
     judge.rows = [{"gap": gap, "r2": one} for gap, one in zip(gaps, r2s)]
-    judge._config, judge._cells, judge.tolerance = SMALL, ["a", "b", "c"], 0.1
+    judge._config, judge._cells, judge._least_gap = SMALL, ["a", "b", "c"], -0.05
     assert judge.best == "abc"[kept] and judge.frame()["kept"].tolist() == [i == kept for i in range(3)]
 
 
@@ -84,7 +84,7 @@ def test_with_a_least_r2_the_highest_return_of_those_that_reach_it_is_kept(r2s, 
     """If none reaches it, the closest."""
     judge = faithful._Judge.__new__(faithful._Judge)
     judge.rows = [{"gap": gap, "r2": one} for gap, one in zip([-0.5, 0.2, 3.0], r2s)]
-    judge._config, judge._cells, judge.tolerance = dataclasses.replace(SMALL, min_r2=0.9), ["a", "b", "c"], 0.1
+    judge._config, judge._cells, judge._least_gap = dataclasses.replace(SMALL, min_r2=0.9), ["a", "b", "c"], -0.05
     assert judge.best == "abc"[kept]
 
 
@@ -94,6 +94,14 @@ def test_a_lower_r2_buys_return(distilled):
     policy, history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)
     kept = history[history["kept"]].iloc[0]
     assert kept["r2"] >= 0.7 and kept["gap"] > distilled[1].loc[distilled[1]["kept"], "gap"].item() + 0.05
+
+
+def test_nothing_is_tuned_where_the_closest_cells_return_enough():
+    config = dataclasses.replace(SMALL, tolerance=1000.0)
+    history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[1]
+    assert history["stage"].tolist() == ["fit"]
+    asked = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, min_r2=0.5), seed=1)[1]
+    assert "tune" in asked["stage"].tolist()  # the return is to be the highest
 
 
 def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():

@@ -140,7 +140,9 @@ def check_faithful(config: Faithful) -> None:
 
 
 _FAITHFUL = {
-    "SimpleGoal-v0": Faithful(n_cells=7, tolerance=0.03, failure_penalty=100.0, n_validation=20_000),
+    "SimpleGoal-v0": Faithful(
+        n_cells=7, tolerance=0.03, failure_penalty=100.0, n_generations=200, n_validation=20_000
+    ),
     "MountainCarContinuous-v0": Faithful(
         n_cells=2, tolerance=0.1, margin=0.1, failure_penalty=100_000.0, n_episodes=2000,
         n_generations=60, n_tuning_episodes=60, n_validation=2000,

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from ...checks import check_seed
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout, score, visited_states
-from ...tasks.base import Task
+from ...tasks.base import GOAL, Task
 from ...tasks.registry import get_task
 from .anneal import squared_error
 from .config import Faithful, check_faithful
@@ -25,8 +25,9 @@ from .search import least_error, moves, spread, uncorrelated
 from .tune import cma_es, is_snapshot
 from .units import Cells, Frame, LabelledStates
 
-SNAPSHOTS = 25  # candidates that a tuning yields, evenly spread over its generations
+SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # on which the error of a candidate is measured
+POOL = 20  # times the episodes of a generation: the starts that generations draw from, where the teacher plays once
 FIRST_STEP = 0.02  # of the tuning: its candidates have about so much more error, relatively
 NUDGE = 0.05  # of a codeword, for the curvature of the error; in deviations of the states
 SHARE = 0.02  # of the teacher's mean return: the tolerance, if none is given
@@ -55,10 +56,11 @@ def distill_faithfully(
 
     cells = least_error(seen, config.n_cells, config.n_restarts, init)
     judge.add("fit", cells)
-    some = seen.rows(spread(seen.inputs[:, :-1], TUNING_STATES, init))
-    config = replace(config, tolerance=judge.tolerance)
-    for tuned in _tune(frame, teacher, some, cells, config, search):
-        judge.add("tune", tuned)
+    if judge.goes_on:
+        some = seen.rows(spread(seen.inputs[:, :-1], TUNING_STATES, init))
+        config = replace(config, tolerance=judge.tolerance)
+        for tuned in _tune(frame, teacher, some, cells, config, search):
+            judge.add("tune", tuned)
     return frame.policy(by_visits(needed_only(judge.best, seen), seen)), judge.frame()
 
 
@@ -71,6 +73,7 @@ class _Judge:
         own = rollout(teacher, frame.task, starts)
         self._own = score(own, config.failure_penalty)
         self.tolerance = config.tolerance or max(SHARE * abs(float(own.returns.mean())), 1e-9)
+        self._least_gap = config.margin - 0.5 * self.tolerance
 
     def add(self, stage: str, cells: Cells) -> None:
         result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
@@ -84,7 +87,12 @@ class _Judge:
         r2, gap = (np.array([row[name] for row in self.rows]) for name in ("r2", "gap"))
         if self._config.min_r2 is not None:
             return _first_by(gap, r2 >= self._config.min_r2, else_by=r2)
-        return _first_by(r2, gap >= self._config.margin - 0.5 * self.tolerance, else_by=gap)
+        return _first_by(r2, gap >= self._least_gap, else_by=gap)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether tuning may gain: not where the closest cells return enough already, and no more is asked for."""
+        return self._config.min_r2 is not None or self.rows[-1]["gap"] < self._least_gap
 
     @property
     def best(self) -> Cells:
@@ -116,9 +124,12 @@ def _tune(
     whole = variance(seen)
     step = np.sqrt(FIRST_STEP * max(squared_error(seen, cells), 1e-6) / cells.vector.size)
     search = cma_es(np.zeros(cells.vector.size), step, rng)
+    pool = frame.task.start(rng, POOL * config.n_tuning_episodes)
+    own = rollout(teacher, frame.task, pool)
+    own = own.returns - config.failure_penalty * (own.outcomes != GOAL)
     for i in range(config.n_generations):
-        starts, steps = frame.task.start(rng, config.n_tuning_episodes), search.ask()
-        aim = score(rollout(teacher, frame.task, starts), config.failure_penalty) + config.margin
+        rows, steps = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
+        starts, aim = pool[rows], own[rows].mean() + config.margin
         candidates = [move(one) for one in steps]
         results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
         missed = np.array([aim - score(result, config.failure_penalty) for result in results])

@@ -21,7 +21,7 @@ N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the las
 FEW = 8000  # states that the rounds see; too few, and the rare states decide by chance
 ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))  # stages, and how many descents go on
 LAST = range(12, N_STAGES)  # of the last descent, which sees all states
-AT_ONCE = 2000  # states whose loss is computed together
+AT_ONCE = 60_000  # numbers of the largest arrays in a loss: what fits into the cache
 RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state
 
 
@@ -80,10 +80,11 @@ def _cooler(seen: LabelledStates, cells: Cells, unit: float, stage: int, n_itera
 
 
 def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
-    """`expected_loss` of all states, some at a time, so that their arrays fit into the cache."""
+    """`expected_loss` of all states, some at a time."""
     n, value, gradient = len(seen.inputs), 0.0, np.zeros(cells.vector.size)
-    for i in range(0, n, AT_ONCE):
-        inputs, actions = seen.inputs[i : i + AT_ONCE], seen.actions[i : i + AT_ONCE]
+    step = max(1, AT_ONCE // (len(cells.maps) * seen.actions.shape[1]))
+    for i in range(0, n, step):
+        inputs, actions = seen.inputs[i : i + step], seen.actions[i : i + step]
         part, its_gradient = expected_loss(cells, inputs, actions, **about)
         value, gradient = value + len(inputs) / n * part, gradient + len(inputs) / n * its_gradient
     return value, gradient
