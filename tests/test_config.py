@@ -119,10 +119,10 @@ def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
 # Refinement
 
 
-def test_every_task_has_a_best_preset():
+def test_every_task_has_a_tuned_preset():
     for task in task_names():
-        assert isinstance(vsp.preset(task, "best"), Refinement) and vsp.preset(task, "best").n_cells <= 5
-    with pytest.raises(ValueError, match="kind is 'finest', expected one of \\['paper', 'best', 'faithful'\\]"):
+        assert isinstance(vsp.preset(task, "tuned"), Refinement) and vsp.preset(task, "tuned").n_cells <= 5
+    with pytest.raises(ValueError, match="kind is 'finest', expected one of \\['paper', 'faithful', 'tuned'\\]"):
         vsp.preset(TASKS[0], "finest")
 
 
@@ -163,8 +163,8 @@ def test_any_task_has_faithful_settings_that_suit_its_size():
 def test_two_numbers_choose_a_faithful_policy():
     config = vsp.preset("Pendulum-v1", "faithful", n_cells=3, min_r2=0.9)
     assert config == dataclasses.replace(vsp.preset("Pendulum-v1", "faithful"), n_cells=3, min_r2=0.9)
-    with pytest.raises(ValueError, match="n_cells and min_r2 choose a 'faithful' policy, but kind is 'best'"):
-        vsp.preset("Pendulum-v1", "best", n_cells=3)
+    with pytest.raises(ValueError, match="n_cells and min_r2 choose a 'faithful' policy, but kind is 'tuned'"):
+        vsp.preset("Pendulum-v1", "tuned", n_cells=3)
     with pytest.raises(ValueError, match="n_cells is 0, expected an integer from 1 to 1000"):
         vsp.preset("Pendulum-v1", "faithful", n_cells=0)
 

@@ -219,7 +219,7 @@ digits = Argument(3, count(3, least=0).bad.filter(lambda one: one is not None)) 
 cell = count(1, least=0, most=1)
 leaves = count(3)
 intent = Argument(FAITHFUL, st.sampled_from([3, "faithful", SHORT, REFINEMENT, {}, np.nan]))
-budget = Argument(REFINEMENT, st.sampled_from([3, "best", SHORT, {}, np.nan]))
+budget = Argument(REFINEMENT, st.sampled_from([3, "tuned", SHORT, {}, np.nan]))
 x_y = {"x": Argument(GRID[0], numbers(GRID[0], free=()).bad), "y": Argument(GRID[1], numbers(GRID[1], free=()).bad)}
 values_on_grid = numbers(np.arange(9.0) % 2, free=(), any_shape=True, also=[np.zeros(8), np.zeros((3, 4))])
 RNG = np.random.default_rng
@@ -254,7 +254,7 @@ CASES = {
     ),
     "beyond.refinement.config.check_refinement": (config.check_refinement, {"config": budget}),
     "config.paper_preset": (paper_preset, {"task": task}),
-    "beyond.refinement.config.best_preset": (config.best_preset, {"task": task}),
+    "beyond.refinement.config.tuned_preset": (config.tuned_preset, {"task": task}),
     "vsp.distill": (
         vsp.distill,
         {

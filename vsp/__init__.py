@@ -16,7 +16,7 @@ import pandas as pd
 
 from . import algorithms
 from .algorithms import merge_regions, split_regions, teacher_episodes
-from .beyond.refinement import Faithful, Refinement, best_preset, faithful_preset, simplify
+from .beyond.refinement import Faithful, Refinement, faithful_preset, simplify, tuned_preset
 from .beyond.refinement.refine import refine
 from .checks import check_choice, check_seed
 from .config import PAPER_TASKS, Config, paper_preset
@@ -63,24 +63,24 @@ def distill(
 
 def preset(
     task: str | Task,
-    kind: Literal["paper", "best", "faithful"] = "paper",
+    kind: Literal["paper", "faithful", "tuned"] = "paper",
     *,
     n_cells: int | None = None,
     min_r2: float | None = None,
 ) -> Config | Refinement | Faithful:
     """The settings for `task`: the paper's (table T2, with the default readings), or ours.
 
-    Ours are "faithful", for actions like the teacher's, of any task, and "best", for a high return. Two numbers choose
-    between faithful policies: `n_cells`, at most, and `min_r2`, how much of the teacher's actions the policy has to
-    explain; it then returns as much as it can. Raises ValueError for an unknown task or kind, for a task without such
-    settings, and for numbers that are out of range or of another kind.
+    Ours are "faithful", for actions like the teacher's, of any task, and "tuned", for a high return alone. Two numbers
+    choose between faithful policies: `n_cells`, at most, and `min_r2`, how much of the teacher's actions the policy has
+    to explain; it then returns as much as it can. Raises ValueError for an unknown task or kind, for a task without
+    such settings, and for numbers that are out of range or of another kind.
     """
-    check_choice("kind", kind, ("paper", "best", "faithful"))
+    check_choice("kind", kind, ("paper", "faithful", "tuned"))
     if kind == "faithful":
         return faithful_preset(task, n_cells=n_cells, min_r2=min_r2)
     if (n_cells, min_r2) != (None, None):
         raise ValueError(f"n_cells and min_r2 choose a 'faithful' policy, but kind is {kind!r}")
-    return paper_preset(task) if kind == "paper" else best_preset(task)
+    return paper_preset(task) if kind == "paper" else tuned_preset(task)
 
 
 def __getattr__(name: str) -> ModuleType:

@@ -37,7 +37,7 @@ SMALL = Refinement(
     n_generations=1, n_tuning_episodes=10, n_validation=20,
 )  # fmt: skip
 PRESETS = {
-    "best": SMALL,
+    "tuned": SMALL,
     "paper": tiny(n_epochs=40, n_freeze=10),
     "faithful": Faithful(
         n_cells=3, tolerance=0.1, n_episodes=100, n_states=1000, n_restarts=4, n_generations=3, n_tuning_episodes=10,

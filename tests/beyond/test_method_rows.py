@@ -24,7 +24,7 @@ from vsp.beyond.comparison.method_rows import (
 )  # fmt: skip
 from vsp.beyond.comparison.method_summary import read_rows
 from vsp.beyond.comparison.methods import Budget
-from vsp.beyond.refinement.config import Faithful, Refinement, best_preset
+from vsp.beyond.refinement.config import Faithful, Refinement, tuned_preset
 from vsp.evaluation import start_states
 from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
@@ -44,7 +44,7 @@ def small(monkeypatch):
     monkeypatch.setattr(method_rows, "SEEDS", range(2))
     monkeypatch.setattr(measure, "N_REPORTED", 30)
     monkeypatch.setattr(measure, "N_ERROR", 10)
-    monkeypatch.setattr(method_rows, "best_preset", lambda task: SMALL)
+    monkeypatch.setattr(method_rows, "tuned_preset", lambda task: SMALL)
     two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
     monkeypatch.setattr(method_rows, "METHODS", two)
     for module in (method_rows, make_rows):
@@ -72,7 +72,7 @@ def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
         assert method.sizes in ((1, 2, 3, 4, 8, 13, 32), (2, 4, 8, 32), (3, 4), (13,), (0,))
     for part in ABLATION:
         own = {(job.size, job.seed) for job in found if job.method == f"refined, {part}"}
-        assert {(best_preset(task).n_cells, seed) for seed in range(20)} <= own
+        assert {(tuned_preset(task).n_cells, seed) for seed in range(20)} <= own
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -89,7 +89,7 @@ def test_a_tuned_row_depends_on_the_settings_of_the_tuning(small):
     jobs = [Job(SIMPLEGOAL, name, 3, 0) for name in ("CART, DAgger", "CART, DAgger, tuned", "refined")]
     small.setattr(method_rows, "METHODS", METHODS)
     before = [job.provenance for job in jobs]
-    small.setattr(method_rows, "best_preset", lambda task: dataclasses.replace(SMALL, tuning_step=0.2))
+    small.setattr(method_rows, "tuned_preset", lambda task: dataclasses.replace(SMALL, tuning_step=0.2))
     assert [job.provenance == known for job, known in zip(jobs, before)] == [True, False, False]
 
 
@@ -158,7 +158,7 @@ def test_a_row_depends_on_the_settings_that_its_method_reads(small):
     small.setattr(method_rows, "METHODS", METHODS)
     before = [job.provenance for job in jobs]
     for change, equal in (({"n_steps": 99}, [True, False, True]), ({"n_episodes": 99}, [False, False, True])):
-        small.setattr(method_rows, "best_preset", lambda task, change=change: dataclasses.replace(SMALL, **change))
+        small.setattr(method_rows, "tuned_preset", lambda task, change=change: dataclasses.replace(SMALL, **change))
         assert [job.provenance == known for job, known in zip(jobs, before)] == equal
 
 

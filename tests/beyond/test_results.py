@@ -168,9 +168,9 @@ def test_results_of_another_preset_are_stale(results, monkeypatch):
     fewer = cache(lambda task: dataclasses.replace(paper_experiment(task), n_episodes=999))
     monkeypatch.setattr(teachers_module, "paper_experiment", fewer)
     monkeypatch.setitem(READINGS, "R7", [*READINGS["R7"], {"batch_size": 32}])
-    best = method_rows.best_preset
+    best = method_rows.tuned_preset
     changed = {task: dataclasses.replace(best(task), n_steps=99) for task in (SIMPLEGOAL, LUNARLANDER)}
-    monkeypatch.setattr(method_rows, "best_preset", lambda task: changed.get(task) or best(task))
+    monkeypatch.setattr(method_rows, "tuned_preset", lambda task: changed.get(task) or best(task))
     assert stale_results() == [
         says("readings.csv", "settings", "study"),
         says("teachers.csv", "settings", "study"),

@@ -365,7 +365,7 @@ def test_a_teacher_that_does_not_play_the_task_is_refused(teacher, message):
 
 def test_a_laboratory_needs_cells_to_split():
     with pytest.raises(ValueError, match="config is a Refinement, expected a Config"):
-        Laboratory(CurvedTeacher(), SIMPLEGOAL, vsp.preset(SIMPLEGOAL, "best"))
+        Laboratory(CurvedTeacher(), SIMPLEGOAL, vsp.preset(SIMPLEGOAL, "tuned"))
     with pytest.raises(ValueError, match="task is Pendulum-v1, expected one of"):
         Laboratory(CurvedTeacher(), PENDULUM, CONFIG)
 

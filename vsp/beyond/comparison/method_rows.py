@@ -27,7 +27,7 @@ from ...rollouts import Policy, rollout
 from ...run import listed, sealed
 from ...tasks.registry import get_task
 from ...teachers.teacher import load_teacher
-from ..refinement.config import Faithful, Refinement, best_preset, faithful_preset
+from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from ..refinement.simplification import simplify
 from ..refinement.units import METRIC
 from . import measure, methods
@@ -64,7 +64,7 @@ class Method:
     sizes: tuple[int, ...] = SIZES  # cells or leaves; `OWN` where the method finds its own number
     chance: bool = True  # whether the seed matters
     tasks: tuple[str, ...] | None = None  # None: for all
-    preset: str = "best"  # the kind of preset whose settings are the budget
+    preset: str = "tuned"  # the kind of preset whose settings are the budget
 
 
 def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
@@ -171,7 +171,7 @@ class Job:
 
 def preset(task: str, kind: str) -> Refinement | Faithful | Config:
     """The settings that a method of this kind has for `task`."""
-    return {"best": best_preset, "paper": paper_preset, "faithful": faithful_preset}[kind](task)
+    return {"tuned": tuned_preset, "paper": paper_preset, "faithful": faithful_preset}[kind](task)
 
 
 @cache
@@ -189,7 +189,7 @@ def jobs_of(task: str, table: str = "beyond") -> list[Job]:
     if table != "beyond" or task in LONG:
         return found
     names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS]
-    return found + [Job(task, name, best_preset(task).n_cells, seed) for name in names for seed in several]
+    return found + [Job(task, name, tuned_preset(task).n_cells, seed) for name in names for seed in several]
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
@@ -239,7 +239,7 @@ def pairs(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
 
 def simplest(task: str) -> VoronoiPolicy:
     """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
-    teacher, config = load_teacher(task), best_preset(task)
+    teacher, config = load_teacher(task), tuned_preset(task)
     starts = start_states(get_task(task), config.n_validation, 0)
     own = rollout(teacher, get_task(task), starts).returns.mean()
     return simplify(teacher, task, config, tolerance=LOSS * abs(own), seed=0)[0]
@@ -255,4 +255,4 @@ def keep_simplest(task: str, path: str | os.PathLike) -> None:
 
 def simplest_provenance(task: str) -> dict[str, str | int]:
     """What decides the policy of `simplest`; its seed is 0."""
-    return provenance({"task": task, "loss": LOSS, **asdict(best_preset(task))}, _digest(task), SIMPLIFY_VERSION)
+    return provenance({"task": task, "loss": LOSS, **asdict(tuned_preset(task))}, _digest(task), SIMPLIFY_VERSION)

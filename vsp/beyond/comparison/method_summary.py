@@ -12,7 +12,7 @@ import pandas as pd
 
 from ...paper.results import read_results
 from ...paper.statistics import interval
-from ..refinement.config import best_preset
+from ..refinement.config import tuned_preset
 from .method_rows import ABLATION, METHODS
 
 MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameters", "operations")
@@ -103,7 +103,7 @@ def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]
     found = []
     for task, frame in frames.items():
         table = rivals(summaries[task]).merge(seeds_as_good(task, frame), on="size").rename(columns={"size": "cells"})
-        (row,) = table.loc[table["cells"] == best_preset(task).n_cells, columns].to_dict("records")
+        (row,) = table.loc[table["cells"] == tuned_preset(task).n_cells, columns].to_dict("records")
         theirs = seeds_as_good(task, frame, row["rival"]).set_index("size")
         teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
         found.append({"task": task, "teacher": teacher, **row, "rival reached": theirs.loc[row["cells"], "reached"]})

@@ -24,7 +24,7 @@ from ...run.progress import progress
 from ...tasks.base import GOAL
 from ...tasks.registry import get_task
 from ...teachers.teacher import load_teacher
-from ..refinement.config import best_preset
+from ..refinement.config import tuned_preset
 from ..refinement.refine import refine
 from .measure import N_REPORTED, REPORT_SEED
 
@@ -32,7 +32,7 @@ VERSION = 1  # raise it when the same settings give other policies; tests/golden
 TASK = "SimpleGoal-v0"
 SEEDS = range(20)
 ENOUGH = 0.99  # of the teacher's mean return
-QUICK = replace(best_preset(TASK), n_restarts=1, n_generations=0, n_validation=1000)
+QUICK = replace(tuned_preset(TASK), n_restarts=1, n_generations=0, n_validation=1000)
 TREES = {  # by the episodes of the teacher: with two rounds of corrections
     f"{n} + 2 × {more} episodes": replace(QUICK, n_episodes=n, n_correction_episodes=more)
     for n, more in ((300, 200), (2000, 500), (5000, 1000), (10_000, 3000))

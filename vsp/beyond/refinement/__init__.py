@@ -4,5 +4,5 @@ the teacher's as well, `imitate` for these alone; `simplify` reduces cells and n
 `refine` and `imitate` are also modules here, so import the functions from these.
 """
 
-from .config import Faithful, Refinement, best_preset, faithful_preset
+from .config import Faithful, Refinement, faithful_preset, tuned_preset
 from .simplification import gathered, simplify

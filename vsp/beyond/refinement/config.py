@@ -179,10 +179,10 @@ def _by_size(task: Task) -> Faithful:
 def check_refinement(config: Refinement) -> None:
     """Raise ValueError for anything else, such as a `Config`."""
     if not isinstance(config, Refinement):
-        raise ValueError(f"config is {config!r}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'best')")
+        raise ValueError(f"config is {config!r}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'tuned')")
 
 
-_BEST = {
+_TUNED = {
     "SimpleGoal-v0": Refinement(n_cells=4, n_restarts=6, n_generations=150, failure_penalty=100.0),
     # One failure in ten thousand costs ten points of return: tuning makes the force so gentle that it may not suffice
     "MountainCarContinuous-v0": Refinement(
@@ -198,9 +198,9 @@ _BEST = {
 }  # fmt: skip
 
 
-def best_preset(task: str | Task) -> Refinement:
-    """The best settings known for `task`. Raises ValueError for a task without any."""
+def tuned_preset(task: str | Task) -> Refinement:
+    """The settings of `refine` for `task`: a high return. Raises ValueError for a task without any."""
     name = get_task(task).name
-    if name not in _BEST:
-        raise ValueError(f"no preset for task {name!r}, expected one of {list(_BEST)}: write a Refinement of your own")
-    return _BEST[name]
+    if name not in _TUNED:
+        raise ValueError(f"no preset for task {name!r}, expected one of {list(_TUNED)}: write a Refinement of your own")
+    return _TUNED[name]
