@@ -13,6 +13,9 @@ from test_export import compiled
 import vsp
 from vsp.tasks import registry
 
+LITTLE = vsp.Faithful(
+    n_cells=4, n_episodes=15, n_restarts=2, n_generations=3, n_tuning_episodes=5, n_validation=10, tolerance=1.0
+)
 NAMES = {
     "Dock-v0": (["east", "north", "ve", "vn"], ["push e", "push n"]),
     "Arm-v0": (["q1", "q2", "w1", "w2", "g1", "g2"], ["t1", "t2"]),
@@ -41,7 +44,7 @@ def distilled(request):
     outcome = docked if request.param == "Dock-v0" else None
     task = vsp.register(request.param, inputs=inputs, outputs=outputs, outcome=outcome)
     pilot = vsp.agent(PILOTS[request.param])
-    policy, history = vsp.distill(pilot, request.param, vsp.preset(request.param, "faithful").quick(), seed=0)
+    policy, history = vsp.distill(pilot, request.param, LITTLE, seed=0)
     return task, pilot, policy, history
 
 
@@ -50,7 +53,7 @@ def test_the_policy_acts_like_the_pilot(distilled):
     states = vsp.visited_states(pilot, task, vsp.start_states(task, 20, seed=9))
     actions = pilot.predict(states)[0]
     error = np.square(policy.predict(states)[0] - actions).mean() / actions.var(axis=0).mean()
-    assert error < 0.1 and len(policy) <= 6 and history["kept"].sum() == 1
+    assert error < 0.1 and len(policy) <= 4 and history["kept"].sum() == 1
 
 
 def test_it_explains_itself_by_the_names_that_were_given(distilled):
@@ -92,8 +95,7 @@ def test_without_an_outcome_an_episode_just_ends(monkeypatch):
 
 
 def test_faithful_is_the_default_and_one_sentence_says_so(monkeypatch, capsys):
-    quick = vsp.preset("Tank-v0", "faithful").quick()
-    monkeypatch.setattr(vsp, "faithful_preset", lambda task: quick)
+    monkeypatch.setattr(vsp, "faithful_preset", lambda task: LITTLE)
     vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
     assert capsys.readouterr().out == "Tank-v0 is not in the paper: distilling by vsp.preset('Tank-v0', 'faithful')\n"
 
@@ -129,7 +131,7 @@ def test_an_agent_with_a_memory_is_refused():
             return np.zeros((len(obs), 1)), np.zeros(3)
 
     with pytest.raises(ValueError, match="the agent keeps a state between steps, .* train one without memory"):
-        vsp.distill(vsp.agent(Recurrent()), "Tank-v0", vsp.preset("Tank-v0", "faithful").quick(), seed=0)
+        vsp.distill(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +144,7 @@ def test_an_agent_with_a_memory_is_refused():
 )
 def test_a_pilot_that_does_not_fit_is_one_clear_error(act, why):
     with pytest.raises(ValueError, match=why):
-        vsp.distill(vsp.agent(act), "Tank-v0", vsp.preset("Tank-v0", "faithful").quick(), seed=0)
+        vsp.distill(vsp.agent(act), "Tank-v0", LITTLE, seed=0)
 
 
 def test_a_task_that_never_ends_is_refused():

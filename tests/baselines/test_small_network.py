@@ -17,7 +17,8 @@ def test_it_fits_what_a_linear_map_cannot(task):
     assert [weights.shape for weights, _ in network.layers] == [(2, 3), (3, actions.shape[1])]
 
 
-def test_actions_stay_in_the_box_and_the_seed_decides():
+def test_actions_stay_in_the_box_and_the_seed_decides(monkeypatch):
+    monkeypatch.setattr(SmallNetwork, "ITERATIONS", 20)
     states, actions = examples(SIMPLEGOAL)
     one, again, other = (SmallNetwork(states, 3 * actions, units=2, task=SIMPLEGOAL, seed=s) for s in (1, 1, 2))
     found = one.predict(states)[0]

@@ -19,6 +19,13 @@ TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SMALL = Refinement(
     n_cells=2, n_episodes=20, n_generations=6, n_tuning_episodes=20, n_validation=100, failure_penalty=10.0
 )
+
+
+@pytest.fixture(autouse=True)
+def shorter(monkeypatch):
+    monkeypatch.setattr(SmallNetwork, "ITERATIONS", 20)
+
+
 KINDS = {
     "CART": lambda x, y, task: Tree(x, y, leaves=6),
     "linear tree": lambda x, y, task: LinearTree(x, y, leaves=6, task=task),
