@@ -188,8 +188,8 @@ class VoronoiPolicy:
         arrays = {"codewords": self.codewords, "coefficients": self.coefficients, "scale": self.scale}
         arrays |= {limit: getattr(self.task, limit) for limit in BOX}
         about = {"task": self.task.name, "metric": self.metric, "sub_policy": self.policy_class.name}
-        about |= {"inputs": self.task.inputs, "outputs": self.task.outputs}
-        sealed.save_arrays(path, arrays, {"kind": "VoronoiPolicy", **about})
+        names = {"inputs": self.task.inputs, "outputs": self.task.outputs}
+        sealed.save_arrays(path, arrays, {"kind": "VoronoiPolicy", **about, **names})
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> VoronoiPolicy:

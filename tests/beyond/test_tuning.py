@@ -77,11 +77,12 @@ def test_all_numbers_are_tuned_and_the_structure_is_not(kind, n):
 def test_a_tree_by_hand():
     """Beyond 0.5 of the first input to the right; there, beyond 0.2 of the second one to the right again."""
     sides = np.array([[-1, 0], [1, -1], [1, 1]])
-    maps = np.array([[[0.0], [0.0], [0.1]], [[1.0], [0.0], [0.0]], [[0.0], [2.0], [0.0]]])
+    maps = np.array([[[0.0], [0.0], [0.1]], [[1.0], [0.0], [0.0]], [[0.0], [3.0], [0.0]]])
     tree = TreeNumbers(sides, np.eye(2), np.array([0.5, 0.2]), maps, oblique=False, constant=False)
     inputs = np.array([[0.5, 0.9, 1.0], [0.6, 0.2, 1.0], [0.6, 0.3, 1.0]])
-    assert np.allclose(tree.outputs(inputs), [[0.1], [0.6], [0.6]])
-    assert np.allclose(tree.like(np.append([0.5, 0.25, *maps[:, :2].ravel()][:2], maps)).outputs(inputs[2:]), [[0.6]])
+    assert np.allclose(tree.outputs(inputs), [[0.1], [0.6], [0.9]])
+    moved = tree.like(np.append([0.5, 0.35], maps))  # the last state now turns left at the second cut
+    assert np.allclose(moved.outputs(inputs), [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
 
 
 def test_a_population_of_trees_plays_as_each_alone():

@@ -57,7 +57,11 @@ class Task:
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
     start_size: int | None = None  # s, where it is not d
     signals: Signals | None = None  # None: the task has no natural error
-    has_goal: bool = True  # whether it is known which episodes succeed; if not, failures are not defined
+
+    @property
+    def one_by_one(self) -> bool:
+        """Whether states are objects of a physics engine, which steps them one at a time."""
+        return self.begin is not _unchanged
 
     def observe(self, states: np.ndarray) -> np.ndarray:
         """Observations of `states` in float32, as Gymnasium returns them. (n, d)"""

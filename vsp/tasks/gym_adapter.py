@@ -47,7 +47,7 @@ def _see_live(states: np.ndarray) -> np.ndarray:
 def _step_live(
     outcome: Outcome | None, states: np.ndarray, actions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A step of every environment."""
+    """A step of every environment. An episode that ended succeeded if `outcome` says so; None: nobody can say."""
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (live, action) in enumerate(zip(states, actions)):
         live.observation, rewards[i], ended, _, info = live.env.step(action.astype(live.env.action_space.dtype))
@@ -90,5 +90,4 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
         see=_see_live,
         begin=partial(_begin_live, name),
         start_size=1,
-        has_goal=outcome is not None,
     )

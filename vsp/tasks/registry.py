@@ -40,16 +40,19 @@ def get_task(name: str | Task) -> Task:
         return name
     if isinstance(name, str) and (found := _TASKS.get(name) or _ADDED.get(name)):
         return found
-    if not isinstance(name, str) or name not in gymnasium.registry:
-        known = f"expected one of {task_names()} or of Gymnasium's registry"
-        raise ValueError(f"unknown task {name!r}, {known}; did you mean {_nearest(str(name))!r}?")
+    _check_registered(name)
     return _LATER.get(name, partial(gymnasium_task, name))()
 
 
-def _nearest(name: str) -> str:
-    """The task that is called most like `name`: one of ours if it is near, else of all that are registered."""
+def _check_registered(name: str) -> None:
+    """Raise ValueError for what Gymnasium does not know, with the name that is most like it: one of ours if it is near,
+    else of all."""
+    if isinstance(name, str) and name in gymnasium.registry:
+        return
     ours, every = task_names(), [*task_names(), *gymnasium.registry]
-    return (difflib.get_close_matches(name, ours) or difflib.get_close_matches(name, every, cutoff=0.0))[0]
+    near = difflib.get_close_matches(str(name), ours) or difflib.get_close_matches(str(name), every, cutoff=0.0)
+    known = f"expected one of {ours} or of Gymnasium's registry"
+    raise ValueError(f"unknown task {name!r}, {known}; did you mean {near[0]!r}?")
 
 
 def register(
@@ -70,7 +73,8 @@ def register(
         raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another environment")
     if outcome is not None and not callable(outcome):
         raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
-    plain = get_task(name) if name not in gymnasium.registry else gymnasium_task(name, outcome)
+    _check_registered(name)
+    plain = gymnasium_task(name, outcome)
     inputs = _names("inputs", inputs, plain.inputs)
     _ADDED[name] = replace(plain, inputs=inputs, input_labels=inputs, outputs=_names("outputs", outputs, plain.outputs))
     return _ADDED[name]
@@ -97,9 +101,9 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
     try:
         known = get_task(name)
-    except ValueError:
+    except (ValueError, gymnasium.error.Error):  # the latter where packages are missing that it needs
         absent = partial(_absent, name)
-        return Task(name, **labels, **box, max_steps=1, start=absent, step=absent, has_goal=False)
+        return Task(name, **labels, **box, max_steps=1, start=absent, step=absent)
     for limit in BOX:
         if not np.array_equal(getattr(known, limit), box[limit]):
             raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, and was {box[limit]}")

@@ -15,7 +15,7 @@ from ...subpolicies import linear_outputs
 from ...tasks.base import Task
 from ..refinement.config import Refinement
 from ..refinement.tune import Candidates, Objective, tune
-from ..refinement.units import Frame
+from ..refinement.units import Frame, joined, parted
 from .measure import cost
 
 
@@ -53,7 +53,7 @@ class TreeNumbers:
     @property
     def vector(self) -> np.ndarray:
         """All that is tuned."""
-        return np.concatenate([part.ravel() for part in self._parts])
+        return joined(self._parts)
 
     @property
     def _parts(self) -> list[np.ndarray]:
@@ -62,9 +62,7 @@ class TreeNumbers:
 
     def like(self, vector: np.ndarray) -> TreeNumbers:
         """The same structure with the numbers of `vector`."""
-        shapes = [part.shape for part in self._parts]
-        cuts = np.cumsum([part.size for part in self._parts])[:-1]
-        *directions, thresholds, maps = (part.reshape(shape) for part, shape in zip(np.split(vector, cuts), shapes))
+        *directions, thresholds, maps = parted(vector, self._parts)
         if self.constant:
             maps = np.concatenate([np.zeros_like(self.maps[:, :-1]), maps[:, None]], axis=1)
         new = {"directions": directions[0]} if directions else {}
@@ -87,12 +85,11 @@ class NetworkNumbers:
     @property
     def vector(self) -> np.ndarray:
         """All that is tuned."""
-        return np.concatenate([self.hidden.ravel(), self.output.ravel()])
+        return joined([self.hidden, self.output])
 
     def like(self, vector: np.ndarray) -> NetworkNumbers:
         """The same structure with the numbers of `vector`."""
-        cut = self.hidden.size
-        return NetworkNumbers(vector[:cut].reshape(self.hidden.shape), vector[cut:].reshape(self.output.shape))
+        return NetworkNumbers(*parted(vector, [self.hidden, self.output]))
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
         """Actions (n, m), not limited, for inputs (n, d + 1)."""
@@ -103,11 +100,15 @@ class Tunable:
     """The policy of `numbers` in the units of `frame`; as large and as costly as `start`."""
 
     def __init__(self, frame: Frame, numbers: Numbers, start: Policy):
-        self.frame, self.numbers, self.COST = frame, numbers, cost(start)
-        self._size = len(start) if hasattr(start, "__len__") else 0
+        self.frame, self.numbers, self._start = frame, numbers, start
 
     def __len__(self) -> int:
-        return self._size
+        return len(self._start) if hasattr(self._start, "__len__") else 0
+
+    @property
+    def COST(self) -> tuple[int, float]:  # as of policies whose cost is counted by hand
+        """What `cost` says of `start`: tuning changes no structure."""
+        return cost(self._start)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
@@ -143,13 +144,12 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Refinement, seed: 
 def in_units(policy: Policy, frame: Frame) -> tuple[Frame, Numbers]:
     """The numbers of `policy`, and the frame that makes policies of them: its own scale where it has one, else that of
     `frame`. Raises TypeError for a kind of policy that has no numbers to tune."""
-    scale = getattr(policy, "scale", frame.scale)
     if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
-        own = replace(frame, scale=scale)
+        own = replace(frame, scale=policy.scale)  # which is part of its borders
         return own, own.cells(policy)
-    own = TunableFrame(frame.task, getattr(policy, "centre", frame.centre), scale, policy)
+    units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
+    own = TunableFrame(frame.task, units.centre, units.scale, policy)
     if isinstance(policy, VoronoiPolicy):
-        own = replace(own, scale=frame.scale)
         return own, TreeNumbers.one_leaf(own.cells(policy).maps)
     if isinstance(policy, Tree):
         return own, _of_cart(policy.model.tree_, own)
@@ -162,8 +162,7 @@ def in_units(policy: Policy, frame: Frame) -> tuple[Frame, Numbers]:
 
 
 def _of_tree(tree: LinearTree, frame: Frame) -> TreeNumbers:
-    nodes = [node.children for node in tree.nodes]
-    inner, ends, sides = _ways(nodes)
+    inner, ends, sides = _ways([node.children for node in tree.nodes])
     splits = [tree.nodes[i].split for i in inner]
     directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
     thresholds = np.array([split.threshold for split in splits])

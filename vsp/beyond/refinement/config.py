@@ -6,8 +6,6 @@ import dataclasses
 from dataclasses import dataclass
 from typing import get_type_hints
 
-import numpy as np
-
 from ...checks import check_count, check_number
 from ...config import check_field
 from ...tasks import Task, get_task
@@ -101,7 +99,7 @@ class Faithful:
     n_generations: int = 250
     """Generations of CMA-ES that raise the return where it is below the teacher's."""
     n_tuning_episodes: int = 500
-    """Episodes, from fresh starts, that each candidate of a generation plays, and the teacher."""
+    """Episodes that each candidate of a generation plays, from starts drawn anew out of twenty times as many."""
     n_validation: int = 5000
     """Episodes that decide which candidate is kept."""
 
@@ -166,12 +164,11 @@ def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: flo
 
 
 def _by_size(task: Task) -> Faithful:
-    d, engine = len(task.low), task.start_size == 1 and task.begin(np.zeros((0, 1))).dtype == object
-    steps = 60_000 if engine else 300_000  # of the teacher, if episodes are as long as may be
-    episodes = int(np.clip(steps // task.max_steps, 100, 30_000))
-    tuning, validation = (20, 200) if engine else (100, 1000)
+    steps = 60_000 if task.one_by_one else 300_000  # of the teacher, if episodes are as long as may be
+    episodes = min(max(100, steps // task.max_steps), 30_000)
+    generations, tuning, validation = (40, 20, 200) if task.one_by_one else (100, 100, 1000)
     return Faithful(
-        n_cells=6, n_episodes=episodes, n_restarts=32 if d <= 8 else 16, n_generations=40 if engine else 100,
+        n_cells=6, n_episodes=episodes, n_restarts=32 if len(task.low) <= 8 else 16, n_generations=generations,
         n_tuning_episodes=tuning, n_validation=validation,
     )  # fmt: skip
 

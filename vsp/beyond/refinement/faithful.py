@@ -134,7 +134,7 @@ def _tune(
         results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
         missed = np.array([aim - score(result, config.failure_penalty) for result in results])
         errors = np.array([squared_error(seen, one) / whole for one in candidates])
-        search.tell(steps, (_cost(errors, missed, config)).tolist())
+        search.tell(steps, _cost(errors, missed, config).tolist())
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
 

@@ -15,7 +15,7 @@ from ...tasks.base import Task
 def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -> list[Outcomes]:
     """`rollout` for policies of one kind, in one batch, unless the task has a physics engine; Voronoi policies are
     Euclidean, of one shape and scale."""
-    if task.begin(one := starts[:1]) is not one:
+    if task.one_by_one:
         return [rollout(policy, task, starts) for policy in policies]
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])

@@ -63,8 +63,8 @@ class Frame:
     def cells(self, policy: VoronoiPolicy) -> Cells:
         """The codewords and maps of `policy` in these units."""
         weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
-        biases = (biases + self.centre @ weights - self._middle) / self._half
-        maps = np.concatenate([weights * self.scale[:, None] / self._half, biases[:, None]], axis=1)
+        biases = biases + self.centre @ weights
+        maps = self.maps(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
         return Cells((policy.codewords - self.centre) / self.scale, maps)
 
     def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
@@ -72,6 +72,20 @@ class Frame:
         actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
         weights = teacher.criticality(states) if criticality else None
         return LabelledStates(self.inputs(states), self.outputs(actions), weights)
+
+
+def joined(parts: list[np.ndarray]) -> np.ndarray:
+    """The numbers of all `parts` in one array, as a search wants them."""
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def parted(vector: np.ndarray, like: list[np.ndarray]) -> list[np.ndarray]:
+    """The parts that `joined` put together, of the shapes of those in `like`."""
+    found, start = [], 0
+    for part in like:
+        found.append(vector[start : start + part.size].reshape(part.shape))
+        start += part.size
+    return found
 
 
 @dataclass(frozen=True)
@@ -84,12 +98,11 @@ class Cells:
     @property
     def vector(self) -> np.ndarray:
         """All numbers in one array."""
-        return np.concatenate([self.codewords.ravel(), self.maps.ravel()])
+        return joined([self.codewords, self.maps])
 
     def like(self, vector: np.ndarray) -> Cells:
         """Cells of the same shape with the numbers of `vector`."""
-        cut = self.codewords.size
-        return Cells(vector[:cut].reshape(self.codewords.shape), vector[cut:].reshape(self.maps.shape))
+        return Cells(*parted(vector, [self.codewords, self.maps]))
 
     def closeness(self, states: np.ndarray) -> np.ndarray:
         """How near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
