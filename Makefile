@@ -14,17 +14,25 @@ TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_
   simplegoal_spread mountaincar_spread text_numbers
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
-FIGURES_06_beyond := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
+FIGURES_06_few_equations := beyond_map beyond_likeness beyond_read
+TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes equal budgets)
+FIGURES_07_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
-TABLES_06_beyond := beyond_headline beyond_ablation beyond_lunarlander \
+TABLES_07_methods := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
 # In an order in which no core waits; which of them read data/runs, and which committed results.
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
-NOTEBOOKS := $(sort $(PAPER) 06_beyond)
+OURS := 07_methods 06_few_equations
+NOTEBOOKS := $(sort $(PAPER) $(OURS))
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
-READS_06_beyond := $(foreach n,beyond_SimpleGoal-v0 beyond_MountainCarContinuous-v0 beyond_Pendulum-v1 beyond_race \
-  beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) data/results/beyond_LunarLanderContinuous-v3.policy
-READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_06_beyond)))
+SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
+ROWS := $(foreach n,$(SMALL),beyond_$(n))
+READS_06_few_equations := $(foreach n,$(ROWS) beyond_seconds tuned_seconds faithful_seconds $(foreach t,$(SMALL), \
+  $(foreach table,tuned faithful same,$(table)_$(t))) beyond_LunarLanderContinuous-v3,data/results/$(n).csv) \
+  data/results/faithful_SimpleGoal-v0.policy
+READS_07_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
+  data/results/beyond_LunarLanderContinuous-v3.policy
+READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_07_methods)))
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -64,8 +72,8 @@ unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PAT
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-test venv-test-train-dask venv-site venv-site-test
-.PHONY: help quick paper-figures all lab runs study lookup course site test lint test-site manifest lock clean bench \
-  beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
+.PHONY: help quick paper-figures all lab runs study lookup course site test test-long lint test-site manifest lock \
+  clean bench beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
 
 help:
 	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
@@ -87,10 +95,10 @@ lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
 ## Reproduce
-all: begin venv-train ## the same and our own method beside it, notebook 06: about 3 minutes
+all: begin venv ## the same and our own method beside it, notebooks 06 and 07: about 4 minutes
 paper-figures all:
 	@: > "$$STATE/made"
-	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),06_beyond) $(PAPER)
+	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)
 	@if [ -s "$$STATE/made" ]; then printf 'made %s: see %s/figures\n' "$$(xargs < "$$STATE/made")" "$$OUT"; \
 	  $(PY) -m vsp.beyond.comparison.stale > "$$STATE/stale" || exit 1; \
 	else printf 'everything is up to date: see %s/figures\n' "$$OUT"; fi; test ! -s "$$STATE/stale" || cat "$$STATE/stale"
@@ -131,6 +139,9 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 test: venv-test-train-dask ## runs the tests, several at a time: about 3 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
+test-long: venv-test-train-dask ## runs whole commands, kills some, and a cluster: about a minute
+	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/long
+
 lint: venv-test ## ruff and mypy: what .pre-commit-config.yaml runs before a commit; `ruff format` mends the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
@@ -159,7 +170,7 @@ bench: venv-test-train-dask ## measures speed and scale, into data/results/: an 
 faults: venv-test-train-dask ## breaks it in every way we know, into data/results/: 3 HOURS or more; kills resume
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
-beyond: begin venv-train ## our own method and others beside it, into data/results/: 1 to 1.5 HOURS, resumable
+beyond: begin venv-train ## our own method and others beside it, into data/results/: 3 to 4 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 beyond-long: begin venv-train ## the same for LunarLander, whose physics engine is slow: 3 to 4 HOURS, resumable
@@ -186,7 +197,7 @@ begin:
 define notebook-rules
 .PHONY: $(call outputs,$(1))
 $(call outputs,$(1)): $(1) ;
-$(1): begin $(if $(filter $(1),$(PAPER)),venv,venv-train) $(if $(filter $(1),$(NEED_RUNS)),runs)
+$(1): begin venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@for file in $$(READS_$(1)); do test -f "$$$$file" || { echo "error: $$$$file is missing: \`git checkout $$$$file\` \
 	brings it back; \`make study beyond beyond-long lookup\` makes all such files" >&2; exit 1; }; done; \
 	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) \

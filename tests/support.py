@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -179,3 +180,23 @@ def until(condition) -> None:
     while not condition():
         assert time.monotonic() < deadline, "waited 30 s in vain"
         time.sleep(0.05)
+
+
+STORY_PARAMETERS = 'out = ".."\nruns = "../data/runs"\nquick = False'
+
+
+def write_story(folder: Path, *cells: str, parameters: str = STORY_PARAMETERS) -> Path:
+    """story.ipynb, a notebook of code cells; a cell that begins with `# skip` is tagged so that it never runs."""
+    from vsp.run.notebook import nbformat  # which takes long, and few tests write notebooks
+
+    notebook = nbformat.v4.new_notebook()
+    notebook.metadata.kernelspec = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    for number, source in enumerate((parameters, *cells)):
+        cell = nbformat.v4.new_code_cell(source, id=f"cell-{number}")
+        cell.metadata.tags = (
+            ["parameters"] if number == 0 else ["skip-execution"] if source.startswith("# skip") else []
+        )
+        notebook.cells.append(cell)
+    path = folder / "story.ipynb"
+    nbformat.write(notebook, path)
+    return path

@@ -1,6 +1,7 @@
 """Who may import whom, and that no circle comes back."""
 
 import ast
+import functools
 import importlib.util
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -22,6 +23,7 @@ for wing in ("paper", "beyond", "course"):
 MAY["teachers"] -= {"subpolicies"}
 
 
+@functools.cache
 def modules():
     return {".".join(("vsp", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
 

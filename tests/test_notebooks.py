@@ -37,7 +37,8 @@ def test_cells_are_short_and_define_no_helpers(notebook):
     for cell in code_cells(notebook):
         assert len(cell.source.splitlines()) < 15, cell.id
         tree = ast.parse(cell.source)
-        assert not any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(tree)), cell.id
+        defined = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(tree))
+        assert not defined or cell.id == "own-environment", cell.id  # a reader's own task is no helper
 
 
 def test_more_words_than_code(notebook):
@@ -101,24 +102,16 @@ def run_without_torch(code):
     return done.stdout
 
 
-def test_those_of_the_paper_draw_without_torch():
-    """01 to 05: everything that they import, and a teacher."""
+def test_they_draw_without_torch():
+    """Everything that they import, and a teacher."""
     statements = {
         ast.unparse(node)
-        for path in NOTEBOOKS if path.stem < "06"
+        for path in NOTEBOOKS
         for cell in code_cells(nbformat.read(path, as_version=4))
         for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Import | ast.ImportFrom)
     }  # fmt: skip
     assert len(statements) > 10
     run_without_torch("\n".join([*sorted(statements), "vsp.load_teacher('SimpleGoal-v0')"]))
-
-
-def test_the_cell_that_trains_says_what_to_type_where_torch_is_missing():
-    notebook = nbformat.read(ROOT / "notebooks" / "06_beyond.ipynb", as_version=4)
-    (cell,) = (cell for cell in notebook.cells if cell.id == "own")
-    said = run_without_torch(cell.source)
-    (target,) = re.findall(r"`make ([\w-]+)`", said)
-    assert target in (ROOT / "Makefile").read_text("utf-8").split()
 
 
 def test_defaults_lie_in_the_checkout(notebook):
@@ -128,11 +121,3 @@ def test_defaults_lie_in_the_checkout(notebook):
         exec(ast.unparse(line), names)
     assert names["out"] == ROOT / "build" / "lab"
     assert names.get("runs", ROOT / "data" / "runs") == ROOT / "data" / "runs"
-
-
-def test_one_runs_by_plain_papermill_from_the_root(tmp_path):
-    command = [sys.executable, "-m", "papermill", "notebooks/01_teacher.ipynb", str(tmp_path / "out.ipynb")]
-    options = ["-p", "out", str(tmp_path), "-p", "quick", "true", "--no-progress-bar"]
-    done = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "figures" / "environments.pdf").exists()

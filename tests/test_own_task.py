@@ -96,7 +96,29 @@ def test_without_an_outcome_an_episode_just_ends(monkeypatch):
 def test_faithful_is_the_default_and_one_sentence_says_so(monkeypatch, capsys):
     monkeypatch.setattr(vsp, "faithful_preset", lambda task: LITTLE)
     vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
-    assert capsys.readouterr().out == "Tank-v0 is not in the paper: distilling by vsp.preset('Tank-v0', 'faithful')\n"
+    said = capsys.readouterr().out
+    assert said.startswith("Tank-v0 is not in the paper: distilling by vsp.preset('Tank-v0', 'faithful'), about ")
+    assert said.endswith(" seconds more where its return has to be raised\n") and said.count("\n") == 1
+
+
+def test_observations_beyond_the_declared_box_are_counted():
+    class Overfull(own_tasks.Tank):
+        observation_space = gymnasium.spaces.Box(0.0, 1.0, (2,), np.float64)  # but it fills beyond
+
+        def reset(self, *, seed=None, options=None):
+            super().reset(seed=seed)
+            self.state = np.array([0.9, 0.95])
+            return self.state.copy(), {}
+
+        def step(self, action):
+            return super().step([1.0])
+
+    gymnasium.register("Overfull-v0", entry_point=Overfull, max_episode_steps=60)
+    try:
+        with pytest.warns(UserWarning, match=r"[\d,]+ of 900 observations leave the box of Overfull-v0, such as s0 = "):
+            vsp.distill(vsp.agent(own_tasks.tank_pilot), "Overfull-v0", LITTLE, seed=0)
+    finally:
+        del gymnasium.registry["Overfull-v0"]
 
 
 # What does not fit

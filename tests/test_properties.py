@@ -25,7 +25,7 @@ import vsp
 
 # BARE moments
 from vsp import algorithms, evaluation, export, geometry, policy, rollouts
-from vsp.baselines import dagger, simple, small_network, tdavq, trees
+from vsp.baselines import critics, dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
@@ -204,6 +204,12 @@ class QuickSoftTree(SoftTree):
     N_STEPS = 5
 
 
+def quick_critic_driven(*data, **about):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(critics, "N_STEPS", 3)
+        return critics.critic_driven(*data, **about)
+
+
 def partition():
     return partition_of([[0.25, 0.5], [0.75, 0.5]])
 
@@ -211,6 +217,7 @@ def partition():
 states, some_states = numbers(STATES, free=(0,)), numbers(STATES, some=True)
 pairs = {"states": numbers(STATES, free=(), some=True), "actions": numbers(ACTIONS, free=(), some=True)}
 task, seed, teacher = choice(SIMPLEGOAL), count(0, least=0), actor(TEACHER)
+critic = Argument(with_critics(), st.sampled_from([TEACHER, NET, None, 3, "TD3", np.zeros(2)]))
 player = {"policy": actor(TEACHER), "task": task}
 starts = numbers(STATES, also=[np.full((1, 2), 1.5), np.full((1, 2), -0.001)])
 points = {"codewords": numbers(STATES, free=(0, 1), some=True), "metric": choice("manhattan")}
@@ -232,6 +239,14 @@ CASES = {
     "baselines.simple.Heuristic.predict": (simple.Heuristic().predict, {"obs": numbers(np.ones((3, 8)) / 4)}),
     "baselines.simple.PumpAndBalance.predict": (simple.PumpAndBalance().predict, {"obs": numbers(np.ones((3, 3)) / 4)}),
     "baselines.simple.ZeroPolicy.predict": (simple.ZeroPolicy(TASK).predict, {"obs": states}),
+    "baselines.critics.critic_driven": (
+        quick_critic_driven,
+        pairs | {"cells": count(2), "teacher": critic, "task": task, "seed": seed},
+    ),
+    "baselines.critics.advantage_weighted": (
+        critics.advantage_weighted,
+        pairs | {"cells": count(2, most=len(STATES)), "teacher": critic, "task": task, "seed": seed},
+    ),
     "baselines.dagger.dagger": (
         functools.partial(dagger.dagger, [lambda s, a: simple.linear_map(s, a, SIMPLEGOAL)]),
         {"teacher": teacher, "task": task, "rounds": budget, "seed": seed},
@@ -502,6 +517,10 @@ CASES = {
     ),
     "teachers.teacher.Teacher.predict": (NET.predict, {"obs": states}),
     "teachers.teacher.Teacher.criticality": (with_critics().criticality, {"obs": numbers(STATES)}),
+    "teachers.teacher.Teacher.value": (
+        with_critics().value,
+        {"obs": numbers(STATES, free=()), "actions": numbers(ACTIONS, free=())},
+    ),
     "teachers.teacher.load_teacher": (
         load_teacher,
         {"source": Argument(SIMPLEGOAL, st.sampled_from(["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"]))},
@@ -555,15 +574,17 @@ EXEMPT = {
         config.check_field history.History history.History.add_events history.History.observe partition.Partition
         partition.Partition.cells partition.Partition.far partition.Partition.keep partition.Partition.loss
         partition.Partition.neighbours partition.Partition.reset partition.Partition.scaled partition.Partition.train
-        rollouts.score""",
+        rollouts.score rollouts.warn_outside""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
         tasks.base tasks.lunarlander.landed tasks.mountaincar tasks.pendulum tasks.simplegoal.SimpleGoalEnv.reset
         tasks.simplegoal.start tasks.simplegoal.step""",
     "the inside of `refine`, `imitate` and `distill_faithfully`, which check what comes in": """
-        beyond.refinement.search beyond.refinement.faithful.by_visits beyond.refinement.faithful.needed_only
-        beyond.refinement.faithful.variance beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
+        beyond.refinement.search beyond.refinement.faithful.among_states beyond.refinement.faithful.by_visits
+        beyond.refinement.faithful.needed_only beyond.refinement.duration beyond.refinement.faithful.variance
+        beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
         beyond.refinement.population beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
     "the inside of trees, of `dagger` and of `learn`, which check what comes in": """
+        baselines.critics.trained baselines.critics.where_lost
         baselines.dagger.Rounds baselines.tdavq.DiscretePolicy baselines.tdavq.ParallelEpisodes baselines.tdavq.merge
         baselines.tdavq.split baselines.tdavq.update baselines.trees.LinearTree.apply baselines.trees.LinearTree.inputs
         baselines.trees.LinearTree.split baselines.trees.Node baselines.trees.ObliqueLinearTree.split
@@ -574,7 +595,8 @@ EXEMPT = {
     "names and what was saved: see the tests of own tasks and of saved policies": """
         tasks.registry.register tasks.registry.saved_task""",
     "takes a path: see the tests of damaged files": """
-        policy.VoronoiPolicy.save policy.VoronoiPolicy.load paper.results teachers.agent_zip""",
+        policy.VoronoiPolicy.save policy.VoronoiPolicy.load paper.results teachers.agent_zip
+        teachers.teacher.further_teachers""",
     "takes a policy, a task or runs, which are good by construction, and no more than digits for `number`": """
         export.to_json export.to_python export.to_c export.distances_latex baselines.simple.ZeroPolicy
         paper.tables.run_overview paper.tables.run_summary paper.tables.teacher_beside_runs

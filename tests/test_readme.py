@@ -9,6 +9,7 @@ import subprocess
 import pandas as pd
 import pytest
 
+from vsp.beyond.comparison import largest_alike
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
 
@@ -21,7 +22,7 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
     (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.S)
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "README.md", "exec"), {})
-    assert "cells" in capsys.readouterr().out
+    assert "push east = -1.50" in capsys.readouterr().out  # as the pilot's
     assert (tmp_path / "my_policy.vsp").exists()
 
 
@@ -106,15 +107,46 @@ def quoted(text):
 
 def test_numbers_of_the_readme_are_those_of_the_tables():
     cells = read_table("what_cells_buy").set_index(["task", "policy"])
-    failing, mean = cells["failing"]["SimpleGoal-v0"], cells["mean"]["MountainCarContinuous-v0"]
+    failing = cells["failing"]["SimpleGoal-v0"]
     assert quoted(f"13 constants misses the goal in {failing['tree, 13 leaves']:.1%}".replace("%", " %"))
     assert quoted(f"the distilled policies in {failing['distilled, all runs']:.1%}".replace("%", " %"))
     assert quoted(f"fail in {failing['same cells, least squares']:.1%}".replace("%", " %"))
-    assert quoted(f"returns {mean['12 · velocity']:.2f} on average, the teacher {mean['teacher (TD3)']:.2f}")
-    missed = cells["failing"]["MountainCarContinuous-v0"]["12 · velocity"]
-    assert quoted(f"misses the flag in {missed:.1%}".replace("%", " %"))
     spread = read_table("simplegoal_spread", index_col="metric").loc["Mean"]
     assert quoted(f"return {spread.iloc[3]:.2f}, the paper prints {spread.iloc[2]:.2f}")
+
+
+def test_faithful_policies_are_those_of_the_table():
+    table = read_table("beyond_faithful").set_index("task")
+    tasks = table.to_dict("index")
+    both = [f"{round(own['both'] * own['policies'])}" for own in tasks.values()]
+    assert quoted("returns, in all 20 seeds:") and set(table["policies"]) == {20} and set(both) == {"20"}
+    first, *others = tasks.values()
+    assert quoted(f"{first['at most']} cells reproduce {first['r2']:.0%}".replace("%", " %"))
+    for own, task in zip(others, ("MountainCar", "Pendulum")):
+        assert quoted(f"{own['at most']} cells {own['r2']:.0%} on {task}".replace("%", " %"))
+    teachers = read_table("beyond_headline").set_index("task")["teacher"]
+    pattern = r"^\| (\w+) \| (\d+) \| (0\.\d{3}) \| ([-\d.]+) \| ([-\d.]+) \| (\d+) of (\d+) \| ([\d.]+) \|$"
+    assert re.findall(pattern, RESULTS, flags=re.M) == [
+        (task, f"{own['at most']}", f"{own['r2']:.3f}", f"{own['mean']:.2f}", f"{teachers[task]:.2f}", good,
+         f"{own['policies']}", f"{own['index']:.2f}")
+        for good, (task, own) in zip(both, tasks.items())
+    ]  # fmt: skip
+
+
+def test_who_leads_is_that_of_the_table():
+    table = read_table("beyond_leaders").set_index(["task", "size"])
+    two = table.loc[("MountainCar", 2)]
+    assert quoted(f"one line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
+    assert f"{two['rival mean']:.2f} on average, two of our cells {two['mean']:.2f}" in " ".join(RESULTS.split())
+    assert two["rival"] == "oblique tree, constants" and set(table.loc["SimpleGoal", "ahead"]) == {"level"}
+    assert table.index[table["ahead"] == "ours"].tolist() == [("Pendulum", 2), ("Pendulum", 3)]
+
+
+def test_up_to_how_many_cells_seeds_agree():
+    sizes = read_table("beyond_sizes")
+    found = [largest_alike(sizes[sizes["task"] == task]) for task in ("SimpleGoal", "MountainCar", "Pendulum")]
+    said = f"with up to {found[0]} cells on SimpleGoal, {found[1]} on MountainCar and {found[2]} on Pendulum"
+    assert said in " ".join(RESULTS.split())
 
 
 def test_counts_of_the_readme_are_those_of_the_ledger():

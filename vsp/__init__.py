@@ -38,7 +38,7 @@ def distill(
     (few cells that return much) or a `Faithful` (few cells that act like the teacher, and return what it returns).
 
     `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset,
-    and for a task that the paper does not treat to `preset(task, "faithful")`, which is then printed. Returns the
+    and for a task that the paper does not treat to `preset(task, "faithful")`, printed with its time. Returns the
     policy and its history: a `History` that lets a notebook replay the run, or a row for each candidate of our methods.
     Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its states or actions are not
     finite, or `seed` is no integer from 0 on.
@@ -46,12 +46,15 @@ def distill(
     check_seed(seed)
     task = get_task(task)
     if config is None and task.name not in PAPER_TASKS:
+        from .beyond.refinement.duration import announcement  # which takes a while to import
+
         config = faithful_preset(task)
-        print(f"{task.name} is not in the paper: distilling by vsp.preset({task.name!r}, 'faithful')")
+        how = f"{task.name} is not in the paper: distilling by vsp.preset({task.name!r}, 'faithful')"
+        print(f"{how}, {announcement(teacher, task, config)}")
     if isinstance(config, Refinement):
         return refine(teacher, task, config, seed=seed)
     if isinstance(config, Faithful):
-        from .beyond.refinement.faithful import distill_faithfully  # which takes a while to import
+        from .beyond.refinement.faithful import distill_faithfully  # likewise
 
         return distill_faithfully(teacher, task, config, seed=seed)
     if config is not None and not isinstance(config, Config):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import InitVar, dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -82,6 +83,19 @@ def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.n
     if not episodes:
         raise ValueError("there are no start states, expected at least one")
     return np.concatenate([episode.states for episode in episodes])
+
+
+def warn_outside(task: Task, states: np.ndarray) -> None:
+    """Warn where observations (t, d) leave the box that the task declares: how many, and which variable how far."""
+    beyond = np.maximum(task.low - states, states - task.high)
+    outside = (beyond > 1e-6 * (1.0 + np.abs(states))).any(axis=1)  # float32 rounds
+    if outside.any():
+        row, j = np.unravel_index(beyond.argmax(), beyond.shape)
+        warnings.warn(
+            f"{outside.sum():,} of {len(states):,} observations leave the box of {task.name}, such as "
+            f"{task.inputs[j]} = {states[row, j]:.6g}, declared from {task.low[j]:g} to {task.high[j]:g}",
+            stacklevel=5,  # of whoever calls `vsp.distill`
+        )
 
 
 def score(result: Outcomes, failure_penalty: float) -> float:

@@ -8,7 +8,7 @@ import vsp
 from vsp.beyond.refinement import faithful
 from vsp.beyond.refinement.anneal import squared_error
 from vsp.beyond.refinement.config import Faithful
-from vsp.beyond.refinement.faithful import by_visits, distill_faithfully, needed_only, variance
+from vsp.beyond.refinement.faithful import among_states, by_visits, distill_faithfully, needed_only, variance
 from vsp.beyond.refinement.units import Cells, Frame, LabelledStates
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
@@ -17,6 +17,8 @@ from vsp.tasks.registry import get_task
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
 )
+
+pytestmark = pytest.mark.filterwarnings("ignore:no policy of 3 cells")  # so little work finds less than was asked
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +59,8 @@ def test_the_same_arguments_give_the_same_policy(distilled):
 
 def test_without_tuning_the_closest_imitation_is_kept():
     config = dataclasses.replace(SMALL, n_generations=0, margin=100.0)  # that no policy reaches
-    history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[1]
+    with pytest.warns(UserWarning):
+        history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[1]
     assert history[["stage", "kept"]].to_numpy().tolist() == [["fit", True]]
 
 
@@ -68,7 +71,7 @@ def test_without_tuning_the_closest_imitation_is_kept():
     ("gaps", "r2s", "kept"),
     [
         ([-1.0, 0.0, -0.04], [0.9, 0.7, 0.8], 2),  # half of the tolerance is accepted
-        ([-1.0, -0.06, -0.5], [0.9, 0.7, 0.8], 1),  # nothing is accepted: the highest return
+        ([-1.0, -0.06, -0.5], [0.9, 0.7, 0.81], 2),  # nothing is accepted: the highest return of those that are near
         ([0.5, 0.1, 3.0], [0.7, 0.9, 0.8], 1),  # beyond the teacher's, the return earns nothing
     ],
 )
@@ -86,6 +89,14 @@ def test_with_a_least_r2_the_highest_return_of_those_that_reach_it_is_kept(r2s, 
     judge.rows = [{"gap": gap, "r2": one} for gap, one in zip([-0.5, 0.2, 3.0], r2s)]
     judge._config, judge._cells, judge._least_gap = dataclasses.replace(SMALL, min_r2=0.9), ["a", "b", "c"], -0.05
     assert judge.best == "abc"[kept]
+
+
+def test_what_is_asked_for_and_not_found_is_said():
+    config = dataclasses.replace(SMALL, n_generations=0)
+    with pytest.warns(UserWarning, match=r"no policy of 3 cells that acts like .* returns enough: .* expected \+99.95"):
+        distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, margin=100.0), seed=1)
+    with pytest.warns(UserWarning, match=r"no policy of 3 cells with R² 1 was found: the closest is kept, R² 0.9\d\d"):
+        distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, min_r2=1.0), seed=1)
 
 
 def test_a_lower_r2_buys_return(distilled):
@@ -115,6 +126,15 @@ def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():
 # What is made of the cells at the end
 
 
+def test_a_cell_that_the_return_needs_stays(monkeypatch, distilled):
+    """Though the error does not."""
+    first = Cells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))  # stands still
+    monkeypatch.setattr(faithful, "needed_only", lambda cells, seen: first)
+    assert len(distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)[0]) == len(distilled[0]) > 1
+    lenient = dataclasses.replace(SMALL, tolerance=1000.0)
+    assert len(distill_faithfully(CurvedTeacher(), SIMPLEGOAL, lenient, seed=1)[0]) == 1
+
+
 def on_a_line(codewords, values, states):
     maps = np.zeros((len(values), 2, 1))
     maps[:, 1, 0] = values
@@ -137,6 +157,21 @@ def test_one_cell_is_left_where_all_hold_the_same_map_and_none_goes_that_is_need
     cells, _ = on_a_line([0, 1.5, 3], [0.0, 0.4, 0.8], states)
     own = cells.closeness(states[:, None]).argmax(axis=0)
     assert len(needed_only(cells, LabelledStates(inputs, cells.maps[own, 1])).codewords) == 3
+
+
+def test_two_codewords_come_among_the_states_and_draw_the_same_border():
+    rng = np.random.default_rng(0)
+    states = rng.normal(size=(500, 3))
+    cells = Cells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
+    seen = LabelledStates(np.column_stack([states, np.ones(500)]), np.zeros((500, 1)))
+    moved = among_states(cells, seen)
+    assert (moved.nearest(states) == cells.nearest(states)).all() and len(set(cells.nearest(states).tolist())) == 2
+    middle, across = moved.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]
+    assert np.abs(moved.codewords).max() < 4 and np.dot(middle - cells.codewords.mean(axis=0), across) == pytest.approx(
+        0
+    )
+    three = Cells(rng.normal(size=(3, 3)), np.zeros((3, 4, 1)))
+    assert among_states(three, seen) is three
 
 
 def test_the_most_visited_cell_comes_first():

@@ -19,7 +19,7 @@ from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.comparison import measure, method_rows, time_to_quality
-from vsp.beyond.comparison.method_rows import LIKE, METHODS, RIVALS
+from vsp.beyond.comparison.method_rows import APART, LIKE, METHODS, RIVALS
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.refinement.config import Faithful, Refinement
 from vsp.beyond.refinement.simplification import simplify
@@ -31,7 +31,7 @@ imitate = importlib.import_module("vsp.beyond.refinement.imitate")  # the module
 GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
 # Of actions on another type of processor, where sums are rounded differently, and a split or a long descent may go
 # elsewhere
-TOLERANCE, LOOSE, SENSITIVE = 1e-6, 0.1, ("oblique tree", "small network")
+TOLERANCE, LOOSE, SENSITIVE = 1e-6, 0.1, ("oblique tree", "small network", "greedy fit")
 SMALL = Refinement(
     n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
     n_generations=1, n_tuning_episodes=10, n_validation=20,
@@ -44,6 +44,18 @@ PRESETS = {
         n_validation=50,
     ),
 }  # fmt: skip
+
+
+class CriticalTeacher(CurvedTeacher):
+    """With critics, by which an error costs more on the right."""
+
+    def value(self, obs, actions):
+        return -obs[:, 0] * np.square(np.asarray(actions) - self.predict(obs)[0]).sum(axis=1)
+
+    def criticality(self, obs):
+        return obs[:, 0]
+
+
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SHORTER = {  # settings of methods that would take long
     "refined, faithful": {"n_generations": 1, "n_tuning_episodes": 10},
@@ -78,9 +90,10 @@ def actions(policy, task):
 
 def by_method(name):
     """Actions on every task that the method is for, SimpleGoal if it is for all."""
-    method, found = (METHODS | RIVALS | LIKE)[name], {"at length": AT_LENGTH.get(name, 0)}
+    method, found = (METHODS | RIVALS | LIKE | APART)[name], {"at length": AT_LENGTH.get(name, 0)}
+    teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if name in APART else {})
     for task in method.tasks or (SIMPLEGOAL,):
-        budget = Budget(TEACHERS.get(task), get_task(task), PRESETS[method.preset])
+        budget = Budget(teachers.get(task), get_task(task), PRESETS[method.preset])
         found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
     return found
 
@@ -112,7 +125,7 @@ def by_measure():
 
 CASES = {
     f"{table}[{name!r}]": (functools.partial(by_method, name), method.version)
-    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE}.items()
+    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE, "APART": APART}.items()
     for name, method in known.items()
 } | {
     "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),

@@ -11,11 +11,12 @@ from vsp.beyond.comparison.method_rows import (
     ABLATION,
     LIKE,
     METHODS,
-    SEEDS,
+    TABLES,
     TASKS,
     TUNED_SIZES,
     UNTUNED,
     Job,
+    Table,
     jobs_of,
     make_all,
     make_row,
@@ -24,7 +25,7 @@ from vsp.beyond.comparison.method_rows import (
 )  # fmt: skip
 from vsp.beyond.comparison.method_summary import read_rows
 from vsp.beyond.comparison.methods import Budget
-from vsp.beyond.refinement.config import Faithful, Refinement, tuned_preset
+from vsp.beyond.refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from vsp.evaluation import start_states
 from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
@@ -41,14 +42,13 @@ SMALL = Refinement(
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(method_rows, "SEEDS", range(2))
     monkeypatch.setattr(measure, "N_REPORTED", 30)
     monkeypatch.setattr(measure, "N_ERROR", 10)
     monkeypatch.setattr(method_rows, "tuned_preset", lambda task: SMALL)
     two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
     monkeypatch.setattr(method_rows, "METHODS", two)
     for module in (method_rows, make_rows):
-        monkeypatch.setattr(module, "TABLES", {"beyond": two})
+        monkeypatch.setattr(module, "TABLES", {"beyond": Table(two, seeds=range(2), fewer=range(2), long=tuple(two))})
     monkeypatch.setattr(method_rows, "ABLATION", {})
     return monkeypatch
 
@@ -80,9 +80,32 @@ def test_every_rival_is_tuned_at_every_size_and_untuned_too(task):
     found = jobs_of(task, "tuned")
     for name in UNTUNED:
         sizes = {(job.size, job.seed) for job in found if job.method == f"{name}, tuned"}
-        assert sizes == {(size, seed) for size in ((0,) if name == "one linear map" else TUNED_SIZES) for seed in SEEDS}
+        seeds, own = TABLES["tuned"].seeds, (0,) if name == "one linear map" else TUNED_SIZES
+        assert sizes == {(size, seed) for size in own for seed in seeds}
         assert name in METHODS or any(job.method == name for job in found)
     assert not {job.method for job in found} & {job.method for job in jobs_of(task)}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_other_teachers_are_distilled_at_the_size_of_the_preset(task):
+    found = jobs_of(task, "teachers")
+    assert {job.agent for job in found} == {1, 2} and len({name_of(job) for job in found}) == len(found)
+    sizes = {(job.method, job.size) for job in found}
+    assert {("faithful", faithful_preset(task).n_cells), ("refined", tuned_preset(task).n_cells)} <= sizes
+    assert len(sizes) == 5 and ("one linear map, tuned", 0) in sizes
+
+
+def test_a_file_names_its_teacher_by_checksum():
+    one, other = (Job(SIMPLEGOAL, "CART", 3, 0, agent) for agent in (0, 1))
+    assert one.about().keys() == {"task", "method", "size", "seed", "settings", "teacher", "version"}
+    assert one.about() | {"teacher": ""} == other.about() | {"teacher": ""} and one.path("") != other.path("")
+
+
+def test_all_seeds_are_those_of_the_size_of_the_preset():
+    found = jobs_of(SIMPLEGOAL, "faithful")
+    n = {size: sum(job.size == size for job in found) for size in {job.size for job in found}}
+    own = faithful_preset(SIMPLEGOAL).n_cells
+    assert n[own] == len(TABLES["faithful"].seeds) > n[own - 1] == len(TABLES["faithful"].fewer)
 
 
 def test_a_tuned_row_depends_on_the_settings_of_the_tuning(small):
@@ -110,7 +133,7 @@ def test_a_row_holds_what_is_measured(small):
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
     policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
-    assert about.items() >= {**dataclasses.asdict(job), **job.provenance}.items() and about["seconds"] > 0
+    assert all(about[name] == value for name, value in job.about().items()) and about["seconds"] > 0
 
 
 def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
@@ -185,20 +208,24 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
 
 def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
     quick = Faithful(
-        n_cells=3, tolerance=0.1, n_episodes=50, n_restarts=2, n_generations=1, n_tuning_episodes=5, n_validation=20
+        n_cells=2, tolerance=0.1, n_episodes=50, n_restarts=2, n_generations=1, n_tuning_episodes=5, n_validation=20
     )
     like = {"faithful": dataclasses.replace(LIKE["faithful"], sizes=(1, 2))}
     small.setattr(method_rows, "faithful_preset", lambda task: quick)
     small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
     small.setattr(make_rows, "time_to_quality", lambda: pd.DataFrame({"seconds": [0.5]}))
     for module in (method_rows, make_rows):
-        small.setattr(module, "TABLES", {"faithful": like})
+        small.setattr(module, "TABLES", {"faithful": Table(like, seeds=range(2), fewer=range(2))})
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1", "--tables", "faithful"])
     make_rows.main()
     found, same = (pd.read_csv(tmp_path / f"data/results/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
     assert found["size"].tolist() == [1, 1, 2, 2] and found["r2"].between(-1, 1).all() and (found["cells"] <= 2).all()
     assert same[["size", "seed", "other"]].to_numpy().tolist() == [[1, 0, 1], [2, 0, 1]]
     assert np.isnan(same["index"][0]) and (same["ratio"] < 2).all()
+    kept = VoronoiPolicy.load(tmp_path / "data/results/faithful_SimpleGoal-v0.policy")
+    first = found[(found["size"] == 2) & (found["seed"] == 0)].iloc[0]
+    starts = start_states(get_task(SIMPLEGOAL), measure.N_REPORTED, measure.REPORT_SEED)
+    assert rollout(kept, SIMPLEGOAL, starts).returns.mean() == pytest.approx(first["mean"], abs=1e-6)
 
 
 def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
@@ -210,7 +237,7 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
     _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
     assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= method_rows.simplest_provenance(SIMPLEGOAL).items()
-    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 2 * 5 + 1  # few seeds
+    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5 + 1  # sizes 1 of 1 and 3, few seeds
     assert not (results / "beyond_race.csv").exists()
     listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
 

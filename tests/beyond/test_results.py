@@ -2,10 +2,7 @@
 
 import dataclasses
 import shutil
-import subprocess
-import sys
 from functools import cache
-from subprocess import PIPE
 from types import SimpleNamespace
 
 import pandas as pd
@@ -24,7 +21,6 @@ from vsp.paper.studies import teachers as teachers_module
 from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, READINGS, distance, landmarks, ranking
 from vsp.paper.studies.teachers import SEEDS
 from vsp.run import listed
-from vsp.run.atomic import ROOT
 
 # Committed
 
@@ -182,13 +178,15 @@ def test_results_of_another_preset_are_stale(results, monkeypatch):
 def test_results_of_another_teacher_are_stale(results, monkeypatch):
     paths = teachers_module.teachers
     monkeypatch.setattr(teachers_module, "teachers", lambda task: dict(list(paths(task).items())[:-1]))
-    monkeypatch.setattr(method_rows, "_digest", lambda task: "f" * 64)
+    monkeypatch.setattr(method_rows, "_teacher", lambda task, agent: SimpleNamespace(digest="f" * 64))
     monkeypatch.setattr(time_to_quality, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
+    names = ("beyond_{}.csv", "tuned_{}.csv", "faithful_{}.csv", "same_{}.csv", "faithful_{}.policy")
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),
-        *(says(f"beyond_{task}.csv", "teacher", "beyond") for task in method_rows.TASKS),
+        *(says(name.format(task), "teacher", "beyond") for task in method_rows.TASKS for name in names),
+        says(f"beyond_{LUNARLANDER}.csv", "teacher", "beyond-long"),
         says("beyond_race.csv", "teacher", "beyond"),
-        *long_ones("teacher"),
+        says(f"beyond_{LUNARLANDER}.policy", "teacher", "beyond-long"),
     ]
 
 
@@ -220,14 +218,3 @@ def test_make_study_writes_what_was_found(tmp_path, monkeypatch):
     assert asked == dict.fromkeys(("readings", "teachers"), (tmp_path / "build" / "study", 3))
     names = [path.name for path in sorted((tmp_path / "data" / "results").iterdir())]
     assert names == [listed.MANIFEST, "readings.csv", "teachers.csv"]
-
-
-def test_commands_run_without_a_warning():
-    """Of a module that its package has imported already, `python -m` warns."""
-    commands = ["beyond.comparison.stale", "beyond.comparison.make_rows --help"]
-    commands += ["paper.studies.make_studies --help", "paper.make_runs --help"]
-    how = {"cwd": ROOT, "stdout": PIPE, "stderr": PIPE, "text": True}
-    running = [subprocess.Popen([sys.executable, "-m", *f"vsp.{command}".split()], **how) for command in commands]
-    said = [(*process.communicate(), process.returncode) for process in running]
-    assert said[0] == ("", "", 0)  # nothing is stale
-    assert all(out.startswith("usage:") and (err, code) == ("", 0) for out, err, code in said[1:])

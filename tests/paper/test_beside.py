@@ -137,6 +137,6 @@ def test_every_run_brings_one_policy_of_each_fitted_kind(compared, monkeypatch):
 
 def test_a_comparison_is_kept_beside_the_runs(compared, tmp_path, monkeypatch):
     result, frame = compared
-    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path), frame)
+    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path, jobs=1), frame)
     monkeypatch.setattr(beside, "compare_simpler", None)  # what is kept is not made again
-    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path), frame)
+    pd.testing.assert_frame_equal(kept_comparison(result, 2, runs=tmp_path, jobs=1), frame)

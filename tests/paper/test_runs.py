@@ -1,7 +1,6 @@
 import dataclasses
 import re
 import shutil
-import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -9,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import support
-from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, alive, network_teacher, same_arrays, until
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, network_teacher, same_arrays
 
 from vsp import config, distill
 from vsp.evaluation import rollout_from_seed
@@ -319,21 +318,6 @@ def test_the_command_makes_the_runs_and_what_stands_beside_them(tmp_path, monkey
     beside = (results, n_fits), {"runs": runs, "jobs": jobs}
     first, second = ((task, {"runs": runs, "quick": quick, "jobs": jobs}) for task in N_RUNS)
     assert made == [first, beside, second, beside]
-
-
-def test_an_end_by_signal_ends_the_workers_too(tmp_path):
-    """Else they would wait for ever, with open pipes, to hand over their next run.
-
-    As `make` calls it: a module run as a script has another name than the one workers know it by.
-    """
-    command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "2", "--out", str(tmp_path)]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    until(lambda: list(tmp_path.rglob("[0-9]*.run")))
-    children = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
-    process.terminate()
-    assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
-    until(lambda: not any(alive(int(pid)) for pid in children))
-    assert len(children) >= 2
 
 
 def test_a_killed_worker_ends_the_notebooks_of_this_make(tmp_path, monkeypatch):

@@ -172,9 +172,9 @@ def test_a_killed_set_up_blocks_nobody(checkout):
 
 
 PARTS = {
-    "paper-figures quick lab course runs study lookup 01_teacher figures/ledger.pdf": {"draw"},
-    "all 06_beyond teachers short-teachers beyond beyond-long": {"draw", "train"},
-    "test bench faults": {"draw", "train", "test", "dask"},
+    "paper-figures all quick lab course runs study lookup 01_teacher 07_methods figures/ledger.pdf": {"draw"},
+    "teachers short-teachers beyond beyond-long": {"draw", "train"},
+    "test test-long bench faults": {"draw", "train", "test", "dask"},
     "lint": {"draw", "test"},
     "site": {"draw", "site"},
 }

@@ -1,24 +1,18 @@
-"""Jobs on this machine and on a Dask cluster: the same results, whoever dies on the way."""
+"""Jobs on this machine: every result once, whoever dies on the way. tests/long has them on a Dask cluster."""
 
 import os
 import signal
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher, tiny, until
+from support import CurvedTeacher
 from threadpoolctl import threadpool_info
 
-from vsp.paper.runs import Experiment, make_runs
 from vsp.run import workers
 from vsp.run.atomic import ROOT
 from vsp.run.listed import MANIFEST
 from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied, _call, _shared, results
-
-SMALL = Experiment(SIMPLEGOAL, tiny(n_epochs=500, n_freeze=5), CurvedTeacher(), n_episodes=20)
 
 
 def power(base, exponent):
@@ -33,19 +27,6 @@ def die(n):
 
 def threads():
     return {library["num_threads"] for library in threadpool_info()}
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    distributed = pytest.importorskip("distributed")  # an extra
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
-    ) as cluster:
-        yield cluster
-
-
-def files(folder):
-    return {path.name: path.read_bytes() for path in folder.rglob("*.run")}
 
 
 def ask(work, arguments, jobs, *, done=0):
@@ -84,35 +65,6 @@ def test_a_killed_worker_is_named():
     with pytest.raises(WorkerDied, match=told):
         ask(die, [(n,) for n in range(3)], 2, done=3)
     assert ask(die, [(3,), (4,)], 2) == {0: 3, 1: 4}  # and the pool is as good as new
-
-
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="joblib uses it on Linux alone")
-def test_a_kill_of_all_leaves_no_folder_of_joblibs(tmp_path):
-    """Neither in /dev/shm nor in TMPDIR, although jobs get arrays that joblib would put there."""
-    ready = tmp_path / "ready"
-    code = f"""
-import pathlib, time
-import numpy as np
-from vsp.run.workers import results
-def wait(array, n):
-    pathlib.Path({str(ready)!r}).touch()
-    time.sleep(60)
-list(results(wait, [(np.zeros(10**6), n) for n in range(4)], "work", jobs=2, total=4, unit="jobs"))
-"""
-    (tmp_path / "tmp").mkdir()
-    process = subprocess.Popen(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        start_new_session=True,
-        env=os.environ | {"TMPDIR": str(tmp_path / "tmp")},
-    )
-    until(ready.exists)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    left = [*Path("/dev/shm").glob(f"joblib*_{process.pid}_*"), *(tmp_path / "tmp").iterdir()]
-    for semaphore in Path("/dev/shm").glob(f"sem.loky-{process.pid}-*"):
-        semaphore.unlink()  # as `locks` does for a command that holds a lock
-    assert left == []
 
 
 def test_a_worker_with_other_code_is_refused(monkeypatch):
@@ -156,24 +108,3 @@ def test_a_cluster_without_its_package_is_one_clear_error(monkeypatch):
 def test_what_jobs_share_is_sent_once_and_numbers_are_not():
     teacher, other = CurvedTeacher(), CurvedTeacher()
     assert _shared([(teacher, 0), (other, 0), (teacher, 0)]) == [teacher]
-
-
-def kill_one_of(cluster, folder):
-    """SIGKILL to a worker process as soon as a run is there; how many were there by then."""
-    victim, end = next(iter(cluster.workers.values())), time.monotonic() + 60
-    while not (done := len(files(folder))):
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    os.kill(victim.pid, signal.SIGKILL)
-    return done
-
-
-def test_a_cluster_makes_the_same_runs_and_the_death_of_a_worker_changes_nothing(cluster, tmp_path):
-    from concurrent.futures import ThreadPoolExecutor
-
-    make_runs(SMALL, range(8), runs=tmp_path / "here")
-    with ThreadPoolExecutor() as beside:
-        killed = beside.submit(kill_one_of, cluster, tmp_path / "there")
-        make_runs(SMALL, range(8), runs=tmp_path / "there", jobs=cluster.scheduler_address)
-        assert killed.result(timeout=30) < 6
-    assert files(tmp_path / "here") == files(tmp_path / "there") and len(files(tmp_path / "there")) == 8

@@ -215,7 +215,7 @@ def test_numbers_of_the_text_stand_under_each_other(start, address):
     assert [start.evaluate(aligned % text) for text in ("16.599", "SimpleGoal, mean return")] == ["right", "start"]
 
 
-@pytest.mark.parametrize("name", ["index.html", "notebooks/06_beyond.html", "api/method.html"])
+@pytest.mark.parametrize("name", ["index.html", "notebooks/06_few_equations.html", "api/method.html"])
 def test_nothing_moves_while_it_loads_and_little_comes_along(browser, address, name):
     page, got = browser.new_context(viewport=DESK).new_page(), []
     page.on("response", lambda response: got.append((response.url, int(response.headers.get("content-length", 0)))))

@@ -8,7 +8,7 @@ import importlib
 from .animation import save_growth
 from .benchmarks import kills, shares_over, times_over_dimension
 from .explanation import contributions, whereabouts
-from .methods import against_time, method_comparison, return_over_cells, simplified
+from .methods import against_time, fidelity_map, likeness_over_cells, method_comparison, return_over_cells, simplified
 from .returns import (
     again,
     box_plot,

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from .style import COLOURS, DISTILLED, TEACHER, legend_below, letter, panels
+from .style import COLOURS, DISTILLED, OTHER, TEACHER, legend_below, letter, panels
 
 # The methods of the comparison: a colour per family, dashed where a method lacks a part that its family has
 METHODS = {
@@ -37,13 +37,75 @@ def method_comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> 
     fig, axes = panels(2, height=3.6)
     return_over_cells(axes[0], frame, teacher, linear=linear)
     over_cells(axes[1], frame[frame["method"] != "teacher"], "error_teacher")
-    axes[1].set(yscale="log", ylabel="half action boxes")
+    axes[1].set(yscale="log", ylabel="action error / half range")
     axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes[1].yaxis.set_major_formatter("{x:g}")
     axes[1].yaxis.set_minor_locator(NullLocator())
     letter(axes, ["return", "action error"])
     legend_below(fig, axes[0], ncol=2)
     return fig
+
+
+RIVAL_KINDS = {"oblique tree": "^", "CART": "s", "k-means": "D", "small network": "P", "soft tree": "v"}
+OWN_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # cells of the lines on the map
+LARGEST = 13  # leaves of what is drawn there
+
+
+def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
+    """Return over fidelity: what can be had. To the right, policies act more like the teacher; up, they return more.
+
+    `points` has method, size, mean and r2, as `beyond.comparison.possible` makes it. Lines are our cells, a colour per
+    number of cells: from the closest (circle) over those with the highest return at a given R² to the highest return
+    (star). Marks are other methods by kind, open as they imitate, filled where they are tuned; the larger the more
+    leaves. The scale is logarithmic in 1 - R² and, beyond `linear`, in the return.
+    """
+    points = points.assign(unlike=1.0 - points["r2"], gap=points["mean"] - teacher)
+    others = points[points["size"] <= LARGEST]
+    for kind, marker in RIVAL_KINDS.items():
+        rows = others[others["method"].str.startswith(kind)]
+        tuned = rows["method"].str.endswith(", tuned")
+        look = {"marker": marker, "edgecolor": OTHER, "lw": 0.5, "alpha": 0.7}
+        for part, face, name in ((rows[~tuned], "none", kind), (rows[tuned], OTHER, None)):
+            ax.scatter(part["unlike"], part["gap"], s=6 + 1.5 * part["size"], facecolor=face, label=name, **look)
+    one = points[points["method"].str.startswith("one linear map")]
+    ax.scatter(one["unlike"], one["gap"], marker="x", s=18, color="black", lw=1.0, label="one linear map", zorder=4)
+    for size, color in OWN_SIZES.items():
+        _own_line(ax, points[points["size"] == size], color, f"ours, {size} cells")
+    ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher’s return")
+    ax.axvline(1, color=OTHER, ls=":", lw=0.8, label="a constant")
+    ax.set_yscale("symlog", linthresh=linear)
+    ax.yaxis.set_major_formatter("{x:g}")
+    drawn = points.loc[(points["size"] <= LARGEST) & (points["method"] != "teacher"), "unlike"]
+    ax.set(xscale="log", xlim=(1.3 * drawn.max(), drawn.min() / 1.3), xlabel="R² of the actions")
+    ticks = {5: "−4", 1: "0", 0.3: ".7", 0.1: ".9", 0.05: ".95", 0.01: ".99", 0.001: ".999"}
+    ax.set_xticks(list(ticks), list(ticks.values()))
+    ax.set_xlim(1.3 * drawn.max(), drawn.min() / 1.3)  # ticks beyond it would widen it
+    ax.minorticks_off()
+    return ax
+
+
+def _own_line(ax: Axes, points: pd.DataFrame, color: str, label: str) -> None:
+    rows = points[points["method"].str.match("faithful|refined$")].sort_values("unlike")
+    ax.plot(rows["unlike"], rows["gap"], color=color, lw=1.2, marker=".", ms=4, zorder=5, label=label)
+    for method, marker in (("faithful", "o"), ("refined", "*")):
+        end = rows[rows["method"] == method]
+        ax.plot(end["unlike"], end["gap"], marker, color=color, mec="white", mew=0.4, ms=6, zorder=6)
+
+
+def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
+    """R² of the actions (from the lowest seed to the median), sameness of the cells and ratio of the actions'
+    differences over the number of cells; `table` as `beyond.comparison.likeness` makes it."""
+    ax.set_xscale("log")
+    ax.fill_between(table["size"], table["r2_least"], table["r2"], color=TEACHER, alpha=0.2, lw=0)
+    for column, color, marker, label in (
+        ("r2", TEACHER, "o", "R², median and lowest"),
+        ("index", DISTILLED, "s", "index: same cells"),
+        ("ratio", COLOURS[2], "^", "ratio: different actions"),
+    ):
+        ax.plot(table["size"], table[column], color=color, marker=marker, ms=3.5, label=label)
+    ax.set_ylim(min(0.0, table["r2_least"].min()), 1.02 * max(1.0, table["ratio"].max()))
+    ax.set_xlabel("cells")
+    return ticks_at(ax, table["size"])
 
 
 def against_time(ax: Axes, frame: pd.DataFrame, *, enough: float) -> Axes:

@@ -48,15 +48,14 @@ _STYLE = {
 
 
 def panels(
-    n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, stacked: bool = False, **subplots
+    n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, rows: int = 1, **subplots
 ) -> tuple[Figure, np.ndarray]:
-    """A figure with n panels in a row, or `stacked` in a column, as wide as an LNCS page; sizes in inches.
+    """A figure with n panels in so many `rows`, as wide as an LNCS page; sizes in inches.
 
     Returns the figure and its axes (n,). Sets the style for everything drawn afterwards.
     """
     mpl.rcParams.update(_STYLE)
-    shape = (n, 1) if stacked else (1, n)
-    fig, axes = plt.subplots(*shape, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
+    fig, axes = plt.subplots(rows, n // rows, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
     return fig, axes.ravel()
 
 

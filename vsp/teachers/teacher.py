@@ -24,8 +24,8 @@ class Teacher:
     """A deterministic TD3 actor as arrays: ReLU layers and a tanh, scaled to the action box.
 
     `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays, `critic` likewise
-    ("qf0.0.weight", ...); only `criticality` needs it. Raises ValueError when the actor does not fit the task,
-    and for numbers that are not finite or beyond `MOST_WEIGHT`.
+    ("qf0.0.weight", ...); only `criticality` and `value` need it. Raises ValueError when the actor does not fit the
+    task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
 
     def __init__(
@@ -69,16 +69,25 @@ class Teacher:
         The value of the teacher's own action minus that of the worst corner of the action box, by the lower of its two
         critics, in units of the discounted return; at least 0. Raises ValueError for a teacher without critics.
         """
-        if not self._critics:
-            raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: set criticality to False")
         states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self._half))), dtype=np.float32)
         own = (self.predict(states)[0] - self._centre) / self._half
         worst = np.min([self._value(states, np.broadcast_to(corner, own.shape)) for corner in corners], axis=0)
         return np.maximum(self._value(states, own) - worst, 0.0).astype(np.float64)
 
+    def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)
+
+        In units of the discounted return. Raises ValueError for a teacher without critics.
+        """
+        states = check_array("observations", obs, (-1, len(self.task.low))).astype(np.float32)
+        actions = check_array("actions", actions, (len(states), len(self._half))).astype(np.float32)
+        return self._value(states, (actions - self._centre) / self._half).astype(np.float64)
+
     def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """The lower of the critics' values of `actions` (n, m), scaled to [-1, 1]. (n,)"""
+        if not self._critics:
+            raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: load a teacher with critics")
         inputs = np.column_stack([states, actions])
         return np.min([_forward(layers, inputs)[:, 0] for layers in self._critics], axis=0)
 
@@ -139,3 +148,9 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
         raise atomic.DamagedFile(f"{path}: not a safetensors file: {error}") from error
     critic = part_of(tensors, "critic")
     return Teacher(part_of(tensors, "actor"), task or card.get("task"), card=card, critic=critic)
+
+
+def further_teachers(task: str) -> dict[str, Path]:
+    """The files of a task's other teachers, trained more briefly than the shipped one, by the seed of the training."""
+    others = sorted((SHIPPED / "short").glob(f"{task}-*.safetensors"))
+    return {f"seed {path.stem.split('-')[-1]}": path for path in others}

@@ -9,31 +9,34 @@ import pandas as pd
 
 from ...paper.results import write_results
 from ...run import command
-from .method_rows import LONG, TABLES, TASKS, jobs_of, keep_simplest, make_all, pairs, rows
+from .method_rows import LONG, TABLES, TASKS, UNFINISHED, jobs_of, keep_faithful, keep_simplest, make_all, pairs, rows
 from .time_to_quality import time_to_quality
 
 
 def main() -> None:
-    """Make the rows that are missing, and write data/results/<table>_<task>.csv, same_<task>.csv beside the faithful
-    table and, with times, <table>_seconds.csv and beyond_race.csv; or those of the tasks whose rows take hours, their
-    times in <table>_seconds_long.csv, and beyond_<task>.policy.
+    """Make the rows that are missing, and write data/results/<table>_<task>.csv, same_<task>.csv and
+    faithful_<task>.policy beside the faithful table and, with times, <table>_seconds.csv and beyond_race.csv; or those
+    of the tasks whose rows take hours, their times in <table>_seconds_long.csv, and beyond_<task>.policy.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
-    parser.add_argument("--tables", nargs="+", choices=TABLES, default=["beyond"], help="default: beyond")
+    committed = sorted(TABLES.keys() - UNFINISHED)
+    parser.add_argument("--tables", nargs="+", choices=TABLES, default=committed, help=f"default: {committed}")
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
     rows_in = out / "build" / "beyond"
     wanted = {(table, task): jobs_of(task, table) for table in arguments.tables for task in tasks}
+    wanted = {about: some for about, some in wanted.items() if some}
     make_all(rows_in, [job for some in wanted.values() for job in some], jobs=arguments.jobs)
-    for table in arguments.tables:
+    for table in dict.fromkeys(table for table, _ in wanted):
         found = {task: rows(rows_in, wanted[table, task]) for task in tasks}
         for task, (frame, _) in found.items():
             write_results(frame, f"{table}_{task}", out=out)
             if table == "faithful":
                 write_results(pairs(rows_in, wanted[table, task]), f"same_{task}", out=out)
+                keep_faithful(rows_in, task, out / "data" / "results" / f"faithful_{task}.policy")
         seconds = pd.concat([took for _, took in found.values()])
         write_results(seconds, f"{table}_seconds{'_long' * arguments.long}", out=out)
     if "beyond" in arguments.tables and arguments.long:

@@ -26,11 +26,11 @@ from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
 from ...run import listed, sealed
 from ...tasks.registry import get_task
-from ...teachers.teacher import load_teacher
+from ...teachers.teacher import Teacher, further_teachers, load_teacher
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from ..refinement.simplification import simplify
 from ..refinement.units import METRIC
-from . import measure, methods
+from . import apart, measure, methods, peers
 from .methods import Budget
 from .sameness import sameness
 
@@ -132,7 +132,56 @@ ABLATION = {
 FAITHFUL_SIZES = (1, 2, 3, 4, 6, 7, 8, 13)
 LIKE = {"faithful": Method(methods.faithfully, reads=OF_FAITHFUL, sizes=FAITHFUL_SIZES, preset="faithful")}
 
-TABLES = {"beyond": METHODS, "tuned": RIVALS, "faithful": LIKE}  # data/results/<table>_<task>.csv
+# Fit and geometry apart, and newer methods: all imitate the teacher's own episodes
+APART = {
+    name: Method(make, reads=EPISODES, sizes=(2, 4, 8))
+    for name, make in {
+        "our cells, our fit": apart.cells_by_global_fit,
+        "our cells, greedy fit": apart.cells_by_greedy_fit,
+        "oblique tree, our fit": apart.tree_by_global_fit,
+        "oblique tree, greedy fit": partial(methods.alone, fit=methods.FITS["oblique tree"]),
+        "critic-driven splitting": peers.critic_driven_cells,
+        "advantage-weighted maps": peers.advantage_weighted_cells,
+    }.items()
+}
+
+# The highest return of policies that are so much like the teacher: the way from `faithful` to `refined`
+DEMANDED = {
+    f"faithful, R² {r2:g}": replace(LIKE["faithful"], settings={"min_r2": r2}, sizes=(2, 4, 8))
+    for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
+}
+
+OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the nearest rivals
+AGENTS = (1, 2)  # further teachers of a task, data/teachers/short/, in the order of their names; 0 is the shipped one
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows that come into one file per task, data/results/<name>_<task>.csv."""
+
+    methods: dict[str, Method]
+    seeds: range = SEEDS
+    fewer: range = SEEDS  # of sizes that the preset does not have
+    agents: tuple[int, ...] = (0,)
+    at_preset: bool = False  # only as many cells as the preset has
+    long: tuple[str, ...] = ()  # methods that are also asked on the tasks that take long
+    long_sizes: tuple[int, ...] = (0, 1, 2, 4, 8)
+    long_seeds: range = FEW_SEEDS
+
+
+TABLES = {
+    "beyond": Table(METHODS, long=tuple(METHODS), long_sizes=(0, *SIZES)),
+    "tuned": Table(RIVALS, seeds=range(7), fewer=range(7)),
+    "faithful": Table(LIKE, fewer=range(6)),
+    "apart": Table(APART, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
+    "demanded": Table(DEMANDED, seeds=range(3), fewer=range(3)),
+    "teachers": Table(
+        LIKE | {name: (METHODS | RIVALS)[name] for name in ("teacher", "refined", OBLIQUE, ONE_MAP)},
+        seeds=FEW_SEEDS, fewer=FEW_SEEDS, agents=AGENTS, at_preset=True,
+    ),
+}  # fmt: skip
+
+UNFINISHED = ("apart", "demanded", "teachers")  # tables whose rows are not all made yet: data/README.md
 
 
 @dataclass(frozen=True)
@@ -143,11 +192,12 @@ class Job:
     method: str
     size: int
     seed: int
+    agent: int = 0  # the shipped teacher, or one of `AGENTS`
 
     @property
     def how(self) -> Method:
         """The method, or `refined` with a part taken away."""
-        if self.method in (known := METHODS | RIVALS | LIKE):
+        if self.method in (known := METHODS | RIVALS | LIKE | APART | DEMANDED):
             return known[self.method]
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
@@ -158,7 +208,13 @@ class Job:
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
         about["measure"] = measure.settings() | (measure.common() if how.preset == "faithful" else {})
-        return provenance(about, _digest(self.task), how.version)
+        about["measure"] |= measure.tail_settings() if self.with_tail else {}
+        return provenance(about, _teacher(self.task, self.agent).digest, how.version)
+
+    @property
+    def with_tail(self) -> bool:
+        """Whether the worst episodes are reported too."""
+        return self.task in LONG and self.method not in METHODS
 
     def path(self, folder: str | os.PathLike) -> Path:
         """Its file."""
@@ -166,7 +222,8 @@ class Job:
 
     def about(self) -> dict:
         """What its file names."""
-        return {**asdict(self), **self.provenance}
+        named = {name: value for name, value in asdict(self).items() if name != "agent"}
+        return {**named, **self.provenance}  # the checksum of the teacher names the agent
 
 
 def preset(task: str, kind: str) -> Refinement | Faithful | Config:
@@ -175,33 +232,48 @@ def preset(task: str, kind: str) -> Refinement | Faithful | Config:
 
 
 @cache
-def _digest(task: str) -> str:
-    return load_teacher(task).digest
+def _teacher(task: str, agent: int) -> Teacher:
+    """The shipped teacher of a task, or one of its further ones, by number."""
+    return load_teacher(list(further_teachers(task).values())[agent - 1] if agent else task)
 
 
 def jobs_of(task: str, table: str = "beyond") -> list[Job]:
     """All rows of a task in a table, a key of `TABLES`."""
-    found, several = [], FEW_SEEDS if task in LONG else SEEDS
-    for name, method in TABLES[table].items():
-        if method.tasks is None or task in method.tasks:
-            seeds = several if method.chance else several[:1]
-            found += [Job(task, name, size, seed) for size in method.sizes for seed in seeds]
+    about, found = TABLES[table], []
+    for name, method in about.methods.items():
+        if (method.tasks is None or task in method.tasks) and (task not in LONG or name in about.long):
+            for size in _sizes(task, method, about):
+                seeds = _seeds(task, method, about, size)
+                found += [Job(task, name, size, seed, agent) for agent in about.agents for seed in seeds]
     if table != "beyond" or task in LONG:
         return found
     names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS]
-    return found + [Job(task, name, tuned_preset(task).n_cells, seed) for name in names for seed in several]
+    return found + [Job(task, name, tuned_preset(task).n_cells, seed) for name in names for seed in about.seeds]
+
+
+def _sizes(task: str, method: Method, about: Table) -> tuple[int, ...]:
+    if about.at_preset and method.sizes != OWN:
+        return (preset(task, method.preset).n_cells,)
+    return tuple(size for size in method.sizes if task not in LONG or size in about.long_sizes)
+
+
+def _seeds(task: str, method: Method, about: Table, size: int) -> range:
+    own = size in (OWN[0], preset(task, method.preset).n_cells) if about.fewer != about.seeds else True
+    seeds = about.long_seeds if task in LONG else about.seeds if own else about.fewer
+    return seeds if method.chance else seeds[:1]
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
     """Distil and measure: what the file of the row holds, no arrays and about."""
-    budget = Budget(load_teacher(job.task), get_task(job.task), preset(job.task, job.how.preset))
+    teacher = _teacher(job.task, job.agent)
+    budget = Budget(teacher, get_task(job.task), preset(job.task, job.how.preset))
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
-    row = measure.measure(policy, budget.teacher, budget.task)
+    row = measure.measure(policy, teacher, budget.task) | (measure.tail(policy, budget.task) if job.with_tail else {})
     if not isinstance(policy, VoronoiPolicy):
         return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
-    row |= measure.fidelity(policy, budget.teacher, budget.task) if job.how.preset == "faithful" else {}
+    row |= measure.fidelity(policy, teacher, budget.task) if job.how.preset == "faithful" else {}
     arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
     return arrays, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
 
@@ -217,7 +289,7 @@ def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd
     found, took = [], []
     for job in wanted:
         _, about = load_made(job.path(folder), "Row", job.about())
-        what = {"method": job.method, "size": job.size, "seed": job.seed}
+        what = {"method": job.method, "size": job.size, "seed": job.seed} | ({"agent": job.agent} if job.agent else {})
         found.append({**what, **about["row"], **job.provenance})
         took.append({"task": job.task, **what, "seconds": about["seconds"]})
     return pd.DataFrame(found), pd.DataFrame(took)
@@ -225,16 +297,28 @@ def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd
 
 def pairs(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
     """How alike the policies of different seeds are, one row per size and pair, for rows whose files keep policies."""
-    found, by_size = [], {}
+    found, by_kind = [], {}
     for job in wanted:
         arrays, _ = load_made(job.path(folder), "Row", job.about())
         policy = VoronoiPolicy(**arrays, task=job.task, metric=METRIC)
-        by_size.setdefault((job.task, job.size), {})[job.seed] = policy
-    for (task, size), policies in by_size.items():
-        frame = sameness(policies, load_teacher(task), get_task(task))
-        frame.insert(0, "size", size)
+        by_kind.setdefault(replace(job, seed=0), {})[job.seed] = policy
+    for job, policies in by_kind.items():
+        frame = sameness(policies, load_teacher(job.task), get_task(job.task)).assign(**job.provenance)
+        frame.insert(0, "size", job.size)
         found.append(frame)
     return pd.concat(found, ignore_index=True)
+
+
+def keep_faithful(folder: str | os.PathLike, task: str, path: str | os.PathLike) -> None:
+    """Write the faithful policy of the preset's size and of the first seed to `path`, with its provenance; listed."""
+    job = faithful_job(task)
+    arrays, _ = load_made(job.path(folder), "Row", job.about())
+    _keep(VoronoiPolicy(**arrays, task=task, metric=METRIC), path, job.provenance)
+
+
+def faithful_job(task: str) -> Job:
+    """The row whose policy is kept."""
+    return Job(task, "faithful", faithful_preset(task).n_cells, 0)
 
 
 def simplest(task: str) -> VoronoiPolicy:
@@ -247,12 +331,17 @@ def simplest(task: str) -> VoronoiPolicy:
 
 def keep_simplest(task: str, path: str | os.PathLike) -> None:
     """Make `simplest`, and write it to `path` with its provenance; listed."""
-    simplest(task).save(path)
+    _keep(simplest(task), path, simplest_provenance(task))
+
+
+def _keep(policy: VoronoiPolicy, path: str | os.PathLike, made_with: dict) -> None:
+    policy.save(path)
     arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
-    sealed.save_arrays(path, arrays, about | simplest_provenance(task))
+    sealed.save_arrays(path, arrays, about | made_with)
     listed.list_file(path)
 
 
 def simplest_provenance(task: str) -> dict[str, str | int]:
     """What decides the policy of `simplest`; its seed is 0."""
-    return provenance({"task": task, "loss": LOSS, **asdict(tuned_preset(task))}, _digest(task), SIMPLIFY_VERSION)
+    settings = {"task": task, "loss": LOSS, **asdict(tuned_preset(task))}
+    return provenance(settings, _teacher(task, 0).digest, SIMPLIFY_VERSION)

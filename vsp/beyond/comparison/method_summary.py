@@ -19,9 +19,10 @@ MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameter
 INTERVAL = ("mean", "low", "high")
 
 
-def read_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The committed rows of `task`, or those in another folder; `failing` is NaN where nothing can reach a goal."""
-    frame = read_results(f"beyond_{task}", folder)
+def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "beyond") -> pd.DataFrame:
+    """The committed rows of `task` in a table of `method_rows`, or those in another folder; `failing` is NaN where
+    nothing can reach a goal."""
+    frame = read_results(f"{table}_{task}", folder)
     return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame
 
 
@@ -55,12 +56,13 @@ def rivals(table: pd.DataFrame) -> pd.DataFrame:
         best = rows[~rows["method"].str.startswith("refined")].iloc[0]
         row = {"size": size, **{name: own[name] for name in INTERVAL}, "rival": best["method"]}
         row |= {f"rival {name}": best[name] for name in INTERVAL}
-        row |= {"ahead": _ahead(own, best), "untuned": untuned["mean"], "untuned ahead": _ahead(untuned, best)}
+        row |= {"ahead": ahead(own, best), "untuned": untuned["mean"], "untuned ahead": ahead(untuned, best)}
         found.append(row)
     return pd.DataFrame(found)
 
 
-def _ahead(own: dict, other: pd.Series) -> str:
+def ahead(own: dict | pd.Series, other: pd.Series) -> str:
+    """Who is ahead: "ours" or "theirs" where the intervals low to high do not overlap, else "level"."""
     return "ours" if own["low"] > other["high"] else "theirs" if other["low"] > own["high"] else "level"
 
 

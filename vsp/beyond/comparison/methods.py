@@ -7,6 +7,7 @@ its own preset, and TD-AVQ has no teacher.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -52,9 +53,12 @@ def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
     return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
 
 
-def faithfully(budget: Budget, size: int, seed: int) -> Policy:
-    """`distill_faithfully`, by the faithful preset."""
-    return distill_faithfully(budget.teacher, budget.task, replace(budget.config, n_cells=size), seed=seed)[0]
+def faithfully(budget: Budget, size: int, seed: int, **changes) -> Policy:
+    """`distill_faithfully`, by the faithful preset with some settings changed."""
+    config = replace(budget.config, n_cells=size, **changes)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "no policy of")  # the row says what was found
+        return distill_faithfully(budget.teacher, budget.task, config, seed=seed)[0]
 
 
 def imitated(budget: Budget, size: int, seed: int) -> Policy:

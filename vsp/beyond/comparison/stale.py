@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
 from ..benchmarks import lookup
 from . import time_to_quality
-from .method_rows import LONG, TASKS, jobs_of, simplest_provenance
+from .method_rows import LONG, TABLES, TASKS, UNFINISHED, Job, faithful_job, jobs_of, simplest_provenance
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:
@@ -42,11 +43,16 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
     """Committed files: the name, the target that makes it, and what its rows would name today, given its rows."""
     yield "readings.csv", "study", _readings
     yield "teachers.csv", "study", _teachers
-    for task in TASKS:
-        yield f"beyond_{task}.csv", "beyond", partial(_rows, task)
+    for task in (*TASKS, *LONG):
+        target = "beyond-long" if task in LONG else "beyond"
+        for table in TABLES:
+            if table not in UNFINISHED and jobs_of(task, table):
+                yield f"{table}_{task}.csv", target, partial(_rows, task, table)
+        if jobs_of(task, "faithful"):
+            yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
+            yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
     yield "beyond_race.csv", "beyond", _race
     for task in LONG:
-        yield f"beyond_{task}.csv", "beyond-long", partial(_rows, task)
         yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
     yield "lookup.csv", "lookup", lambda _: [lookup.made_with()]
 
@@ -83,8 +89,13 @@ def _teachers(frame: pd.DataFrame) -> Iterable[dict]:
         yield from ({**teachers.provenance_of(experiment), "seed": seed} for seed in teachers.SEEDS)
 
 
-def _rows(task: str, frame: pd.DataFrame) -> Iterable[dict]:
-    return (job.about() for job in jobs_of(task))
+def _rows(task: str, table: str, frame: pd.DataFrame) -> Iterable[dict]:
+    made_with: dict[Job, dict] = {}  # seeds have it in common
+    for job in jobs_of(task, table):
+        kind = replace(job, seed=0)
+        if kind not in made_with:
+            made_with[kind] = kind.provenance
+        yield {"seed": job.seed, **made_with[kind]}
 
 
 def _race(frame: pd.DataFrame) -> Iterable[dict]:

@@ -139,7 +139,7 @@ def check_faithful(config: Faithful) -> None:
 
 _FAITHFUL = {
     "SimpleGoal-v0": Faithful(
-        n_cells=7, tolerance=0.03, failure_penalty=100.0, n_generations=200, n_validation=20_000
+        n_cells=8, tolerance=0.03, failure_penalty=100.0, n_generations=200, n_validation=20_000
     ),
     "MountainCarContinuous-v0": Faithful(
         n_cells=2, tolerance=0.1, margin=0.1, failure_penalty=100_000.0, n_episodes=2000,

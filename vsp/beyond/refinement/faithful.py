@@ -6,6 +6,7 @@ least error. The return is a constraint, not the aim: beyond the teacher's it ea
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from ...checks import check_seed
 from ...policy import VoronoiPolicy
-from ...rollouts import Policy, rollout, score, visited_states
+from ...rollouts import Policy, rollout, score, visited_states, warn_outside
 from ...tasks.base import GOAL, Task
 from ...tasks.registry import get_task
 from .anneal import squared_error
@@ -32,6 +33,7 @@ FIRST_STEP = 0.02  # of the tuning: its candidates have about so much more error
 NUDGE = 0.05  # of a codeword, for the curvature of the error; in deviations of the states
 SHARE = 0.02  # of the teacher's mean return: the tolerance, if none is given
 BEYOND = 0.001  # unexplained variance beyond that of `min_r2` that weighs as much as a tolerance of return
+NEAR = 2.0  # times the error of the closest cells: the most of what is kept where no candidate returns enough
 PRICE = 0.03  # of a return that is missed by the whole tolerance, in units of the unexplained variance, 1 - R²
 
 
@@ -43,13 +45,14 @@ def distill_faithfully(
 
     Returns the policy and its history, one row per candidate: stage ("fit", "tune"), r2 (of the limited actions, on the
     states of the fit), gap (of the mean return, less the failure penalty, to the teacher's from the same starts), kept.
-    The most visited cell comes first. Raises ValueError as `distill` does.
+    The most visited cell comes first. Warns where no such policy is found. Raises ValueError as `distill` does.
     """
     check_seed(seed)
     check_faithful(config)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    warn_outside(task, states)
     frame = Frame.of(task, states)
     seen = frame.labelled(teacher, states[spread(states / frame.scale, config.n_states, init)])
     judge = _Judge(frame, teacher, seen, config, task.start(validation, config.n_validation))
@@ -61,11 +64,19 @@ def distill_faithfully(
         config = replace(config, tolerance=judge.tolerance)
         for tuned in _tune(frame, teacher, some, cells, config, search):
             judge.add("tune", tuned)
-    return frame.policy(by_visits(needed_only(judge.best, seen), seen)), judge.frame()
+    if judge.shortfall:
+        warnings.warn(judge.shortfall, stacklevel=4)  # of whoever calls `vsp.distill`
+    cells, fewer = judge.best, needed_only(judge.best, seen)
+    if len(fewer.codewords) < len(cells.codewords) and judge.returns_enough(fewer):
+        cells = fewer
+    return frame.policy(by_visits(among_states(cells, seen), seen)), judge.frame()
 
 
 class _Judge:
-    """Chooses between candidates: the least error among those whose return is accepted, else the highest return."""
+    """Chooses between candidates: the least error among those whose return is accepted.
+
+    Where none is, the highest return among those `NEAR` the closest, which is the first.
+    """
 
     def __init__(self, frame: Frame, teacher: Policy, seen: LabelledStates, config: Faithful, starts: np.ndarray):
         self.rows, self._cells = [], []
@@ -76,18 +87,37 @@ class _Judge:
         self._least_gap = config.margin - 0.5 * self.tolerance
 
     def add(self, stage: str, cells: Cells) -> None:
-        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
-        gap = score(result, self._config.failure_penalty) - self._own
         r2 = 1.0 - squared_error(self._seen, cells) / variance(self._seen)
-        self.rows.append({"stage": stage, "r2": r2, "gap": gap})
+        self.rows.append({"stage": stage, "r2": r2, "gap": self._gap(cells)})
         self._cells.append(cells)
+
+    def _gap(self, cells: Cells) -> float:
+        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
+        return score(result, self._config.failure_penalty) - self._own
+
+    def returns_enough(self, cells: Cells) -> bool:
+        """Whether they return as much as the best, or what is accepted."""
+        kept = self.rows[self._best]["gap"]
+        return self._gap(cells) >= (kept if self._config.min_r2 is not None else min(kept, self._least_gap))
 
     @property
     def _best(self) -> int:
         r2, gap = (np.array([row[name] for row in self.rows]) for name in ("r2", "gap"))
         if self._config.min_r2 is not None:
             return _first_by(gap, r2 >= self._config.min_r2, else_by=r2)
-        return _first_by(r2, gap >= self._least_gap, else_by=gap)
+        enough, near = gap >= self._least_gap, 1.0 - r2 <= NEAR * (1.0 - r2[0])
+        return _first_by(r2, enough, else_by=np.where(near, gap, -np.inf))
+
+    @property
+    def shortfall(self) -> str | None:
+        """What was asked for and not found, in words."""
+        kept, cells, floor = self.rows[self._best], self._config.n_cells, self._config.min_r2
+        if floor is not None and kept["r2"] < floor:
+            return f"no policy of {cells} cells with R² {floor:g} was found: the closest is kept, R² {kept['r2']:.3f}"
+        if floor is None and kept["gap"] < self._least_gap:
+            what = f"{kept['gap']:+.4g} over the teacher's return less penalties, expected {self._least_gap:+.4g}"
+            return f"no policy of {cells} cells that acts like the teacher returns enough: the best has {what}"
+        return None
 
     @property
     def goes_on(self) -> bool:
@@ -175,6 +205,18 @@ def needed_only(cells: Cells, seen: LabelledStates) -> Cells:
 
 def _without(cells: Cells, i: int) -> Cells:
     return Cells(np.delete(cells.codewords, i, axis=0), np.delete(cells.maps, i, axis=0))
+
+
+def among_states(cells: Cells, seen: LabelledStates) -> Cells:
+    """The same border between two cells, drawn by codewords among the states: of the many pairs that draw it, the one
+    around the mean state. More codewords have no such choice."""
+    if len(cells.codewords) != 2:
+        return cells
+    states, (one, other) = seen.inputs[:, :-1], cells.codewords
+    across = (other - one) / np.linalg.norm(other - one)
+    beyond = (states - (one + other) / 2) @ across  # signed distances from the border
+    on_border = states.mean(axis=0) - beyond.mean() * across
+    return Cells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.maps)
 
 
 def by_visits(cells: Cells, seen: LabelledStates) -> Cells:

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from ...checks import check_seed
 from ...policy import VoronoiPolicy
-from ...rollouts import Policy, visited_states
+from ...rollouts import Policy, visited_states, warn_outside
 from ...tasks.base import Task
 from ...tasks.registry import get_task
 from .anneal import anneal, linear_init, random_init, warm
@@ -45,6 +45,7 @@ def refine(
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    warn_outside(task, states)
     frame = Frame.of(task, states)
     seen = frame.labelled(teacher, states, criticality=config.criticality)
     objective = Objective(config.failure_penalty, config.error_penalty, seen)

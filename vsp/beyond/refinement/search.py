@@ -19,7 +19,8 @@ TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
 LEAKS = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
 N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last descent
 FEW = 8000  # states that the rounds see; too few, and the rare states decide by chance
-ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))  # stages, and how many descents go on
+# Stages, and how many descents go on: giving up sooner is quicker, and loses the best ends of few cells
+ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))
 LAST = range(12, N_STAGES)  # of the last descent, which sees all states
 AT_ONCE = 60_000  # numbers of the largest arrays in a loss: what fits into the cache
 RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ...baselines.simple import linear_map
 from ...evaluation import rollout_from_seed
-from ...teachers.teacher import SHIPPED, load_teacher
+from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
 from ..beside import teacher_data
 from ..results import settings_id
@@ -24,8 +24,7 @@ SEEDS = range(1000, 1010)  # of the distillations of each teacher
 
 def teachers(task: str) -> dict[str, Path]:
     """The teachers of `task` by name: the shipped one, and those of shorter training."""
-    others = sorted((SHIPPED / "short").glob(f"{task}-*.safetensors"))
-    return {"shipped": SHIPPED / f"{task}.safetensors"} | {f"seed {path.stem.split('-')[-1]}": path for path in others}
+    return {"shipped": SHIPPED / f"{task}.safetensors"} | further_teachers(task)
 
 
 def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) -> pd.DataFrame:

@@ -1,0 +1,64 @@
+import time
+
+import numpy as np
+from support import SIMPLEGOAL, CurvedTeacher
+
+from vsp.beyond.refinement import duration, faithful, search
+from vsp.beyond.refinement.config import Faithful
+from vsp.tasks.registry import get_task
+
+SMALL = Faithful(n_cells=3, n_episodes=100, n_restarts=4, n_generations=10, n_tuning_episodes=50, n_validation=100)
+
+
+def test_episodes_and_losses_are_counted(monkeypatch):
+    """Where an episode takes a second and a loss two."""
+    monkeypatch.setattr(duration, "_seconds", lambda work: float(duration.PLAYED))
+    monkeypatch.setattr(duration, "_one_loss", lambda task, config: 2.0)
+    fit, tuning = duration.expected_seconds(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
+    assert fit == 100 + 2 * 100 + 2.0 * duration._losses(4, SMALL.n_states)
+    # 3 cells of 2 numbers, and of 3 rows for 2 actions: 24 numbers, for which CMA-ES has 13 candidates
+    assert tuning == 10 * 13 * 50 + faithful.POOL * 50 + faithful.SNAPSHOTS * 100
+
+
+def test_what_takes_time_is_timed():
+    fit, tuning = duration.expected_seconds(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
+    slow_fit, slow_tuning = duration.expected_seconds(Slow(), get_task(SIMPLEGOAL), SMALL)
+    assert slow_tuning > 10 * tuning > 0 and fit > 0 and slow_fit > 0
+
+
+class Slow(CurvedTeacher):
+    """Takes a while for each batch."""
+
+    def predict(self, obs):
+        time.sleep(0.05)
+        return super().predict(obs)
+
+
+def test_a_slower_teacher_takes_longer_and_tuning_the_longer_the_more_it_plays():
+    task = get_task(SIMPLEGOAL)
+    _, tuning = duration.expected_seconds(CurvedTeacher(), task, SMALL)
+    slow_fit, slow_tuning = duration.expected_seconds(Slow(), task, SMALL)
+    assert slow_tuning > tuning > 0 < slow_fit < slow_tuning
+
+
+def test_losses_are_counted_as_the_search_computes_them(monkeypatch):
+    rng, counted = np.random.default_rng(0), []
+    monkeypatch.setattr(search, "descend", lambda seen, cells, stages, **_: counted.append(len(stages)) or cells)
+    monkeypatch.setattr(search, "squared_error", lambda *_: 0.0)
+    monkeypatch.setattr(search, "local_maps", lambda *_: None)
+    monkeypatch.setattr(search, "spread", lambda *_: None)
+
+    class Seen:
+        inputs = np.zeros((1, 3))
+
+        def rows(self, _):
+            return self
+
+    search.least_error(Seen(), 3, 20, rng)
+    *rounds, last = counted
+    assert duration._losses(20, search.FEW) == search.N_ITERATIONS * sum(rounds) + search.N_LAST * last
+
+
+def test_words_for_seconds():
+    found = [duration.in_words(seconds) for seconds in (0.3, 18.0, 89.0, 100.0, 400.0)]
+    assert found == ["about 5 seconds", "about 20 seconds", "about 90 seconds", "about 2 minutes", "about 7 minutes"]

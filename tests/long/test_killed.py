@@ -1,0 +1,122 @@
+"""Commands that are killed or told to end, with their kernels and workers: nothing of theirs is left."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support import alive, until
+from support import write_story as write
+
+from vsp.run import run_notebook
+from vsp.run.atomic import ROOT
+
+DRAW = """\
+from pathlib import Path
+folder = Path(out) / "figures"
+folder.mkdir(parents=True)"""
+
+WORKERS = """\
+import joblib, os, pathlib, tempfile, time
+import numpy as np
+tempfile.mkstemp()
+def wait(array, n):
+    (pathlib.Path(runs) / "ready").touch()
+    time.sleep(60 if os.environ.get("WAIT") else 0)
+(pathlib.Path(runs) / "kernel").write_text(str(os.getpid()))
+_ = joblib.Parallel(2)(joblib.delayed(wait)(np.zeros(10**6), n) for n in range(2))"""
+
+
+def test_a_killed_run_leaves_nothing_in_the_folders_of_others_and_the_next_removes_the_rest(tmp_path):
+    """Neither its connection file, nor what the kernel and its workers make for a while, lies in TMPDIR or /dev/shm."""
+    shared, runs, memory = tmp_path / "tmp", tmp_path / "data" / "runs", Path("/dev/shm")
+    shared.mkdir(), runs.mkdir(parents=True)
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, WORKERS), "--out", tmp_path]
+    environ = os.environ | {"TMPDIR": str(shared)}
+    process = subprocess.Popen(command, cwd=ROOT, start_new_session=True, env=environ | {"WAIT": "1"})
+    until((runs / "ready").exists)
+    kernel = int((runs / "kernel").read_text())
+    for group in (process.pid, kernel):
+        os.killpg(group, signal.SIGKILL)
+    process.wait()
+    for semaphore in memory.glob(f"sem.loky-{kernel}-*"):  # a kernel that ends when its runner does removes them
+        semaphore.unlink()
+    assert not list(shared.iterdir()) and not list(memory.glob(f"joblib*_{kernel}_*"))
+    (work,) = (tmp_path / "build" / "running").iterdir()
+    assert (work / "kernel.json").exists() and list((work / "tmp").iterdir())
+    subprocess.run(command, cwd=ROOT, env=environ, check=True)
+    assert not list((tmp_path / "build" / "running").iterdir()) and not list(shared.iterdir())
+
+
+def test_end_by_signal_ends_kernel(tmp_path):
+    """SIGTERM to the runner: no kernel and no output is left, and its lock is free."""
+    pid = tmp_path / "pid"
+    wait = "import os, time\n(Path(out).parents[3] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, DRAW, wait), "--out", tmp_path]
+    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    until(lambda: pid.exists() and pid.read_text())
+    process.send_signal(signal.SIGTERM)
+    assert "story.ipynb: interrupted" in process.communicate(timeout=30)[1]
+    assert process.returncode == 1
+    until(lambda: not alive(int(pid.read_text())))
+    assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
+
+
+def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
+    """Which make would wait for, however long."""
+    started = "(Path(out).parents[3] / 'started').touch()\nimport time\ntime.sleep(120)"
+    other = write(tmp_path, DRAW, started).rename(tmp_path / "other.ipynb")
+    command = [sys.executable, "-m", "vsp.run.run_notebook", other, "--out", tmp_path]
+    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    until((tmp_path / "started").exists)
+    killed = write(tmp_path, DRAW, "import os\nos.kill(os.getpid(), 9)")
+    with pytest.raises(SystemExit) as end:
+        run_notebook.main([str(killed), "--out", str(tmp_path)])
+    assert "did not end: DeadKernelError" in end.value.code
+    assert "other.ipynb: interrupted" in process.communicate(timeout=30)[1]
+
+
+def test_an_end_by_signal_ends_the_workers_too(tmp_path):
+    """Else they would wait for ever, with open pipes, to hand over their next run.
+
+    As `make` calls it: a module run as a script has another name than the one workers know it by.
+    """
+    command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "2", "--out", str(tmp_path)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until(lambda: list(tmp_path.rglob("[0-9]*.run")))
+    children = subprocess.check_output(["pgrep", "-P", str(process.pid)], text=True).split()
+    process.terminate()
+    assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
+    until(lambda: not any(alive(int(pid)) for pid in children))
+    assert len(children) >= 2
+
+
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="joblib uses it on Linux alone")
+def test_a_kill_of_all_leaves_no_folder_of_joblibs(tmp_path):
+    """Neither in /dev/shm nor in TMPDIR, although jobs get arrays that joblib would put there."""
+    ready = tmp_path / "ready"
+    code = f"""
+import pathlib, time
+import numpy as np
+from vsp.run.workers import results
+def wait(array, n):
+    pathlib.Path({str(ready)!r}).touch()
+    time.sleep(60)
+list(results(wait, [(np.zeros(10**6), n) for n in range(4)], "work", jobs=2, total=4, unit="jobs"))
+"""
+    (tmp_path / "tmp").mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        start_new_session=True,
+        env=os.environ | {"TMPDIR": str(tmp_path / "tmp")},
+    )
+    until(ready.exists)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    left = [*Path("/dev/shm").glob(f"joblib*_{process.pid}_*"), *(tmp_path / "tmp").iterdir()]
+    for semaphore in Path("/dev/shm").glob(f"sem.loky-{process.pid}-*"):
+        semaphore.unlink()  # as `locks` does for a command that holds a lock
+    assert left == []

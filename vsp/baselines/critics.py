@@ -1,0 +1,119 @@
+"""Linear maps in cells that ask the teacher's critics, after two published methods.
+
+Both are fitted to states (n, d) and actions (n, m) of a teacher. They raise ValueError for a teacher without critics,
+arrays of a wrong shape, numbers that are not finite, less than one cell, and a bad seed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..checks import check_count, check_data, check_seed
+from ..geometry import nearest
+from ..policy import VoronoiPolicy
+from ..subpolicies import linear_outputs
+from ..subpolicies.stacked import BETA1, BETA2, EPSILON
+from ..tasks.base import Task
+from ..tasks.registry import get_task
+from ..teachers.teacher import Teacher
+from .simple import kmeans_cells
+from .trees import standard
+
+N_STEPS, BATCH, RATE = 1000, 256, 0.03  # of Adam: steps per added cell, states per step, first step in half ranges
+WORST = 0.01  # share of a cell's states, those that lose the most value, around which a codeword is added
+
+
+def critic_driven(
+    states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
+) -> VoronoiPolicy:
+    """Cells that are added where the critics value the distilled action too little, after arXiv 2605.14897.
+
+    Written from its abstract alone, which says: linear maps are trained by gradient descent, cells are added where the
+    value is insufficient by the teacher's critic, and each state belongs to its nearest codeword. The rest is our
+    guess. The first codeword is the mean of the states; distances are Euclidean, of standardised states; maps are
+    trained by `trained`. A state loses the value of the teacher's action minus that of the distilled action, at least
+    0. The cell that loses most in sum gets a second codeword, at the mean of the hundredth of its states that lose
+    most, with a copy of its map. Codewords never move. There are fewer than `cells` where no value is lost.
+    """
+    check_seed(seed)
+    check_count("cells", cells)
+    _check_critics(teacher)
+    own_task, rng = get_task(task), np.random.default_rng(seed)
+    states, actions = check_data(states, actions, len(own_task.low), len(own_task.action_low))
+    centre, scale = standard(states)
+    points, best = (states - centre) / scale, teacher.value(states, actions)
+    codewords, maps = np.zeros((1, len(centre))), np.zeros((1, len(centre) + 1, actions.shape[1]))
+    while True:
+        own = nearest(codewords, points, "euclidean")
+        maps = trained(maps, own, points, actions, own_task, rng)
+        distilled = np.clip(linear_outputs(points, maps[own]), own_task.action_low, own_task.action_high)
+        lost = np.maximum(0.0, best - teacher.value(states, distilled))
+        if len(maps) >= cells or not lost.any():
+            break
+        cell, codeword = where_lost(points, own, lost)
+        codewords, maps = np.vstack([codewords, codeword]), np.concatenate([maps, maps[cell][None]])
+    weights = maps[:, :-1] / scale[:, None]
+    coefficients = np.concatenate([weights, maps[:, -1:] - (centre @ weights)[:, None]], axis=1)
+    return VoronoiPolicy(codewords * scale + centre, coefficients, task=task, metric="euclidean", scale=scale)
+
+
+def where_lost(points: np.ndarray, own: np.ndarray, lost: np.ndarray) -> tuple[int, np.ndarray]:
+    """The cell that loses most in sum, and the mean (d,) of the points in it that lose most, `WORST` of them.
+
+    `points` (n, d) belong to the cells `own` (n,) and lose `lost` (n,).
+    """
+    cell = int(np.bincount(own, lost).argmax())
+    rows = np.flatnonzero(own == cell)
+    worst = rows[np.argsort(-lost[rows], kind="stable")[: max(1, round(WORST * len(rows)))]]
+    return cell, points[worst].mean(axis=0)
+
+
+def trained(
+    maps: np.ndarray, own: np.ndarray, points: np.ndarray, actions: np.ndarray, task: Task, rng: np.random.Generator
+) -> np.ndarray:
+    """`maps` (k, d + 1, m) of the cells `own` (n,) after Adam on the squared error of the limited action.
+
+    `points` (n, d) are standardised, `actions` (n, m) in the units of the task. Batches are drawn with `rng`, steps
+    fall to 0. The gradient passes through the limit as if there were none, or maps beyond it would learn no more.
+    """
+    half, mean, square = 0.5 * (task.action_high - task.action_low), np.zeros_like(maps), np.zeros_like(maps)
+    inputs = np.column_stack([points, np.ones(len(points))])
+    for i in range(N_STEPS):
+        rows = rng.integers(len(points), size=BATCH)
+        raw = linear_outputs(points[rows], maps[own[rows]])
+        error = (np.clip(raw, task.action_low, task.action_high) - actions[rows]) / half
+        here = own[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
+        gradient = 2 / BATCH * np.einsum("kn,np,nm->kpm", here, inputs[rows], error, optimize=True)
+        mean = BETA1 * mean + (1 - BETA1) * gradient
+        square = BETA2 * square + (1 - BETA2) * gradient**2
+        step = mean / (1 - BETA1 ** (i + 1)) / (np.sqrt(square / (1 - BETA2 ** (i + 1))) + EPSILON)
+        maps = maps - RATE * (1 - i / N_STEPS) * half * step
+    return maps
+
+
+def advantage_weighted(
+    states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
+) -> VoronoiPolicy:
+    """`kmeans_cells` whose maps err least where a wrong action costs most, after the idea of arXiv 2507.07848.
+
+    Dispoto et al. (2025) weight the fit of an interpretable policy by the advantage. Here the maps are least squares
+    weighted by the teacher's criticality, relative to the largest of the cell. A cell where no action costs anything
+    keeps its unweighted map. With one cell, this is one weighted linear map.
+    """
+    _check_critics(teacher)
+    policy = kmeans_cells(states, actions, cells=cells, task=task, seed=seed)
+    states, actions = check_data(states, actions)
+    own, weights, coefficients = policy.cells(states), teacher.criticality(states), policy.coefficients.copy()
+    inputs = np.column_stack([states, np.ones(len(states))])
+    for i in np.unique(own):
+        here = own == i
+        if (most := weights[here].max()) > 0:
+            root = np.sqrt(weights[here] / most)[:, None]
+            coefficients[i] = np.linalg.lstsq(root * inputs[here], root * actions[here], rcond=None)[0]
+    return VoronoiPolicy(policy.codewords, coefficients, task=policy.task, metric=policy.metric, scale=policy.scale)
+
+
+def _check_critics(teacher: Teacher) -> None:
+    if not hasattr(teacher, "value"):
+        name = type(teacher).__name__
+        raise ValueError(f"the teacher is a {name} without critics, expected one with, such as vsp.load_teacher gives")

@@ -1,0 +1,190 @@
+"""Who leads at equal tuning: every method with as many cells or leaves, as it imitates and as it is tuned.
+
+Also what each of them costs: episodes of every kind, and seconds.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pandas as pd
+
+from ...baselines.small_network import units_for
+from ...evaluation import start_states
+from ...paper.results import read_results
+from ...rollouts import visited_states
+from ...tasks.registry import SLOW, get_task
+from ...teachers.teacher import Teacher, load_teacher
+from ..refinement import faithful, tune
+from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
+from .measure import ERROR_SEED, N_ERROR
+from .method_rows import LONG, TABLES, UNFINISHED, UNTUNED, jobs_of
+from .method_summary import ahead, method_summary, read_rows
+from .methods import numbers_of
+
+OURS = "our cells"
+# By the name in tables: the imitation, and the same tuned
+PAIRS = {
+    OURS: ("refined, not tuned", "refined"),
+    "axis tree, constants": ("CART, DAgger", "CART, DAgger, tuned"),
+    "axis tree, linear": ("CART, linear leaves, DAgger", "CART, linear leaves, DAgger, tuned"),
+    "oblique tree, constants": (
+        "oblique tree, constant leaves, DAgger", "oblique tree, constant leaves, DAgger, tuned",
+    ),
+    "oblique tree, linear": ("oblique tree, linear leaves, DAgger", "oblique tree, linear leaves, DAgger, tuned"),
+    "k-means cells": ("k-means cells, DAgger", "k-means cells, DAgger, tuned"),
+    "small network": ("small network, DAgger", "small network, DAgger, tuned"),
+    "one linear map": ("one linear map", "one linear map, tuned"),
+}  # fmt: skip
+SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
+COLUMNS = ("mean", "low", "high", "r2")
+
+
+def all_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """The committed rows of `task` of all methods, from the shipped teacher, `with_r2`."""
+    tables = [table for table in TABLES if table not in UNFINISHED and jobs_of(task, table)]
+    return with_r2(pd.concat([read_rows(task, folder, table=table) for table in tables], ignore_index=True), task)
+
+
+def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
+    """`frame` with a column r2: 1 minus the squared action error over that of the best constant, both in the teacher's
+    states of `measure`, which no fit has seen. (`likeness` has R² on more states.)"""
+    r2 = 1.0 - np.square(frame["error_teacher"] / constant_error(load_teacher(task)))
+    return frame.assign(r2=r2)
+
+
+def constant_error(teacher: Teacher) -> float:
+    """Root mean square action error of the best constant in the states of `measure`, in units of half the range."""
+    task = teacher.task
+    states = visited_states(teacher, task, start_states(task, N_ERROR // SLOW.get(task.name, 1), ERROR_SEED))
+    half = 0.5 * (task.action_high - task.action_low)
+    return float(np.sqrt((np.asarray(teacher.predict(states)[0], dtype=np.float64) / half).var(axis=0).mean()))
+
+
+def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
+    """One row per size and method of `PAIRS`, the best tuned mean return of a size first.
+
+    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
+    low, high (its 95 % interval) and r2 of what is tuned, and "untuned mean" and so on. Of size 1 is one linear map.
+    """
+    table, found = method_summary(frame).set_index(["method", "size"]), []
+    r2 = frame.groupby(["method", "size"])["r2"].median()
+    for size in SHOWN:
+        for name, (untuned, tuned) in PAIRS.items():
+            own = 0 if name == "one linear map" else size
+            if (size == 1) != (own == 0) or (tuned, own) not in table.index:
+                continue
+            row = {"size": size, "method": name, **table.loc[tuned, own][["policies", "parameters"]]}
+            for prefix, method in (("", tuned), ("untuned ", untuned)):
+                scores = table.loc[method, own].to_dict() | {"r2": r2[method, own]}
+                row |= {prefix + column: scores[column] for column in COLUMNS}
+            found.append(row)
+    order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
+    return pd.DataFrame(found).sort_values(**order)
+
+
+def leaders(table: pd.DataFrame) -> pd.DataFrame:
+    """Our cells beside the best other method at every size of an `equal_budget`, one row per size beyond 1.
+
+    Columns: size; mean, low, high and policies of ours; rival, its name, "rival mean" and so on; ahead: "ours" or
+    "theirs" where the intervals do not overlap, else "level".
+    """
+    found = []
+    for size, rows in table[table["size"] > 1].groupby("size"):
+        own, best = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS].iloc[0]
+        row = {"size": size, **own[["mean", "low", "high", "policies"]], "rival": best["method"]}
+        row |= {f"rival {column}": best[column] for column in ("mean", "low", "high", "policies")}
+        found.append(row | {"ahead": ahead(own, best)})
+    return pd.DataFrame(found)
+
+
+def possible(frame: pd.DataFrame) -> pd.DataFrame:
+    """Where each method stands on the map of return over fidelity, one row per method and size: medians over seeds."""
+    return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "cells", "parameters"]].median().reset_index()
+
+
+def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """Fit and geometry apart, and newer methods, one row per method: the median r2 at every size, and the median mean
+    return. Columns: method, "r2 2" and so on, "mean 2" and so on."""
+    rows = with_r2(read_rows(task, folder, table="apart"), task)
+    table = rows.groupby(["method", "size"], sort=False)[["r2", "mean"]].median().unstack("size")
+    table.columns = [f"{what} {size}" for what, size in table.columns]
+    return table.reset_index()
+
+
+def budgets(task: str) -> pd.DataFrame:
+    """Episodes of every kind that a policy of the preset's size takes, one row per method; seconds on one core.
+
+    Columns: method, size, teacher (episodes that it plays), correction (of the policy, labelled by the teacher), tuning
+    and validation (of candidates), seconds (median over the seeds), steps (of the teacher's training, in its row, the
+    first). Faithful policies are tuned only where they return too little: theirs are the most that may be.
+    """
+    config, close = tuned_preset(task), faithful_preset(task)
+    seconds = _seconds(task)
+    rows = [{"method": "teacher", "steps": load_teacher(task).card["recipe"]["steps"]}]
+    cost = {**_of_faithful(close, task), "seconds": seconds.get(("faithful", close.n_cells))}
+    rows.append({"method": f"{OURS}, faithful", "size": close.n_cells, **cost})
+    for name, methods in PAIRS.items():
+        size = 0 if name == "one linear map" else config.n_cells
+        for method, tuned in zip(methods, (False, True)):
+            if (method, size) in seconds:
+                cost = {**episodes(name, config, task, tuned=tuned), "seconds": seconds[method, size]}
+                rows.append({"method": f"{name}{', tuned' * tuned}", "size": size or 1, **cost})
+    return pd.DataFrame(rows)
+
+
+def _seconds(task: str) -> pd.Series:
+    """Median seconds by method and size, from all committed tables of times."""
+    long = "_long" * (task in LONG)
+    frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("beyond", "tuned", "faithful")])
+    return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
+
+
+def episodes(name: str, config: Refinement, task: str, *, tuned: bool) -> dict[str, int]:
+    """Episodes that a method of `PAIRS` plays by `config`, as it imitates or tuned: teacher, correction, tuning and
+    validation."""
+    if name == OURS:  # `refine` begins with one linear map
+        rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
+    else:
+        settings = UNTUNED[PAIRS[name][0]].settings
+        rounds, restarts = settings.get("rounds", 0), settings.get("n_restarts", 1)
+        candidates = rounds + (config.n_restarts if tuned and restarts > 1 else restarts) + tuned
+    n = config.n_corrections * config.n_correction_episodes
+    return {
+        "teacher": config.n_episodes + (0 if rounds else n),
+        "correction": n if rounds else 0,
+        "tuning": _tuning(config, _tuned_numbers(name, config.n_cells, task)) if tuned else 0,
+        "validation": (candidates + min(tune.SNAPSHOTS, config.n_generations) * tuned) * config.n_validation,
+    }
+
+
+def _of_faithful(config: Faithful, task: str) -> dict[str, int]:
+    return {
+        "teacher": config.n_episodes + config.n_validation + faithful.POOL * config.n_tuning_episodes,
+        "correction": 0,
+        "tuning": _tuning(config, _tuned_numbers(OURS, config.n_cells, task)),
+        "validation": (1 + faithful.SNAPSHOTS) * config.n_validation,
+    }
+
+
+def _tuning(config: Refinement | Faithful, numbers: int) -> int:
+    """Episodes of the generations: as many candidates as CMA-ES has for so many numbers."""
+    return config.n_generations * (4 + int(3 * np.log(numbers))) * config.n_tuning_episodes
+
+
+def _tuned_numbers(name: str, k: int, task: str) -> int:
+    """How many numbers are tuned of a method of `PAIRS` with k cells or leaves."""
+    found = get_task(task)
+    d, m = len(found.low), len(found.action_low)
+    maps, units = k * (d + 1) * m, units_for(numbers_of(k, found), found)
+    return {
+        OURS: k * d + maps,
+        "k-means cells": k * d + maps,
+        "axis tree, constants": k - 1 + k * m,
+        "axis tree, linear": k - 1 + maps,
+        "oblique tree, constants": (k - 1) * (d + 1) + k * m,
+        "oblique tree, linear": (k - 1) * (d + 1) + maps,
+        "small network": (d + 1) * units + (units + 1) * m,
+        "one linear map": (d + 1) * m,
+    }[name]

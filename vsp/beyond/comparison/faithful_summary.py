@@ -1,0 +1,89 @@
+"""Whether policies act like their teacher, return what it returns, and come out the same from any seed."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pandas as pd
+
+from ...paper.results import read_results
+from .method_summary import AS_GOOD, read_rows
+
+LEAST_R2 = {
+    "SimpleGoal-v0": 0.95,
+    "MountainCarContinuous-v0": 0.97,
+    "Pendulum-v1": 0.95,
+    "LunarLanderContinuous-v3": 0.9,
+}
+SAME_CELLS = 0.9  # adjusted Rand index, at the median of the pairs
+
+
+def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """The faithful policies of a task, one row per number of cells that was asked for.
+
+    Columns: size; policies (how many) and cells (median); r2, the median, r2_least, the lowest, and r2_worst, the
+    median of the worst action coordinate; off, the share of states where an action is off by more than a tenth of its
+    range; mean and failing (medians); like, good and both, the shares of the policies whose R² is at least `LEAST_R2`,
+    that are as good as their teacher (`AS_GOOD`), and that are both; low and high, the 95 % interval of the latter; of
+    all pairs of seeds, index and index_least, the median and the lowest adjusted Rand index of their cells, and ratio,
+    the median ratio of the difference of their actions to that to the teacher; one_cell, how many policies have one
+    cell, which leaves them out of the index.
+    """
+    rows, pairs = read_rows(task, folder, table="faithful"), read_results(f"same_{task}", folder)
+    every = read_rows(task, folder)
+    teacher = every[every["method"] == "teacher"].iloc[0]
+    rows = rows.assign(like=rows["r2"] >= LEAST_R2[task], good=AS_GOOD[task](rows, teacher))
+    rows = rows.assign(both=rows["like"] & rows["good"], one_cell=rows["cells"] == 1)
+    by_size, by_pair = rows.groupby("size"), pairs.groupby("size")
+    table = by_size[["cells", "r2", "r2_worst", "off", "mean", "failing"]].median()
+    table.insert(0, "policies", by_size.size())
+    table.insert(3, "r2_least", by_size["r2"].min())
+    table[["like", "good", "both"]] = by_size[["like", "good", "both"]].mean()
+    bounds = [share_interval(int(own["both"].sum()), len(own)) for _, own in by_size]
+    table["low"], table["high"] = zip(*bounds)
+    table["index"], table["index_least"] = by_pair["index"].median(), by_pair["index"].min()
+    table["ratio"], table["one_cell"] = by_pair["ratio"].median(), by_size["one_cell"].sum()
+    return table.reset_index()
+
+
+def share_interval(found: int, n: int) -> tuple[float, float]:
+    """The 95 % interval of a share, of which `found` of n were seen (Clopper & Pearson 1934)."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(found, n).proportion_ci(method="exact")
+    return interval.low, interval.high
+
+
+def largest_alike(table: pd.DataFrame) -> int | None:
+    """The largest size up to which the median pair of seeds has the same cells, of a table of `likeness`; None if there
+    is none."""
+    found = None
+    for size, index in table.loc[table["index"].notna(), ["size", "index"]].to_numpy():
+        if index < SAME_CELLS:
+            break
+        found = int(size)
+    return found
+
+
+def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """What the methods make of every teacher of a task, one row per teacher and method.
+
+    Columns: teacher (0: the shipped one), own (its mean return), method, size, policies, gap (mean return minus the
+    teacher's, the mean over seeds), least and most (over the seeds), r2 (median; NaN where it was not measured), good
+    (share as good as their teacher).
+    """
+    others = read_rows(task, folder, table="teachers")
+    asked = others[["method", "size"]].drop_duplicates()
+    shipped = [read_rows(task, folder, table=table) for table in ("beyond", "tuned", "faithful")]
+    shipped = pd.concat(shipped).merge(asked).assign(agent=0)
+    found = []
+    for agent, rows in pd.concat([shipped, others]).groupby("agent"):
+        teacher = rows[rows["method"] == "teacher"].iloc[0]
+        for (method, size), own in rows[rows["method"] != "teacher"].groupby(["method", "size"], sort=False):
+            gap = own["mean"] - teacher["mean"]
+            about = {"teacher": agent, "own": teacher["mean"], "method": method, "size": size, "policies": len(own)}
+            scores = {"gap": gap.mean(), "least": gap.min(), "most": gap.max()}
+            r2 = own["r2"].median() if own["r2"].notna().any() else np.nan
+            found.append(about | scores | {"r2": r2, "good": AS_GOOD[task](own, teacher).mean()})
+    return pd.DataFrame(found)

@@ -1,0 +1,76 @@
+"""How long `distill_faithfully` will take, measured on this machine in a moment."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ...rollouts import Policy, rollout
+from ...tasks.base import Task
+from . import search
+from .anneal import expected_loss
+from .config import Faithful
+from .faithful import POOL, SNAPSHOTS
+from .units import Cells
+
+PLAYED = 10  # episodes of the teacher that are timed
+
+
+@threadpool_limits.wrap(limits=1)
+def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[float, float]:
+    """About how many seconds the fit takes, and how many more the tuning, where the return needs it.
+
+    From the times of ten episodes and of one loss, and from how many there will be of each. Tasks that are stepped in
+    batches are quicker than that.
+    """
+    starts = task.start(np.random.default_rng(0), PLAYED)
+    rollout(teacher, task, starts[:1])  # the first takes longer
+    episode = _seconds(lambda: rollout(teacher, task, starts)) / PLAYED
+    per_generation = config.n_tuning_episodes * (4 + int(3 * np.log(_numbers(task, config))))  # as CMA-ES has them
+    loss = _one_loss(task, config) * _losses(config.n_restarts, config.n_states)
+    fit = episode * (config.n_episodes + 2 * config.n_validation) + loss
+    tuning = config.n_generations * per_generation + POOL * config.n_tuning_episodes + SNAPSHOTS * config.n_validation
+    return fit, episode * tuning
+
+
+def announcement(teacher: Policy, task: Task, config: Faithful) -> str:
+    """How long it will take, in words."""
+    fit, tuning = expected_seconds(teacher, task, config)
+    return f"{in_words(fit)}, and {in_words(tuning)} more where its return has to be raised"
+
+
+def _losses(n_restarts: int, n_states: int) -> float:
+    """Losses on `search.FEW` states that `least_error` computes, one per iteration; the last ones see all states."""
+    live, found = n_restarts, 0
+    for stages, n_kept in search.ROUNDS:
+        found, live = found + len(stages) * live, min(live, n_kept)
+    last = search.N_LAST * len(search.LAST) * max(1.0, n_states / search.FEW)
+    return search.N_ITERATIONS * found + last
+
+
+def _one_loss(task: Task, config: Faithful) -> float:
+    d, m, k = len(task.low), len(task.action_low), config.n_cells
+    rng, n = np.random.default_rng(0), min(search.FEW, config.n_states)
+    cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, m)))
+    inputs, actions = rng.normal(size=(n, d + 1)), rng.uniform(-1, 1, size=(n, m))
+    return _seconds(lambda: expected_loss(cells, inputs, actions, temperature=1.0, clip_slope=0.1))
+
+
+def _numbers(task: Task, config: Faithful) -> int:
+    d, m = len(task.low), len(task.action_low)
+    return config.n_cells * (d + (d + 1) * m)
+
+
+def _seconds(work) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def in_words(seconds: float) -> str:
+    """As "about 20 seconds" or "about 3 minutes"."""
+    if seconds < 90:
+        return f"about {max(5, 5 * round(seconds / 5))} seconds"
+    return f"about {round(seconds / 60)} minutes"
