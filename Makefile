@@ -139,7 +139,7 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 test: venv-test-train-dask ## runs the tests, several at a time: about 3 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
-test-long: venv-test-train-dask ## runs whole commands, kills some, and a cluster: about a minute
+test-long: venv-test-train-dask ## runs whole commands, kills some, and a cluster: about 2 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/long
 
 lint: venv-test ## ruff and mypy: what .pre-commit-config.yaml runs before a commit; `ruff format` mends the layout
