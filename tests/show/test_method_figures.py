@@ -1,5 +1,7 @@
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import pytest
 
 from vsp import show
 
@@ -9,6 +11,13 @@ POINTS = pd.DataFrame(
      ("oblique tree, linear leaves, DAgger", 13, 10.0, 0.998), ("one linear map", 0, 1.0, 0.3)],
     columns=["method", "size", "mean", "r2"],
 )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """Other tests count the open figures."""
+    yield
+    plt.close("all")
 
 
 def drawn(ax):
