@@ -5,6 +5,7 @@ from support import SIMPLEGOAL, CurvedTeacher
 
 from vsp.beyond.refinement import duration, faithful, search
 from vsp.beyond.refinement.config import Faithful
+from vsp.beyond.refinement.tune import candidates_per_generation, cma_es
 from vsp.tasks.registry import get_task
 
 SMALL = Faithful(n_cells=3, n_episodes=100, n_restarts=4, n_generations=10, n_tuning_episodes=50, n_validation=100)
@@ -62,3 +63,9 @@ def test_losses_are_counted_as_the_search_computes_them(monkeypatch):
 def test_words_for_seconds():
     found = [duration.in_words(seconds) for seconds in (0.3, 18.0, 89.0, 100.0, 400.0)]
     assert found == ["about 5 seconds", "about 20 seconds", "about 90 seconds", "about 2 minutes", "about 7 minutes"]
+
+
+def test_a_generation_has_as_many_candidates_as_the_search_asks_for():
+    rng = np.random.default_rng(0)
+    for n in (2, 7, 32, 90):
+        assert len(cma_es(np.zeros(n), 0.1, rng).ask()) == candidates_per_generation(n)

@@ -170,7 +170,7 @@ def _of_faithful(config: Faithful, task: str) -> dict[str, int]:
 
 def _tuning(config: Refinement | Faithful, numbers: int) -> int:
     """Episodes of the generations: as many candidates as CMA-ES has for so many numbers."""
-    return config.n_generations * (4 + int(3 * np.log(numbers))) * config.n_tuning_episodes
+    return config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
 
 
 def _tuned_numbers(name: str, k: int, task: str) -> int:

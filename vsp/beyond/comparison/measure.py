@@ -19,7 +19,6 @@ from ...tasks.registry import SLOW
 VERSION = 1  # raise it when the same policy gets other numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # of the start states: for returns, and for action errors
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
-WORST = 0.01  # share of the episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
 
 
@@ -49,18 +48,6 @@ def measure(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
         "parameters": parameters,
         "operations": operations,
     }
-
-
-def tail(policy: Policy, task: Task) -> dict[str, float]:
-    """The mean return of the worst hundredth of the episodes that `measure` plays, and the lowest return."""
-    result = rollout(policy, task, start_states(task, N_REPORTED // SLOW.get(task.name, 1), REPORT_SEED))
-    returns = np.sort(result.returns)
-    return {"worst": float(returns[: max(1, int(WORST * len(returns)))].mean()), "lowest": float(returns[0])}
-
-
-def tail_settings() -> dict:
-    """What decides the numbers of `tail` beside, as JSON-able values."""
-    return {"worst": WORST}
 
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:

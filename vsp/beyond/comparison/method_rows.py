@@ -208,13 +208,7 @@ class Job:
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
         about["measure"] = measure.settings() | (measure.common() if how.preset == "faithful" else {})
-        about["measure"] |= measure.tail_settings() if self.with_tail else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
-
-    @property
-    def with_tail(self) -> bool:
-        """Whether the worst episodes are reported too."""
-        return self.task in LONG and self.method not in METHODS
 
     def path(self, folder: str | os.PathLike) -> Path:
         """Its file."""
@@ -270,7 +264,7 @@ def make_row(job: Job) -> tuple[dict, dict]:
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
-    row = measure.measure(policy, teacher, budget.task) | (measure.tail(policy, budget.task) if job.with_tail else {})
+    row = measure.measure(policy, teacher, budget.task)
     if not isinstance(policy, VoronoiPolicy):
         return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
     row |= measure.fidelity(policy, teacher, budget.task) if job.how.preset == "faithful" else {}

@@ -13,6 +13,7 @@ from . import search
 from .anneal import expected_loss
 from .config import Faithful
 from .faithful import POOL, SNAPSHOTS
+from .tune import candidates_per_generation
 from .units import Cells
 
 PLAYED = 10  # episodes of the teacher that are timed
@@ -28,7 +29,7 @@ def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[flo
     starts = task.start(np.random.default_rng(0), PLAYED)
     rollout(teacher, task, starts[:1])  # the first takes longer
     episode = _seconds(lambda: rollout(teacher, task, starts)) / PLAYED
-    per_generation = config.n_tuning_episodes * (4 + int(3 * np.log(_numbers(task, config))))  # as CMA-ES has them
+    per_generation = config.n_tuning_episodes * candidates_per_generation(_numbers(task, config))
     loss = _one_loss(task, config) * _losses(config.n_restarts, config.n_states)
     fit = episode * (config.n_episodes + 2 * config.n_validation) + loss
     tuning = config.n_generations * per_generation + POOL * config.n_tuning_episodes + SNAPSHOTS * config.n_validation

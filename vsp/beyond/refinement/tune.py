@@ -76,3 +76,8 @@ def cma_es(start: np.ndarray, step: float, rng: np.random.Generator):
 def is_snapshot(i: int, n: int, n_snapshots: int) -> bool:
     """Whether generation i of n is one of `n_snapshots` that are evenly spread; the last one is."""
     return (i + 1) * n_snapshots // n > i * n_snapshots // n
+
+
+def candidates_per_generation(n: int) -> int:
+    """How many candidates CMA-ES has in a generation for n numbers, by default (Hansen 2016, table 1)."""
+    return 4 + int(3 * np.log(n))
