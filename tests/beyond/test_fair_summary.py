@@ -14,6 +14,7 @@ from vsp.beyond.comparison.fair_summary import (
     equal_budget,
     leaders,
     possible,
+    tail,
     with_r2,
 )
 from vsp.beyond.comparison.method_rows import METHODS, RIVALS, preset
@@ -66,6 +67,18 @@ def test_who_leads(rows):
         [2, "axis tree, constants", "ours"],
         [4, "axis tree, constants", "level"],
     ]
+
+
+def test_a_size_without_rivals_is_left_out(rows):
+    alone = pd.DataFrame([row("refined", 3, 0, 1.0), row("refined, not tuned", 3, 0, 1.0)])
+    assert equal_budget(pd.concat([rows, alone])).equals(equal_budget(rows))
+
+
+def test_the_tail_stands_beside_the_mean(rows):
+    worst = rows["seed"].where(rows["method"] == "refined").astype(float)  # of the others it was not measured
+    table = tail(rows.assign(worst=worst, failing=0.01))
+    assert table[["method", "size", "policies"]].to_numpy().tolist() == [["refined", 4, 3], ["refined", 2, 3]]
+    assert table[["worst", "worst_least", "failing"]].to_numpy().tolist() == [[1.0, 0.0, pytest.approx(0.01)]] * 2
 
 
 def test_r2_follows_from_the_action_error_and_from_the_states():

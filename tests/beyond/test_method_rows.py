@@ -48,7 +48,7 @@ def small(monkeypatch):
     two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
     monkeypatch.setattr(method_rows, "METHODS", two)
     for module in (method_rows, make_rows):
-        monkeypatch.setattr(module, "TABLES", {"beyond": Table(two, seeds=range(2), fewer=range(2), long=tuple(two))})
+        monkeypatch.setattr(module, "TABLES", {"beyond": Table(two, seeds=range(2), fewer=range(2))})
     monkeypatch.setattr(method_rows, "ABLATION", {})
     return monkeypatch
 
@@ -106,6 +106,24 @@ def test_all_seeds_are_those_of_the_size_of_the_preset():
     n = {size: sum(job.size == size for job in found) for size in {job.size for job in found}}
     own = faithful_preset(SIMPLEGOAL).n_cells
     assert n[own] == len(TABLES["faithful"].seeds) > n[own - 1] == len(TABLES["faithful"].fewer)
+
+
+def test_of_tasks_that_take_long_fewer_rows_are_asked_and_their_tail():
+    found = {table: jobs_of(LUNARLANDER, table) for table in TABLES}
+    assert [table for table, jobs in found.items() if jobs] == ["beyond", "tuned", "faithful"]
+    assert {job.size for table in ("tuned", "faithful") for job in found[table]} == {0, 1, 2, 4, 8}
+    assert {table: {job.tail for job in jobs} for table, jobs in found.items() if jobs} == {
+        "beyond": {False}, "tuned": {True}, "faithful": {True}
+    }  # fmt: skip
+    assert {job.seed for job in found["beyond"]} == {job.seed for job in found["tuned"]} == set(range(5))
+    assert sum(job.size == faithful_preset(LUNARLANDER).n_cells for job in found["faithful"]) == 10
+
+
+def test_a_row_with_its_tail_is_another_row(small):
+    plain, tailed = (Job(SIMPLEGOAL, "CART", 3, 1, tail=tail) for tail in (False, True))
+    assert plain.path("") != tailed.path("") and plain.provenance["teacher"] == tailed.provenance["teacher"]
+    row = make_row(tailed)[1]["row"]
+    assert row.pop("worst") <= row["mean"] and row == make_row(plain)[1]["row"]
 
 
 def test_a_tuned_row_depends_on_the_settings_of_the_tuning(small):
@@ -229,15 +247,16 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
 
 
 def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
-    small.setattr(method_rows, "LONG", (SIMPLEGOAL,))
-    small.setattr(make_rows, "LONG", (SIMPLEGOAL,))
+    for module in (method_rows, make_rows):
+        small.setattr(module, "LONG", (SIMPLEGOAL,))
+    small.setattr(method_rows, "LONG_TABLES", method_rows.TABLES)
     small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
     results = tmp_path / "data" / "results"
     policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
     _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
     assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= method_rows.simplest_provenance(SIMPLEGOAL).items()
-    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5 + 1  # sizes 1 of 1 and 3, few seeds
+    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5
     assert not (results / "beyond_race.csv").exists()
     listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
 

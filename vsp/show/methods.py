@@ -46,7 +46,8 @@ def method_comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> 
     return fig
 
 
-RIVAL_KINDS = {"oblique tree": "^", "CART": "s", "k-means": "D", "small network": "P", "soft tree": "v"}
+RIVAL_KINDS = {"oblique tree": "^", "CART": "s", "k-means": "D", "small network": "P", "soft tree": "v",
+               "critic-driven": "<", "advantage-weighted": ">"}  # fmt: skip
 OWN_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # cells of the lines on the map
 LARGEST = 13  # leaves of what is drawn there
 

@@ -19,7 +19,7 @@ from ...teachers.teacher import Teacher, load_teacher
 from ..refinement import faithful, tune
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from .measure import ERROR_SEED, N_ERROR
-from .method_rows import LONG, TABLES, UNFINISHED, UNTUNED, jobs_of
+from .method_rows import LONG, UNTUNED, is_committed
 from .method_summary import ahead, method_summary, read_rows
 from .methods import numbers_of
 
@@ -37,14 +37,17 @@ PAIRS = {
     "small network": ("small network, DAgger", "small network, DAgger, tuned"),
     "one linear map": ("one linear map", "one linear map, tuned"),
 }  # fmt: skip
+TABLES = ("beyond", "tuned", "apart", "faithful", "demanded")  # of `method_rows`: all methods, from the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 
 
 def all_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The committed rows of `task` of all methods, from the shipped teacher, `with_r2`."""
-    tables = [table for table in TABLES if table not in UNFINISHED and jobs_of(task, table)]
-    return with_r2(pd.concat([read_rows(task, folder, table=table) for table in tables], ignore_index=True), task)
+    """The committed rows of `task` of all methods, from the shipped teacher, `with_r2`; each method, size and seed
+    once, as its last table has it."""
+    tables = [table for table in TABLES if is_committed(table, task)]
+    frame = pd.concat([read_rows(task, folder, table=table) for table in tables])
+    return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
 def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
@@ -63,7 +66,7 @@ def constant_error(teacher: Teacher) -> float:
 
 
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
-    """One row per size and method of `PAIRS`, the best tuned mean return of a size first.
+    """One row per size and method of `PAIRS`, the best tuned mean return of a size first; only sizes with rivals.
 
     `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
     low, high (its 95 % interval) and r2 of what is tuned, and "untuned mean" and so on. Of size 1 is one linear map.
@@ -81,7 +84,8 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
                 row |= {prefix + column: scores[column] for column in COLUMNS}
             found.append(row)
     order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
-    return pd.DataFrame(found).sort_values(**order)
+    compared = pd.DataFrame(found).groupby("size").filter(lambda rows: set(rows["method"]) != {OURS})
+    return compared.sort_values(**order)
 
 
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
@@ -102,6 +106,19 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 def possible(frame: pd.DataFrame) -> pd.DataFrame:
     """Where each method stands on the map of return over fidelity, one row per method and size: medians over seeds."""
     return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "cells", "parameters"]].median().reset_index()
+
+
+def tail(frame: pd.DataFrame) -> pd.DataFrame:
+    """The worst returns beside the mean, one row per method and size of `all_rows` where they were measured.
+
+    Columns: method, size, policies; mean, worst (mean of the worst `measure.TAIL` of the episodes) and failing: means
+    over the seeds; worst_least, the lowest of a seed.
+    """
+    by_kind = frame[frame["worst"].notna()].groupby(["method", "size"])
+    table = by_kind[["mean", "worst", "failing"]].mean()
+    table.insert(0, "policies", by_kind.size())
+    table["worst_least"] = by_kind["worst"].min()
+    return table.sort_values("mean", ascending=False, kind="stable").reset_index()
 
 
 def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:

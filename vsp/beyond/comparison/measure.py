@@ -20,11 +20,13 @@ VERSION = 1  # raise it when the same policy gets other numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # of the start states: for returns, and for action errors
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
+TAIL = 0.01  # share of the episodes: the worst ones
 
 
-def settings() -> dict:
+def settings(*, tail: bool = False) -> dict:
     """What decides the numbers of a policy, as JSON-able values."""
-    return {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
+    about = {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
+    return about | ({"tail": TAIL} if tail else {})
 
 
 def common() -> dict:
@@ -32,14 +34,15 @@ def common() -> dict:
     return {"states": N_COMMON}
 
 
-def measure(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
+def measure(policy: Policy, teacher: Policy, task: Task, *, tail: bool = False) -> dict[str, float]:
     """Mean return, share of episodes without the goal, action errors on the states of the teacher and on its own,
-    cells or leaves (0: none), parameters, operations per decision. Tasks in `SLOW` are played fewer times."""
+    cells or leaves (0: none), parameters, operations per decision; with `tail`, the mean return of the worst episodes.
+    Tasks in `SLOW` are played fewer times."""
     fewer = SLOW.get(task.name, 1)
     result = rollout(policy, task, start_states(task, N_REPORTED // fewer, REPORT_SEED))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
     parameters, operations = cost(policy)
-    return {
+    row = {
         "mean": float(result.returns.mean()),
         "failing": float(np.mean(result.outcomes != GOAL)),
         "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
@@ -48,6 +51,12 @@ def measure(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
         "parameters": parameters,
         "operations": operations,
     }
+    return row | ({"worst": worst(result.returns)} if tail else {})
+
+
+def worst(returns: np.ndarray) -> float:
+    """The mean of the worst `TAIL` of the returns, of one at least: the conditional value at risk."""
+    return float(np.sort(returns)[: max(1, round(TAIL * len(returns)))].mean())
 
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:

@@ -162,15 +162,14 @@ class Table:
     methods: dict[str, Method]
     seeds: range = SEEDS
     fewer: range = SEEDS  # of sizes that the preset does not have
+    sizes: tuple[int, ...] | None = None  # no others than these
     agents: tuple[int, ...] = (0,)
     at_preset: bool = False  # only as many cells as the preset has
-    long: tuple[str, ...] = ()  # methods that are also asked on the tasks that take long
-    long_sizes: tuple[int, ...] = (0, 1, 2, 4, 8)
-    long_seeds: range = FEW_SEEDS
+    tail: bool = False  # the worst returns are measured too
 
 
 TABLES = {
-    "beyond": Table(METHODS, long=tuple(METHODS), long_sizes=(0, *SIZES)),
+    "beyond": Table(METHODS),
     "tuned": Table(RIVALS, seeds=range(7), fewer=range(7)),
     "faithful": Table(LIKE, fewer=range(6)),
     "apart": Table(APART, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
@@ -181,7 +180,22 @@ TABLES = {
     ),
 }  # fmt: skip
 
-UNFINISHED = ("apart", "demanded", "teachers")  # tables whose rows are not all made yet: data/README.md
+# Of the tasks whose rows take hours
+AGAIN = ("teacher", "refined")  # their tail is measured too, beside that of the rivals
+LONG_RIVALS = ("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP)
+LONG_SIZES = (0, 1, 2, 4, 8)
+LONG_TABLES = {
+    "beyond": Table(METHODS, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
+    "tuned": Table(
+        {name: (METHODS | RIVALS)[name] for name in (*AGAIN, *LONG_RIVALS)},
+        seeds=FEW_SEEDS, fewer=FEW_SEEDS, sizes=LONG_SIZES, tail=True,
+    ),
+    "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
+}  # fmt: skip
+
+# Tables of which not all rows are made yet: data/README.md
+UNFINISHED = {("demanded", task) for task in TASKS}
+UNFINISHED |= {(table, task) for table in ("tuned", "faithful") for task in LONG}
 
 
 @dataclass(frozen=True)
@@ -193,6 +207,7 @@ class Job:
     size: int
     seed: int
     agent: int = 0  # the shipped teacher, or one of `AGENTS`
+    tail: bool = False  # whether the worst returns are measured too
 
     @property
     def how(self) -> Method:
@@ -207,7 +222,7 @@ class Job:
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
-        about["measure"] = measure.settings() | (measure.common() if how.preset == "faithful" else {})
+        about["measure"] = measure.settings(tail=self.tail) | (measure.common() if how.preset == "faithful" else {})
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
@@ -216,8 +231,8 @@ class Job:
 
     def about(self) -> dict:
         """What its file names."""
-        named = {name: value for name, value in asdict(self).items() if name != "agent"}
-        return {**named, **self.provenance}  # the checksum of the teacher names the agent
+        named = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
+        return {**named, **self.provenance}  # which name the agent by its checksum, and the tail in the settings
 
 
 def preset(task: str, kind: str) -> Refinement | Faithful | Config:
@@ -233,12 +248,12 @@ def _teacher(task: str, agent: int) -> Teacher:
 
 def jobs_of(task: str, table: str = "beyond") -> list[Job]:
     """All rows of a task in a table, a key of `TABLES`."""
-    about, found = TABLES[table], []
-    for name, method in about.methods.items():
-        if (method.tasks is None or task in method.tasks) and (task not in LONG or name in about.long):
+    about, found = (LONG_TABLES if task in LONG else TABLES).get(table), []
+    for name, method in about.methods.items() if about else ():
+        if method.tasks is None or task in method.tasks:
             for size in _sizes(task, method, about):
                 seeds = _seeds(task, method, about, size)
-                found += [Job(task, name, size, seed, agent) for agent in about.agents for seed in seeds]
+                found += [Job(task, name, size, seed, agent, about.tail) for agent in about.agents for seed in seeds]
     if table != "beyond" or task in LONG:
         return found
     names = [name for part in ABLATION if (name := f"refined, {part}") not in METHODS]
@@ -248,13 +263,18 @@ def jobs_of(task: str, table: str = "beyond") -> list[Job]:
 def _sizes(task: str, method: Method, about: Table) -> tuple[int, ...]:
     if about.at_preset and method.sizes != OWN:
         return (preset(task, method.preset).n_cells,)
-    return tuple(size for size in method.sizes if task not in LONG or size in about.long_sizes)
+    return tuple(size for size in method.sizes if about.sizes is None or size in about.sizes)
 
 
 def _seeds(task: str, method: Method, about: Table, size: int) -> range:
     own = size in (OWN[0], preset(task, method.preset).n_cells) if about.fewer != about.seeds else True
-    seeds = about.long_seeds if task in LONG else about.seeds if own else about.fewer
+    seeds = about.seeds if own else about.fewer
     return seeds if method.chance else seeds[:1]
+
+
+def is_committed(table: str, task: str) -> bool:
+    """Whether data/results has the rows of a task in a table."""
+    return (table, task) not in UNFINISHED and bool(jobs_of(task, table))
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
@@ -264,7 +284,7 @@ def make_row(job: Job) -> tuple[dict, dict]:
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
-    row = measure.measure(policy, teacher, budget.task)
+    row = measure.measure(policy, teacher, budget.task, tail=job.tail)
     if not isinstance(policy, VoronoiPolicy):
         return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}
     row |= measure.fidelity(policy, teacher, budget.task) if job.how.preset == "faithful" else {}

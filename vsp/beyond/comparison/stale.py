@@ -19,7 +19,7 @@ from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
 from ..benchmarks import lookup
 from . import time_to_quality
-from .method_rows import LONG, TABLES, TASKS, UNFINISHED, Job, faithful_job, jobs_of, simplest_provenance
+from .method_rows import LONG, TABLES, TASKS, Job, faithful_job, is_committed, jobs_of, simplest_provenance
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:
@@ -46,9 +46,9 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
     for task in (*TASKS, *LONG):
         target = "beyond-long" if task in LONG else "beyond"
         for table in TABLES:
-            if table not in UNFINISHED and jobs_of(task, table):
+            if is_committed(table, task):
                 yield f"{table}_{task}.csv", target, partial(_rows, task, table)
-        if jobs_of(task, "faithful"):
+        if is_committed("faithful", task):
             yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
             yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
     yield "beyond_race.csv", "beyond", _race

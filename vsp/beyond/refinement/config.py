@@ -149,6 +149,10 @@ _FAITHFUL = {
         n_cells=8, tolerance=1.0, n_episodes=1500, n_generations=60, n_tuning_episodes=100,
         n_validation=1000,
     ),
+    # The return of a landing varies much: more episodes per candidate, and a margin for the luck of the one chosen
+    "LunarLanderContinuous-v3": Faithful(
+        n_cells=8, margin=2.0, n_episodes=300, n_generations=40, n_tuning_episodes=40, n_validation=300
+    ),
 }  # fmt: skip
 
 
