@@ -1,9 +1,10 @@
+import numpy as np
 import pandas as pd
 import pytest
 from support import SIMPLEGOAL
 
 from vsp.beyond.comparison import faithful_summary
-from vsp.beyond.comparison.faithful_summary import largest_alike, likeness, other_teachers, share_interval
+from vsp.beyond.comparison.faithful_summary import largest_alike, likeness, other_teachers, over_groups, share_interval
 from vsp.run import listed
 
 
@@ -28,7 +29,9 @@ def results(tmp_path):
     pairs = [(2, 0, 1, 0.95, 0.2), (2, 0, 2, 0.85, 0.3), (2, 1, 2, 0.97, 0.4), (3, 0, 1, None, 0.5)]
     write(tmp_path, "same", pd.DataFrame(pairs, columns=["size", "seed", "other", "index", "ratio"]))
     others = [row("teacher", 0, 0, 10.0, 1.0), row("refined", 2, 0, 10.5, 0.1), row("refined", 2, 1, 9.5, 0.2)]
-    write(tmp_path, "teachers", pd.DataFrame(others).assign(agent=1))
+    others = [{**other, "agent": 1} for other in others]
+    others += [{**row("refined", 2, 0, 7.0, 0.3), "agent": 2}, {**row("teacher", 0, 0, 9.0, 1.0), "agent": 2}]
+    write(tmp_path, "teachers", pd.DataFrame(others).sort_values("method", kind="stable"))  # agents take turns
     return tmp_path
 
 
@@ -56,10 +59,21 @@ def test_a_share_has_exact_bounds():
 
 
 def test_every_teacher_is_compared_with_its_own_policies(results):
-    shipped, other = other_teachers(SIMPLEGOAL, results).to_dict("records")
+    shipped, one, other, every = other_teachers(SIMPLEGOAL, results).to_dict("records")
     assert (shipped["teacher"], shipped["own"], shipped["gap"]) == (0, 16.6, pytest.approx(0.3))
-    assert (other["teacher"], other["own"], other["gap"], other["policies"]) == (1, 10.0, 0.0, 2)
-    assert (other["least"], other["most"], other["good"], other["r2"]) == (-0.5, 0.5, 0.5, pytest.approx(0.15))
+    assert (one["teacher"], one["own"], one["gap"], one["policies"]) == (1, 10.0, 0.0, 2)
+    assert (one["low"], one["high"], one["good"], one["r2"]) == (-0.5, 0.5, 0.5, pytest.approx(0.15))
+    assert (other["teacher"], other["gap"], other["good"], other["good_high"]) == (2, -2.0, 0.0, 0.975)
+    assert (every["teacher"], every["policies"], every["good"]) == ("all", 4, 0.5)
+    assert every["gap"] == pytest.approx((0.3 + 0.0 - 2.0) / 3) and every["low"] < -1 < 0 < every["high"]
+
+
+def test_intervals_over_groups_by_enumeration():
+    """Of two groups of one value each, the mean of two draws is one value, the middle, or the other: 1 : 2 : 1."""
+    assert over_groups([np.array([0.0]), np.array([1.0])]) == (0.0, 1.0)
+    assert over_groups([np.array([1.0, 3.0])]) == (1.0, 3.0)
+    low, high = over_groups([np.full(50, 1.0), np.full(5, 2.0), np.full(5, 6.0)])  # each group counts alike
+    assert (low, high) == (1.0, 6.0)
 
 
 def test_targets_are_of_tasks_that_are_known():

@@ -1,7 +1,7 @@
 """The comparison of methods: how each row is made, what the committed rows say, and how long methods take."""
 
 from ...paper.results import RESULTS, read_results
-from .fair_summary import all_rows, budgets, equal_budget, fit_and_geometry, leaders, possible
+from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail
 from .faithful_summary import largest_alike, likeness, other_teachers
 from .method_rows import TASKS
 from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ...paper.results import read_results
+from ...paper.statistics import percentile_interval
 from .method_summary import AS_GOOD, read_rows
 
 LEAST_R2 = {
@@ -67,23 +68,51 @@ def largest_alike(table: pd.DataFrame) -> int | None:
 
 
 def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """What the methods make of every teacher of a task, one row per teacher and method.
+    """What the methods make of every teacher of a task, one row per teacher and method, then one over all teachers.
 
-    Columns: teacher (0: the shipped one), own (its mean return), method, size, policies, gap (mean return minus the
-    teacher's, the mean over seeds), least and most (over the seeds), r2 (median; NaN where it was not measured), good
-    (share as good as their teacher).
+    Columns: teacher (0: the shipped one; "all"), own (its mean return), method, size, policies, gap (mean return minus
+    the teacher's, the mean over seeds), low and high (its 95 % interval, over all teachers by `over_groups`), r2
+    (median; NaN where it was not measured), good (share as good as their teacher), good_low and good_high (its interval
+    for one teacher by `share_interval`).
     """
     others = read_rows(task, folder, table="teachers")
     asked = others[["method", "size"]].drop_duplicates()
     shipped = [read_rows(task, folder, table=table) for table in ("beyond", "tuned", "faithful")]
-    shipped = pd.concat(shipped).merge(asked).assign(agent=0)
+    rows = pd.concat([pd.concat(shipped).merge(asked).assign(agent=0), others], ignore_index=True)
+    teachers = rows[rows["method"] == "teacher"].set_index("agent")
+    own = rows["agent"].map(teachers["mean"])
+    good = pd.concat([AS_GOOD[task](part, teachers.loc[agent]) for agent, part in rows.groupby("agent")])
+    rows = rows.assign(gap=rows["mean"] - own, own=own, good=good)[rows["method"] != "teacher"]
     found = []
-    for agent, rows in pd.concat([shipped, others]).groupby("agent"):
-        teacher = rows[rows["method"] == "teacher"].iloc[0]
-        for (method, size), own in rows[rows["method"] != "teacher"].groupby(["method", "size"], sort=False):
-            gap = own["mean"] - teacher["mean"]
-            about = {"teacher": agent, "own": teacher["mean"], "method": method, "size": size, "policies": len(own)}
-            scores = {"gap": gap.mean(), "least": gap.min(), "most": gap.max()}
-            r2 = own["r2"].median() if own["r2"].notna().any() else np.nan
-            found.append(about | scores | {"r2": r2, "good": AS_GOOD[task](own, teacher).mean()})
+    for (method, size), of_method in rows.groupby(["method", "size"], sort=False):
+        by_teacher = [part for _, part in of_method.groupby("agent")]
+        for part in by_teacher:
+            good_low, good_high = share_interval(int(part["good"].sum()), len(part))
+            shares = {"good": part["good"].mean(), "good_low": good_low, "good_high": good_high}
+            about = {"teacher": part["agent"].iloc[0], "own": part["own"].iloc[0], "method": method, "size": size}
+            found.append({**about, **_of_gaps([part]), **shares})
+        shares = {"good": np.mean([part["good"].mean() for part in by_teacher])}
+        found.append({"teacher": "all", "method": method, "size": size, **_of_gaps(by_teacher), **shares})
     return pd.DataFrame(found)
+
+
+def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
+    """The rows of some teachers in short; every teacher counts alike."""
+    low, high = over_groups([rows["gap"].to_numpy() for rows in groups])
+    r2 = pd.concat(groups)["r2"]
+    return {
+        "policies": len(r2),
+        "gap": np.mean([rows["gap"].mean() for rows in groups]),
+        "low": low,
+        "high": high,
+        "r2": r2.median() if r2.notna().any() else np.nan,
+    }
+
+
+def over_groups(groups: list[np.ndarray]) -> tuple[float, float]:
+    """Percentile bootstrap interval (95 %) of the mean of the groups' means: resamples groups, such as teachers, and
+    the values within each, such as policies. Of few groups it is a lower bound on what another one may bring."""
+    rng, n = np.random.default_rng(0), len(groups)
+    means = [group[rng.integers(len(group), size=(2000, n, len(group)))].mean(axis=2) for group in groups]
+    drawn = rng.integers(n, size=(2000, n))
+    return percentile_interval(np.take_along_axis(np.stack(means), drawn[None], axis=0)[0].mean(axis=1))
