@@ -151,7 +151,7 @@ _FAITHFUL = {
     ),
     # The return of a landing varies much: more episodes per candidate, and a margin for the luck of the one chosen
     "LunarLanderContinuous-v3": Faithful(
-        n_cells=8, margin=6.0, n_episodes=300, n_generations=44, n_tuning_episodes=40, n_validation=300
+        n_cells=8, margin=10.0, n_episodes=300, n_generations=44, n_tuning_episodes=40, n_validation=300
     ),
 }  # fmt: skip
 
