@@ -170,7 +170,7 @@ bench: venv-test-train-dask ## measures speed and scale, into data/results/: an 
 faults: venv-test-train-dask ## breaks it in every way we know, into data/results/: 3 HOURS or more; kills resume
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
-beyond: begin venv-train ## our own method and others beside it, into data/results/: 3 to 4 HOURS, resumable
+beyond: begin venv-train ## our own method and others beside it, into data/results/: 4 to 5 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 beyond-long: begin venv-train ## the same for LunarLander, whose physics engine is slow: 3 to 4 HOURS, resumable
