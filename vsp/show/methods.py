@@ -46,8 +46,10 @@ def method_comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> 
     return fig
 
 
-RIVAL_KINDS = {"oblique tree": "^", "CART": "s", "k-means": "D", "small network": "P", "soft tree": "v",
-               "critic-driven": "<", "advantage-weighted": ">"}  # fmt: skip
+# Other methods by how their names begin: marker and label
+RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree"), "k-means": ("D", "k-means"),
+               "small network": ("P", "small network"), "soft tree": ("v", "soft tree"),
+               "critic-driven": ("<", "critic-driven"), "advantage-weighted": (">", "advantage-weighted")}  # fmt: skip
 OWN_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # cells of the lines on the map
 LARGEST = 13  # leaves of what is drawn there
 
@@ -62,8 +64,8 @@ def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: floa
     """
     points = points.assign(unlike=1.0 - points["r2"], gap=points["mean"] - teacher)
     others = points[points["size"] <= LARGEST]
-    for kind, marker in RIVAL_KINDS.items():
-        rows = others[others["method"].str.startswith(kind)]
+    for start, (marker, kind) in RIVAL_KINDS.items():
+        rows = others[others["method"].str.startswith(start)]
         tuned = rows["method"].str.endswith(", tuned")
         look = {"marker": marker, "edgecolor": OTHER, "lw": 0.5, "alpha": 0.7}
         for part, face, name in ((rows[~tuned], "none", kind), (rows[tuned], OTHER, None)):
@@ -75,6 +77,7 @@ def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: floa
     ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher’s return")
     ax.axvline(1, color=OTHER, ls=":", lw=0.8, label="a constant")
     ax.set_yscale("symlog", linthresh=linear)
+    ax.margins(y=0.08)
     ax.yaxis.set_major_formatter("{x:g}")
     drawn = points.loc[(points["size"] <= LARGEST) & (points["method"] != "teacher"), "unlike"]
     ax.set(xscale="log", xlim=(1.3 * drawn.max(), drawn.min() / 1.3), xlabel="R² of the actions")
@@ -99,14 +102,14 @@ def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
     ax.set_xscale("log")
     ax.fill_between(table["size"], table["r2_least"], table["r2"], color=TEACHER, alpha=0.2, lw=0)
     for column, color, marker, label in (
-        ("r2", TEACHER, "o", "R², median and lowest"),
+        ("r2", TEACHER, "o", "R², median (band: to the lowest)"),
         ("index", DISTILLED, "s", "index: same cells"),
         ("ratio", COLOURS[2], "^", "ratio: different actions"),
     ):
         ax.plot(table["size"], table[column], color=color, marker=marker, ms=3.5, label=label)
-    ax.set_ylim(min(0.0, table["r2_least"].min()), 1.02 * max(1.0, table["ratio"].max()))
+    ax.set_ylim(min(0.0, table["r2_least"].min()) - 0.05, 0.05 + max(1.0, table["ratio"].max()))
     ax.set_xlabel("cells")
-    return ticks_at(ax, table["size"])
+    return ticks_at(ax, table.loc[table["size"] != 7, "size"])  # whose label would touch that of 8
 
 
 def against_time(ax: Axes, frame: pd.DataFrame, *, enough: float) -> Axes:
