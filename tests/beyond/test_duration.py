@@ -13,7 +13,7 @@ SMALL = Faithful(n_cells=3, n_episodes=100, n_restarts=4, n_generations=10, n_tu
 
 def test_episodes_and_losses_are_counted(monkeypatch):
     """Where an episode takes a second and a loss two."""
-    monkeypatch.setattr(duration, "_seconds", lambda work: float(duration.PLAYED))
+    monkeypatch.setattr(duration, "_seconds", lambda work: float(duration.IN_BATCH))
     monkeypatch.setattr(duration, "_one_loss", lambda task, config: 2.0)
     fit, tuning = duration.expected_seconds(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
     assert fit == 100 + 2 * 100 + 2.0 * duration._losses(4, SMALL.n_states)

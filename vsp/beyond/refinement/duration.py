@@ -16,19 +16,18 @@ from .faithful import POOL, SNAPSHOTS
 from .tune import candidates_per_generation
 from .units import Cells
 
-PLAYED = 10  # episodes of the teacher that are timed
+PLAYED, IN_BATCH = 10, 500  # episodes of the teacher that are timed: one by one, or in one batch
 
 
 @threadpool_limits.wrap(limits=1)
 def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[float, float]:
     """About how many seconds the fit takes, and how many more the tuning, where the return needs it.
 
-    From the times of ten episodes and of one loss, and from how many there will be of each. Tasks that are stepped in
-    batches are quicker than that.
+    From the times of some episodes and of one loss, and from how many there will be of each.
     """
-    starts = task.start(np.random.default_rng(0), PLAYED)
+    starts = task.start(np.random.default_rng(0), PLAYED if task.one_by_one else IN_BATCH)
     rollout(teacher, task, starts[:1])  # the first takes longer
-    episode = _seconds(lambda: rollout(teacher, task, starts)) / PLAYED
+    episode = _seconds(lambda: rollout(teacher, task, starts)) / len(starts)
     per_generation = config.n_tuning_episodes * candidates_per_generation(_numbers(task, config))
     loss = _one_loss(task, config) * _losses(config.n_restarts, config.n_states)
     fit = episode * (config.n_episodes + 2 * config.n_validation) + loss
