@@ -18,7 +18,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
-from vsp.beyond.comparison import measure, method_rows, time_to_quality
+from vsp.beyond.comparison import kept, measure, time_to_quality
 from vsp.beyond.comparison.method_rows import APART, LIKE, METHODS, RIVALS
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.refinement.config import Faithful, Refinement
@@ -129,7 +129,7 @@ CASES = {
     for name, method in known.items()
 } | {
     "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),
-    "method_rows.simplest": (by_simplest, method_rows.SIMPLIFY_VERSION),
+    "kept.simplest": (by_simplest, kept.SIMPLIFY_VERSION),
     "beside": (beside_a_run, beside.VERSION),
     "measure": (by_measure, measure.VERSION),
 }

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
 
-from vsp.beyond.comparison import make_rows, measure, method_rows
+from vsp.beyond.comparison import kept, make_rows, measure, method_rows
 from vsp.beyond.comparison.method_rows import (
     ABLATION,
     LIKE,
@@ -21,7 +21,6 @@ from vsp.beyond.comparison.method_rows import (
     make_all,
     make_row,
     rows,
-    simplest,
 )  # fmt: skip
 from vsp.beyond.comparison.method_summary import read_rows
 from vsp.beyond.comparison.methods import Budget
@@ -255,7 +254,7 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     results = tmp_path / "data" / "results"
     policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
     _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
-    assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= method_rows.simplest_provenance(SIMPLEGOAL).items()
+    assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= kept.simplest_provenance(SIMPLEGOAL).items()
     assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5
     assert not (results / "beyond_race.csv").exists()
     listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
@@ -263,10 +262,8 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
 
 def test_the_simplified_policy_may_lose_its_share(small):
     asked = []
-    small.setattr(
-        method_rows, "simplify", lambda *given, **settings: asked.append((given, settings)) or ("policy", None)
-    )
-    assert simplest(SIMPLEGOAL) == "policy"
+    small.setattr(kept, "simplify", lambda *given, **settings: asked.append((given, settings)) or ("policy", None))
+    assert kept.simplest(SIMPLEGOAL) == "policy"
     ((teacher, task, config), settings) = asked[0]
     starts = start_states(get_task(SIMPLEGOAL), SMALL.n_validation, 0)
     own = rollout(teacher, get_task(SIMPLEGOAL), starts).returns.mean()

@@ -10,7 +10,7 @@ import pytest
 from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.beyond.benchmarks import lookup
-from vsp.beyond.comparison import method_rows, stale_results, time_to_quality
+from vsp.beyond.comparison import kept, method_rows, stale_results, time_to_quality
 from vsp.beyond.comparison.method_rows import METHODS
 from vsp.paper import results as results_module
 from vsp.paper import runs
@@ -149,7 +149,7 @@ def raised(name):
         (lambda patch: patch.setitem(METHODS, "TD-AVQ", raised("TD-AVQ")), BEYOND[:1]),
         (lambda patch: patch.setattr(time_to_quality, "VERSION", 2), [says("beyond_race.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(lookup, "VERSION", 2), [says("lookup.csv", "version", "lookup")]),
-        (lambda patch: patch.setattr(method_rows, "SIMPLIFY_VERSION", 2),
+        (lambda patch: patch.setattr(kept, "SIMPLIFY_VERSION", 2),
          [says(f"beyond_{LUNARLANDER}.policy", "version", "beyond-long")]),
         (lambda patch: patch.setattr(interpretations, "VERSION", 2), [says("readings.csv", "settings", "study")]),
     ],
@@ -187,6 +187,7 @@ def test_results_of_another_teacher_are_stale(results, monkeypatch):
     paths = teachers_module.teachers
     monkeypatch.setattr(teachers_module, "teachers", lambda task: dict(list(paths(task).items())[:-1]))
     monkeypatch.setattr(method_rows, "_teacher", lambda task, agent: SimpleNamespace(digest="f" * 64))
+    monkeypatch.setattr(kept, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
     monkeypatch.setattr(time_to_quality, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),

@@ -9,7 +9,8 @@ import pandas as pd
 
 from ...paper.results import write_results
 from ...run import command
-from .method_rows import LONG, TABLES, TASKS, jobs_of, keep_faithful, keep_simplest, make_all, pairs, rows
+from .kept import keep_faithful, keep_simplest
+from .method_rows import LONG, TABLES, TASKS, jobs_of, make_all, pairs, rows
 from .time_to_quality import time_to_quality
 
 

@@ -1,8 +1,7 @@
 """The comparison beyond the paper: every method at every size, from the same teachers, budgets and starts, on disk.
 
 `make beyond` makes the rows that are missing; data/results/beyond_<task>.csv holds what came out, one row per method,
-size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv. Of
-tasks whose rows take hours, one simplified policy is kept too, beyond_<task>.policy.
+size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, partial
 from pathlib import Path
 
@@ -19,16 +18,13 @@ import pandas as pd
 from ...algorithms import VERSION
 from ...baselines import tdavq
 from ...config import Config, paper_preset
-from ...evaluation import start_states
 from ...paper import printed
 from ...paper.results import load_made, make_missing, provenance, provenance_folder
 from ...policy import VoronoiPolicy
-from ...rollouts import Policy, rollout
-from ...run import listed, sealed
+from ...rollouts import Policy
 from ...tasks.registry import get_task
 from ...teachers.teacher import Teacher, further_teachers, load_teacher
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
-from ..refinement.simplification import simplify
 from ..refinement.units import METRIC
 from . import apart, measure, methods, peers
 from .methods import Budget
@@ -37,8 +33,6 @@ from .sameness import sameness
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
 SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
-LOSS = 0.02  # share of the teacher's mean return that the simplified policy of a long task may lose
-SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
 OWN = (0,)
@@ -320,41 +314,3 @@ def pairs(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
         frame.insert(0, "size", job.size)
         found.append(frame)
     return pd.concat(found, ignore_index=True)
-
-
-def keep_faithful(folder: str | os.PathLike, task: str, path: str | os.PathLike) -> None:
-    """Write the faithful policy of the preset's size and of the first seed to `path`, with its provenance; listed."""
-    job = faithful_job(task)
-    arrays, _ = load_made(job.path(folder), "Row", job.about())
-    _keep(VoronoiPolicy(**arrays, task=task, metric=METRIC), path, job.provenance)
-
-
-def faithful_job(task: str) -> Job:
-    """The row whose policy is kept."""
-    return Job(task, "faithful", faithful_preset(task).n_cells, 0)
-
-
-def simplest(task: str) -> VoronoiPolicy:
-    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
-    teacher, config = load_teacher(task), tuned_preset(task)
-    starts = start_states(get_task(task), config.n_validation, 0)
-    own = rollout(teacher, get_task(task), starts).returns.mean()
-    return simplify(teacher, task, config, tolerance=LOSS * abs(own), seed=0)[0]
-
-
-def keep_simplest(task: str, path: str | os.PathLike) -> None:
-    """Make `simplest`, and write it to `path` with its provenance; listed."""
-    _keep(simplest(task), path, simplest_provenance(task))
-
-
-def _keep(policy: VoronoiPolicy, path: str | os.PathLike, made_with: dict) -> None:
-    policy.save(path)
-    arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
-    sealed.save_arrays(path, arrays, about | made_with)
-    listed.list_file(path)
-
-
-def simplest_provenance(task: str) -> dict[str, str | int]:
-    """What decides the policy of `simplest`; its seed is 0."""
-    settings = {"task": task, "loss": LOSS, **asdict(tuned_preset(task))}
-    return provenance(settings, _teacher(task, 0).digest, SIMPLIFY_VERSION)

@@ -19,7 +19,8 @@ from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
 from ..benchmarks import lookup
 from . import time_to_quality
-from .method_rows import LONG, TABLES, TASKS, Job, faithful_job, is_committed, jobs_of, simplest_provenance
+from .kept import faithful_job, simplest_provenance
+from .method_rows import LONG, TABLES, TASKS, Job, is_committed, jobs_of
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:

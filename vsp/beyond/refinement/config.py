@@ -149,7 +149,7 @@ _FAITHFUL = {
         n_cells=8, tolerance=1.0, n_episodes=1500, n_generations=60, n_tuning_episodes=100,
         n_validation=1000,
     ),
-    # Many generations of few episodes: with 40 episodes each and a third of the generations, some seeds fell short
+    # Many generations of few episodes: in a third as many, of 40 episodes, the search did not arrive
     "LunarLanderContinuous-v3": Faithful(
         n_cells=8, margin=3.0, n_episodes=300, n_generations=120, n_tuning_episodes=12, n_validation=300
     ),

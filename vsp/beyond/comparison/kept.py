@@ -1,0 +1,59 @@
+"""Policies that are kept beside the committed rows, each with what made it: a faithful one of every task, and of tasks
+whose rows take hours a simplified one."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict
+
+from ...evaluation import start_states
+from ...paper.results import load_made, provenance
+from ...policy import VoronoiPolicy
+from ...rollouts import rollout
+from ...run import listed, sealed
+from ...tasks.registry import get_task
+from ...teachers.teacher import load_teacher
+from ..refinement.simplification import simplify
+from ..refinement.units import METRIC
+from .method_rows import Job, preset
+
+LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
+SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
+
+
+def keep_faithful(folder: str | os.PathLike, task: str, path: str | os.PathLike) -> None:
+    """Write the faithful policy of the preset's size and of the first seed to `path`, with its provenance; listed."""
+    job = faithful_job(task)
+    arrays, _ = load_made(job.path(folder), "Row", job.about())
+    _keep(VoronoiPolicy(**arrays, task=task, metric=METRIC), path, job.provenance)
+
+
+def faithful_job(task: str) -> Job:
+    """The row whose policy is kept."""
+    return Job(task, "faithful", preset(task, "faithful").n_cells, 0)
+
+
+def simplest(task: str) -> VoronoiPolicy:
+    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
+    teacher, config = load_teacher(task), preset(task, "tuned")
+    starts = start_states(get_task(task), config.n_validation, 0)
+    own = rollout(teacher, get_task(task), starts).returns.mean()
+    return simplify(teacher, task, config, tolerance=LOSS * abs(own), seed=0)[0]
+
+
+def keep_simplest(task: str, path: str | os.PathLike) -> None:
+    """Make `simplest`, and write it to `path` with its provenance; listed."""
+    _keep(simplest(task), path, simplest_provenance(task))
+
+
+def _keep(policy: VoronoiPolicy, path: str | os.PathLike, made_with: dict) -> None:
+    policy.save(path)
+    arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
+    sealed.save_arrays(path, arrays, about | made_with)
+    listed.list_file(path)
+
+
+def simplest_provenance(task: str) -> dict[str, str | int]:
+    """What decides the policy of `simplest`; its seed is 0."""
+    settings = {"task": task, "loss": LOSS, **asdict(preset(task, "tuned"))}
+    return provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)
