@@ -11,6 +11,7 @@ from vsp.beyond.comparison.measure import cost
 from vsp.beyond.comparison.tuning import TreeNumbers, in_units, tuned
 from vsp.beyond.refinement.config import Refinement
 from vsp.beyond.refinement.population import rollout_population
+from vsp.beyond.refinement.tune import cma_es
 from vsp.beyond.refinement.units import Frame
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
@@ -109,3 +110,14 @@ def test_tuning_raises_the_return_and_is_the_same_again(kind):
 def test_what_has_no_numbers_is_refused():
     with pytest.raises(TypeError, match="the policy is a ZeroPolicy, which has no numbers to tune"):
         in_units(ZeroPolicy(get_task(SIMPLEGOAL)), Frame.of(get_task(SIMPLEGOAL), examples(SIMPLEGOAL)[0]))
+
+
+def test_a_short_search_of_many_numbers_gains_by_learning_variances_only():
+    scales, found = np.logspace(0, 2, 200), {}
+    for diagonal in (True, False):
+        search = cma_es(np.ones(200), 0.3, np.random.default_rng(0), diagonal=diagonal)
+        for _ in range(100):
+            steps = search.ask()
+            search.tell(steps, [float(np.square(scales * step).sum()) for step in steps])
+        found[diagonal] = search.result.fbest
+    assert found[True] < 0.95 * found[False]

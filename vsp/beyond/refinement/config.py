@@ -151,7 +151,7 @@ _FAITHFUL = {
     ),
     # Many generations of few episodes: in a third as many, of 40 episodes, the search did not arrive
     "LunarLanderContinuous-v3": Faithful(
-        n_cells=8, margin=3.0, n_episodes=300, n_generations=120, n_tuning_episodes=12, n_validation=300
+        n_cells=8, margin=3.0, n_episodes=300, n_generations=130, n_tuning_episodes=12, n_validation=300
     ),
 }  # fmt: skip
 

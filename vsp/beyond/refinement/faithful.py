@@ -29,6 +29,7 @@ from .units import Cells, Frame, LabelledStates
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # on which the error of a candidate is measured
 POOL = 20  # times the episodes of a generation: the starts that generations draw from, where the teacher plays once
+MANY = 150  # numbers; of more, the tuning learns no covariances: it is too short for them
 FIRST_STEP = 0.02  # of the tuning: its candidates have about so much more error, relatively
 NUDGE = 0.05  # of a codeword, for the curvature of the error; in deviations of the states
 SHARE = 0.02  # of the teacher's mean return: the tolerance, if none is given
@@ -153,7 +154,7 @@ def _tune(
     move, _ = moves(cells, *_units(seen, cells))
     whole = variance(seen)
     step = np.sqrt(FIRST_STEP * max(squared_error(seen, cells), 1e-6) / cells.vector.size)
-    search = cma_es(np.zeros(cells.vector.size), step, rng)
+    search = cma_es(np.zeros(cells.vector.size), step, rng, diagonal=cells.vector.size > MANY)
     pool = frame.task.start(rng, POOL * config.n_tuning_episodes)
     own = rollout(teacher, frame.task, pool)
     own = own.returns - config.failure_penalty * (own.outcomes != GOAL)

@@ -65,11 +65,15 @@ def tune(
             yield cells.like(search.result.xfavorite)
 
 
-def cma_es(start: np.ndarray, step: float, rng: np.random.Generator):
-    """The library's search from `start` with this first standard deviation, with the draws of `rng`."""
+def cma_es(start: np.ndarray, step: float, rng: np.random.Generator, *, diagonal: bool = False):
+    """The library's search from `start` with this first standard deviation, with the draws of `rng`.
+
+    `diagonal`: learn variances only (sep-CMA-ES, Ros & Hansen 2008), for more numbers than there are generations.
+    """
     import cma  # which few need
 
     options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
+    options["CMA_diagonal"] = diagonal
     return cma.CMAEvolutionStrategy(start, step, options)
 
 
