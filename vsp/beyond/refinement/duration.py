@@ -7,16 +7,17 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
 from ...tasks.base import Task
 from . import search
-from .anneal import expected_loss
 from .config import Faithful
 from .faithful import POOL, SNAPSHOTS
 from .tune import candidates_per_generation
-from .units import Cells
+from .units import METRIC, Cells, LabelledStates
 
 PLAYED, IN_BATCH = 10, 500  # episodes of the teacher that are timed: one by one, or in one batch
+STEPS = 20  # of such a batch, by cells
 
 
 @threadpool_limits.wrap(limits=1)
@@ -27,12 +28,26 @@ def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[flo
     """
     starts = task.start(np.random.default_rng(0), PLAYED if task.one_by_one else IN_BATCH)
     rollout(teacher, task, starts[:1])  # the first takes longer
-    episode = _seconds(lambda: rollout(teacher, task, starts)) / len(starts)
-    per_generation = config.n_tuning_episodes * candidates_per_generation(_numbers(task, config))
+    by_teacher, by_cells = _of_an_episode(teacher, task, config, starts)
+    candidates = config.n_generations * candidates_per_generation(_numbers(task, config))
     loss = _one_loss(task, config) * _losses(config.n_restarts, config.n_states)
-    fit = episode * (config.n_episodes + 2 * config.n_validation) + loss
-    tuning = config.n_generations * per_generation + POOL * config.n_tuning_episodes + SNAPSHOTS * config.n_validation
-    return fit, episode * tuning
+    fit = by_teacher * (config.n_episodes + config.n_validation) + by_cells * config.n_validation + loss
+    tuning = by_cells * (candidates * config.n_tuning_episodes + SNAPSHOTS * config.n_validation)
+    return fit, tuning + by_teacher * POOL * config.n_tuning_episodes
+
+
+def _of_an_episode(teacher: Policy, task: Task, config: Faithful, starts: np.ndarray) -> tuple[float, float]:
+    """Seconds of an episode of the teacher, and of cells that take as many steps."""
+    played = []
+    seconds = _seconds(lambda: played.append(rollout(teacher, task, starts))) / len(starts)
+    if task.one_by_one:  # where the physics engine takes most of it
+        return seconds, seconds
+    states, m = task.begin(starts), len(task.action_low)
+    seen = task.observe(states)
+    k, d = config.n_cells, seen.shape[1]
+    cells = VoronoiPolicy(np.resize(seen, (k, d)), np.zeros((k, d + 1, m)), task=task, metric=METRIC)
+    step = _seconds(lambda: [task.step(states, cells.predict(task.observe(states))[0]) for _ in range(STEPS)]) / STEPS
+    return seconds, step * played[0].lengths.mean() / len(starts)
 
 
 def announcement(teacher: Policy, task: Task, config: Faithful) -> str:
@@ -54,8 +69,8 @@ def _one_loss(task: Task, config: Faithful) -> float:
     d, m, k = len(task.low), len(task.action_low), config.n_cells
     rng, n = np.random.default_rng(0), min(search.FEW, config.n_states)
     cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, m)))
-    inputs, actions = rng.normal(size=(n, d + 1)), rng.uniform(-1, 1, size=(n, m))
-    return _seconds(lambda: expected_loss(cells, inputs, actions, temperature=1.0, clip_slope=0.1))
+    seen = LabelledStates(rng.normal(size=(n, d + 1)), rng.uniform(-1, 1, size=(n, m)))
+    return min(_seconds(lambda: search.whole_loss(cells, seen, temperature=1.0, clip_slope=0.1)) for _ in range(3))
 
 
 def _numbers(task: Task, config: Faithful) -> int:
