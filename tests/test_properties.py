@@ -28,6 +28,7 @@ from vsp import algorithms, evaluation, export, geometry, policy, rollouts
 from vsp.baselines import critics, dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
+from vsp.beyond.optimum import best_policy, best_returns
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.config import Config, paper_preset
 from vsp.paper import printed, statistics, tables
@@ -262,6 +263,8 @@ CASES = {
     "beyond.refinement.config.Refinement": (config.Refinement, settings_of(config.Refinement, REFINEMENT)),
     "beyond.refinement.config.Faithful": (config.Faithful, settings_of(config.Faithful, FAITHFUL)),
     "beyond.refinement.config.check_faithful": (config.check_faithful, {"config": intent}),
+    "beyond.optimum.references.best_policy": (best_policy, {"task": task, "finer": number(0.5, least=0.1, most=10.0)}),
+    "beyond.optimum.simplegoal.best_returns": (best_returns, {"starts": states}),
     "beyond.refinement.config.faithful_preset": (config.faithful_preset, {"task": task}),
     "beyond.refinement.faithful.distill_faithfully": (
         faithful.distill_faithfully,
@@ -583,6 +586,8 @@ EXEMPT = {
         beyond.refinement.faithful.needed_only beyond.refinement.duration beyond.refinement.faithful.variance
         beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
         beyond.refinement.population beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
+    "the inside of `best_policy`, which checks what comes in, and policies, which `rollouts` checks": """
+        beyond.optimum.grid beyond.optimum.simplegoal.Shortest""",
     "the inside of trees, of `dagger` and of `learn`, which check what comes in": """
         baselines.critics.trained baselines.critics.where_lost
         baselines.dagger.Rounds baselines.tdavq.DiscretePolicy baselines.tdavq.ParallelEpisodes baselines.tdavq.merge

@@ -1,1 +1,2 @@
-"""Beyond the paper: our own method (refinement), explanations, comparisons with other methods, and benchmarks."""
+"""Beyond the paper: our own method (refinement), the best possible returns (optimum), explanations, comparisons with
+other methods, and benchmarks."""

@@ -1,0 +1,4 @@
+"""The best that any policy can return, computed from the dynamics: what teachers and policies are measured against."""
+
+from .references import TASKS, best_policy
+from .simplegoal import best_returns
