@@ -5,7 +5,7 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 from vsp.beyond.optimum import best_policy, best_returns
-from vsp.beyond.optimum.grid import Grid, best_values
+from vsp.beyond.optimum.grid import Grid, best_values, best_values_in
 from vsp.beyond.optimum.references import _SOLVABLE, TASKS
 from vsp.evaluation import start_states
 from vsp.rollouts import rollout
@@ -43,6 +43,8 @@ def test_values_by_hand():
     corridor = replace(get_task(MOUNTAINCAR), step=step)
     values = best_values(corridor, Grid((0.0, 0.0), (1.0, 1.0), (6, 2)), np.array([-1.0, 0.0, 1.0]))
     assert np.allclose(values.reshape(6, 2).T, [0.6, 0.7, 0.8, 0.9, 1.0, 1.0])
+    soon = best_values_in(2, corridor, Grid((0.0, 0.0), (1.0, 1.0), (6, 2)), np.array([-1.0, 0.0, 1.0]))
+    assert np.allclose(soon.reshape(6, 2)[:, 1], [-0.2, -0.2, -0.2, 0.9, 1.0, 1.0])
     dearer = best_values(corridor, Grid((0.0, 0.0), (1.0, 1.0), (6, 2)), np.array([-1.0, 0.0, 1.0]), price=0.1)
     assert np.allclose(dearer.reshape(6, 2)[:, 0], [0.1, 0.3, 0.5, 0.7, 0.9, 0.9])
 

@@ -81,15 +81,32 @@ def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0
     For a task with one action whose states are the grid's. Without a limit of steps: a price keeps episodes short.
     """
     moves = [_move(task, grid, action, price) for action in actions]
-    values, everywhere = np.zeros(len(grid.points())), np.arange(len(grid.points()))
+    values = np.zeros(len(grid.points()))
     for _ in range(MOST_IMPROVEMENTS):
-        before, offers = values, np.stack([rewards + matrix @ values for rewards, matrix in moves])
-        best = offers.argmax(axis=0)
-        values = offers[best, everywhere]
+        before, (values, best) = values, _improved(moves, values)
         if np.abs(values - before).max() < CLOSE:
             return values
         values = _followed(moves, best, values)
     raise RuntimeError(f"values still change by {np.abs(values - before).max():g}, expected less than {CLOSE:g}")
+
+
+def best_values_in(steps: int, task: Task, grid: Grid, actions: np.ndarray) -> np.ndarray:
+    """The highest return in so many steps, by policies that know how many are left; else as `best_values`. (n,)"""
+    moves = [_move(task, grid, action, 0.0) for action in actions]
+    values = np.zeros(len(grid.points()))
+    for _ in range(steps):
+        values, _ = _improved(moves, values)
+    return values
+
+
+def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The values a step earlier, and the best actions there, by index. (n,) each"""
+    most, best = np.full(len(values), -np.inf), np.zeros(len(values), dtype=np.intp)
+    for i, (rewards, matrix) in enumerate(moves):
+        offer = rewards + matrix @ values
+        better = offer > most
+        most[better], best[better] = offer[better], i
+    return most, best
 
 
 def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarray, sparse.csr_array]:
