@@ -27,8 +27,10 @@ NOTEBOOKS := $(sort $(PAPER) $(OURS))
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
 ROWS := $(foreach n,$(SMALL),beyond_$(n))
-READS_06_few_equations := $(foreach n,$(ROWS) beyond_seconds tuned_seconds faithful_seconds $(foreach t,$(SMALL), \
-  $(foreach table,tuned apart faithful demanded teachers same,$(table)_$(t))) beyond_LunarLanderContinuous-v3,data/results/$(n).csv) \
+READS_06_few_equations := $(foreach n,$(ROWS) \
+  $(foreach t,$(SMALL),$(foreach table,tuned apart faithful demanded teachers same,$(table)_$(t))) \
+  $(foreach table,beyond faithful same,$(table)_LunarLanderContinuous-v3) \
+  $(foreach table,beyond tuned faithful,$(table)_seconds),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
 READS_07_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
@@ -173,7 +175,7 @@ faults: venv-test-train-dask ## breaks it in every way we know, into data/result
 beyond: begin venv-train ## our own method and others beside it, into data/results/: 4 to 5 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train ## the same for LunarLander, whose physics engine is slow: 3 to 4 HOURS, resumable
+beyond-long: begin venv-train ## the same for LunarLander, whose physics engine is slow: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

@@ -114,7 +114,8 @@ def test_of_tasks_that_take_long_fewer_rows_are_asked_and_their_tail():
     assert {table: {job.tail for job in jobs} for table, jobs in found.items() if jobs} == {
         "beyond": {False}, "tuned": {True}, "faithful": {True}
     }  # fmt: skip
-    assert {job.seed for job in found["beyond"]} == {job.seed for job in found["tuned"]} == set(range(5))
+    n_seeds = {table: len({job.seed for job in jobs}) for table, jobs in found.items() if jobs}
+    assert n_seeds == {"beyond": 5, "tuned": 3, "faithful": 10}
     assert sum(job.size == faithful_preset(LUNARLANDER).n_cells for job in found["faithful"]) == 10
 
 

@@ -15,7 +15,7 @@ from ...tasks.registry import get_task
 from ...teachers.teacher import load_teacher
 from ..refinement.simplification import simplify
 from ..refinement.units import METRIC
-from .method_rows import Job, preset
+from .method_rows import Job, jobs_of, preset
 
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
@@ -30,7 +30,8 @@ def keep_faithful(folder: str | os.PathLike, task: str, path: str | os.PathLike)
 
 def faithful_job(task: str) -> Job:
     """The row whose policy is kept."""
-    return Job(task, "faithful", preset(task, "faithful").n_cells, 0)
+    size = preset(task, "faithful").n_cells
+    return next(job for job in jobs_of(task, "faithful") if (job.size, job.seed) == (size, 0))
 
 
 def simplest(task: str) -> VoronoiPolicy:
