@@ -28,7 +28,7 @@ from vsp import algorithms, evaluation, export, geometry, policy, rollouts
 from vsp.baselines import critics, dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
-from vsp.beyond.optimum import best_policy, best_returns
+from vsp.beyond.optimum import best_policy, best_returns, limit_preset
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.config import Config, paper_preset
 from vsp.paper import printed, statistics, tables
@@ -223,6 +223,7 @@ player = {"policy": actor(TEACHER), "task": task}
 starts = numbers(STATES, also=[np.full((1, 2), 1.5), np.full((1, 2), -0.001)])
 points = {"codewords": numbers(STATES, free=(0, 1), some=True), "metric": choice("manhattan")}
 lookup = points | {"states": states}
+price = Argument(0.01, number(0.01, least=0.0).bad.filter(lambda one: one is not None))
 digits = Argument(3, count(3, least=0).bad.filter(lambda one: one is not None))  # None: as many as it takes
 cell = count(1, least=0, most=1)
 leaves = count(3)
@@ -263,7 +264,11 @@ CASES = {
     "beyond.refinement.config.Refinement": (config.Refinement, settings_of(config.Refinement, REFINEMENT)),
     "beyond.refinement.config.Faithful": (config.Faithful, settings_of(config.Faithful, FAITHFUL)),
     "beyond.refinement.config.check_faithful": (config.check_faithful, {"config": intent}),
-    "beyond.optimum.references.best_policy": (best_policy, {"task": task, "finer": number(0.5, least=0.1, most=10.0)}),
+    "beyond.optimum.limit.limit_preset": (limit_preset, {"task": task}),
+    "beyond.optimum.references.best_policy": (
+        best_policy,
+        {"task": task, "finer": number(0.5, least=0.1, most=10.0), "price": price},
+    ),
     "beyond.optimum.simplegoal.best_returns": (best_returns, {"starts": states}),
     "beyond.refinement.config.faithful_preset": (config.faithful_preset, {"task": task}),
     "beyond.refinement.faithful.distill_faithfully": (
@@ -588,6 +593,7 @@ EXEMPT = {
         beyond.refinement.population beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
     "the inside of `best_policy`, which checks what comes in, and policies, which `rollouts` checks": """
         beyond.optimum.grid beyond.optimum.simplegoal.Shortest""",
+    "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",
     "the inside of trees, of `dagger` and of `learn`, which check what comes in": """
         baselines.critics.trained baselines.critics.where_lost
         baselines.dagger.Rounds baselines.tdavq.DiscretePolicy baselines.tdavq.ParallelEpisodes baselines.tdavq.merge

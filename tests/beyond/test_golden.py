@@ -18,9 +18,11 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
-from vsp.beyond.comparison import kept, measure, time_to_quality
+from vsp.beyond.comparison import kept, measure, regret, time_to_quality
 from vsp.beyond.comparison.method_rows import APART, LIKE, METHODS, RIVALS
 from vsp.beyond.comparison.methods import Budget
+from vsp.beyond.optimum import TASKS as SOLVED
+from vsp.beyond.optimum import at_the_limit, best_policy, limit
 from vsp.beyond.refinement.config import Faithful, Refinement
 from vsp.beyond.refinement.simplification import simplify
 from vsp.paper import beside
@@ -123,6 +125,16 @@ def by_measure():
     return measure.measure(METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 0), teacher, task)
 
 
+def by_best_policies():
+    """Of coarse grids."""
+    return {task: actions(best_policy(task, finer=0.2), task) for task in SOLVED}
+
+
+def by_limit():
+    few = dataclasses.replace(SMALL, n_generations=5)
+    return {SIMPLEGOAL: actions(at_the_limit(SIMPLEGOAL, few, seed=0), SIMPLEGOAL)}
+
+
 CASES = {
     f"{table}[{name!r}]": (functools.partial(by_method, name), method.version)
     for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE, "APART": APART}.items()
@@ -132,6 +144,8 @@ CASES = {
     "kept.simplest": (by_simplest, kept.SIMPLIFY_VERSION),
     "beside": (beside_a_run, beside.VERSION),
     "measure": (by_measure, measure.VERSION),
+    "regret": (by_best_policies, regret.VERSION),
+    "limit": (by_limit, limit.VERSION),
 }
 
 

@@ -212,14 +212,16 @@ def test_an_ablated_row_is_that_of_the_changed_settings(monkeypatch):
 
 def test_the_command_writes_results_and_times_apart(small, tmp_path):
     small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
-    small.setattr(make_rows, "time_to_quality", lambda: pd.DataFrame({"seconds": [0.5]}))
+    for name in ("time_to_quality", "optimum"):
+        small.setattr(make_rows, name, lambda: pd.DataFrame({"seconds": [0.5]}))
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
     results = tmp_path / "data" / "results"
     frame = read_rows(SIMPLEGOAL, results)
     assert len(frame) == 5 and "seconds" not in frame
     assert len(pd.read_csv(results / "beyond_seconds.csv")) == 5
-    assert (results / "beyond_race.csv").read_text() == "seconds\n0.500000\n"
+    for name in ("beyond_race", "optimum"):
+        assert (results / f"{name}.csv").read_text() == "seconds\n0.500000\n"
     listed.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
     assert read_rows("Pendulum-v1", results)["failing"].isna().all()
 
@@ -231,7 +233,6 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
     like = {"faithful": dataclasses.replace(LIKE["faithful"], sizes=(1, 2))}
     small.setattr(method_rows, "faithful_preset", lambda task: quick)
     small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
-    small.setattr(make_rows, "time_to_quality", lambda: pd.DataFrame({"seconds": [0.5]}))
     for module in (method_rows, make_rows):
         small.setattr(module, "TABLES", {"faithful": Table(like, seeds=range(2), fewer=range(2))})
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1", "--tables", "faithful"])

@@ -10,7 +10,7 @@ import pytest
 from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.beyond.benchmarks import lookup
-from vsp.beyond.comparison import kept, method_rows, stale_results, time_to_quality
+from vsp.beyond.comparison import kept, method_rows, regret, stale_results, time_to_quality
 from vsp.beyond.comparison.method_rows import METHODS
 from vsp.paper import results as results_module
 from vsp.paper import runs
@@ -148,12 +148,13 @@ def raised(name):
         (lambda patch: patch.setitem(METHODS, "CART", raised("CART")), BEYOND + LONG),
         (lambda patch: patch.setitem(METHODS, "TD-AVQ", raised("TD-AVQ")), BEYOND[:1]),
         (lambda patch: patch.setattr(time_to_quality, "VERSION", 2), [says("beyond_race.csv", "version", "beyond")]),
+        (lambda patch: patch.setattr(regret, "VERSION", 2), [says("optimum.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(lookup, "VERSION", 2), [says("lookup.csv", "version", "lookup")]),
         (lambda patch: patch.setattr(kept, "SIMPLIFY_VERSION", 2),
          [says(f"beyond_{LUNARLANDER}.policy", "version", "beyond-long")]),
         (lambda patch: patch.setattr(interpretations, "VERSION", 2), [says("readings.csv", "settings", "study")]),
     ],
-    ids=["paper", "CART", "TD-AVQ", "race", "lookup", "simplify", "study"],
+    ids=["paper", "CART", "TD-AVQ", "race", "optimum", "lookup", "simplify", "study"],
 )  # fmt: skip
 def test_results_of_another_version_are_stale(results, monkeypatch, change, expected):
     change(monkeypatch)

@@ -5,6 +5,7 @@ from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geo
 from .faithful_summary import largest_alike, likeness, other_teachers
 from .method_rows import TASKS
 from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good
+from .regret import best_mean, with_regret
 from .time_to_quality import ENOUGH, quickest
 
 

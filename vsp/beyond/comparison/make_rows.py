@@ -11,13 +11,14 @@ from ...paper.results import write_results
 from ...run import command
 from .kept import keep_faithful, keep_simplest
 from .method_rows import LONG, TABLES, TASKS, jobs_of, make_all, pairs, rows
+from .regret import optimum
 from .time_to_quality import time_to_quality
 
 
 def main() -> None:
     """Make the rows that are missing, and write data/results/<table>_<task>.csv, same_<task>.csv and
-    faithful_<task>.policy beside the faithful table and, with times, <table>_seconds.csv and beyond_race.csv; or those
-    of the tasks whose rows take hours, their times in <table>_seconds_long.csv, and beyond_<task>.policy.
+    faithful_<task>.policy beside the faithful table, times in <table>_seconds.csv, beyond_race.csv and optimum.csv; or
+    those of the tasks whose rows take hours, their times in <table>_seconds_long.csv, and beyond_<task>.policy.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
@@ -44,6 +45,7 @@ def main() -> None:
             keep_simplest(task, out / "data" / "results" / f"beyond_{task}.policy")
     elif "beyond" in arguments.tables:
         write_results(time_to_quality(), "beyond_race", out=out)
+        write_results(optimum(), "optimum", out=out)
 
 
 if __name__ == "__main__":

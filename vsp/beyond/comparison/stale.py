@@ -18,7 +18,7 @@ from ...paper import results
 from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
 from ..benchmarks import lookup
-from . import time_to_quality
+from . import regret, time_to_quality
 from .kept import faithful_job, simplest_provenance
 from .method_rows import LONG, TABLES, TASKS, Job, is_committed, jobs_of
 
@@ -53,6 +53,7 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
             yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
             yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
     yield "beyond_race.csv", "beyond", _race
+    yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
     for task in LONG:
         yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
     yield "lookup.csv", "lookup", lambda _: [lookup.made_with()]

@@ -90,15 +90,6 @@ def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0
     raise RuntimeError(f"values still change by {np.abs(values - before).max():g}, expected less than {CLOSE:g}")
 
 
-def best_values_in(steps: int, task: Task, grid: Grid, actions: np.ndarray) -> np.ndarray:
-    """The highest return in so many steps, by policies that know how many are left; else as `best_values`. (n,)"""
-    moves = [_move(task, grid, action, 0.0) for action in actions]
-    values = np.zeros(len(grid.points()))
-    for _ in range(steps):
-        values, _ = _improved(moves, values)
-    return values
-
-
 def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The values a step earlier, and the best actions there, by index. (n,) each"""
     most, best = np.full(len(values), -np.inf), np.zeros(len(values), dtype=np.intp)
@@ -136,7 +127,7 @@ class GridPolicy:
     def __init__(
         self, task: Task, grid: Grid, values: np.ndarray, actions: np.ndarray, state_of: Callable, price: float = 0.0
     ):
-        self._task, self._grid, self._values, self._price = task, grid, values, price
+        self.grid, self._task, self._values, self._price = grid, task, values, price
         self._actions, self._state_of = actions, state_of
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
@@ -144,6 +135,14 @@ class GridPolicy:
         states = self._state_of(obs.astype(np.float64))
         parts = np.split(states, range(AT_ONCE, len(states), AT_ONCE))
         return np.concatenate([self._best(part) for part in parts])[:, None], None
+
+    def lost(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """What `actions` (n, 1) cost in the observations (n, d), if the best actions follow: in units of return. (n,)
+
+        Of an episode that ends where no more is to be had, the sum is its regret, but for the grid's error.
+        """
+        states, best = self._state_of(obs.astype(np.float64)), self.predict(obs)[0]
+        return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
 
     def _best(self, states: np.ndarray) -> np.ndarray:
         """The top of the parabola through the best three actions. (n,)"""
@@ -159,4 +158,4 @@ class GridPolicy:
 
     def _offers(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         after, rewards, outcomes = self._task.step(states, actions[:, None])
-        return rewards - self._price + (outcomes == RUNNING) * self._grid.at(after, self._values)
+        return rewards - self._price + (outcomes == RUNNING) * self.grid.at(after, self._values)

@@ -44,19 +44,23 @@ _SOLVABLE = {
 TASKS = ("SimpleGoal-v0", *_SOLVABLE)
 
 
-def best_policy(task: str | Task, *, finer: float = 1.0) -> Policy:
+def best_policy(task: str | Task, *, finer: float = 1.0, price: float | None = None) -> Policy:
     """The policy with the highest mean return, for one of `TASKS`; made anew, in some seconds.
 
     SimpleGoal's is exact but 2e-5; the others are solved on a grid, with `finer` times as many points in each variable.
-    Raises ValueError for a task whose optimum is not known, and for `finer` beyond 0.1 to 10.
+    `price`: of each step, by default as little as the best return allows; a higher one comes sooner where there is a
+    goal. Raises ValueError for a task whose optimum is not known, for `finer` beyond 0.1 to 10, and a negative price.
     """
     task = get_task(task)
     check_number("finer", finer, least=0.1, most=10.0)
+    if price is not None:
+        check_number("price", price, least=0.0)
     if task.name == "SimpleGoal-v0":
         return Shortest()
     if task.name not in _SOLVABLE:
         raise ValueError(f"the best return of {task.name} is not known, expected one of {TASKS}")
     about = _SOLVABLE[task.name]
     grid, actions = about.grid.finer(finer), np.linspace(task.action_low[0], task.action_high[0], N_ACTIONS)
-    values = best_values(task, grid, actions, price=about.price)
-    return GridPolicy(task, grid, values, actions, about.state_of, about.price)
+    price = about.price if price is None else price
+    values = best_values(task, grid, actions, price=price)
+    return GridPolicy(task, grid, values, actions, about.state_of, price)

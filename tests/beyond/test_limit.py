@@ -1,0 +1,73 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+
+from vsp.beyond.optimum import at_the_limit, best_returns, limit, limit_preset
+from vsp.beyond.refinement.config import Faithful, faithful_preset, tuned_preset
+from vsp.evaluation import start_states
+from vsp.rollouts import rollout
+from vsp.tasks.base import GOAL
+from vsp.teachers.teacher import load_teacher
+
+FEW = replace(
+    limit_preset(SIMPLEGOAL), n_episodes=100, n_restarts=1, n_steps=300, n_correction_episodes=50, n_generations=30,
+    n_tuning_episodes=100, n_validation=300,
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(limit, "BEGINNINGS", 2)
+    few = Faithful(n_cells=4, n_episodes=100, n_restarts=2, n_validation=20)
+    monkeypatch.setattr(limit, "faithful_preset", lambda task, n_cells: replace(few, n_cells=n_cells))
+
+
+def test_a_short_search_comes_near_the_best():
+    policy = at_the_limit(SIMPLEGOAL, FEW, seed=0)
+    starts = start_states(SIMPLEGOAL, 500, 7)
+    result = rollout(policy, SIMPLEGOAL, starts)
+    regret = (best_returns(starts) - result.returns)[result.outcomes == GOAL].mean()
+    assert len(policy) <= 4 and 0 < regret < 0.3 and (result.outcomes == GOAL).mean() > 0.95
+
+
+def test_the_same_seed_gives_the_same_policy():
+    few = replace(FEW, n_steps=20, n_generations=5)
+    one, again, other = (at_the_limit(SIMPLEGOAL, few, seed=seed) for seed in (0, 0, 1))
+    assert np.array_equal(one.codewords, again.codewords) and np.array_equal(one.coefficients, again.coefficients)
+    assert not np.array_equal(one.coefficients, other.coefficients)
+
+
+def test_each_beginning_is_tuned_for_a_while_and_the_best_to_the_end(monkeypatch):
+    called, refine, close = [], limit.refine, limit.distill_faithfully
+
+    def recorded(teacher, task, config, *, seed, start=None):
+        called.append((config.n_generations, start is None))
+        return refine(teacher, task, config, seed=seed, start=start)
+
+    monkeypatch.setattr(limit, "refine", recorded)
+    monkeypatch.setattr(
+        limit, "distill_faithfully", lambda *some, **more: called.append("close") or close(*some, **more)
+    )
+    at_the_limit(SIMPLEGOAL, replace(FEW, n_generations=10), seed=1)
+    assert called == ["close", (2, False), (2, True), (10, False)]
+
+
+def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one_or_any(monkeypatch):
+    taught, shipped = [], load_teacher(SIMPLEGOAL)
+    monkeypatch.setattr(limit, "best_policy", lambda task, price: ("best", task.name, price))
+    monkeypatch.setattr(limit, "load_teacher", lambda task: ("shipped", task))
+    monkeypatch.setattr(limit, "_begun", lambda teacher, *rest, closest: taught.append(teacher) or 1 / 0)
+    for task, teacher in ((MOUNTAINCAR, None), (PENDULUM, None), (LUNARLANDER, None), (SIMPLEGOAL, shipped)):
+        with pytest.raises(ZeroDivisionError):
+            at_the_limit(task, seed=0, teacher=teacher)
+    assert taught == [("best", MOUNTAINCAR, 3e-3), ("best", PENDULUM, None), ("shipped", LUNARLANDER), shipped]
+
+
+def test_what_cannot_be_searched_is_refused():
+    with pytest.raises(ValueError, match="expected a Refinement"):
+        at_the_limit(SIMPLEGOAL, faithful_preset(SIMPLEGOAL), seed=0)
+    with pytest.raises(ValueError, match="seed is -1"):
+        at_the_limit(SIMPLEGOAL, seed=-1)
+    assert limit_preset(PENDULUM).n_generations > tuned_preset(PENDULUM).n_generations

@@ -1,0 +1,66 @@
+"""How far returns are from the best that is possible, for the tasks whose optimum is computed.
+
+data/results/optimum.csv holds what the best policies return from the start states on which all rows are reported.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pandas as pd
+
+from ...evaluation import start_states
+from ...paper.results import provenance, read_results
+from ...rollouts import rollout
+from ...run.progress import progress
+from ...tasks.base import GOAL, Task
+from ...tasks.registry import get_task
+from ..optimum import TASKS, best_policy, best_returns
+from ..optimum.grid import GridPolicy
+from .measure import N_REPORTED, REPORT_SEED
+
+VERSION = 1  # raise it when the best policies return something else; tests/golden/methods.json guards it
+# Tasks, and how much finer the grid: how far two returns of a task differ shows the grid's error
+WAYS = (("SimpleGoal-v0", 1.0), *((task, finer) for task in TASKS[1:] for finer in (1.0, 2.0)))
+CLOSED = "closed form"
+
+
+def optimum() -> pd.DataFrame:
+    """What the best policies return, one row per task and way to find them; the last of a task is the best.
+
+    Columns: task, found (how: `CLOSED`, or the points of the grid), mean, worst, failing (share of the
+    episodes without the goal; NaN where there is none), longest (steps), and the provenance. Takes about five minutes.
+    """
+    shown = progress(WAYS, "optimum", total=len(WAYS), unit="policies")
+    return pd.DataFrame([_played(get_task(task), finer) for task, finer in shown])
+
+
+def _played(task: Task, finer: float) -> dict:
+    """The row of a task, from a grid with `finer` times the points."""
+    policy, starts = best_policy(task, finer=finer), start_states(task, N_REPORTED, REPORT_SEED)
+    result, on_grid = rollout(policy, task, starts), isinstance(policy, GridPolicy)
+    returns, failing = result.returns if on_grid else best_returns(starts), np.mean(result.outcomes != GOAL)
+    found = "{} × {} points".format(*policy.grid.shape) if on_grid else CLOSED
+    row = {"task": task.name, "found": found, "mean": returns.mean(), "worst": returns.min()}
+    row |= {"failing": failing if failing < 1 else np.nan, "longest": result.lengths.max()}
+    return row | provenance_of(task.name, finer)
+
+
+def provenance_of(task: str, finer: float) -> dict[str, str | int]:
+    """The provenance of a row; no teacher has a part in it."""
+    return provenance({"task": task, "finer": finer, "starts": [REPORT_SEED, N_REPORTED]}, "none", VERSION)
+
+
+def best_mean(task: str, folder: str | os.PathLike | None = None) -> float:
+    """The highest mean return that is possible from the report starts; NaN where it is not known."""
+    frame = read_results("optimum", folder)
+    found = frame.loc[frame["task"] == task, "mean"]
+    return float(found.iloc[-1]) if len(found) else np.nan
+
+
+def with_regret(table: pd.DataFrame, task: str, *, of: str = "mean") -> pd.DataFrame:
+    """`table` with a column regret: the best possible mean return less its column `of`; "not known" where the best is
+    not computed."""
+    best = best_mean(task)
+    return table.assign(regret="not known" if np.isnan(best) else best - table[of])
