@@ -133,8 +133,7 @@ def by_best_policies():
 
 
 def by_limit():
-    few = dataclasses.replace(SMALL, n_generations=5)
-    return {SIMPLEGOAL: actions(at_the_limit(SIMPLEGOAL, few, seed=0), SIMPLEGOAL)}
+    return {SIMPLEGOAL: actions(at_the_limit(SIMPLEGOAL, SMALL, seed=0, teacher=TEACHERS[SIMPLEGOAL]), SIMPLEGOAL)}
 
 
 CASES = {
