@@ -91,6 +91,32 @@ def test_a_resumed_training_ends_with_the_same_weights(short, tmp_path, monkeypa
     assert not same(weights(whole), weights(other))
 
 
+def test_on_another_machine_a_training_goes_on_without_its_replay_buffer(short, tmp_path, monkeypatch):
+    """Networks, optimisers and the learning curve move; the actor fills a new buffer, and the card says so."""
+    lines, lean = [], tmp_path / "lean"
+
+    def interrupt(line):
+        lines.append(line)
+        if len(lines) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "here", lean=lean, report=interrupt)
+    (moved,) = lean.iterdir()
+    before = read_checkpoint(moved)
+    assert "buffer" not in before and before["counters"][0] == 31  # the second point was not written any more
+    path = train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "there", lean=lean, report=lines.append)
+    after = read_checkpoint(path)
+    assert [point["steps"] for point in after["curve"]] == [31, 62, 90] and after["refilled"] == [31]
+    assert len(after["buffer"]["rewards"]) == 90 - 31 + SHORT.learning_starts
+    assert read_checkpoint(moved)["curve"] == after["curve"]
+    path.unlink()
+    assert train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "there", lean=lean, report=pytest.fail) == moved
+    monkeypatch.setattr(train, "BARS", {SIMPLEGOAL: (-100.0, 1.0)})
+    assert export(SIMPLEGOAL, {3: moved}, tmp_path / "out")
+    assert load_teacher(tmp_path / "out" / f"{SIMPLEGOAL}.safetensors").card["buffer_refilled_at"] == [31]
+
+
 def test_a_finished_training_is_not_done_again(short, tmp_path):
     first, lines = train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None), []
     before = first.read_bytes()

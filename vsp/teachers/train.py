@@ -97,11 +97,21 @@ SCORE_EPISODES, CURVE_EPISODES = 10_000, 500
 SELECTION_SEED, SCORE_SEED = 101, 102  # start states to choose a training seed on, and to report on
 
 
-def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | None = None, report=print) -> Path:
+def train(
+    task: str,
+    *,
+    seed: int,
+    cache: str | os.PathLike,
+    lean: str | os.PathLike | None = None,
+    recipe: Recipe | None = None,
+    report=print,
+) -> Path:
     """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint.
 
     Training goes in chunks of `CHUNK` steps. Each chunk begins a fresh episode with fresh random streams from (seed,
-    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one.
+    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one. The folder
+    `lean` is for moving to another machine: its checkpoints have no replay buffer. Where the cache has none, training
+    goes on from there, after the actor has filled the buffer again; the checkpoint says at which steps.
     """
     import torch
 
@@ -109,10 +119,15 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     recipe = RECIPES[task] if recipe is None else recipe
     path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
-    model, curve, best = _new_model(task, recipe, seed), [], None
-    if path.exists():
-        snapshot = read_checkpoint(path)
-        curve, best = _restore(model, snapshot), snapshot.get("best")
+    model, curve, best, refilled = _new_model(task, recipe, seed), [], None, []
+    known = [path, Path(lean) / path.name] if lean else [path]
+    if found := next(filter(Path.exists, known), None):
+        snapshot = read_checkpoint(found)
+        curve, best, refilled = _restore(model, snapshot), snapshot.get("best"), snapshot.get("refilled", [])
+        if "buffer" not in snapshot and model.num_timesteps < recipe.steps:
+            model.set_random_seed(seed)
+            _refill(model)
+            refilled.append(model.num_timesteps)
     while model.num_timesteps < recipe.steps:
         chunk_seed = np.random.SeedSequence([seed, model.num_timesteps]).generate_state(1)[0]
         model.set_random_seed(int(chunk_seed))
@@ -126,10 +141,29 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
             if best is None or curve[-1]["mean"] > best["point"]["mean"]:
                 best = {"point": curve[-1], "policy": copy.deepcopy(snapshot["policy"])}
             snapshot["best"] = best
-        content = io.BytesIO()
-        torch.save(snapshot, content)
-        sealed.write_sealed(path, content.getvalue())
+        snapshot["refilled"] = refilled
+        found = _write_checkpoint(path, snapshot)
+        if lean:
+            del snapshot["buffer"], snapshot["buffer_at"]
+            _write_checkpoint(Path(lean) / path.name, snapshot)
+    return found
+
+
+def _write_checkpoint(path: Path, snapshot: dict) -> Path:
+    import torch
+
+    content = io.BytesIO()
+    torch.save(snapshot, content)
+    sealed.write_sealed(path, content.getvalue())
     return path
+
+
+def _refill(model) -> None:
+    """Fill the replay buffer with as many steps as training begins after, without training; they do not count."""
+    steps, gradient_steps = model.num_timesteps, model.gradient_steps
+    model.gradient_steps = 0
+    model.learn(max(model.learning_starts, model.batch_size), reset_num_timesteps=False, log_interval=None)
+    model.num_timesteps, model.gradient_steps = steps, gradient_steps
 
 
 def read_checkpoint(path: str | os.PathLike) -> dict:
@@ -184,9 +218,9 @@ def _restore(model, snapshot: dict) -> list[dict]:
     model.policy.load_state_dict(snapshot["policy"])
     model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
     model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
-    for name, rows in snapshot["buffer"].items():
+    for name, rows in snapshot.get("buffer", {}).items():
         getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
-    model.replay_buffer.pos, model.replay_buffer.full = snapshot["buffer_at"]
+    model.replay_buffer.pos, model.replay_buffer.full = snapshot.get("buffer_at", (0, False))
     model.num_timesteps, model._n_updates, model._episode_num = snapshot["counters"]
     return snapshot["curve"]
 
@@ -227,6 +261,8 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
         "seeds_tried": [{"seed": s, **_chosen(snap)[1]} for s, snap in tried.items()],
         "earlier_trials": EARLIER_TRIALS.get(task, []),
     }
+    if snapshot.get("refilled"):  # after a move to another machine
+        about["buffer_refilled_at"] = snapshot["refilled"]
     _write(task, snapshot, RECIPES[task], seed, Path(folder) / f"{task}.safetensors", ("actor.", "critic."), about)
     return True
 
@@ -283,6 +319,7 @@ def main() -> None:
     """Train each task's teacher with seeds 0, 1, ... until one reaches the bar, and export it; or the short ones."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--cache", required=True, help="folder for checkpoints; training resumes from there")
+    parser.add_argument("--lean", help="folder for checkpoints without replay buffers, to go on with elsewhere")
     parser.add_argument("--out", default=SHIPPED, help="folder for the exported teachers")
     parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
     parser.add_argument("--short", action="store_true", help="the shorter trainings that a study compares")
@@ -295,7 +332,7 @@ def main() -> None:
             continue
         checkpoints = {}
         for seed in range(MOST_SEEDS):
-            checkpoints[seed] = train(task, seed=seed, cache=arguments.cache)
+            checkpoints[seed] = train(task, seed=seed, cache=arguments.cache, lean=arguments.lean)
             if export(task, checkpoints, arguments.out):
                 break
         else:
