@@ -77,7 +77,7 @@ AT_LENGTH = {  # numbers that decide on a policy and are made small here
 def shorter(monkeypatch):
     monkeypatch.setattr(SoftTree, "N_STEPS", 50)
     monkeypatch.setattr(imitate, "N_MOVES", 1)
-    monkeypatch.setattr(limit, "BEGINNINGS", 2)
+    monkeypatch.setattr(limit, "N_STARTS", 2)
     monkeypatch.setattr(limit, "faithful_preset", lambda task, n_cells: PRESETS["faithful"])
 
 

@@ -19,7 +19,7 @@ FEW = replace(
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(limit, "BEGINNINGS", 2)
+    monkeypatch.setattr(limit, "N_STARTS", 2)
     few = Faithful(n_cells=4, n_episodes=100, n_restarts=2, n_validation=20)
     monkeypatch.setattr(limit, "faithful_preset", lambda task, n_cells: replace(few, n_cells=n_cells))
 
@@ -39,7 +39,7 @@ def test_the_same_seed_gives_the_same_policy():
     assert not np.array_equal(one.coefficients, other.coefficients)
 
 
-def test_each_beginning_is_tuned_for_a_while_and_the_best_to_the_end(monkeypatch):
+def test_each_start_is_tuned_briefly_and_the_best_to_the_end(monkeypatch):
     called, refine, close = [], limit.refine, limit.distill_faithfully
 
     def recorded(teacher, task, config, *, seed, start=None):
@@ -58,7 +58,7 @@ def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one_o
     taught, shipped = [], load_teacher(SIMPLEGOAL)
     monkeypatch.setattr(limit, "best_policy", lambda task, price: ("best", task.name, price))
     monkeypatch.setattr(limit, "load_teacher", lambda task: ("shipped", task))
-    monkeypatch.setattr(limit, "_begun", lambda teacher, *rest, closest: taught.append(teacher) or 1 / 0)
+    monkeypatch.setattr(limit, "_screened", lambda teacher, *rest, closest: taught.append(teacher) or 1 / 0)
     for task, teacher in ((MOUNTAINCAR, None), (PENDULUM, None), (LUNARLANDER, None), (SIMPLEGOAL, shipped)):
         with pytest.raises(ZeroDivisionError):
             at_the_limit(task, seed=0, teacher=teacher)

@@ -1,7 +1,6 @@
-"""How near a few cells come to the best: distilled from the best policy, then tuned on the return.
+"""How near a few cells come to the best return: distilled from the best policy, then tuned on the return.
 
-Where the search begins decides where it ends. So several beginnings are tuned for a while, and the best of them to the
-end.
+The start decides where such a search ends. So several starts are tuned briefly, and the best of them to the end.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ from ..refinement.refine import refine
 from .references import TASKS, best_policy
 
 VERSION = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
-BEGINNINGS = 4  # every other one of them the closest imitation
-SHARE = 0.2  # of the generations that each beginning is tuned for
-PRICE = {"MountainCarContinuous-v0": 3e-3}  # of a step: who comes sooner can be imitated with less care
+N_STARTS = 12  # every other one is the closest imitation
+SCREENING = 0.2  # share of the generations for which each start is tuned
+PRICE = {"MountainCarContinuous-v0": 3e-3}  # of a step: a car that arrives sooner may be imitated less exactly
 
 _LIMIT = {
     "SimpleGoal-v0": {"n_cells": 4, "n_generations": 400, "n_tuning_episodes": 500},
@@ -57,30 +56,30 @@ def at_the_limit(
     config = limit_preset(task) if config is None else config
     check_refinement(config)
     teacher = _best_teacher(task) if teacher is None else teacher
-    last, *seeds = np.random.SeedSequence(seed).generate_state(1 + BEGINNINGS).tolist()
-    short = replace(config, n_generations=round(SHARE * config.n_generations))
-    begun = [_begun(teacher, task, short, one, closest=i % 2 == 0) for i, one in enumerate(seeds)]
-    starts = task.start(np.random.default_rng(last), config.n_validation)
-    best = max(begun, key=lambda policy: score(rollout(policy, task, starts), config.failure_penalty))
-    return _on(best, teacher, task, config, last)
+    last, *seeds = np.random.SeedSequence(seed).generate_state(1 + N_STARTS).tolist()
+    brief = replace(config, n_generations=round(SCREENING * config.n_generations))
+    screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds)]
+    validation = task.start(np.random.default_rng(last), config.n_validation)
+    best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
+    return _tuned(best, teacher, task, config, last)
 
 
 def _best_teacher(task: Task) -> Policy:
     return best_policy(task, price=PRICE.get(task.name)) if task.name in TASKS else load_teacher(task.name)
 
 
-def _begun(teacher: Policy, task: Task, config: Refinement, seed: int, *, closest: bool) -> VoronoiPolicy:
-    """Tuned for a while: the closest imitation that is known, or the best of `refine`."""
+def _screened(teacher: Policy, task: Task, config: Refinement, seed: int, *, closest: bool) -> VoronoiPolicy:
+    """Tuned briefly: the closest imitation that `distill_faithfully` finds, or the best one of `refine`."""
     if not closest:
         return refine(teacher, task, config, seed=seed)[0]
     like = replace(faithful_preset(task, n_cells=config.n_cells), n_episodes=config.n_episodes, n_generations=0)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no policy of")  # its return is not the aim
         policy, _ = distill_faithfully(teacher, task, like, seed=seed)
-    return _on(policy, teacher, task, config, seed)
+    return _tuned(policy, teacher, task, config, seed)
 
 
-def _on(policy: VoronoiPolicy, teacher: Policy, task: Task, config: Refinement, seed: int) -> VoronoiPolicy:
+def _tuned(policy: VoronoiPolicy, teacher: Policy, task: Task, config: Refinement, seed: int) -> VoronoiPolicy:
     """The policy tuned as `config` says."""
     config = replace(config, n_cells=len(policy), n_restarts=1, n_corrections=0)
     return refine(teacher, task, config, seed=seed, start=policy)[0]
