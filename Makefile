@@ -15,7 +15,7 @@ TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
 FIGURES_06_few_equations := beyond_map beyond_likeness beyond_read
-TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equal budgets teachers)
+TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equal tail budgets teachers)
 FIGURES_07_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
 TABLES_07_methods := beyond_headline beyond_ablation beyond_lunarlander \
@@ -29,8 +29,8 @@ SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
 ROWS := $(foreach n,$(SMALL),beyond_$(n))
 READS_06_few_equations := $(foreach n,$(ROWS) \
   $(foreach t,$(SMALL),$(foreach table,tuned apart faithful demanded teachers same,$(table)_$(t))) \
-  $(foreach table,beyond faithful same,$(table)_LunarLanderContinuous-v3) \
-  $(foreach table,beyond tuned faithful,$(table)_seconds),data/results/$(n).csv) \
+  $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3) optimum \
+  $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
 READS_07_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy

@@ -140,10 +140,21 @@ def test_faithful_policies_are_those_of_the_table():
 def test_who_leads_is_that_of_the_table():
     table = read_table("beyond_leaders").set_index(["task", "size"])
     two = table.loc[("MountainCar", 2)]
-    assert quoted(f"one line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
+    assert quoted(f"of a line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
     assert f"{two['rival mean']:.2f} on average, two of our cells {two['mean']:.2f}" in " ".join(RESULTS.split())
-    assert two["rival"] == "oblique tree, constants" and set(table.loc["SimpleGoal", "ahead"]) == {"level"}
+    assert two["rival"] == "oblique tree, constants"
+    assert set(table.loc["SimpleGoal", "ahead"]) == set(table.loc["LunarLander", "ahead"]) == {"level"}
     assert table.index[table["ahead"] == "ours"].tolist() == [("Pendulum", 2), ("Pendulum", 3)]
+    lander = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]["LunarLander"]
+    said = f"one linear map returns {lander[1, 'one linear map']:.1f}, two of our cells {lander[2, 'our cells']:.1f}"
+    assert said in " ".join(RESULTS.split())
+
+
+def test_how_often_faithful_landers_fail_is_that_of_the_table():
+    tail = read_table("beyond_tail").set_index(["method", "size"])["failing"]
+    faithful, teacher = (1000 * tail[about] for about in (("our cells, faithful", 8), ("teacher", 0)))
+    said = f"{faithful:.0f} landings in a thousand fail, {teacher:.0f} of the teacher's"
+    assert said in " ".join(RESULTS.split()) and tail.drop(index="our cells, faithful").max() <= teacher / 1000
 
 
 def test_up_to_how_many_cells_seeds_agree():

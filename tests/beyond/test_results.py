@@ -134,7 +134,9 @@ STUDIES = [says(f"{name}.csv", "version", "study") for name in ("readings", "tea
 
 
 def long_ones(what):
-    return [says(f"beyond_{t}.{kind}", what, "beyond-long") for kind in ("csv", "policy") for t in method_rows.LONG]
+    """Of LunarLander, what holds rows of `refined` or comes from it."""
+    names = ("beyond_{}.csv", "tuned_{}.csv", "beyond_{}.policy")
+    return [says(name.format(LUNARLANDER), what, "beyond-long") for name in names]
 
 
 def raised(name):
@@ -179,9 +181,8 @@ def test_results_of_another_preset_are_stale(results, monkeypatch):
 
 def files_of(task):
     """The committed rows of a task, and what is kept of its faithful ones."""
-    tables = [table for table in method_rows.TABLES if method_rows.is_committed(table, task)]
-    kept = [f"same_{task}.csv", f"faithful_{task}.policy"] if "faithful" in tables else []
-    return [f"{table}_{task}.csv" for table in tables] + kept
+    tables = [f"{table}_{task}.csv" for table in method_rows.tables_of(task)]
+    return [*tables, f"same_{task}.csv", f"faithful_{task}.policy"]
 
 
 def test_results_of_another_teacher_are_stale(results, monkeypatch):

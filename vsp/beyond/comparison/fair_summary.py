@@ -19,7 +19,7 @@ from ...teachers.teacher import Teacher, load_teacher
 from ..refinement import faithful, tune
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from .measure import ERROR_SEED, N_ERROR
-from .method_rows import LONG, UNTUNED, is_committed
+from .method_rows import LONG, UNTUNED, tables_of
 from .method_summary import ahead, method_summary, read_rows
 from .methods import numbers_of
 
@@ -45,7 +45,7 @@ COLUMNS = ("mean", "low", "high", "r2")
 def all_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """The committed rows of `task` of all methods, from the shipped teacher, `with_r2`; each method, size and seed
     once, as its last table has it."""
-    tables = [table for table in TABLES if is_committed(table, task)]
+    tables = [table for table in TABLES if table in tables_of(task)]
     frame = pd.concat([read_rows(task, folder, table=table) for table in tables])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
@@ -118,7 +118,8 @@ def tail(frame: pd.DataFrame) -> pd.DataFrame:
     table = by_kind[["mean", "worst", "failing"]].mean()
     table.insert(0, "policies", by_kind.size())
     table["worst_least"] = by_kind["worst"].min()
-    return table.sort_values("mean", ascending=False, kind="stable").reset_index()
+    names = {tuned: f"{name}, tuned" for name, (_, tuned) in PAIRS.items()} | {"faithful": f"{OURS}, faithful"}
+    return table.rename(index=names).sort_values("mean", ascending=False, kind="stable").reset_index()
 
 
 def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:

@@ -10,7 +10,7 @@ import pandas as pd
 from ...paper.results import write_results
 from ...run import command
 from .kept import keep_faithful, keep_simplest
-from .method_rows import LONG, TABLES, TASKS, jobs_of, make_all, pairs, rows
+from .method_rows import LONG, TABLES, TASKS, jobs_of, make_all, pairs, rows, tables_of
 from .regret import optimum
 from .time_to_quality import time_to_quality
 
@@ -28,8 +28,8 @@ def main() -> None:
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
     rows_in = out / "build" / "beyond"
-    wanted = {(table, task): jobs_of(task, table) for table in arguments.tables for task in tasks}
-    wanted = {about: some for about, some in wanted.items() if some}
+    wanted = {(table, task): jobs_of(task, table) for task in tasks for table in tables_of(task)}
+    wanted = {about: some for about, some in wanted.items() if about[0] in arguments.tables}
     make_all(rows_in, [job for some in wanted.values() for job in some], jobs=arguments.jobs)
     for table in dict.fromkeys(table for table, _ in wanted):
         found = {task: rows(rows_in, wanted[table, task]) for task in tasks}

@@ -187,9 +187,6 @@ LONG_TABLES = {
     "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
 }  # fmt: skip
 
-# Tables of which not all rows are made yet: data/README.md
-UNFINISHED = {("tuned", task) for task in LONG}
-
 
 @dataclass(frozen=True)
 class Job:
@@ -241,8 +238,8 @@ def _teacher(task: str, agent: int) -> Teacher:
 
 def jobs_of(task: str, table: str = "beyond") -> list[Job]:
     """All rows of a task in a table, a key of `TABLES`."""
-    about, found = (LONG_TABLES if task in LONG else TABLES).get(table), []
-    for name, method in about.methods.items() if about else ():
+    about, found = (LONG_TABLES if task in LONG else TABLES)[table], []
+    for name, method in about.methods.items():
         if method.tasks is None or task in method.tasks:
             for size in _sizes(task, method, about):
                 seeds = _seeds(task, method, about, size)
@@ -265,9 +262,9 @@ def _seeds(task: str, method: Method, about: Table, size: int) -> range:
     return seeds if method.chance else seeds[:1]
 
 
-def is_committed(table: str, task: str) -> bool:
-    """Whether data/results has the rows of a task in a table."""
-    return (table, task) not in UNFINISHED and bool(jobs_of(task, table))
+def tables_of(task: str) -> tuple[str, ...]:
+    """The tables that a task has rows in."""
+    return tuple(LONG_TABLES if task in LONG else TABLES)
 
 
 def make_row(job: Job) -> tuple[dict, dict]:

@@ -20,7 +20,7 @@ from ...run import atomic, command, sealed
 from ..benchmarks import lookup
 from . import regret, time_to_quality
 from .kept import faithful_job, simplest_provenance
-from .method_rows import LONG, TABLES, TASKS, Job, is_committed, jobs_of
+from .method_rows import LONG, TASKS, Job, jobs_of, tables_of
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:
@@ -46,12 +46,10 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
     yield "teachers.csv", "study", _teachers
     for task in (*TASKS, *LONG):
         target = "beyond-long" if task in LONG else "beyond"
-        for table in TABLES:
-            if is_committed(table, task):
-                yield f"{table}_{task}.csv", target, partial(_rows, task, table)
-        if is_committed("faithful", task):
-            yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
-            yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
+        for table in tables_of(task):
+            yield f"{table}_{task}.csv", target, partial(_rows, task, table)
+        yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
+        yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
     yield "beyond_race.csv", "beyond", _race
     yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
     for task in LONG:
