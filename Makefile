@@ -70,7 +70,8 @@ export NUMEXPR_NUM_THREADS := 1
 export JUPYTER_PREFER_ENV_PATH := 1
 export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
-unexport MPLBACKEND MATPLOTLIBRC PYTHONPATH PYTHONHOME PYTHONSTARTUP JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
+unexport MPLBACKEND MATPLOTLIBRC JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
+unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-test venv-test-train-dask venv-site venv-site-test
@@ -147,7 +148,7 @@ test-long: venv-test-train-dask ## runs whole commands, kills some, and a cluste
 lint: venv-test ## ruff and mypy: what .pre-commit-config.yaml runs before a commit; `ruff format` mends the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
-test-site: site venv-site-test ## looks at site and JupyterLab in a browser, which needs Chromium: about 6 minutes
+test-site: site venv-site-test ## looks at site and JupyterLab in a browser, which needs Chromium: about 7 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/site
 
 manifest: venv ## lists the files of data/ as they are, for somebody who changed one on purpose: at once
