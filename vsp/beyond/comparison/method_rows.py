@@ -24,6 +24,7 @@ from ...policy import VoronoiPolicy
 from ...rollouts import Policy
 from ...tasks.registry import get_task
 from ...teachers.teacher import Teacher, further_teachers, load_teacher
+from ..optimum import limit
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from ..refinement.units import METRIC
 from . import apart, measure, methods, peers
@@ -145,6 +146,9 @@ DEMANDED = {
     for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
 }
 
+# The highest return, from the best policy where it is known
+LIMIT = {"at the limit": Method(methods.limited, limit.VERSION, reads=ALL, sizes=(1, 2, 3, 4, 8, 12), preset="limit")}
+
 OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the nearest rivals
 AGENTS = (1, 2)  # further teachers of a task, data/teachers/short/, in the order of their names; 0 is the shipped one
 
@@ -202,7 +206,7 @@ class Job:
     @property
     def how(self) -> Method:
         """The method, or `refined` with a part taken away."""
-        if self.method in (known := METHODS | RIVALS | LIKE | APART | DEMANDED):
+        if self.method in (known := METHODS | RIVALS | LIKE | APART | DEMANDED | LIMIT):
             return known[self.method]
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
@@ -227,7 +231,10 @@ class Job:
 
 def preset(task: str, kind: str) -> Refinement | Faithful | Config:
     """The settings that a method of this kind has for `task`."""
-    return {"tuned": tuned_preset, "paper": paper_preset, "faithful": faithful_preset}[kind](task)
+    kinds = {
+        "tuned": tuned_preset, "paper": paper_preset, "faithful": faithful_preset, "limit": limit.limit_preset,
+    }  # fmt: skip
+    return kinds[kind](task)
 
 
 @cache

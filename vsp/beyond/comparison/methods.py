@@ -22,6 +22,7 @@ from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
 from ...config import Config
 from ...rollouts import Policy
 from ...tasks.base import Task
+from ..optimum import at_the_limit
 from ..refinement.config import Faithful, Refinement
 from ..refinement.faithful import distill_faithfully
 from ..refinement.imitate import imitate
@@ -59,6 +60,11 @@ def faithfully(budget: Budget, size: int, seed: int, **changes) -> Policy:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no policy of")  # the row says what was found
         return distill_faithfully(budget.teacher, budget.task, config, seed=seed)[0]
+
+
+def limited(budget: Budget, size: int, seed: int) -> Policy:
+    """`at_the_limit`, from the best policy where it is known, whoever the teacher is."""
+    return at_the_limit(budget.task, replace(budget.config, n_cells=size), seed=seed)
 
 
 def imitated(budget: Budget, size: int, seed: int) -> Policy:

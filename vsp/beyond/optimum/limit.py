@@ -22,7 +22,7 @@ from ..refinement.refine import refine
 from .references import TASKS, best_policy
 
 VERSION = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
-N_STARTS = 12  # every other one is the closest imitation
+N_STARTS, N_SLOW = 12, 2  # every other one is the closest imitation; N_SLOW: of a task with a physics engine
 SCREENING = 0.2  # share of the generations for which each start is tuned
 PRICE = {"MountainCarContinuous-v0": 3e-3}  # of a step: a car that arrives sooner may be imitated less exactly
 
@@ -56,7 +56,8 @@ def at_the_limit(
     config = limit_preset(task) if config is None else config
     check_refinement(config)
     teacher = _best_teacher(task) if teacher is None else teacher
-    last, *seeds = np.random.SeedSequence(seed).generate_state(1 + N_STARTS).tolist()
+    n_starts = N_SLOW if task.one_by_one else N_STARTS
+    last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts).tolist()
     brief = replace(config, n_generations=round(SCREENING * config.n_generations))
     screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds)]
     validation = task.start(np.random.default_rng(last), config.n_validation)
