@@ -24,6 +24,7 @@ nearest_brute, nearest_kdtree = (functools.partial(nearest, kdtree=kdtree) for k
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
 PENDULUM, LUNARLANDER = "Pendulum-v1", "LunarLanderContinuous-v3"
+WALKER, CHEETAH = "BipedalWalker-v3", "HalfCheetah-v5"
 TASKS = (SIMPLEGOAL, MOUNTAINCAR)  # of the paper
 
 TINY = Config(

@@ -154,7 +154,8 @@ def test_how_often_faithful_landers_fail_is_that_of_the_table():
     tail = read_table("beyond_tail").set_index(["method", "size"])["failing"]
     faithful, teacher = (1000 * tail[about] for about in (("our cells, faithful", 8), ("teacher", 0)))
     said = f"{faithful:.0f} landings in a thousand fail, {teacher:.0f} of the teacher's"
-    assert said in " ".join(RESULTS.split()) and tail.drop(index="our cells, faithful").max() <= teacher / 1000
+    others = tail[tail.index.get_level_values("method") != "our cells, faithful"]
+    assert said in " ".join(RESULTS.split()) and 1000 * others.max() <= teacher
 
 
 def test_up_to_how_many_cells_seeds_agree():

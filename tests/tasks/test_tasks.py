@@ -1,15 +1,16 @@
 import dataclasses
 import warnings
+from importlib.util import find_spec
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, RandomPolicy
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER, RandomPolicy
 
 import vsp
 from vsp.rollouts import collect_episodes, rollout
-from vsp.tasks import mountaincar, simplegoal
+from vsp.tasks import halfcheetah, mountaincar, simplegoal
 from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import get_task, task_names
@@ -230,20 +231,23 @@ def test_pendulum_starts_as_in_gymnasium_and_always_plays_to_the_end():
 # Any environment of Gymnasium
 
 
-def test_lunarlander_is_gymnasium_step_by_step():
-    task = get_task(LUNARLANDER)
-    starts, policy = task.start(np.random.default_rng(0), 6), RandomPolicy(2, seed=3)
-    episodes, result = collect_episodes(policy, task, starts), rollout(RandomPolicy(2, seed=3), task, starts)
-    env = gymnasium.make(LUNARLANDER)
+@pytest.mark.parametrize(("name", "failure"), [(LUNARLANDER, -100), (WALKER, -100)])
+def test_a_task_with_a_physics_engine_is_gymnasium_step_by_step(name, failure):
+    task = get_task(name)
+    m = len(task.outputs)
+    starts, policy = task.start(np.random.default_rng(0), 6), RandomPolicy(m, seed=3)
+    episodes, result = collect_episodes(policy, task, starts), rollout(RandomPolicy(m, seed=3), task, starts)
     for i, episode in enumerate(episodes):
+        env = gymnasium.make(name)  # a fresh one, as ours are: after a reset, an engine is not quite as new
         seen, total = [env.reset(seed=int(starts[i, 0]))[0]], 0.0
         for action in episode.actions.astype(np.float32):
-            observation, reward, terminated, _, _ = env.step(action)
+            observation, reward, terminated, truncated, _ = env.step(action)
             seen.append(observation)
             total += reward
-        assert terminated and len(episode.actions) == result.lengths[i] and total == pytest.approx(result.returns[i])
+        assert terminated != truncated and len(episode.actions) == result.lengths[i]
+        assert total == pytest.approx(result.returns[i])
         assert np.array_equal(episode.states, np.array(seen[:-1], dtype=np.float64))
-        assert result.outcomes[i] == (GOAL if reward > 0 else PIT)
+        assert result.outcomes[i] == (TRUNCATED if truncated else PIT if reward == failure else GOAL)
     assert len({episode.states[0].tobytes() for episode in episodes}) == 6
 
 
@@ -297,8 +301,13 @@ def test_states_stay_in_the_box_and_rows_do_not_mix(name):
 
 
 def test_tasks_by_name():
-    assert task_names() == [*TASKS, PENDULUM, LUNARLANDER] == vsp.task_names()
-    assert all(isinstance(get_task(name), Task) and get_task(name).name == name for name in task_names())
+    assert task_names() == [*TASKS, PENDULUM, LUNARLANDER, WALKER, CHEETAH] == vsp.task_names()
+    for name in task_names():
+        if name != CHEETAH or find_spec("mujoco"):
+            task = get_task(name)
+            assert isinstance(task, Task) and task.name == name and get_task(name) is task
+            assert len(set(task.inputs)) == len(task.low) == len(task.input_labels)
+            assert len(set(task.outputs) - set(task.inputs)) == len(task.action_low)
     task = get_task(SIMPLEGOAL)
     assert get_task(task) is task and task.name == SIMPLEGOAL
 
@@ -309,7 +318,7 @@ def test_tasks_by_name():
         ("simplegoal", SIMPLEGOAL),
         ("MountainCar", MOUNTAINCAR),
         ("SimpleGoal-v1", SIMPLEGOAL),
-        ("BipedalWalker-v2", "BipedalWalker-v3"),
+        ("BipedalWalker-v2", WALKER),
     ],
 )
 def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
@@ -325,8 +334,15 @@ def test_a_task_of_gymnasium_that_does_not_fit_is_answered_with_a_way_out():
 
 
 def test_any_environment_of_boxes_is_a_task():
-    assert get_task("BipedalWalker-v3") is get_task("BipedalWalker-v3") is gymnasium_task("BipedalWalker-v3")
-    assert len(get_task("BipedalWalker-v3").low) == 24 and get_task("BipedalWalker-v3").max_steps == 1600
+    name = "BipedalWalkerHardcore-v3"
+    assert get_task(name) is get_task(name) is gymnasium_task(name)
+    assert len(get_task(name).low) == 24 and get_task(name).max_steps == 2000
+
+
+def test_without_mujoco_one_sentence_says_how_to_get_it(monkeypatch):
+    monkeypatch.setattr(halfcheetah, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match="HalfCheetah-v5 needs the package mujoco, which is not installed: run `make "):
+        halfcheetah.make()
 
 
 # Signals of a controller

@@ -13,14 +13,15 @@ import gymnasium
 import numpy as np
 
 from ..checks import check_array
-from . import lunarlander, mountaincar, pendulum, simplegoal
+from . import bipedalwalker, halfcheetah, lunarlander, mountaincar, pendulum, simplegoal
 from .base import Task
 from .gym_adapter import Outcome, gymnasium_task
 
 BOX = ("low", "high", "action_low", "action_high")  # the limits of a task
 _ADDED: dict[str, Task] = {}  # by `register`
 _TASKS = {module.TASK.name: module.TASK for module in (simplegoal, mountaincar, pendulum)}
-_LATER = {lunarlander.NAME: cache(lunarlander.make)}  # made on request: it opens an environment
+_ENGINES = (lunarlander, bipedalwalker, halfcheetah)
+_LATER = {module.NAME: cache(module.make) for module in _ENGINES}  # made on request: they open an environment
 
 gymnasium.register("SimpleGoal-v0", entry_point="vsp.tasks.simplegoal:SimpleGoalEnv", max_episode_steps=50)
 
@@ -130,4 +131,4 @@ def render(name: str, state: np.ndarray) -> np.ndarray:
 
 
 # Tasks stepped by a physics engine: policies are evaluated on so many times fewer episodes
-SLOW = {"LunarLanderContinuous-v3": 10}
+SLOW = {lunarlander.NAME: 10, bipedalwalker.NAME: 20, halfcheetah.NAME: 50}
