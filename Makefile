@@ -74,7 +74,7 @@ unexport MPLBACKEND MATPLOTLIBRC JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
-ENVIRONMENTS := venv venv-train venv-mujoco venv-train-mujoco venv-test venv-test-train-dask venv-site venv-site-test
+ENVIRONMENTS := venv venv-train venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
 .PHONY: help quick paper-figures all lab runs study lookup course site test test-long lint test-site manifest lock \
   clean bench beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
 

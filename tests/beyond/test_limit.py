@@ -65,6 +65,16 @@ def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one_o
     assert taught == [("best", MOUNTAINCAR, 3e-3), ("best", PENDULUM, None), ("shipped", LUNARLANDER), shipped]
 
 
+def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned(monkeypatch):
+    screened = []
+    monkeypatch.setattr(limit, "N_SLOW", 1)
+    monkeypatch.setattr(limit, "_screened", lambda *some, closest: screened.append(closest) or "policy")
+    monkeypatch.setattr(limit, "rollout", lambda *some: None)
+    monkeypatch.setattr(limit, "score", lambda *some: 0.0)
+    monkeypatch.setattr(limit, "_tuned", lambda policy, *rest: policy)
+    assert at_the_limit(LUNARLANDER, seed=0) == "policy" and screened == [True]
+
+
 def test_what_cannot_be_searched_is_refused():
     with pytest.raises(ValueError, match="expected a Refinement"):
         at_the_limit(SIMPLEGOAL, faithful_preset(SIMPLEGOAL), seed=0)

@@ -42,5 +42,5 @@ def test_nothing_returns_more_than_the_best(task):
 def test_of_a_task_without_an_optimum_the_regret_is_not_known():
     table = with_regret(pd.DataFrame({"mean": [1.0, 2.0]}), LUNARLANDER)
     assert table["regret"].tolist() == ["not known"] * 2
-    known = with_regret(pd.DataFrame({"gain": [1.0]}), SIMPLEGOAL, of="gain")
+    known = with_regret(pd.DataFrame({"mean": [1.0]}), SIMPLEGOAL)
     assert known["regret"][0] == best_mean(SIMPLEGOAL) - 1.0

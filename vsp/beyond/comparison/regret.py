@@ -59,8 +59,8 @@ def best_mean(task: str, folder: str | os.PathLike | None = None) -> float:
     return float(found.iloc[-1]) if len(found) else np.nan
 
 
-def with_regret(table: pd.DataFrame, task: str, *, of: str = "mean") -> pd.DataFrame:
-    """`table` with a column regret: the best possible mean return less its column `of`; "not known" where the best is
+def with_regret(table: pd.DataFrame, task: str) -> pd.DataFrame:
+    """`table` with a column regret: the best possible mean return minus its column mean; "not known" where the best is
     not computed."""
     best = best_mean(task)
-    return table.assign(regret="not known" if np.isnan(best) else best - table[of])
+    return table.assign(regret="not known" if np.isnan(best) else best - table["mean"])
