@@ -16,13 +16,15 @@ FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
 FIGURES_06_few_equations := beyond_map beyond_likeness beyond_read
 TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equal tail budgets teachers)
-FIGURES_07_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
+FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times
+TABLES_07_limits := limit_references limit_sizes limit_losses
+FIGURES_08_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
-TABLES_07_methods := beyond_headline beyond_ablation beyond_lunarlander \
+TABLES_08_methods := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
 # In an order in which no core waits; which of them read data/runs, and which committed results.
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
-OURS := 07_methods 06_few_equations
+OURS := 08_methods 06_few_equations 07_limits
 NOTEBOOKS := $(sort $(PAPER) $(OURS))
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
@@ -32,9 +34,11 @@ READS_06_few_equations := $(foreach n,$(ROWS) \
   $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3) optimum \
   $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
-READS_07_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
+READS_07_limits := $(foreach n,$(ROWS) limit_SimpleGoal-v0 tuned_SimpleGoal-v0 apart_SimpleGoal-v0 faithful_SimpleGoal-v0 \
+  demanded_SimpleGoal-v0 optimum fits,data/results/$(n).csv) data/results/faithful_Pendulum-v1.policy
+READS_08_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
-READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_07_methods)))
+READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_08_methods)))
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -74,7 +78,7 @@ unexport MPLBACKEND MATPLOTLIBRC JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
-ENVIRONMENTS := venv venv-train venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
+ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
 .PHONY: help quick paper-figures all lab runs study lookup course site test test-long lint test-site manifest lock \
   clean bench beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
 
@@ -98,7 +102,7 @@ lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
 ## Reproduce
-all: begin venv ## the same and our own method beside it, notebooks 06 and 07: about 4 minutes
+all: begin venv ## the same and our own method beside it, notebooks 06 to 08: about 4 minutes
 paper-figures all:
 	@: > "$$STATE/made"
 	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)
@@ -116,8 +120,9 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 study: begin venv ## the studies of the interpretations and of the teachers, into data/results/: 15 minutes, resumable
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-lookup: begin venv ## times of look-ups and neighbour graphs in many dimensions, into data/results/: about 3 minutes
+lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimensions, into data/results/: 4 minutes
 	$(PY) -m vsp.beyond.benchmarks.lookup --out="$$OUT"
+	$(PY) -m vsp.beyond.benchmarks.fits --out="$$OUT"
 
 ## Study
 course: begin venv ## three lessons: hand-out for students, solutions, the lecturer's guide, into build/course/: 3 s
@@ -182,7 +187,7 @@ beyond-long: begin venv-train ## the same for LunarLander, whose physics engine 
 short-teachers: venv-train ## the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m vsp.teachers.train --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
-teachers: venv-train ## trains the TD3 teachers from scratch: 5 to 6 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
+teachers: venv-train-mujoco ## trains the TD3 teachers from scratch: 9 to 11 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
 	$(PY) -m vsp.teachers.train --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
 # What others build on

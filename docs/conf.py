@@ -22,6 +22,7 @@ myst_heading_anchors = 3
 # API: docstrings are prose in which `name` is code, and a link where there is such a name
 default_role = "py:obj"
 add_module_names = False
+autodoc_mock_imports = ["torch"]  # its few users here are documented where it is not installed
 autodoc_inherit_docstrings = False  # Gymnasium has its own pages
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True

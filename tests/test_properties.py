@@ -30,6 +30,8 @@ from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.optimum import best_policy, best_returns, limit_preset
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
+from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
+from vsp.beyond.robots.fewest import fewest_numbers
 from vsp.config import Config, paper_preset
 from vsp.paper import printed, statistics, tables
 from vsp.show import state_space, style
@@ -45,7 +47,7 @@ OUTSIDE = {
         paper.audit paper.beside paper.ledger paper.make_runs paper.runs paper.studies beyond.benchmarks
         beyond.comparison teachers.train""",
     "draw such tables, histories and runs, with tests of what they refuse": """
-        show.animation show.benchmarks show.explanation show.laboratory show.methods show.page show.replay
+        show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.replay
         show.stage""",
     "machinery around the method, and the course, with tests of their own faults": "run course",
     "what the others check with": "checks",
@@ -162,6 +164,10 @@ FAITHFUL = config.Faithful(
     n_cells=2, tolerance=1.0, n_episodes=2, n_states=20, n_restarts=1, n_generations=1, n_tuning_episodes=2,
     n_validation=2,
 )  # fmt: skip
+WALKING = Walking(
+    n_cells=2, n_episodes=2, n_corrections=1, n_correction_episodes=2, n_states=20, n_restarts=1, n_validation=2,
+    n_random_steps=10, n_directions=2, n_best=1,
+)  # fmt: skip
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 RULES = [
     rules.Rule(0, np.array([-np.inf, -np.inf]), np.array([0.5, np.inf])),
@@ -268,6 +274,20 @@ CASES = {
     "beyond.optimum.references.best_policy": (
         best_policy,
         {"task": task, "finer": number(0.5, least=0.1, most=10.0), "price": price},
+    ),
+    "beyond.robots.settings.Walking": (Walking, settings_of(Walking, WALKING)),
+    "beyond.robots.settings.walking_preset": (walking_preset, {"task": task}),
+    "beyond.robots.fewest.fewest_numbers": (
+        functools.partial(fewest_numbers, TWO),
+        {"keep": number(0.5, least=0.0, most=1.0), "n_episodes": count(2), "seed": seed},
+    ),
+    "beyond.robots.imitation.imitate_pushed": (
+        functools.partial(imitate_pushed, config=WALKING),
+        {"teacher": teacher, "task": task, "seed": seed},
+    ),
+    "beyond.robots.random_search.search_one_map": (
+        functools.partial(search_one_map, config=WALKING),
+        {"task": task, "seed": seed},
     ),
     "beyond.optimum.simplegoal.best_returns": (best_returns, {"starts": states}),
     "beyond.refinement.config.faithful_preset": (config.faithful_preset, {"task": task}),
@@ -589,10 +609,15 @@ EXEMPT = {
     "the inside of `refine`, `imitate` and `distill_faithfully`, which check what comes in": """
         beyond.refinement.search beyond.refinement.faithful.among_states beyond.refinement.faithful.by_visits
         beyond.refinement.faithful.needed_only beyond.refinement.duration beyond.refinement.faithful.variance
-        beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune
+        beyond.refinement.units beyond.refinement.anneal beyond.refinement.tune beyond.refinement.simplification.like
         beyond.refinement.population beyond.refinement.imitate.relocate beyond.refinement.imitate.nearest_two""",
     "the inside of `best_policy`, which checks what comes in, and policies, which `rollouts` checks": """
-        beyond.optimum.grid beyond.optimum.simplegoal.Shortest""",
+        beyond.optimum.grid beyond.optimum.losses beyond.optimum.simplegoal.Shortest""",
+    "the inside of `imitate_pushed` and `search_one_map`, which check what comes in": """
+        beyond.robots.choice beyond.robots.imitation.Pushed beyond.robots.imitation.cells_fit
+        beyond.robots.random_search.RunningMoments""",
+    "of robots with an engine, and what it recorded: see their own tests": "beyond.robots.gait",
+    "trains networks for minutes: see their own tests": "beyond.robots.actors beyond.robots.further_training",
     "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",
     "the inside of trees, of `dagger` and of `learn`, which check what comes in": """
         baselines.critics.trained baselines.critics.where_lost

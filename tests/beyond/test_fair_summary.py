@@ -17,7 +17,8 @@ from vsp.beyond.comparison.fair_summary import (
     tail,
     with_r2,
 )
-from vsp.beyond.comparison.method_rows import METHODS, RIVALS, preset
+from vsp.beyond.comparison.method_rows import preset
+from vsp.beyond.comparison.method_tables import METHODS, RIVALS
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.comparison.tuning import in_units
 from vsp.beyond.refinement.config import Refinement, tuned_preset

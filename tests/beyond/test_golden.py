@@ -19,12 +19,13 @@ from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.comparison import kept, measure, regret, time_to_quality
-from vsp.beyond.comparison.method_rows import APART, LIKE, METHODS, RIVALS
+from vsp.beyond.comparison.method_tables import APART, LIKE, METHODS, RIVALS, ROBOTS
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.optimum import TASKS as SOLVED
 from vsp.beyond.optimum import at_the_limit, best_policy, limit
 from vsp.beyond.refinement.config import Faithful, Refinement
 from vsp.beyond.refinement.simplification import simplify
+from vsp.beyond.robots import Walking
 from vsp.paper import beside
 from vsp.paper.runs import Experiment, Run
 from vsp.tasks.registry import get_task
@@ -33,7 +34,7 @@ imitate = importlib.import_module("vsp.beyond.refinement.imitate")  # the module
 GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
 # Of actions on another type of processor, where sums are rounded differently, and a split or a long descent may go
 # elsewhere
-TOLERANCE, LOOSE, SENSITIVE = 1e-6, 0.1, ("oblique tree", "small network", "greedy fit")
+TOLERANCE, LOOSE, SENSITIVE = 1e-6, 0.1, ("oblique tree", "small network", "greedy fit", "ROBOTS")
 SMALL = Refinement(
     n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
     n_generations=1, n_tuning_episodes=10, n_validation=20,
@@ -44,6 +45,10 @@ PRESETS = {
     "faithful": Faithful(
         n_cells=3, tolerance=0.1, n_episodes=100, n_states=1000, n_restarts=4, n_generations=3, n_tuning_episodes=10,
         n_validation=50,
+    ),
+    "walking": Walking(
+        n_cells=3, n_episodes=60, n_corrections=0, n_correction_episodes=1, n_states=900, n_restarts=1, n_validation=5,
+        n_steps=60, n_filling=20, batch_size=10, n_random_steps=500, n_directions=4, n_best=2,
     ),
 }  # fmt: skip
 
@@ -56,6 +61,11 @@ class CriticalTeacher(CurvedTeacher):
 
     def criticality(self, obs):
         return obs[:, 0]
+
+    def critic_weights(self):
+        rng = np.random.default_rng(0)
+        shapes = {"0.weight": (6, 4), "0.bias": (6,), "2.weight": (1, 6), "2.bias": (1,)}
+        return {f"qf{i}.{name}": rng.normal(size=n).astype("f4") for i in range(2) for name, n in shapes.items()}
 
 
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
@@ -94,8 +104,8 @@ def actions(policy, task):
 
 def by_method(name):
     """Actions on every task that the method is for, SimpleGoal if it is for all."""
-    method, found = (METHODS | RIVALS | LIKE | APART)[name], {"at length": AT_LENGTH.get(name, 0)}
-    teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if name in APART else {})
+    method, found = (METHODS | RIVALS | LIKE | APART | ROBOTS)[name], {"at length": AT_LENGTH.get(name, 0)}
+    teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if name in APART | ROBOTS else {})
     for task in method.tasks or (SIMPLEGOAL,):
         budget = Budget(teachers.get(task), get_task(task), PRESETS[method.preset])
         found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
@@ -138,8 +148,9 @@ def by_limit():
 
 CASES = {
     f"{table}[{name!r}]": (functools.partial(by_method, name), method.version)
-    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE, "APART": APART}.items()
+    for table, known in {"METHODS": METHODS, "RIVALS": RIVALS, "LIKE": LIKE, "APART": APART, "ROBOTS": ROBOTS}.items()
     for name, method in known.items()
+    if name != "robot's teacher"
 } | {
     "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),
     "kept.simplest": (by_simplest, kept.SIMPLIFY_VERSION),

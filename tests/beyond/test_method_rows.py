@@ -4,28 +4,25 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from support import LUNARLANDER, PENDULUM, SIMPLEGOAL
+from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, WALKER
 
-from vsp.beyond.comparison import kept, make_rows, measure, method_rows
-from vsp.beyond.comparison.method_rows import (
+from vsp.beyond.comparison import kept, kept_robots, make_rows, measure, method_rows
+from vsp.beyond.comparison.method_rows import Job, jobs_of, make_all, make_row, rows, tables_of
+from vsp.beyond.comparison.method_summary import read_rows
+from vsp.beyond.comparison.method_tables import (
     ABLATION,
     LIKE,
     METHODS,
+    ROBOTS,
     TABLES,
     TASKS,
     TUNED_SIZES,
     UNTUNED,
-    Job,
     Table,
-    jobs_of,
-    make_all,
-    make_row,
-    rows,
-    tables_of,
-)  # fmt: skip
-from vsp.beyond.comparison.method_summary import read_rows
+)
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
+from vsp.beyond.robots import Walking
 from vsp.evaluation import start_states
 from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
@@ -251,6 +248,7 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
 def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     for module in (method_rows, make_rows):
         small.setattr(module, "LONG", (SIMPLEGOAL,))
+        small.setattr(module, "WALKERS", ())
     small.setattr(method_rows, "LONG_TABLES", method_rows.TABLES)
     small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
@@ -261,6 +259,28 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5
     assert not (results / "beyond_race.csv").exists()
     listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
+
+
+def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
+    robots = {"cells": dataclasses.replace(ROBOTS["cells"], sizes=(2,)), "robot's teacher": ROBOTS["robot's teacher"]}
+    walking = Walking(n_cells=2, n_episodes=1, n_corrections=0, n_states=300, n_restarts=1, n_validation=1)
+    small.setattr(method_rows, "walking_preset", lambda task: walking)
+    small.setattr(method_rows, "ROBOTS", robots)
+    for module in (method_rows, make_rows):
+        small.setattr(module, "LONG", ())
+        small.setattr(module, "WALKERS", (WALKER,))
+        small.setattr(module, "ROBOT_TABLES", {"robots": Table(robots, seeds=range(1))})
+    small.setitem(kept.KEPT, "robots", "cells")
+    small.setattr(measure, "N_ERROR", 20)
+    small.setitem(kept_robots.GAIT, "n_steps", 20)
+    small.setattr(kept_robots, "fewest", lambda policy: pd.DataFrame({"cells": [len(policy)]}))
+    small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
+    make_rows.main()
+    found = {name: pd.read_csv(tmp_path / f"data/results/{name}_{WALKER}.csv") for name in ("robots", "gait", "fewest")}
+    assert found["robots"]["method"].tolist() == list(robots) and found["robots"]["r2"][1] == 1
+    assert len(found["gait"]) == 20 and found["fewest"]["cells"].tolist() == [2]
+    policy = VoronoiPolicy.load(tmp_path / f"data/results/robots_{WALKER}.policy")
+    assert policy.task.name == WALKER and len(pd.read_csv(tmp_path / "data/results/robots_seconds_long.csv")) == 2
 
 
 def test_the_simplified_policy_may_lose_its_share(small):

@@ -9,7 +9,7 @@ from support import SIMPLEGOAL, CurvedTeacher
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.comparison import methods
-from vsp.beyond.comparison.method_rows import ABLATION, METHODS, OWN
+from vsp.beyond.comparison.method_tables import ABLATION, METHODS, OWN
 from vsp.beyond.comparison.methods import Budget, corrected, refined
 from vsp.beyond.refinement.config import Refinement
 from vsp.paper import printed

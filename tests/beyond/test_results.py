@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 
-from vsp.beyond.benchmarks import lookup
-from vsp.beyond.comparison import kept, method_rows, regret, stale_results, time_to_quality
-from vsp.beyond.comparison.method_rows import METHODS
+from vsp.beyond.benchmarks import fits, lookup
+from vsp.beyond.comparison import kept, method_rows, method_tables, regret, stale_results, time_to_quality
+from vsp.beyond.comparison.method_tables import METHODS
 from vsp.paper import results as results_module
 from vsp.paper import runs
 from vsp.paper.results import RESULTS, read_results, write_results
@@ -128,7 +128,7 @@ def test_other_rows_are_stale(results, name, change, what):
     assert stale_results() == [says(f"{name}.csv", what, "study")]
 
 
-BEYOND = [says(f"beyond_{task}.csv", "version", "beyond") for task in method_rows.TASKS]
+BEYOND = [says(f"beyond_{task}.csv", "version", "beyond") for task in method_tables.TASKS]
 LONG = [says(f"beyond_{LUNARLANDER}.csv", "version", "beyond-long")]
 STUDIES = [says(f"{name}.csv", "version", "study") for name in ("readings", "teachers")]
 
@@ -152,11 +152,12 @@ def raised(name):
         (lambda patch: patch.setattr(time_to_quality, "VERSION", 2), [says("beyond_race.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(regret, "VERSION", 2), [says("optimum.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(lookup, "VERSION", 2), [says("lookup.csv", "version", "lookup")]),
+        (lambda patch: patch.setattr(fits, "VERSION", 2), [says("fits.csv", "version", "lookup")]),
         (lambda patch: patch.setattr(kept, "SIMPLIFY_VERSION", 2),
          [says(f"beyond_{LUNARLANDER}.policy", "version", "beyond-long")]),
         (lambda patch: patch.setattr(interpretations, "VERSION", 2), [says("readings.csv", "settings", "study")]),
     ],
-    ids=["paper", "CART", "TD-AVQ", "race", "optimum", "lookup", "simplify", "study"],
+    ids=["paper", "CART", "TD-AVQ", "race", "optimum", "lookup", "fits", "simplify", "study"],
 )  # fmt: skip
 def test_results_of_another_version_are_stale(results, monkeypatch, change, expected):
     change(monkeypatch)
@@ -180,9 +181,12 @@ def test_results_of_another_preset_are_stale(results, monkeypatch):
 
 
 def files_of(task):
-    """The committed rows of a task, and what is kept of its faithful ones."""
-    tables = [f"{table}_{task}.csv" for table in method_rows.tables_of(task)]
-    return [*tables, f"same_{task}.csv", f"faithful_{task}.policy"]
+    """The committed rows of a task, and what is kept beside them."""
+    found = []
+    for table in method_rows.tables_of(task):
+        found += [f"{table}_{task}.csv"] + [f"same_{task}.csv"] * (table == "faithful")
+        found += [f"{table}_{task}.policy"] * (table in kept.KEPT)
+    return found
 
 
 def test_results_of_another_teacher_are_stale(results, monkeypatch):
@@ -193,7 +197,7 @@ def test_results_of_another_teacher_are_stale(results, monkeypatch):
     monkeypatch.setattr(time_to_quality, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),
-        *(says(name, "teacher", "beyond") for task in method_rows.TASKS for name in files_of(task)),
+        *(says(name, "teacher", "beyond") for task in method_tables.TASKS for name in files_of(task)),
         *(says(name, "teacher", "beyond-long") for name in files_of(LUNARLANDER)),
         says("beyond_race.csv", "teacher", "beyond"),
         says(f"beyond_{LUNARLANDER}.policy", "teacher", "beyond-long"),

@@ -172,8 +172,9 @@ def test_a_killed_set_up_blocks_nobody(checkout):
 
 
 PARTS = {
-    "paper-figures all quick lab course runs study lookup 01_teacher 07_methods figures/ledger.pdf": {"draw"},
-    "teachers short-teachers beyond beyond-long": {"draw", "train"},
+    "paper-figures all quick lab course runs study lookup 01_teacher 08_methods figures/ledger.pdf": {"draw"},
+    "short-teachers beyond beyond-long": {"draw", "train"},
+    "teachers": {"draw", "train", "mujoco"},
     "test test-long bench faults": {"draw", "train", "test", "dask"},
     "lint": {"draw", "test"},
     "site": {"draw", "site"},

@@ -42,3 +42,12 @@ def test_kills_are_shares_of_the_undisturbed_time_and_failures_stand_out(ax):
     assert set(line.get_ydata()) == {1} and ax.get_ylim()[0] == 0
     ax.clear()
     assert len(benchmarks.kills(ax, frame.assign(wrong=None)).lines) == 2
+
+
+def test_times_of_fits_stand_beside_what_is_proportional(ax):
+    rows = [("cells", 1, 0.002), ("cells", 8, 0.01), ("states", 8, 0.5)]
+    benchmarks.fit_times(ax, pd.DataFrame(rows, columns=["varied", "cells", "seconds"]), "cells")
+    lines = named(ax)
+    assert lines["measured"].get_xydata().tolist() == [[1, 2], [8, 10]]
+    assert lines["proportional"].get_xydata().tolist() == [[1, 10 / 8], [8, 10]]
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "8"] and ax.get_xlabel() == "cells"

@@ -8,7 +8,7 @@ import pytest
 from drawn import hexes, labels, named
 from matplotlib.collections import FillBetweenPolyCollection
 
-from vsp.beyond.comparison import method_rows
+from vsp.beyond.comparison import method_tables
 from vsp.policy import VoronoiPolicy
 from vsp.show import explanation, methods, state_space, style
 from vsp.show.style import letter, panels
@@ -149,11 +149,19 @@ def test_what_simplify_ended_with_is_a_mark_in_it(ax):
 
 
 def test_every_method_of_the_comparison_has_a_look_of_its_own():
-    assert set(methods.METHODS) == set(method_rows.METHODS) - {"teacher"}
+    assert set(methods.METHODS) == set(method_tables.METHODS) - {"teacher"}
     looks = {(s["color"], s.get("ls"), s.get("marker")) for s in methods.METHODS.values()}
     assert len(looks) == len(methods.METHODS)
     for name, look in methods.METHODS.items():
-        assert ("marker" in look) == (len(method_rows.METHODS[name].sizes) == 1)
+        assert ("marker" in look) == (len(method_tables.METHODS[name].sizes) == 1)
+
+
+@pytest.mark.parametrize("looks", [methods.LIMITS, methods.ROBOTS])
+def test_so_has_every_method_at_the_limit_and_of_robots(looks):
+    known = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT | method_tables.ROBOTS
+    assert set(looks) <= set(known)
+    assert len({(s["color"], s.get("ls"), s.get("marker")) for s in looks.values()}) == len(looks)
+    assert all(("marker" in look) == (known[name].sizes == method_tables.OWN) for name, look in looks.items())
 
 
 def test_nothing_of_an_explanation_overlaps():

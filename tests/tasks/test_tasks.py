@@ -345,6 +345,13 @@ def test_without_mujoco_one_sentence_says_how_to_get_it(monkeypatch):
         halfcheetah.make()
 
 
+def test_mujocos_warnings_are_pythons_but_for_the_one_of_every_environment(recwarn):
+    halfcheetah._warn("compiler attribute 'settotalmass' is deprecated")
+    assert not recwarn
+    with pytest.warns(RuntimeWarning, match="Nan, Inf or huge value"):
+        halfcheetah._warn("Nan, Inf or huge value in QACC at DOF 0.")
+
+
 # Signals of a controller
 
 

@@ -1,8 +1,9 @@
 import dataclasses
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER
 
 import vsp
 from vsp.evaluation import rollout_from_seed
@@ -29,7 +30,10 @@ def in_json(recipe):
     return {key: list(v) if isinstance(v, tuple) else v for key, v in dataclasses.asdict(recipe).items()}
 
 
-@pytest.mark.parametrize("task", [*TASKS, PENDULUM, LUNARLANDER])
+ROBOT = pytest.param(CHEETAH, marks=pytest.mark.skipif(not find_spec("mujoco"), reason="needs mujoco"))
+
+
+@pytest.mark.parametrize("task", [*TASKS, PENDULUM, LUNARLANDER, WALKER, ROBOT])
 def test_a_shipped_teacher_is_what_its_card_says(task):
     teacher = load_teacher(task)
     card, written, (mean, failures) = teacher.card, teacher.card["score"], BARS[task]
@@ -39,9 +43,9 @@ def test_a_shipped_teacher_is_what_its_card_says(task):
     assert steps[-1] >= card["recipe"]["steps"]
     tried = card["seeds_tried"][-1]
     assert tried["seed"] == card["seed"] and tried["mean"] == (max(means) if task in BEST_OF_CURVE else means[-1])
-    assert {"torch", "stable-baselines3", "gymnasium", "numpy"} <= set(card["versions"])
+    assert {*train.PACKAGES, *train.ENGINES.get(task, ())} == set(card["versions"])
     assert card["sha256"] == atomic.sha256(SHIPPED / f"{task}.safetensors")
-    n = 30 if task == LUNARLANDER else 400  # a physics engine takes longer
+    n = {LUNARLANDER: 30, WALKER: 10, CHEETAH: 10}.get(task, 400)  # a physics engine takes longer
     found = rollout_from_seed(teacher, task, n, seed=20_242)  # starts that no one chose a seed on
     assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / n**0.5
     assert (teacher.criticality(np.zeros((3, len(teacher.task.low)))) >= 0).all()  # it has its critics with it
@@ -255,7 +259,7 @@ def test_a_short_teacher_scores_what_its_card_says(task, seed):
     recipe = in_json(short_recipe(task))
     assert (card["task"], card["seed"], card["recipe"], teacher.task.name) == (task, seed, recipe, task)
     assert card["learning_curve"][-1]["steps"] >= recipe["steps"] > card["learning_curve"][-2]["steps"]
-    assert {"torch", "stable-baselines3", "gymnasium", "numpy"} <= set(card["versions"])
+    assert {*train.PACKAGES, *train.ENGINES.get(task, ())} == set(card["versions"])
     found = rollout_from_seed(teacher, task, 200, seed=20_241)  # starts that no one has seen
     assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / np.sqrt(200)
     missed = np.mean(found.outcomes != GOAL)

@@ -6,9 +6,20 @@ Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 import importlib
 
 from .animation import save_growth
-from .benchmarks import kills, shares_over, times_over_dimension
+from .benchmarks import fit_times, kills, shares_over, times_over_dimension
 from .explanation import contributions, whereabouts
-from .methods import against_time, fidelity_map, likeness_over_cells, method_comparison, return_over_cells, simplified
+from .gait import footfall, gait_strip, save_gait
+from .methods import (
+    LIMITS,
+    ROBOTS,
+    against_time,
+    fidelity_map,
+    likeness_over_cells,
+    method_comparison,
+    over_cells,
+    return_over_cells,
+    simplified,
+)
 from .returns import (
     again,
     box_plot,

@@ -187,15 +187,25 @@ def save_growth(
         growth.stage.watermark()
     moments = growth.moments(FRAMES)
     images = [growth.shoot(n, since=before) for before, n in zip([-1, *moments], moments)]
+    return save_frames(images, name, out=out, alt=alt)
+
+
+def save_frames(
+    images: list[np.ndarray], name: str, *, out: str | os.PathLike, alt: str, step: int = STEP, hold: int = HOLD
+) -> Animation:
+    """Write images (height, width, 3) as OUT/figures/NAME.gif, and the last one as NAME.png; return what to show.
+
+    `step`: milliseconds per frame; `hold`: those of the last.
+    """
     path = Path(out) / "figures" / name
     with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
-        _write_gif(temporary, images)
+        _write_gif(temporary, images, step, hold)
     with atomic.atomic_path(path.with_suffix(".png")) as temporary:
         temporary.write_bytes(png(images[-1], small=True))
     return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), alt)
 
 
-def _write_gif(path: Path, images: list[np.ndarray]) -> None:
+def _write_gif(path: Path, images: list[np.ndarray], step: int, hold: int) -> None:
     """Write the frames with one common palette, so that each stores only what differs from the one before."""
     some = Image.fromarray(np.concatenate([images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]))
     colours = np.reshape(some.quantize(COLOURS).getpalette(), (-1, 3))
@@ -203,5 +213,5 @@ def _write_gif(path: Path, images: list[np.ndarray]) -> None:
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    durations = [STEP] * (len(frames) - 1) + [HOLD]
+    durations = [step] * (len(frames) - 1) + [hold]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=False)

@@ -1,4 +1,4 @@
-"""Figures of benchmarks: the time of look-ups and neighbour graphs, and what a kill costs."""
+"""Figures of benchmarks: the time of look-ups, neighbour graphs and fits, and what a kill costs."""
 
 from __future__ import annotations
 
@@ -31,6 +31,20 @@ def times_over_dimension(ax: Axes, frame: pd.DataFrame, *, limit: float | None =
             ax.plot(given_up.min(), limit, "x", color=color, ms=5, mew=1.2, clip_on=False, zorder=5)
     ax.set(xscale="log", yscale="log", xlabel="dimensions", ylabel="seconds")
     return ticks_at(ax, frame["d"])
+
+
+def fit_times(ax: Axes, frame: pd.DataFrame, varied: str) -> Axes:
+    """Milliseconds of an evaluation of the loss over the quantity `varied`, both logarithmic; the dotted line is
+    proportional to it.
+
+    `frame` has rows of `beyond.benchmarks.fits`.
+    """
+    rows = frame[frame["varied"] == varied]
+    taken = 1000 * rows["seconds"]
+    ax.plot(rows[varied], taken, marker=".", ms=4, color=DISTILLED, label="measured")
+    ax.plot(rows[varied], taken.iloc[-1] * rows[varied] / rows[varied].iloc[-1], ":", color=OTHER, label="proportional")
+    ax.set(xscale="log", yscale="log", xlabel=varied)
+    return ticks_at(ax, rows[varied])
 
 
 def shares_over(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, by: str) -> Axes:

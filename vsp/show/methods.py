@@ -31,6 +31,22 @@ METHODS = {
     "refined, no teacher": {"color": DISTILLED, "ls": ":"},
 }
 
+# Of those at the limit, and of robots
+LIMITS = {
+    "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6},
+    "refined": METHODS["refined"],
+    "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3]},
+    "small network, DAgger, tuned": {"color": COLOURS[9]},
+    "one linear map, tuned": {"color": "black", "marker": "s"},
+}
+ROBOTS = {
+    "cells, trained further": METHODS["refined"],
+    "cells": METHODS["refined, not tuned"],
+    "oblique tree, trained further": {"color": COLOURS[3]},
+    "oblique tree": {"color": COLOURS[3], "ls": "--"},
+    "one map, random search": {"color": "black", "marker": "s"},
+}
+
 
 def method_comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> Figure:
     """All methods over their cells: mean return minus the teacher's, and the action error where the teacher goes."""
@@ -152,15 +168,15 @@ def simplified(ax: Axes, frame: pd.DataFrame, tolerance: float) -> Axes:
     return ax
 
 
-def over_cells(ax: Axes, frame: pd.DataFrame, column: str) -> Axes:
+def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict] = METHODS) -> Axes:
     """A column of `frame` over the number of cells or leaves: a line per method, the median of its seeds.
 
-    `frame` has method, size, seed and cells, as `beyond.comparison` makes it. Only the methods in `METHODS` are drawn;
+    `frame` has method, size, seed and cells, as `beyond.comparison` makes it. Only the methods in `looks` are drawn;
     those that choose their own size (size 0) as a mark at their median number of cells. Our bands and the bars of marks
     span the 10 % to 90 % quantiles over the seeds.
     """
     ax.set_xscale("log")
-    for method, style in METHODS.items():
+    for method, style in looks.items():
         rows = frame[frame["method"] == method]
         if not len(rows):
             continue

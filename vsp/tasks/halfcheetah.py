@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -21,5 +22,14 @@ def make() -> Task:
     if find_spec("mujoco") is None:
         advice = "run `make venv-mujoco`, or pip install 'gymnasium[mujoco]'"
         raise ValueError(f"{NAME} needs the package mujoco, which is not installed: {advice}")
+    import mujoco
+
+    mujoco.set_mju_user_warning(_warn)
     torques = tuple(f"τ{joint}" for joint in JOINTS)
     return replace(gymnasium_task(NAME), inputs=INPUTS, outputs=torques, input_labels=INPUTS)
+
+
+def _warn(message: str) -> None:
+    """A warning of MuJoCo's as one of Python's; not the one that every environment gives for Gymnasium's model."""
+    if "settotalmass" not in message:
+        warnings.warn(message, RuntimeWarning, stacklevel=2)

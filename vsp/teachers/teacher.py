@@ -84,10 +84,23 @@ class Teacher:
         actions = check_array("actions", actions, (len(states), len(self._half))).astype(np.float32)
         return self._value(states, (actions - self._centre) / self._half).astype(np.float64)
 
-    def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """The lower of the critics' values of `actions` (n, m), scaled to [-1, 1]. (n,)"""
+    def critic_weights(self) -> dict[str, np.ndarray]:
+        """The tensors of both critics by Stable-Baselines3's names ("qf0.0.weight", ...). Raises ValueError for a
+        teacher without critics."""
+        self._check_critics()
+        found = {}
+        for i, layers in enumerate(self._critics):
+            for j, (weight, bias) in enumerate(layers):
+                found |= {f"qf{i}.{2 * j}.weight": weight.T, f"qf{i}.{2 * j}.bias": bias}
+        return found
+
+    def _check_critics(self) -> None:
         if not self._critics:
             raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: load a teacher with critics")
+
+    def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """The lower of the critics' values of `actions` (n, m), scaled to [-1, 1]. (n,)"""
+        self._check_critics()
         inputs = np.column_stack([states, actions])
         return np.min([_forward(layers, inputs)[:, 0] for layers in self._critics], axis=0)
 

@@ -19,8 +19,9 @@ from ...teachers.teacher import Teacher, load_teacher
 from ..refinement import faithful, tune
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
 from .measure import ERROR_SEED, N_ERROR
-from .method_rows import LONG, UNTUNED, tables_of
+from .method_rows import tables_of
 from .method_summary import ahead, method_summary, read_rows
+from .method_tables import LONG, UNTUNED
 from .methods import numbers_of
 
 OURS = "our cells"
@@ -37,7 +38,8 @@ PAIRS = {
     "small network": ("small network, DAgger", "small network, DAgger, tuned"),
     "one linear map": ("one linear map", "one linear map, tuned"),
 }  # fmt: skip
-TABLES = ("beyond", "tuned", "apart", "faithful", "demanded")  # of `method_rows`: all methods, from the shipped teacher
+# Of `method_tables`: all methods, from the shipped teacher
+TABLES = ("beyond", "tuned", "apart", "faithful", "demanded")
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 

@@ -1,5 +1,5 @@
-"""Policies that are kept beside the committed rows, each with what made it: a faithful one of every task, and of tasks
-whose rows take hours a simplified one."""
+"""Policies that are kept beside the committed rows, each with what made it: one of every task that acts like its
+teacher, one at the limit, one of each robot, and of LunarLander a simplified one."""
 
 from __future__ import annotations
 
@@ -21,17 +21,21 @@ LOSS = 0.02  # share of the teacher's mean return that the simplified policy may
 SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
 
 
-def keep_faithful(folder: str | os.PathLike, task: str, path: str | os.PathLike) -> None:
-    """Write the faithful policy of the preset's size and of the first seed to `path`, with its provenance; listed."""
-    job = faithful_job(task)
+# Tables of whose rows a policy is kept, and the method that made it
+KEPT = {"faithful": "faithful", "limit": "at the limit", "robots": "cells, trained further"}
+
+
+def keep(folder: str | os.PathLike, task: str, table: str, path: str | os.PathLike) -> None:
+    """Write the policy of `kept_job` to `path`, with its provenance; listed. `folder` is that of the rows."""
+    job = kept_job(task, table)
     arrays, _ = load_made(job.path(folder), "Row", job.about())
     _keep(VoronoiPolicy(**arrays, task=task, metric=METRIC), path, job.provenance)
 
 
-def faithful_job(task: str) -> Job:
-    """The row whose policy is kept."""
-    size = preset(task, "faithful").n_cells
-    return next(job for job in jobs_of(task, "faithful") if (job.size, job.seed) == (size, 0))
+def kept_job(task: str, table: str) -> Job:
+    """The row whose policy is kept: of the preset's size, and of the first seed."""
+    jobs = [job for job in jobs_of(task, table) if job.method == KEPT[table]]
+    return next(job for job in jobs if (job.size, job.seed) == (preset(task, job.how.preset).n_cells, 0))
 
 
 def simplest(task: str) -> VoronoiPolicy:

@@ -8,42 +8,60 @@ from pathlib import Path
 import pandas as pd
 
 from ...paper.results import write_results
+from ...policy import VoronoiPolicy
 from ...run import command
-from .kept import keep_faithful, keep_simplest
-from .method_rows import LONG, TABLES, TASKS, jobs_of, make_all, pairs, rows, tables_of
+from . import kept_robots
+from .kept import KEPT, keep, keep_simplest
+from .method_rows import jobs_of, make_all, pairs, rows, tables_of
+from .method_tables import LONG, ROBOT_TABLES, TABLES, TASKS, WALKERS
 from .regret import optimum
 from .time_to_quality import time_to_quality
 
 
 def main() -> None:
-    """Make the rows that are missing, and write data/results/<table>_<task>.csv, same_<task>.csv and
-    faithful_<task>.policy beside the faithful table, times in <table>_seconds.csv, beyond_race.csv and optimum.csv; or
-    those of the tasks whose rows take hours, their times in <table>_seconds_long.csv, and beyond_<task>.policy.
+    """Make the rows that are missing, and write data/results/<table>_<task>.csv and what is kept beside it: a policy,
+    same_<task>.csv beside the faithful table. Times go to <table>_seconds.csv (_long: of the tasks that take hours).
+
+    Beside them: beyond_race.csv and optimum.csv; or, of the tasks that take hours, beyond_<task>.policy, and of robots
+    gait_<task>.csv and fewest_<task>.csv.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
-    parser.add_argument("--tables", nargs="+", choices=TABLES, default=list(TABLES), help="default: all")
+    parser.add_argument("--tables", nargs="+", choices=TABLES | ROBOT_TABLES, help="default: all")
     arguments = parser.parse_args()
-    out, tasks = Path(arguments.out), LONG if arguments.long else TASKS
-    rows_in = out / "build" / "beyond"
+    out, tasks = Path(arguments.out), (*LONG, *WALKERS) if arguments.long else TASKS
+    rows_in, results = out / "build" / "beyond", out / "data" / "results"
     wanted = {(table, task): jobs_of(task, table) for task in tasks for table in tables_of(task)}
-    wanted = {about: some for about, some in wanted.items() if about[0] in arguments.tables}
-    make_all(rows_in, [job for some in wanted.values() for job in some], jobs=arguments.jobs)
-    for table in dict.fromkeys(table for table, _ in wanted):
-        found = {task: rows(rows_in, wanted[table, task]) for task in tasks}
-        for task, (frame, _) in found.items():
-            write_results(frame, f"{table}_{task}", out=out)
-            if table == "faithful":
-                write_results(pairs(rows_in, wanted[table, task]), f"same_{task}", out=out)
-                keep_faithful(rows_in, task, out / "data" / "results" / f"faithful_{task}.policy")
-        seconds = pd.concat([took for _, took in found.values()])
-        write_results(seconds, f"{table}_seconds{'_long' * arguments.long}", out=out)
-    if "beyond" in arguments.tables and arguments.long:
-        for task in tasks:
-            keep_simplest(task, out / "data" / "results" / f"beyond_{task}.policy")
-    elif "beyond" in arguments.tables:
+    wanted = {about: jobs for about, jobs in wanted.items() if not arguments.tables or about[0] in arguments.tables}
+    make_all(rows_in, [job for jobs in wanted.values() for job in jobs], jobs=arguments.jobs)
+    seconds = {}
+    for (table, task), jobs in wanted.items():
+        frame, took = rows(rows_in, jobs)
+        seconds.setdefault(table, []).append(took)
+        write_results(frame, f"{table}_{task}", out=out)
+        if table == "faithful":
+            write_results(pairs(rows_in, jobs), f"same_{task}", out=out)
+        if table in KEPT:
+            keep(rows_in, task, table, results / f"{table}_{task}.policy")
+    for table, took in seconds.items():
+        write_results(pd.concat(took), f"{table}_seconds{'_long' * arguments.long}", out=out)
+    _beside(arguments.long, {table for table, _ in wanted}, out)
+
+
+def _beside(long: bool, tables: set[str], out: Path) -> None:
+    """What is made from the rows, or beside them."""
+    results = out / "data" / "results"
+    if "robots" in tables:
+        for task in WALKERS:
+            policy = VoronoiPolicy.load(results / f"robots_{task}.policy")
+            write_results(kept_robots.gait(policy), f"gait_{task}", out=out)
+            write_results(kept_robots.fewest(policy), f"fewest_{task}", out=out)
+    if "beyond" in tables and long:
+        for task in LONG:
+            keep_simplest(task, results / f"beyond_{task}.policy")
+    elif "beyond" in tables:
         write_results(time_to_quality(), "beyond_race", out=out)
         write_results(optimum(), "optimum", out=out)
 

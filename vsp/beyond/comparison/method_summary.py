@@ -1,6 +1,6 @@
 """What came out of the comparison beyond the paper, from the committed rows: summaries, rivals, and who is as good.
 
-`method_rows` makes the rows and says what the methods are.
+`method_tables` says what the methods are, `method_rows` makes the rows.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import pandas as pd
 from ...paper.results import read_results
 from ...paper.statistics import interval
 from ..refinement.config import tuned_preset
-from .method_rows import ABLATION, METHODS
+from .method_tables import ABLATION, METHODS
 
 MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameters", "operations")
 INTERVAL = ("mean", "low", "high")
 
 
 def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "beyond") -> pd.DataFrame:
-    """The committed rows of `task` in a table of `method_rows`, or those in another folder; `failing` is NaN where
+    """The committed rows of `task` in a table of `method_tables`, or those in another folder; `failing` is NaN where
     nothing can reach a goal."""
     frame = read_results(f"{table}_{task}", folder)
     return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from ...algorithms import distill
 from ...baselines import tdavq
 from ...baselines.dagger import dagger
@@ -20,14 +22,16 @@ from ...baselines.small_network import SmallNetwork, units_for
 from ...baselines.soft_tree import SoftTree
 from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
 from ...config import Config
-from ...rollouts import Policy
+from ...rollouts import Policy, visited_states
 from ...tasks.base import Task
 from ..optimum import at_the_limit
 from ..refinement.config import Faithful, Refinement
 from ..refinement.faithful import distill_faithfully
 from ..refinement.imitate import imitate
 from ..refinement.refine import refine
-from .tuning import tuned
+from ..refinement.units import Frame, LabelledStates
+from ..robots import Walking, imitate_pushed, search_one_map
+from .tuning import in_units, tuned
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ class Budget:
 
     teacher: Policy
     task: Task
-    config: Refinement | Faithful | Config
+    config: Refinement | Faithful | Config | Walking
 
 
 # Our own
@@ -62,9 +66,10 @@ def faithfully(budget: Budget, size: int, seed: int, **changes) -> Policy:
         return distill_faithfully(budget.teacher, budget.task, config, seed=seed)[0]
 
 
-def limited(budget: Budget, size: int, seed: int) -> Policy:
-    """`at_the_limit`, from the best policy where it is known, whoever the teacher is."""
-    return at_the_limit(budget.task, replace(budget.config, n_cells=size), seed=seed)
+def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -> Policy:
+    """`at_the_limit`, from the best policy where it is known, or from the teacher."""
+    teacher = budget.teacher if by_teacher else None
+    return at_the_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
 
 
 def imitated(budget: Budget, size: int, seed: int) -> Policy:
@@ -84,6 +89,40 @@ def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
     start = imitated(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
     changes |= {"n_restarts": 1, "n_corrections": 0, "n_episodes": config.n_correction_episodes}
     return refine(budget.teacher, budget.task, replace(config, n_cells=size, **changes), seed=seed, start=start)[0]
+
+
+# Of robots
+
+
+def robot(budget: Budget, size: int, seed: int) -> Policy:
+    """`imitate_pushed`: cells that act like the teacher, also after a push or a mistake of their own."""
+    return imitate_pushed(budget.teacher, budget.task, replace(budget.config, n_cells=size), seed=seed)
+
+
+def robot_tree(budget: Budget, size: int, seed: int) -> Policy:
+    """An oblique tree with linear leaves, fitted to states gathered in the same way, in as many rounds."""
+
+    def fit(frame: Frame, seen: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
+        states, actions = frame.states(seen.inputs), frame.actions(seen.actions)
+        tree_seed = int(rng.integers(2**31))
+        return ObliqueLinearTree(states, actions, leaves=size, task=budget.task, seed=tree_seed)
+
+    return imitate_pushed(budget.teacher, budget.task, budget.config, seed=seed, fit=fit)
+
+
+def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy]) -> Policy:
+    """`imitation`, with which the training of the teacher goes on."""
+    from ..robots.further_training import train_further  # which imports torch
+
+    start, task = imitation(budget, size, seed), budget.task
+    states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
+    frame, numbers = in_units(start, Frame.of(task, states))
+    return train_further(frame, numbers, budget.teacher, budget.config, seed=seed)
+
+
+def searched(budget: Budget, size: int, seed: int) -> Policy:
+    """One linear map by random search on the return alone."""
+    return search_one_map(budget.task, budget.config, seed=seed)
 
 
 # Fits to states x (n, d) and actions y (n, m), with so many cells or leaves

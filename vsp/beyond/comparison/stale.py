@@ -17,10 +17,11 @@ import pandas as pd
 from ...paper import results
 from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
-from ..benchmarks import lookup
-from . import regret, time_to_quality
-from .kept import faithful_job, simplest_provenance
-from .method_rows import LONG, TASKS, Job, jobs_of, tables_of
+from ..benchmarks import fits, lookup
+from . import kept_robots, regret, time_to_quality
+from .kept import KEPT, kept_job, simplest_provenance
+from .method_rows import Job, jobs_of, tables_of
+from .method_tables import LONG, TASKS, WALKERS
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:
@@ -44,17 +45,24 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
     """Committed files: the name, the target that makes it, and what its rows would name today, given its rows."""
     yield "readings.csv", "study", _readings
     yield "teachers.csv", "study", _teachers
-    for task in (*TASKS, *LONG):
-        target = "beyond-long" if task in LONG else "beyond"
+    for task in (*TASKS, *LONG, *WALKERS):
+        target = "beyond" if task in TASKS else "beyond-long"
         for table in tables_of(task):
             yield f"{table}_{task}.csv", target, partial(_rows, task, table)
-        yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
-        yield f"faithful_{task}.policy", target, lambda _, task=task: [faithful_job(task).provenance]
+            if table == "faithful":
+                yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
+            if table in KEPT:
+                yield f"{table}_{task}.policy", target, lambda _, about=(task, table): [kept_job(*about).provenance]
     yield "beyond_race.csv", "beyond", _race
     yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
     for task in LONG:
         yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
-    yield "lookup.csv", "lookup", lambda _: [lookup.made_with()]
+    for task in WALKERS:
+        for name in ("gait", "fewest"):
+            yield f"{name}_{task}.csv", "beyond-long", lambda _, about=(name, task): [kept_robots.provenance_of(*about)]
+    for benchmark in (lookup, fits):
+        name = f"{benchmark.__name__.rpartition('.')[2]}.csv"
+        yield name, "lookup", lambda _, benchmark=benchmark: [benchmark.made_with()]
 
 
 def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dict]]) -> list[str]:

@@ -53,16 +53,17 @@ class TreeNumbers:
     @property
     def vector(self) -> np.ndarray:
         """All that is tuned."""
-        return joined(self._parts)
+        return joined(self.parts)
 
     @property
-    def _parts(self) -> list[np.ndarray]:
+    def parts(self) -> list[np.ndarray]:
+        """What is tuned: directions, where they are, thresholds, maps."""
         directions = [self.directions] if self.oblique else []
         return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
 
     def like(self, vector: np.ndarray) -> TreeNumbers:
         """The same structure with the numbers of `vector`."""
-        *directions, thresholds, maps = parted(vector, self._parts)
+        *directions, thresholds, maps = parted(vector, self.parts)
         if self.constant:
             maps = np.concatenate([np.zeros_like(self.maps[:, :-1]), maps[:, None]], axis=1)
         new = {"directions": directions[0]} if directions else {}

@@ -13,10 +13,7 @@ from ...tasks.base import Task
 
 
 def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -> list[Outcomes]:
-    """`rollout` for policies of one kind, in one batch, unless the task has a physics engine; Voronoi policies are
-    Euclidean, of one shape and scale."""
-    if task.one_by_one:
-        return [rollout(policy, task, starts) for policy in policies]
+    """`rollout` for policies of one kind, in one batch; Voronoi policies are Euclidean, of one shape and scale."""
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])
     batch = PolicyBatch if isinstance(policies[0], VoronoiPolicy) else InTurn
@@ -26,20 +23,23 @@ def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -
 
 
 def numbered(task: Task, n: int) -> Task:
-    """`task` with a number below n appended to every state and observation, which never changes."""
+    """`task` with a number below n appended to every start, state and observation, which never changes."""
+
+    def own(states: np.ndarray) -> np.ndarray:
+        return states[:, 0] if task.one_by_one else states[:, :-1]
+
+    def begin(starts: np.ndarray) -> np.ndarray:
+        return np.column_stack([task.begin(starts[:, :-1]), starts[:, -1]])
+
+    def see(states: np.ndarray) -> np.ndarray:
+        return np.column_stack([task.see(own(states)), states[:, -1].astype(np.float64)])
 
     def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        moved, rewards, outcomes = task.step(states[:, :-1], actions)
+        moved, rewards, outcomes = task.step(own(states), actions)
         return np.column_stack([moved, states[:, -1]]), rewards, outcomes
 
-    return replace(
-        task,
-        low=np.append(task.low, 0.0),
-        high=np.append(task.high, n),
-        start_size=1 + (task.start_size or len(task.low)),
-        see=lambda states: np.column_stack([task.see(states[:, :-1]), states[:, -1]]),
-        step=step,
-    )
+    low, high, size = np.append(task.low, 0.0), np.append(task.high, n), 1 + (task.start_size or len(task.low))
+    return replace(task, low=low, high=high, start_size=size, begin=begin, see=see, step=step)
 
 
 class InTurn:

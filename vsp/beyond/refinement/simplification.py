@@ -85,7 +85,7 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
     nearest = -(arms @ common).sum() / np.square(arms).sum()  # proportion that brings codewords nearest to the middle
     least = unit / np.linalg.norm(arms, axis=1).max()  # proportion that keeps them apart
     codewords = (middle + common + max(nearest, least) * arms) * policy.scale
-    return _like(policy, codewords, policy.coefficients, policy.scale)
+    return like(policy, codewords, policy.coefficients, policy.scale)
 
 
 def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
@@ -100,7 +100,7 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
         if not coefficients.flat[place]:
             continue
         coefficients.flat[place] = 0.0
-        without = _like(policy, policy.codewords, coefficients, policy.scale)
+        without = like(policy, policy.codewords, coefficients, policy.scale)
         policy = without if good(without) else policy
     return policy
 
@@ -111,14 +111,15 @@ def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     parts = policy.codewords, policy.coefficients, policy.scale
     codewords, coefficients, scale = (_significant(values, digits) for values in parts)
     distinct = len(np.unique(codewords, axis=0)) == len(codewords)
-    return _like(policy, codewords, coefficients, scale) if distinct else None
+    return like(policy, codewords, coefficients, scale) if distinct else None
 
 
 def _significant(values: np.ndarray, digits: int) -> np.ndarray:
     return np.array([float(f"{value:.{digits}g}") for value in values.flat]).reshape(values.shape)
 
 
-def _like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
+def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
+    """A policy for the same task with the same metric, and these numbers."""
     about = {"task": policy.task, "metric": policy.metric, "sub_policy": policy.policy_class.name}
     return VoronoiPolicy(codewords, coefficients, scale=scale, **about)
 

@@ -40,6 +40,10 @@ class Frame:
         """Scaled states and a column of ones, (n, d + 1), of states (n, d)."""
         return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
 
+    def states(self, inputs: np.ndarray) -> np.ndarray:
+        """The states (n, d) of `inputs` (n, d + 1)."""
+        return inputs[:, :-1] * self.scale + self.centre
+
     def outputs(self, actions: np.ndarray) -> np.ndarray:
         """Actions (n, m) in units in which the limits are -1 and 1."""
         return (actions - self._middle) / self._half
@@ -98,11 +102,16 @@ class Cells:
     @property
     def vector(self) -> np.ndarray:
         """All numbers in one array."""
-        return joined([self.codewords, self.maps])
+        return joined(self.parts)
+
+    @property
+    def parts(self) -> list[np.ndarray]:
+        """Where the cells lie, then their maps."""
+        return [self.codewords, self.maps]
 
     def like(self, vector: np.ndarray) -> Cells:
         """Cells of the same shape with the numbers of `vector`."""
-        return Cells(*parted(vector, [self.codewords, self.maps]))
+        return Cells(*parted(vector, self.parts))
 
     def closeness(self, states: np.ndarray) -> np.ndarray:
         """How near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)

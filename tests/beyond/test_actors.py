@@ -1,0 +1,70 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from support import PENDULUM
+
+from vsp.baselines.trees import ObliqueLinearTree
+from vsp.beyond.comparison.tuning import in_units
+from vsp.beyond.refinement.search import local_maps
+from vsp.beyond.refinement.units import Frame
+from vsp.beyond.robots.actors import LEAK, SoftActor
+from vsp.beyond.robots.further_training import train_further
+from vsp.beyond.robots.settings import Walking
+from vsp.rollouts import rollout, visited_states
+from vsp.tasks.registry import get_task
+from vsp.teachers.teacher import load_teacher
+
+TASK, TEACHER = get_task(PENDULUM), load_teacher(PENDULUM)
+STATES = visited_states(TEACHER, TASK, TASK.start(np.random.default_rng(0), 20))
+FRAME = Frame.of(TASK, STATES)
+FEW = Walking(n_cells=3, n_validation=5, n_steps=160, n_filling=60, gamma=0.98)
+
+
+def pieces(kind):
+    """A frame, the numbers of three linear maps, and the policy they make."""
+    if kind == "cells":
+        cells = local_maps(FRAME.labelled(TEACHER, STATES), 3, np.random.default_rng(1))
+        return FRAME, cells, FRAME.policy(cells)
+    tree = ObliqueLinearTree(STATES, TEACHER.predict(STATES)[0].astype(float), leaves=3, task=PENDULUM, seed=0)
+    return *in_units(tree, FRAME), tree
+
+
+@pytest.mark.parametrize("kind", ["cells", "tree"])
+def test_hard_it_acts_as_the_policy_and_cold_it_nearly_does(kind):
+    frame, numbers, policy = pieces(kind)
+    wanted = policy.predict(STATES)[0] / 2
+    observations = torch.tensor(STATES, dtype=torch.float32)
+    actor = SoftActor(frame, numbers, temperature=1e-4).eval()
+    hard = actor(observations).detach().numpy()
+    assert np.mean(np.abs(hard - wanted) > 1e-4) < 0.002  # a threshold of a tree is a state: in float32 it may go left
+    cold = actor.train()(observations).detach().numpy()
+    assert np.mean(np.abs(cold - wanted) > LEAK) < 0.02  # but at the borders
+    warm = SoftActor(frame, numbers, temperature=10.0).train()(observations).detach().numpy()
+    assert np.abs(warm - wanted).mean() > 0.05 and np.abs(warm).max() <= 1
+
+
+@pytest.mark.parametrize("kind", ["cells", "tree"])
+def test_every_number_learns_and_comes_back(kind):
+    frame, numbers, _ = pieces(kind)
+    actor = SoftActor(frame, numbers, temperature=1.0).train()
+    assert np.allclose(actor.numbers.vector, numbers.vector, atol=1e-5)
+    actor(torch.tensor(STATES, dtype=torch.float32)).square().mean().backward()
+    assert (actor.vector.grad != 0).all()
+
+
+def test_further_training_keeps_the_best_and_repeats():
+    frame, numbers, policy = pieces("cells")
+    one, again = (train_further(frame, numbers, TEACHER, FEW, seed=0) for _ in range(2))
+    assert np.array_equal(one.coefficients, again.coefficients)
+    starts = TASK.start(np.random.default_rng(np.random.SeedSequence(0).spawn(2)[0]), FEW.n_validation)
+    before, after = (rollout(each, TASK, starts).returns.mean() for each in (policy, one))
+    assert after >= before
+    assert np.float32(1e-44) * np.float32(1) > 0  # denormal numbers are back
+
+
+def test_nothing_learns_until_the_replay_buffer_is_filled():
+    frame, numbers, policy = pieces("cells")
+    waits = replace(FEW, n_filling=10_000)
+    assert np.allclose(train_further(frame, numbers, TEACHER, waits, seed=0).coefficients, policy.coefficients)

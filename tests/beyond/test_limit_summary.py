@@ -1,0 +1,45 @@
+import pandas as pd
+import pytest
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
+
+from vsp.beyond.comparison import best_mean, limit_summary, near, references, walking
+from vsp.paper.results import write_results
+
+MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3, "parameters": 9, "operations": 9.0}
+
+
+def rows(*found):
+    """A row per method, size, seed and mean return."""
+    return pd.DataFrame([dict(zip(("method", "size", "seed", "mean"), row)) | MEASURED for row in found])
+
+
+def test_shares_regret_and_failures_by_hand(tmp_path):
+    best = pd.DataFrame({"task": [MOUNTAINCAR] * 2, "mean": [99.5, 99.6]})
+    write_results(best, "optimum", out=tmp_path)
+    frame = rows(*(("at the limit", 3, seed, mean) for seed, mean in enumerate((99.2, 99.4, 99.0, 99.4))))
+    frame.loc[2, "failing"] = 0.25
+    write_results(frame, f"limit_{MOUNTAINCAR}", out=tmp_path)
+    found = limit_summary(MOUNTAINCAR, tmp_path / "data/results").iloc[0]
+    assert (found["size"], found["policies"], found["near"], found["least"], found["failing"]) == (3, 4, 0.75, 99, 0.25)
+    assert found["regret"] == pytest.approx(99.6 - 99.25) and found["low"] < 99.25 < found["high"]
+    assert found["near_low"] == pytest.approx(0.194, abs=1e-3) and found["near_high"] == pytest.approx(0.994, abs=1e-3)
+
+
+def test_simplegoals_limit_follows_its_best_return():
+    assert near(SIMPLEGOAL) == best_mean(SIMPLEGOAL) - 0.015 and near(LUNARLANDER) == 290
+
+
+def test_references_have_a_row_per_task_and_the_error_of_the_grid():
+    table = references().set_index("task")
+    assert (table["regret"] > 0).all() and table["error"].isna().tolist() == [True, False, False]
+    assert table.loc[MOUNTAINCAR, "best"] == best_mean(MOUNTAINCAR)
+
+
+def test_robots_stand_beside_their_teacher(tmp_path):
+    found = [("cells", 8, 0, 40.0), ("cells", 8, 1, 60.0), ("one map, random search", 0, 0, 20.0)]
+    frame = rows(*found, ("robot's teacher", 0, 0, 100.0)).assign(r2=[0.8, 0.9, -1.0, 1.0])
+    write_results(frame, f"robots_{CHEETAH}", out=tmp_path)
+    table = walking(CHEETAH, tmp_path / "data/results").set_index("method")
+    assert table.index[0] == "robot's teacher" and table.loc["cells", "share"] == 0.5
+    assert table.loc["cells", "r2"] == pytest.approx(0.85) and table.loc["cells", "policies"] == 2
+    assert table.loc["one map, random search", "share"] == 0.2

@@ -1,0 +1,46 @@
+"""What is shown of the kept policy of a robot: its gait, step by step, and how few of its numbers it needs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from ...evaluation import start_states
+from ...paper.results import provenance
+from ...policy import VoronoiPolicy
+from ...rollouts import rollout
+from ...tasks.registry import SLOW
+from ..robots import fewest_numbers, record_gait
+from .kept import kept_job
+from .measure import N_REPORTED, REPORT_SEED
+
+VERSION = 1  # raise it when the same policy gets another table
+GAIT = {"start": 0.0, "n_steps": 200}
+FEWEST = {"keep": 0.95, "n_episodes": 20, "seed": 0}
+
+
+def gait(policy: VoronoiPolicy) -> pd.DataFrame:
+    """`record_gait` of one episode, and the provenance."""
+    task = policy.task.name
+    return record_gait(policy, task, **GAIT).assign(**provenance_of("gait", task))
+
+
+def fewest(policy: VoronoiPolicy) -> pd.DataFrame:
+    """The candidates of `fewest_numbers`, then two rows from the report starts: stages "all numbers" and "fewest"."""
+    task = policy.task
+    small, rows = fewest_numbers(policy, **FEWEST)
+    starts = start_states(task, N_REPORTED // SLOW.get(task.name, 1), REPORT_SEED)
+    ends = []
+    for stage, one in (("all numbers", policy), ("fewest", small)):
+        size = {"cells": len(one), "nonzero": np.count_nonzero(one.coefficients), "digits": 0}
+        ends.append({"stage": stage, **size, "mean": rollout(one, task, starts).returns.mean(), "kept": True})
+    if len(short := rows.loc[(rows["stage"] == "digits") & rows["kept"], "digits"]):
+        ends[1]["digits"] = int(short.iloc[-1])
+    return pd.concat([rows, pd.DataFrame(ends)], ignore_index=True).assign(**provenance_of("fewest", task.name))
+
+
+def provenance_of(name: str, task: str) -> dict[str, str | int]:
+    """The provenance of the table `name`, which depends on that of the policy."""
+    made_with = kept_job(task, "robots").provenance
+    settings = {"policy": made_with, "table": name, **(GAIT if name == "gait" else FEWEST)}
+    return {**made_with, **provenance(settings, made_with["teacher"], VERSION)}

@@ -1,0 +1,222 @@
+"""Which methods are compared, at which sizes, with how many seeds: the tables beyond the paper, before any row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
+
+from ...algorithms import VERSION
+from ...baselines import tdavq
+from ...config import Config
+from ...paper import printed
+from ...rollouts import Policy
+from ..optimum import limit
+from ..refinement.config import Faithful, Refinement
+from . import apart, methods, peers
+
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
+LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
+WALKERS: tuple[str, ...] = ()  # robots, whose rows take hours too: those whose table is whole
+SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
+
+SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
+OWN = (0,)
+TUNED_SIZES = (2, 3, 4, 8, 13)  # of rivals that are tuned as ours is
+EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
+TUNING = ("n_restarts", "n_generations", "n_tuning_episodes", "tuning_step")
+ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
+OF_FAITHFUL = tuple(field.name for field in fields(Faithful) if field.name != "n_cells")
+PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
+ALIKE = ("faithful", "walking")  # kinds of presets whose rows say how alike the actions are
+
+# `refined` that stays close to its teacher
+FAITHFUL = {"n_generations": 300, "n_tuning_episodes": 500, "tuning_step": 0.01, "error_penalty": 30.0}
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a policy is made: `make(budget, size, seed, **settings)`."""
+
+    make: Callable[..., Policy]
+    version: int = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
+    reads: tuple[str, ...] = ()  # settings of the budget that decide the policy
+    settings: dict = field(default_factory=dict)
+    sizes: tuple[int, ...] = SIZES  # cells or leaves; `OWN` where the method finds its own number
+    chance: bool = True  # whether the seed matters
+    tasks: tuple[str, ...] | None = None  # None: for all
+    preset: str = "tuned"  # the kind of preset whose settings are the budget
+
+
+def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
+    settings, make = {"rounds": rounds, "n_restarts": n_restarts}, partial(methods.corrected, fit=methods.FITS[fit])
+    return Method(make, reads=EPISODES, settings=settings, sizes=sizes)
+
+
+def _by_teacher(fit: str, *, sizes: tuple[int, ...] = SIZES) -> Method:
+    return Method(partial(methods.alone, fit=methods.FITS[fit]), reads=EPISODES, sizes=sizes)
+
+
+def _tuned(fit: Method) -> Method:
+    """`fit`, then tuned; sizes of one leaf are left out, since one linear map stands for them."""
+    sizes = OWN if fit.sizes == OWN else TUNED_SIZES
+    return replace(fit, make=partial(methods.tuned_fit, imitation=fit.make), reads=EPISODES + TUNING, sizes=sizes)
+
+
+METHODS = {
+    "refined": Method(methods.refined, reads=ALL),
+    "refined, not tuned": Method(methods.refined, reads=ALL, settings={"n_generations": 0}),
+    "refined, no teacher": Method(methods.no_teacher, reads=ALL, sizes=(3, 4)),  # those of presets
+    "refined, closest": Method(methods.imitated, reads=ALL, sizes=(13,)),
+    "refined, faithful": Method(methods.faithful, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]),
+    "k-means cells, DAgger": _by_dagger("k-means", n_restarts=3),
+    "CART": _by_teacher("tree"),
+    "CART, DAgger": _by_dagger("tree"),
+    "CART, linear leaves, DAgger": _by_dagger("linear tree"),
+    "oblique tree, linear leaves, DAgger": _by_dagger("oblique tree", n_restarts=2),
+    "soft tree, DAgger": _by_dagger("soft tree", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
+    "teacher": Method(methods.the_teacher, sizes=OWN, chance=False),
+    "one linear map": _by_teacher("one map", sizes=OWN),
+    "rule of thumb": Method(methods.by_thumb, sizes=OWN, chance=False, tasks=printed.TASKS),
+    "heuristic": Method(methods.by_hand, sizes=OWN, chance=False, tasks=("Pendulum-v1", *LONG)),
+    "TD-AVQ": Method(methods.td_avq, sizes=OWN, tasks=printed.TASKS[:1]),
+    "TD-AVQ, coarse": Method(methods.td_avq, settings=tdavq.COARSE, sizes=OWN, tasks=printed.TASKS[:1]),
+    "the paper's method": Method(
+        methods.paper_method, version=VERSION, reads=PAPER, sizes=OWN, tasks=printed.TASKS, preset="paper"
+    ),
+}
+
+# Rivals, tuned as `refined` is
+UNTUNED = {
+    "oblique tree, constant leaves, DAgger": _by_dagger("constant oblique tree", n_restarts=2, sizes=TUNED_SIZES),
+    "small network, DAgger": _by_dagger("small network", n_restarts=2, sizes=TUNED_SIZES),
+} | {
+    name: METHODS[name]
+    for name in ("CART, DAgger", "CART, linear leaves, DAgger", "oblique tree, linear leaves, DAgger",
+                 "k-means cells, DAgger", "one linear map")
+}  # fmt: skip
+RIVALS = {f"{name}, tuned": _tuned(method) for name, method in UNTUNED.items()}
+RIVALS |= {name: method for name, method in UNTUNED.items() if name not in METHODS}
+
+# `refined` at the size of the preset, with one more part taken away
+ABLATION = {
+    "cold from the start": {"initial_temperature": 0.04},
+    "one beginning": {"n_restarts": 1},
+    "not corrected": {"n_corrections": 0},
+    "no leak": {"clip_slope": 1e-9},
+    "not tuned": {"n_generations": 0},
+    "failures at no price": {"failure_penalty": 0.0},
+    "no teacher": {},
+    "drawn by stakes": {"criticality": True},
+}
+
+FAITHFUL_SIZES = (1, 2, 3, 4, 6, 7, 8, 13)
+LIKE = {"faithful": Method(methods.faithfully, reads=OF_FAITHFUL, sizes=FAITHFUL_SIZES, preset="faithful")}
+
+# Fit and geometry apart, and newer methods: all imitate the teacher's own episodes
+APART = {
+    name: Method(make, reads=EPISODES, sizes=(2, 4, 8))
+    for name, make in {
+        "our cells, our fit": apart.cells_by_global_fit,
+        "our cells, greedy fit": apart.cells_by_greedy_fit,
+        "oblique tree, our fit": apart.tree_by_global_fit,
+        "oblique tree, greedy fit": partial(methods.alone, fit=methods.FITS["oblique tree"]),
+        "critic-driven splitting": peers.critic_driven_cells,
+        "advantage-weighted maps": peers.advantage_weighted_cells,
+    }.items()
+}
+
+# The highest return of policies that are so much like the teacher: the way from `faithful` to `refined`
+DEMANDED = {
+    f"faithful, R² {r2:g}": replace(LIKE["faithful"], settings={"min_r2": r2}, sizes=(2, 4, 8))
+    for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
+}
+
+# The highest return, from the best policy where it is known; and whether the start or the length of the search decides
+LIMIT = {
+    "at the limit": Method(
+        methods.limited, limit.VERSION, reads=ALL, sizes=(1, 2, 3, 4, 8, 12), preset="limit",
+        tasks=TASKS[:1],  # those whose table is whole
+    )
+}  # fmt: skip
+_ON_THE_CAR = {"sizes": (3,), "tasks": printed.TASKS[1:]}
+STARTS = {
+    "at the limit, from the teacher": replace(
+        LIMIT["at the limit"], make=partial(methods.limited, by_teacher=True), **_ON_THE_CAR
+    ),
+    "refined, 800 generations": replace(METHODS["refined"], settings={"n_generations": 800}, **_ON_THE_CAR),
+}
+
+# Of robots: acting like the teacher, then training on as the teacher's actor; and one map by returns alone
+OF_IMITATION = (
+    "push", "n_episodes", "n_corrections", "n_correction_episodes", "n_states", "n_restarts", "n_validation"
+)  # fmt: skip
+OF_TRAINING = ("n_steps", "n_filling", "learning_rate", "critic_rate", "batch_size", "gamma", "temperature")
+OF_SEARCH = ("n_random_steps", "n_directions", "n_best", "step_size", "search_noise", "n_validation")
+
+
+def _robot(make: Callable[..., Policy], reads: tuple[str, ...], sizes: tuple[int, ...] = OWN) -> Method:
+    return Method(make, reads=reads, sizes=sizes, preset="walking")
+
+
+def _further(imitation: Method) -> Method:
+    make = partial(methods.trained_further, imitation=imitation.make)
+    return replace(imitation, make=make, reads=imitation.reads + OF_TRAINING)
+
+
+ROBOTS = {
+    "cells": (_cells := _robot(methods.robot, OF_IMITATION, (1, 2, 4, 8, 16))),
+    "cells, trained further": _further(_cells),
+    "oblique tree": (_tree := _robot(methods.robot_tree, OF_IMITATION, (2, 4, 8, 16))),
+    "oblique tree, trained further": _further(_tree),
+    "one map, random search": _robot(methods.searched, OF_SEARCH),
+    "robot's teacher": replace(METHODS["teacher"], preset="walking"),
+}
+
+OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the nearest rivals
+AGENTS = (1, 2)  # further teachers of a task, data/teachers/short/, in the order of their names; 0 is the shipped one
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows that come into one file per task, data/results/<name>_<task>.csv."""
+
+    methods: dict[str, Method]
+    seeds: range = SEEDS
+    fewer: range = SEEDS  # of sizes that the preset does not have
+    sizes: tuple[int, ...] | None = None  # no others than these
+    agents: tuple[int, ...] = (0,)
+    at_preset: bool = False  # only as many cells as the preset has
+    tail: bool = False  # the worst returns are measured too
+
+    def has(self, task: str) -> bool:
+        """Whether a task has rows in it."""
+        return any(method.tasks is None or task in method.tasks for method in self.methods.values())
+
+
+TABLES = {
+    "beyond": Table(METHODS),
+    "tuned": Table(RIVALS, seeds=range(7), fewer=range(7)),
+    "faithful": Table(LIKE, fewer=range(6)),
+    "apart": Table(APART, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
+    "demanded": Table(DEMANDED, seeds=range(2), fewer=range(2)),
+    "teachers": Table(
+        LIKE | {name: (METHODS | RIVALS)[name] for name in ("teacher", "refined", OBLIQUE, ONE_MAP)},
+        seeds=FEW_SEEDS, fewer=FEW_SEEDS, agents=AGENTS, at_preset=True,
+    ),
+    "limit": Table(LIMIT, fewer=range(3)),
+}  # fmt: skip
+
+# Of the tasks whose rows take hours
+AGAIN = ("teacher", "refined")  # their tail is measured too, beside that of the rivals
+LONG_RIVALS = ("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP)
+LONG_SIZES = (0, 1, 2, 4, 8)
+LONG_TABLES = {
+    "beyond": Table(METHODS, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
+    "tuned": Table(
+        {name: (METHODS | RIVALS)[name] for name in (*AGAIN, *LONG_RIVALS)},
+        seeds=range(3), fewer=range(3), sizes=LONG_SIZES, tail=True,
+    ),
+    "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
+}  # fmt: skip
+ROBOT_TABLES = {"robots": Table(ROBOTS, seeds=FEW_SEEDS, fewer=range(3))}

@@ -1,0 +1,11 @@
+"""Robots that walk: many inputs, several actions, and a teacher whose every mistake adds up.
+
+Imitation sees states after pushes and after its own mistakes; then the teacher's own training goes on, with a few cells
+as its actor.
+"""
+
+from .fewest import fewest_numbers
+from .gait import phases, record_gait
+from .imitation import imitate_pushed
+from .random_search import search_one_map
+from .settings import Walking, walking_preset

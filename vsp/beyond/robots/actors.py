@@ -1,0 +1,59 @@
+"""Cells and trees as differentiable actors: soft borders while they learn, hard ones when they act. Imports torch."""
+
+from __future__ import annotations
+
+import torch
+
+from ..refinement.units import Cells, Frame, parted
+
+LEAK = 0.02  # slope of the limited action beyond the limits, while it learns: without any, a saturated map stays so
+
+
+class SoftActor(torch.nn.Module):
+    """Policies made of linear maps, in the units of a `Frame`, as the network that TD3 trains.
+
+    `numbers`: `Cells`, or the `TreeNumbers` of an oblique tree. Observations (n, d) to actions (n, m) in [-1, 1].
+    """
+
+    def __init__(self, frame: Frame, numbers, temperature: float):
+        super().__init__()
+        self._numbers, self._temperature = numbers, temperature
+        self.vector = torch.nn.Parameter(torch.tensor(numbers.vector, dtype=torch.float32))
+        for name, value in (("centre", frame.centre), ("scale", frame.scale)):
+            self.register_buffer(name, torch.tensor(value, dtype=torch.float32))
+        self._closeness = _to_codewords if isinstance(numbers, Cells) else _to_leaves
+
+    @property
+    def numbers(self):
+        """What has been learned, of the kind that it began with."""
+        return self._numbers.like(self.vector.detach().double().numpy())
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Actions of the nearest piece; while it trains, of all, in shares that fall with the distance."""
+        states = (observations - self.centre) / self.scale
+        *places, maps = parted(self.vector, self._numbers.parts)
+        closeness = self._closeness(states, places, self._numbers)  # (n, k)
+        k, rows, m = maps.shape
+        inputs = torch.cat([states, torch.ones(len(states), 1)], dim=1)
+        raw = (inputs @ maps.permute(1, 0, 2).reshape(rows, k * m)).reshape(-1, k, m)
+        limited = raw.clamp(-1.0, 1.0)
+        if not self.training:
+            return limited[torch.arange(len(states)), closeness.argmax(dim=1)]
+        shares = torch.softmax(closeness / self._temperature, dim=1)
+        return (shares[:, :, None] * (limited + LEAK * (raw - limited))).sum(dim=1).clamp(-1.0, 1.0)
+
+
+def _to_codewords(states: torch.Tensor, places: list[torch.Tensor], numbers: Cells) -> torch.Tensor:
+    """How near each codeword is, as `Cells.closeness` has it. (n, k)"""
+    (codewords,) = places
+    return 2 * states @ codewords.T - codewords.square().sum(dim=1)
+
+
+def _to_leaves(states: torch.Tensor, places: list[torch.Tensor], numbers) -> torch.Tensor:
+    """How far a state is on the side of each leaf: the sum of the distances by which it is beyond a border on the way
+    there, negative on the wrong side. 0 for a leaf whose turns are all taken. (n, k)"""
+    directions, thresholds = places
+    sides = torch.tensor(numbers.sides, dtype=torch.float32)  # (k, nodes)
+    beyond = states @ directions.T - thresholds  # (n, nodes)
+    wrong = torch.relu(-beyond) @ sides.clamp(min=0).T + torch.relu(beyond) @ (-sides).clamp(min=0).T
+    return -2 * wrong

@@ -1,0 +1,90 @@
+"""One linear map, learned from returns alone by augmented random search (ARS V2-t, Mania et al. 2018): no teacher."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ...checks import check_seed
+from ...policy import VoronoiPolicy
+from ...tasks.base import Task
+from ...tasks.registry import get_task
+from ..refinement.population import rollout_population
+from ..refinement.units import METRIC
+from .choice import most_rewarding
+from .settings import Walking
+
+EVERY = 8  # of so many observations, one counts for their mean and deviation
+N_CHOICES = 20  # times, evenly spread over the search, that the map is kept
+
+
+class RunningMoments:
+    """Mean and variance of the observations so far, which scale the inputs of the map (Welford 1962)."""
+
+    def __init__(self, d: int):
+        self.n, self.mean, self._squares = 0, np.zeros(d), np.zeros(d)
+
+    def add(self, states: np.ndarray) -> None:
+        """Count the rows of `states` (n, d) in."""
+        n, gap = self.n + len(states), states.mean(axis=0) - self.mean
+        within = np.square(states - states.mean(axis=0)).sum(axis=0)
+        self._squares = self._squares + within + gap**2 * self.n * len(states) / n
+        self.n, self.mean = n, self.mean + gap * len(states) / n
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """1 where nothing varies yet. (d,)"""
+        found = np.sqrt(self._squares / max(1, self.n))
+        return np.where(found > 1e-6, found, 1.0)
+
+
+@threadpool_limits.wrap(limits=1)
+def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPolicy:
+    """The best map that `config.n_random_steps` steps of the robot find, as one cell. Same arguments, same policy.
+
+    A round plays maps on both sides of the present one, in random directions; it then moves along those `n_best`
+    directions that had the highest returns. Raises ValueError for a bad seed.
+    """
+    check_seed(seed)
+    task = get_task(task)
+    d, m = len(task.low), len(task.action_low)
+    starts, noise, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3))
+    weights, moments, played, on_the_way = np.zeros((d, m)), RunningMoments(d), 0, []
+    while played < config.n_random_steps:
+        directions = noise.normal(size=(config.n_directions, d, m))
+        both = np.concatenate([directions, -directions])
+        tried = [_policy(weights + config.search_noise * one, moments, task) for one in both]
+        results, seen = _played(tried, task, task.start(starts, 1))
+        played += sum(int(result.lengths.sum()) for result in results)
+        returns = np.array([result.returns.mean() for result in results]).reshape(2, -1)
+        kept = np.argsort(-returns.max(axis=0), kind="stable")[: config.n_best]
+        gains = (returns[0] - returns[1])[kept]
+        step = config.step_size / max(len(kept) * returns[:, kept].std(), 1e-12)
+        weights = weights + step * np.tensordot(gains, directions[kept], axes=1)
+        moments.add(seen)
+        if played * N_CHOICES // config.n_random_steps > len(on_the_way):
+            on_the_way.append(_policy(weights, moments, task))
+    return most_rewarding(on_the_way, task, config.n_validation, validation)
+
+
+def _policy(weights: np.ndarray, moments: RunningMoments, task: Task) -> VoronoiPolicy:
+    """The map `weights` (d, m) of scaled inputs to scaled actions, as one cell in the units of the task."""
+    half = 0.5 * (task.action_high - task.action_low)
+    slopes = weights / moments.deviation[:, None] * half
+    biases = 0.5 * (task.action_high + task.action_low) - moments.mean @ slopes
+    coefficients = np.concatenate([slopes, biases[None]])[None]
+    return VoronoiPolicy(moments.mean[None], coefficients, task=task, metric=METRIC)
+
+
+def _played(policies: list[VoronoiPolicy], task: Task, starts: np.ndarray):
+    """How the episodes ended, and every `EVERY`-th observation (n, d)."""
+    seen = []
+
+    def see(states: np.ndarray) -> np.ndarray:
+        seen.append(observations := task.see(states))
+        return observations
+
+    results = rollout_population(policies, replace(task, see=see), starts)
+    return results, np.concatenate(seen)[::EVERY]

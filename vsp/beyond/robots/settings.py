@@ -1,0 +1,72 @@
+"""`Walking`: the settings of everything that makes policies for robots, and its presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from ...checks import check_count, check_number
+from ...tasks import Task, get_task
+from ..refinement.config import MOST, MOST_CELLS
+
+
+@dataclass(frozen=True)
+class Walking:
+    """How a robot's teacher is imitated and how the policy is tuned. Raises ValueError for a value out of range."""
+
+    n_cells: int
+    """Cells of the policy."""
+    push: float = 0.4
+    """Standard deviation of noise on the teacher's actions, in half action ranges: the teacher labels the states to
+    which this leads (DART, Laskey et al. 2017)."""
+    n_episodes: int = 20
+    """Episodes of the teacher. With the noise it plays twice as many."""
+    n_corrections: int = 12
+    """Rounds in which the teacher labels the states that the policy itself visits (DAgger, Ross et al. 2011)."""
+    n_correction_episodes: int = 10
+    """Episodes of the policy per round."""
+    n_states: int = 30_000
+    """States that a fit sees, evenly over where they lie."""
+    n_restarts: int = 8
+    """Descents from other random initial cells in the first round; the closest imitation is kept."""
+    n_validation: int = 20
+    """Episodes by which the policies on the way are compared; the best are compared over more (`choice`)."""
+    n_steps: int = 160_000
+    """Steps for which TD3 goes on, with the cells as its actor."""
+    n_filling: int = 5000
+    """The first of these steps: the replay buffer fills, and nothing learns."""
+    learning_rate: float = 1e-4
+    """Of Adam, for the cells: with larger steps they run ahead of the critics, and the return falls before it rises."""
+    critic_rate: float = 1e-3
+    """Of Adam, for the critics, as in the teacher's own training."""
+    batch_size: int = 100
+    """Steps out of the replay buffer that each update sees."""
+    gamma: float = 0.99
+    """Discount per step, as in the teacher's own training."""
+    temperature: float = 0.3
+    """How soft the borders are while TD3 learns, in squared deviations of the states."""
+    n_random_steps: int = 20_000_000
+    """Steps of the random search for one linear map."""
+    n_directions: int = 32
+    """Directions that a round of it tries, forwards and backwards."""
+    n_best: int = 4
+    """The best of these, which the map follows."""
+    step_size: float = 0.02
+    """How far, in deviations of the returns."""
+    search_noise: float = 0.03
+    """Standard deviation of what is tried."""
+
+    def __post_init__(self) -> None:
+        check_count("n_cells", self.n_cells, most=MOST_CELLS)
+        for name in (field.name for field in fields(self) if field.type == "int" and field.name != "n_cells"):
+            check_count(name, getattr(self, name), least=int(name != "n_corrections"), most=MOST)
+        for name in (field.name for field in fields(self) if field.type == "float"):
+            check_number(name, getattr(self, name), least=0.0 if name in ("push", "gamma") else 1e-12)
+        check_number("gamma", self.gamma, least=0.0, most=1.0)
+
+
+_WALKING = {"BipedalWalker-v3": Walking(n_cells=8, gamma=0.98)}
+
+
+def walking_preset(task: str | Task) -> Walking:
+    """The settings for a robot: eight cells. Raises ValueError as `get_task` does."""
+    return _WALKING.get(get_task(task).name, Walking(n_cells=8))
