@@ -31,7 +31,7 @@ def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.integers(2**32, size=(n, 1)).astype(np.float64)
 
 
-def _begin_live(name: str, starts: np.ndarray) -> np.ndarray:
+def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
     """A freshly reset environment per start. (n,) objects"""
     live = np.empty(len(starts), dtype=object)
     for i, (seed,) in enumerate(starts):
@@ -75,19 +75,29 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
         raise ValueError(f"actions of {name} are {acts}, expected limits: gymnasium.wrappers.RescaleAction sets some")
     if most is None:
         raise ValueError(f"{name} has no limit of steps, expected one: give gymnasium.register max_episode_steps")
+    box = (np.asarray(limit, dtype=np.float64) for limit in (seen.low, seen.high, acts.low, acts.high))
+    return live_task(name, *box, max_steps=most, outcome=outcome)
+
+
+def live_task(
+    name: str, low: np.ndarray, high: np.ndarray, action_low: np.ndarray, action_high: np.ndarray, *, max_steps: int,
+    outcome: Outcome | None = None,
+) -> Task:  # fmt: skip
+    """The `Task` of the environment `name`, which is opened when an episode begins; boxes (d,) and (m,) as given."""
+    inputs = tuple(f"s{i}" for i in range(len(low)))
     return Task(
         name=name,
-        inputs=(inputs := tuple(f"s{i}" for i in range(seen.shape[0]))),
-        outputs=tuple(f"a{j}" for j in range(acts.shape[0])),
+        inputs=inputs,
+        outputs=tuple(f"a{j}" for j in range(len(action_low))),
         input_labels=inputs,
-        low=seen.low.astype(np.float64),
-        high=seen.high.astype(np.float64),
-        action_low=acts.low.astype(np.float64),
-        action_high=acts.high.astype(np.float64),
-        max_steps=most,
+        low=low,
+        high=high,
+        action_low=action_low,
+        action_high=action_high,
+        max_steps=max_steps,
         start=_draw_seeds,
         step=partial(_step_live, outcome),
         see=_see_live,
-        begin=partial(_begin_live, name),
+        begin=partial(begin_live, name),
         start_size=1,
     )
