@@ -16,8 +16,9 @@ FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
 FIGURES_06_few_equations := beyond_map beyond_likeness beyond_read
 TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equal tail budgets teachers)
-FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times
-TABLES_07_limits := limit_references limit_sizes limit_losses
+FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times limit_strides
+ANIMATIONS_07_limits := gait_halfcheetah
+TABLES_07_limits := $(addprefix limit_,references sizes starts losses robots gait fewest)
 FIGURES_08_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
 TABLES_08_methods := beyond_headline beyond_ablation beyond_lunarlander \
@@ -34,8 +35,10 @@ READS_06_few_equations := $(foreach n,$(ROWS) \
   $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3) optimum \
   $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
-READS_07_limits := $(foreach n,$(ROWS) limit_SimpleGoal-v0 tuned_SimpleGoal-v0 apart_SimpleGoal-v0 faithful_SimpleGoal-v0 \
-  demanded_SimpleGoal-v0 optimum fits,data/results/$(n).csv) data/results/faithful_Pendulum-v1.policy
+READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL)) starts_MountainCarContinuous-v0 optimum fits \
+  $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
+  $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
+  data/results/faithful_Pendulum-v1.policy data/results/robots_HalfCheetah-v5.policy
 READS_08_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_08_methods)))
@@ -178,10 +181,10 @@ bench: venv-test-train-dask ## measures speed and scale, into data/results/: an 
 faults: venv-test-train-dask ## breaks it in every way we know, into data/results/: 3 HOURS or more; kills resume
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
-beyond: begin venv-train ## our own method and others beside it, into data/results/: 4 to 5 HOURS, resumable
+beyond: begin venv-train ## our own method and others beside it, into data/results/: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train ## the same for LunarLander, whose physics engine is slow: 5 to 6 HOURS, resumable
+beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 7 to 8 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

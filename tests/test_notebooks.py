@@ -51,7 +51,7 @@ def test_every_saved_figure_has_alternative_text(notebook):
     for cell in code_cells(notebook):
         for call in (node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)):
             name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", None)
-            if name in ("save_figure", "save_growth"):
+            if name in ("save_figure", "save_growth", "save_gait"):
                 assert {"alt", "out", "quick"} <= {keyword.arg for keyword in call.keywords}, cell.id
 
 

@@ -2,7 +2,7 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
-from vsp.beyond.comparison import best_mean, limit_summary, near, references, walking
+from vsp.beyond.comparison import best_mean, limit_summary, near, references, starts_summary, walking
 from vsp.paper.results import write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3, "parameters": 9, "operations": 9.0}
@@ -43,3 +43,17 @@ def test_robots_stand_beside_their_teacher(tmp_path):
     assert table.index[0] == "robot's teacher" and table.loc["cells", "share"] == 0.5
     assert table.loc["cells", "r2"] == pytest.approx(0.85) and table.loc["cells", "policies"] == 2
     assert table.loc["one map, random search", "share"] == 0.2
+
+
+def test_searches_stand_in_the_order_of_their_length(tmp_path):
+    of_table = {
+        "beyond": [("refined", 3, 0, 95.0), ("refined", 3, 1, 96.0), ("refined", 4, 0, 90.0), ("CART", 3, 0, 91.0)],
+        "starts": [("at the limit, from the teacher", 3, 0, 97.0), ("refined, 800 generations", 3, 0, 96.0)],
+        "limit": [("at the limit", 3, 0, 99.4), ("at the limit", 4, 0, 99.3)],
+    }
+    for table, found in of_table.items():
+        write_results(rows(*found), f"{table}_{MOUNTAINCAR}", out=tmp_path)
+    table = starts_summary(MOUNTAINCAR, tmp_path / "data/results")
+    by_length = ["refined", "refined, 800 generations", "at the limit, from the teacher", "at the limit"]
+    assert table["method"].tolist() == by_length
+    assert table["mean"].tolist() == [95.5, 96.0, 97.0, 99.4] and table["least"].iloc[0] == 95

@@ -1,10 +1,11 @@
 import dataclasses
 import shutil
+from collections import Counter
 
 import numpy as np
 import pandas as pd
 import pytest
-from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, WALKER
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER
 
 from vsp.beyond.comparison import kept, kept_robots, make_rows, measure, method_rows
 from vsp.beyond.comparison.method_rows import Job, jobs_of, make_all, make_row, rows, tables_of
@@ -103,6 +104,14 @@ def test_all_seeds_are_those_of_the_size_of_the_preset():
     n = {size: sum(job.size == size for job in found) for size in {job.size for job in found}}
     own = faithful_preset(SIMPLEGOAL).n_cells
     assert n[own] == len(TABLES["faithful"].seeds) > n[own - 1] == len(TABLES["faithful"].fewer)
+
+
+def test_a_table_differs_by_task_where_rows_take_long():
+    n = {task: Counter(job.size for job in jobs_of(task, "limit")) for task in TASKS}
+    assert n[SIMPLEGOAL] == {4: 20, 1: 3, 2: 3, 3: 3, 8: 3, 12: 3}
+    assert n[MOUNTAINCAR] == {3: 5, 4: 3} and n[PENDULUM] == {8: 5}
+    assert [task for task in TASKS if "starts" in tables_of(task)] == [MOUNTAINCAR]
+    assert len(jobs_of(MOUNTAINCAR, "starts")) == 6
 
 
 def test_of_tasks_that_take_long_fewer_rows_are_asked_and_their_tail():

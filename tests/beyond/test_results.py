@@ -11,7 +11,7 @@ from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.beyond.benchmarks import fits, lookup
 from vsp.beyond.comparison import kept, method_rows, method_tables, regret, stale_results, time_to_quality
-from vsp.beyond.comparison.method_tables import METHODS
+from vsp.beyond.comparison.method_tables import METHODS, WALKERS
 from vsp.paper import results as results_module
 from vsp.paper import runs
 from vsp.paper.results import RESULTS, read_results, write_results
@@ -198,9 +198,14 @@ def test_results_of_another_teacher_are_stale(results, monkeypatch):
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),
         *(says(name, "teacher", "beyond") for task in method_tables.TASKS for name in files_of(task)),
-        *(says(name, "teacher", "beyond-long") for name in files_of(LUNARLANDER)),
+        *(says(name, "teacher", "beyond-long") for task in (LUNARLANDER, *WALKERS) for name in files_of(task)),
         says("beyond_race.csv", "teacher", "beyond"),
         says(f"beyond_{LUNARLANDER}.policy", "teacher", "beyond-long"),
+        *(
+            says(f"{name}_{task}.csv", "settings and teacher", "beyond-long")  # those of the policy that walks
+            for task in WALKERS
+            for name in ("gait", "fewest")
+        ),
     ]
 
 

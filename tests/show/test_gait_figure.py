@@ -8,13 +8,13 @@ from PIL import Image
 from vsp.show import style
 from vsp.show.gait import THICK, body_lines, cell_colors, footfall, gait_strip, save_gait
 
-LEG = {"leg x0": np.arange(6.0), "leg z0": 0.0, "leg x1": np.arange(6.0), "leg z1": 1.0}
+LEG = {"leg x0": np.arange(6.0), "leg z0": 0.0, "leg x1": np.arange(6.0) + 0.5, "leg z1": 1.0}
 FEET = {"back": [1, 0, 0, 0, 0, 1], "front": 0}
 GAIT = pd.DataFrame({"step": range(6), "cell": [2, 2, 2, 0, 0, 5], **FEET, **LEG})
 
 
 def test_lines_have_their_ends_in_every_step():
-    assert np.array_equal(body_lines(GAIT)["leg"][3], [[3, 0], [3, 1]])
+    assert np.array_equal(body_lines(GAIT)["leg"][3], [[3, 0], [3.5, 1]])
 
 
 def test_a_strip_has_a_pose_and_a_time_for_each_step_and_names_the_cells_that_act():

@@ -15,7 +15,7 @@ from .animation import DPI, WIDTH, Animation, save_frames
 from .stage import Stage
 
 THICK = 3.0  # points: of the lines of the body
-GAP = 1.7  # metres from one pose to the next in a strip
+GAP = 1.1  # from one pose to the next in a strip, in widths of the widest
 ENDS = ("x0", "z0", "x1", "z1")
 
 
@@ -46,12 +46,14 @@ def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: floa
     if not len(steps) or min(steps) < 0 or max(steps) >= len(gait):
         raise ValueError(f"steps are {steps}, expected some of the {len(gait)} recorded ones")
     lines, colors = body_lines(gait), cell_colors(gait)
+    across = np.concatenate([ends[list(steps), :, 0] for ends in lines.values()], axis=1)
+    gap = GAP * float(np.ptp(across, axis=1).max())
     for i, step in enumerate(steps):
-        draw_pose(ax, lines, step, color=colors[int(gait.cell[step])], shift=i * GAP)
+        draw_pose(ax, lines, step, color=colors[int(gait.cell[step])], shift=i * gap)
     times = [f"{step_seconds * (step - steps[0]):.2f}" for step in steps]
-    ax.set(xticks=np.arange(len(steps)) * GAP, xticklabels=times, yticks=[], xlabel="time (s)", aspect="equal")
+    ax.set(xticks=np.arange(len(steps)) * gap, xticklabels=times, yticks=[], xlabel="time (s)", aspect="equal")
     ax.axhline(0.0, color="0.6", zorder=0)
-    ax.set(xlim=(-GAP / 2, (len(steps) - 0.5) * GAP))
+    ax.set(xlim=(-gap / 2, (len(steps) - 0.5) * gap))
     ax.spines["left"].set_visible(False)
     _name_cells(ax, {cell: color for cell, color in colors.items() if cell in set(gait.cell[list(steps)])})
 

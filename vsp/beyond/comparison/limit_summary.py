@@ -8,8 +8,10 @@ import numpy as np
 import pandas as pd
 
 from ...paper.results import read_results
+from ..optimum.limit import limit_preset
 from .faithful_summary import share_interval
 from .method_summary import method_summary, read_rows
+from .method_tables import LIMIT, STARTS
 from .regret import best_mean
 
 # Mean return from which on a policy is said to be at the limit; SimpleGoal's: so much below the best
@@ -40,6 +42,19 @@ def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Data
     bounds = [share_interval(int((means >= bar).sum()), len(means)) for _, means in by_size]
     table["near_low"], table["near_high"] = zip(*bounds)
     return table
+
+
+def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """Whether the start or the length of the search decides, one row per search, "at the limit" last.
+
+    Columns: method, policies, mean, low, high (its 95 % interval), least (of a seed) and failing (the most).
+    """
+    size, order = limit_preset(task).n_cells, ["refined", *reversed(STARTS), *LIMIT]
+    rows = pd.concat([read_rows(task, folder, table=table) for table in ("beyond", "starts", "limit")])
+    rows = rows[(rows["size"] == size) & rows["method"].isin(order)]
+    table = method_summary(rows).set_index("method")[["policies", "mean", "low", "high"]]
+    by_method = rows.groupby("method")
+    return table.assign(least=by_method["mean"].min(), failing=by_method["failing"].max()).loc[order].reset_index()
 
 
 def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:

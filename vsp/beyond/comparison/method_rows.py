@@ -129,7 +129,7 @@ def _seeds(task: str, method: Method, about: Table, size: int) -> range:
 def tables_of(task: str) -> dict[str, Table]:
     """The tables that a task has rows in."""
     tables = ROBOT_TABLES if task in WALKERS else LONG_TABLES if task in LONG else TABLES
-    return {name: table for name, table in tables.items() if table.has(task)}
+    return {name: table.of(task) for name, table in tables.items() if table.has(task)}
 
 
 def make_row(job: Job) -> tuple[dict, dict]:

@@ -71,16 +71,18 @@ def _cheetah(env) -> Body:
 
 
 def _walker(env) -> Body:
-    """The edges of the hull, and the axes of the four parts of the legs."""
-    from gymnasium.envs.box2d.bipedal_walker import LEG_H
+    """The edges of the hull and the axes of the four parts of the legs, above the height where the ground begins."""
+    from gymnasium.envs.box2d.bipedal_walker import LEG_H, TERRAIN_HEIGHT
 
-    corners = [env.hull.transform * vertex for vertex in env.hull.fixtures[0].shape.vertices]
+    ground = np.array([0.0, TERRAIN_HEIGHT])
+    corners = [np.array(env.hull.transform * vertex) - ground for vertex in env.hull.fixtures[0].shape.vertices]
     lines = {
         f"hull {i}": np.array([*one, *other]) for i, (one, other) in enumerate(zip(corners, corners[1:] + corners[:1]))
     }
     for name, leg in zip(("thigh 1", "shin 1", "thigh 2", "shin 2"), env.legs):
         along = 0.5 * LEG_H * np.array([-np.sin(leg.angle), np.cos(leg.angle)])
-        lines[name] = np.concatenate([np.array(leg.position) - along, np.array(leg.position) + along])
+        middle = np.array(leg.position) - ground
+        lines[name] = np.concatenate([middle - along, middle + along])
     return lines, (env.legs[1].ground_contact, env.legs[3].ground_contact)
 
 
