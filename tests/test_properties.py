@@ -604,7 +604,8 @@ EXEMPT = {
         partition.Partition.neighbours partition.Partition.reset partition.Partition.scaled partition.Partition.train
         rollouts.score rollouts.warn_outside""",
     "dynamics, and what a task is made of: `rollouts` checks what moves through them": """
-        tasks.base tasks.bipedalwalker.walked tasks.lunarlander.landed tasks.mountaincar tasks.pendulum
+        tasks.base tasks.bipedalwalker.walked tasks.gym_adapter.begin_live tasks.gym_adapter.live_task
+        tasks.lunarlander.landed tasks.mountaincar tasks.pendulum
         tasks.simplegoal.SimpleGoalEnv.reset tasks.simplegoal.start tasks.simplegoal.step""",
     "the inside of `refine`, `imitate` and `distill_faithfully`, which check what comes in": """
         beyond.refinement.search beyond.refinement.faithful.among_states beyond.refinement.faithful.by_visits
