@@ -235,3 +235,23 @@ def test_what_cells_buy_is_that_of_the_table():
     for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
         kinds = kinds.to_dict("records")
         assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}
+
+
+def test_what_is_said_of_the_limit_is_in_its_tables():
+    block = RESULTS.partition("## How good can a few cells be?")[2].partition("\n## ")[0]
+    best, sizes, starts, robots = (
+        pd.read_csv(ROOT / f"figures/tables/limit_{name}.csv") for name in ("references", "sizes", "starts", "robots")
+    )
+    best, cells = best.set_index("task"), {"SimpleGoal": 4, "MountainCar": 3, "Pendulum": 8}
+    for row in sizes[[cells[row.task] == row.size for row in sizes.itertuples()]].to_dict("records"):
+        near, known = f"{row['near'] * row['policies']:.0f} of {row['policies']}", best.loc[row["task"]]
+        returns = f"{known['best']:.3f} | {known['teacher']:.3f} | {row['size']} | {row['mean']:.3f}"
+        assert f"| {row['task']} | {returns} | {near} |" in block
+    assert f"generations reach {starts['mean'][1]:.3f}" in block
+    mean = robots.set_index(["task", "method"])["mean"]
+    walker, cheetah = mean["BipedalWalker"], mean["HalfCheetah"]
+    ours, teacher = "cells, trained further", "robot's teacher"
+    said = " ".join(block.split())
+    assert f"eight cells returns {walker[ours]:.1f} and" in said and f"teacher returns {walker[teacher]:.1f}." in said
+    assert f"cells returns {cheetah[ours]:.0f}, which is {100 * cheetah[ours] / cheetah[teacher]:.0f} % of" in said
+    assert f"found by random search, {cheetah['one map, random search']:.0f}." in said
