@@ -45,7 +45,7 @@ from vsp.teachers.teacher import Teacher, load_teacher
 OUTSIDE = {
     "commands and studies, and what reads the tables that they write: their arguments are ours": """
         paper.audit paper.beside paper.ledger paper.make_runs paper.runs paper.studies beyond.benchmarks
-        beyond.comparison teachers.train""",
+        beyond.comparison teachers.recipes teachers.train""",
     "draw such tables, histories and runs, with tests of what they refuse": """
         show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.replay
         show.stage""",

@@ -11,7 +11,6 @@ from .explanation import contributions, whereabouts
 from .gait import footfall, gait_strip, save_gait
 from .methods import (
     LIMITS,
-    ROBOTS,
     against_time,
     fidelity_map,
     likeness_over_cells,

@@ -31,20 +31,13 @@ METHODS = {
     "refined, no teacher": {"color": DISTILLED, "ls": ":"},
 }
 
-# Of those at the limit, and of robots
+# Of those at the limit
 LIMITS = {
     "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6},
     "refined": METHODS["refined"],
     "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3]},
     "small network, DAgger, tuned": {"color": COLOURS[9]},
     "one linear map, tuned": {"color": "black", "marker": "s"},
-}
-ROBOTS = {
-    "cells, trained further": METHODS["refined"],
-    "cells": METHODS["refined, not tuned"],
-    "oblique tree, trained further": {"color": COLOURS[3]},
-    "oblique tree": {"color": COLOURS[3], "ls": "--"},
-    "one map, random search": {"color": "black", "marker": "s"},
 }
 
 

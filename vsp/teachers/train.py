@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import argparse
 import copy
-import hashlib
 import io
 import os
 import pickle
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,81 +23,8 @@ from ..run import atomic, command, listed, sealed
 from ..tasks.base import GOAL, PIT
 from ..tasks.registry import SLOW, get_task
 from .agent_zip import part_of
+from .recipes import BARS, BEST_OF_CURVE, EARLIER_TRIALS, RECIPES, SHORT_SEEDS, SHORT_STEPS, Recipe
 from .teacher import SHIPPED, Teacher
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """Arguments of Stable-Baselines3's TD3 for one teacher; the policy is MlpPolicy, [400, 300], ReLU."""
-
-    steps: int  # environment steps
-    batch_size: int = 256
-    train_freq: tuple[int, str] = (1, "step")
-    gradient_steps: int = 1  # per training phase; -1: as many as steps were taken
-    learning_rate: float = 1e-3
-    gamma: float = 0.99  # discount per step
-    buffer_size: int = 1_000_000
-    learning_starts: int = 100
-    noise: str = "normal"  # exploration noise: "normal" or "ornstein-uhlenbeck"
-    noise_std: float = 0.1  # its standard deviation, in units of the action
-
-    @property
-    def id(self) -> str:
-        """Eight hexadecimal digits of a hash: checkpoints are resumed by the same recipe only."""
-        return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
-
-
-RECIPES = {
-    # "500.000 steps using the standard parameters": the library's, with the exploration noise of the TD3 article
-    # (Fujimoto et al. 2018); without noise, training never discovers that a short last step pays
-    "SimpleGoal-v0": Recipe(steps=500_000),
-    # RL Zoo's recipe with the library defaults of that time (batch 100, one training phase per episode)
-    "MountainCarContinuous-v0": Recipe(
-        steps=300_000, batch_size=100, train_freq=(1, "episode"), gradient_steps=-1,
-        noise="ornstein-uhlenbeck", noise_std=0.5,
-    ),
-    # RL Zoo's recipe
-    "Pendulum-v1": Recipe(steps=20_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
-    # With RL Zoo's recipe the return rises and falls; a larger buffer, a higher gamma and smaller steps stabilise it
-    "LunarLanderContinuous-v3": Recipe(steps=450_000, learning_rate=3e-4, learning_starts=10_000),
-    # RL Zoo's recipe, in fewer of its steps
-    "BipedalWalker-v3": Recipe(steps=300_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
-    "HalfCheetah-v5": Recipe(steps=350_000, learning_starts=10_000),
-}  # fmt: skip
-
-# Tasks whose teacher is the best snapshot of the learning curve; elsewhere it is the last
-BEST_OF_CURVE = ("LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5")
-
-# Trainings with another recipe, rejected for their score (over SCORE_EPISODES, or `episodes`)
-_ZOO = {"gamma": 0.98, "buffer_size": 200_000, "learning_rate": 1e-3, "seed": 0, "episodes": 50}
-EARLIER_TRIALS = {
-    "SimpleGoal-v0": [{"noise_std": 0.0, "seed": 0, "steps": 140_000, "mean": 16.0875, "std": 2.9943, "pit": 0.001}],
-    "LunarLanderContinuous-v3": [  # RL Zoo's recipe; its best snapshot; continued from there with smaller steps
-        {**_ZOO, "steps": 300_000, "mean": 209.8963, "std": 91.8232},
-        {**_ZOO, "steps": 290_000, "mean": 239.2406, "std": 48.4486},
-        {**_ZOO, "steps": 350_000, "then_learning_rate": 1e-4, "mean": 210.4371, "std": 99.7109},
-    ],
-    "BipedalWalker-v3": [  # stopped early: the same on another machine, and with smaller batches
-        {"seed": 0, "episodes": 25, "steps": 100_000, "mean": -40.3250, "std": 4.5847},
-        {"seed": 0, "episodes": 25, "batch_size": 100, "steps": 20_000, "mean": -106.1235, "std": 1.8941},
-    ],
-}
-
-# Further trainings, to study the teacher's influence; shorter where the shipped one took long. SimpleGoal's seed 1 is
-# left out: its actor saturated within 10,000 steps at (-1, -1) for every state and stayed there.
-SHORT_STEPS = {"SimpleGoal-v0": 60_000, "MountainCarContinuous-v0": 120_000, "Pendulum-v1": 20_000}
-SHORT_SEEDS = {"SimpleGoal-v0": (2, 3), "MountainCarContinuous-v0": (1, 2), "Pendulum-v1": (1, 2)}
-
-# Requirements for a shipped teacher, over SCORE_EPISODES episodes: least mean return, largest share of episodes without
-# a goal (Pendulum and HalfCheetah have none; a walker that does not fall has reached it).
-BARS = {
-    "SimpleGoal-v0": (16.3, 0.01),
-    "MountainCarContinuous-v0": (93.3, 0.0),
-    "Pendulum-v1": (-155.0, 1.0),
-    "LunarLanderContinuous-v3": (270.0, 0.05),
-    "BipedalWalker-v3": (300.0, 0.03),
-    "HalfCheetah-v5": (6000.0, 1.0),
-}
 
 PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # whose versions a card names
 ENGINES = {"HalfCheetah-v5": ("mujoco",)}

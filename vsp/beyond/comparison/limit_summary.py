@@ -77,8 +77,8 @@ def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:
 def walking(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """The policies of a robot, one row per method and size, the teacher first.
 
-    Columns: method, size, policies, mean, low, high (its 95 % interval), share (of the teacher's mean return), r2 (the
-    median) and parameters.
+    Columns: method, size, policies, mean, low, high (its 95 % interval), failing, share (of the teacher's mean
+    return), r2 (the median) and parameters.
     """
     rows = read_rows(task, folder, table="robots")
     teacher = rows.loc[rows["method"] == "robot's teacher", "mean"].iloc[0]
@@ -86,5 +86,5 @@ def walking(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     r2 = rows.groupby(["method", "size"])["r2"].median()
     table["share"] = table["mean"] / teacher
     table["r2"] = [r2[about] for about in zip(table["method"], table["size"])]
-    columns = ["method", "size", "policies", "mean", "low", "high", "share", "r2", "parameters"]
+    columns = ["method", "size", "policies", "mean", "low", "high", "failing", "share", "r2", "parameters"]
     return table.loc[(table["method"] != "robot's teacher").sort_values(kind="stable").index, columns]
