@@ -29,6 +29,7 @@ from vsp.baselines import critics, dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.optimum import best_policy, best_returns, limit_preset
+from vsp.beyond.proofs import largest_disturbance, steps_to_goal
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
 from vsp.beyond.robots.fewest import fewest_numbers
@@ -49,6 +50,7 @@ OUTSIDE = {
     "draw such tables, histories and runs, with tests of what they refuse": """
         show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.replay
         show.stage""",
+    "checks certificates, which its own tests spoil": "beyond.proofs.checker",
     "machinery around the method, and the course, with tests of their own faults": "run course",
     "what the others check with": "checks",
 }
@@ -274,6 +276,14 @@ CASES = {
     "beyond.optimum.references.best_policy": (
         best_policy,
         {"task": task, "finer": number(0.5, least=0.1, most=10.0), "price": price},
+    ),
+    "beyond.proofs.robust.steps_to_goal": (
+        functools.partial(steps_to_goal, TWO),
+        {"disturbance": number(0.01, least=0.0, most=1.0), "n": count(20, most=4000)},
+    ),
+    "beyond.proofs.robust.largest_disturbance": (
+        functools.partial(largest_disturbance, TWO),
+        {"n": count(10, most=4000), "tolerance": number(0.05, least=1e-6, most=0.1)},
     ),
     "beyond.robots.settings.Walking": (Walking, settings_of(Walking, WALKING)),
     "beyond.robots.settings.walking_preset": (walking_preset, {"task": task}),
@@ -617,6 +627,9 @@ EXEMPT = {
     "the inside of `imitate_pushed` and `search_one_map`, which check what comes in": """
         beyond.robots.choice beyond.robots.imitation.Pushed beyond.robots.imitation.cells_fit
         beyond.robots.random_search.RunningMoments""",
+    "follow a policy, which they check, or work on what `follow` found: see their own tests": """
+        beyond.proofs.polygons beyond.proofs.proof beyond.proofs.returns beyond.proofs.simplegoal
+        beyond.proofs.robust.proved""",
     "of robots with an engine, and what it recorded: see their own tests": "beyond.robots.gait",
     "trains networks for minutes: see their own tests": "beyond.robots.actors beyond.robots.further_training",
     "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",

@@ -16,6 +16,7 @@ import pandas as pd
 
 from . import algorithms
 from .algorithms import merge_regions, split_regions, teacher_episodes
+from .beyond.proofs import prove
 from .beyond.refinement import Faithful, Refinement, faithful_preset, simplify, tuned_preset
 from .beyond.refinement.refine import refine
 from .checks import check_choice, check_seed

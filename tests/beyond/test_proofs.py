@@ -1,0 +1,259 @@
+import copy
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
+from support import MOUNTAINCAR, SIMPLEGOAL
+
+import vsp
+from vsp.beyond import comparison
+from vsp.beyond.proofs import checker, largest_disturbance, proved, returns, steps_to_goal
+from vsp.beyond.proofs.polygons import box, line_of, meet, total
+from vsp.beyond.proofs.proof import ENDS, Proof
+from vsp.beyond.proofs.simplegoal import follow
+from vsp.run import sealed
+from vsp.tasks import GOAL, PIT, TRUNCATED
+
+HALF, ONE = Fraction(1, 2), Fraction(1)
+
+
+def policy_of(codewords, maps, **more):
+    return vsp.VoronoiPolicy(np.array(codewords, float), np.array(maps, float), task=SIMPLEGOAL, **more)
+
+
+STRAIGHT = policy_of([[0.5, 0.5]], [[[0, 0], [0, 0], [-1, -1]]])  # left and down at full speed
+# Beyond the other diagonal to the left, below it down and left
+MAPS = [[[0, 0], [0, 0], [-1, -1]], [[0, 0], [0, 0], [-1, 0]]]
+TWO = policy_of([[0.25, 0.25], [0.75, 0.75]], MAPS, metric="euclidean")
+
+
+@st.composite
+def policies(draw):
+    """Small ones, with numbers of few digits, so that ties, equal maps and empty cells do occur."""
+    tenth = st.integers(-12, 22).map(lambda n: n / 10)
+    k = draw(st.integers(1, 5))
+    codewords = draw(st.lists(st.tuples(tenth, tenth), min_size=k, max_size=k, unique=True))
+    number = st.integers(-12, 12).map(lambda n: n / 10)
+    maps = draw(st.lists(st.tuples(*[st.tuples(number, number)] * 3), min_size=k, max_size=k))
+    scale = draw(st.sampled_from([(1.0, 1.0), (0.5, 2.0)]))
+    metric = draw(st.sampled_from(["euclidean", "manhattan"]))
+    return policy_of(codewords, np.array(maps) - [[0.5, 0.5], [0.5, 0.5], [1, 1]], metric=metric, scale=np.array(scale))
+
+
+def followed(policy):
+    """Its pieces, if there are few."""
+    try:
+        return follow(policy, most=300)
+    except ValueError:
+        reject()
+
+
+# Polygons
+
+
+def test_a_square_is_cut_by_hand():
+    square = box((0 * ONE, ONE), (0 * ONE, ONE))
+    line = line_of((ONE, ONE, Fraction(-1, 2)))  # x + y = 1/2
+    low, high = square.cut(line)
+    assert (low.area(), high.area()) == (Fraction(1, 8), Fraction(7, 8))
+    assert sorted(low.points()) == [(0, 0), (0, HALF), (HALF, 0)] and len(high.corners) == 5
+
+
+def test_a_line_through_corners_adds_none():
+    low, high = box((0 * ONE, ONE), (0 * ONE, ONE)).cut((1, -1, 0))
+    assert len(low.corners) == len(high.corners) == 3 and low.area() == high.area() == HALF
+
+
+def test_a_line_beside_the_square_or_along_its_edge_leaves_it_whole():
+    square = box((0 * ONE, ONE), (0 * ONE, ONE))
+    assert square.cut((1, 0, 0)) == (None, square) and square.cut((1, 0, -1)) == (square, None)
+    assert square.cut((0, 0, 3)) == (None, square)
+    with pytest.raises(ValueError, match="0 = 0"):
+        square.cut((0, 0, 0))
+
+
+def test_lines_meet_and_are_in_smallest_integers():
+    assert line_of((HALF, Fraction(1, 3), -ONE)) == (3, 2, -6)
+    x, y, w = meet((1, 0, -2), (0, 3, -1))
+    assert (Fraction(x, w), Fraction(y, w)) == (2, Fraction(1, 3)) and w > 0
+
+
+@given(st.lists(st.tuples(*[st.integers(-9, 9)] * 3).filter(any), max_size=6))
+def test_parts_add_up_to_the_whole(lines):
+    parts = [box((0 * ONE, ONE), (0 * ONE, ONE))]
+    for line in lines:
+        parts = [half for part in parts for half in part.cut(line) if half]
+    assert total([part.area() for part in parts]) == 1 and all(part.area() > 0 for part in parts)
+
+
+# The closed loop
+
+
+def test_the_areas_by_hand():
+    proof = vsp.prove(STRAIGHT)
+    # After k steps the pit holds the starts of a square of 1/5 that lies k/10 further up the diagonal. Four of these
+    # are within the square of starts; each overlaps with the next in a square of 1/10
+    assert proof.areas == {"goal": Fraction(87, 100), "pit": 4 * Fraction(4, 100) - 3 * Fraction(1, 100), "left": 0}
+    assert proof.longest == 9
+
+
+def test_a_policy_that_stands_still_gets_nowhere():
+    proof = vsp.prove(policy_of([[0.5, 0.5]], np.zeros((1, 3, 2))))
+    # What starts in the goal or in the pit is there after a step: 1/100 and 1/25
+    assert proof.areas == {"goal": Fraction(1, 100), "pit": Fraction(1, 25), "left": Fraction(95, 100)}
+    assert proof.longest == 50
+
+
+def test_a_tie_over_an_area_goes_to_the_lowest_cell():
+    codewords = [[0.25, 0.25], [0.75, 0.75]]  # |Δx| = |Δy|: two corners tie
+    maps = [[[0, 0], [0, 0], [-1, -1]], [[0, 0], [0, 0], [0, 0]]]
+    cells = dict.fromkeys((0, 1), 0)
+    for piece in follow(policy_of(codewords, maps, metric="manhattan")):
+        cells[piece.steps[0].cell] += piece.starts.area()
+    assert cells == {0: Fraction(9, 16), 1: Fraction(7, 16)}  # the two corners in which both tie are 1/16 each
+
+
+@settings(max_examples=6, deadline=None)
+@given(policies(), st.integers(0, 2**31))
+def test_pieces_do_what_the_program_does(policy, seed):
+    pieces = followed(policy)
+    assert total([piece.starts.area() for piece in pieces]) == 1
+    rng = np.random.default_rng(seed)
+    chosen = [pieces[i] for i in rng.integers(len(pieces), size=200)]
+    starts = np.array([piece.starts.middle() for piece in chosen])
+    found = vsp.rollout(policy, SIMPLEGOAL, starts)
+    wanted = [(piece.outcome, len(piece.steps)) for piece in chosen]
+    inner = np.array([piece.starts.area() > 1e-9 for piece in chosen])  # in slivers the program's rounding decides
+    differ = np.array([one != pair for one, pair in zip(zip(found.outcomes, found.lengths), wanted)])
+    assert (differ & inner).mean() < 0.03
+
+
+def test_returns_are_those_of_the_pieces():
+    proof = vsp.prove(TWO)
+    low, high = returns.mean_return(proof.pieces, width=1e-4)
+    starts = np.random.default_rng(1).uniform(size=(200_000, 2))
+    sampled = vsp.rollout(TWO, SIMPLEGOAL, starts).returns
+    assert 0 <= high - low <= 1.1e-4 and abs(sampled.mean() - low) < 5 * sampled.std() / np.sqrt(len(sampled))
+    start, worst = proof.worst_start()
+    assert worst <= sampled.min() + 1e-6 and abs(vsp.rollout(TWO, SIMPLEGOAL, start[None]).returns[0] - worst) < 1e-6
+
+
+def test_the_mean_distance_from_the_origin():
+    still = follow(policy_of([[0.5, 0.5]], np.zeros((1, 3, 2))))
+    low, high = returns.mean_return(still, width=1e-4)
+    assert low <= 10 * 0.01 - 10 * 0.04 <= high
+
+
+@pytest.mark.parametrize(
+    ("policy", "match"),
+    [(vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR), "need a proof of their own"),
+     (policy_of([[0, 0]], np.zeros((1, 3, 2)), metric="chebyshev"), "metric 'chebyshev'"),
+     ("a name", "expected a VoronoiPolicy")],
+)  # fmt: skip
+def test_other_policies_get_one_clear_error(policy, match):
+    for refuses in (vsp.prove, steps_to_goal):
+        with pytest.raises(ValueError, match=match):
+            refuses(policy)
+
+
+# Over a grid
+
+
+def test_boxes_agree_with_pieces():
+    steps = steps_to_goal(TWO, n=100)
+    assert 0 < (steps > 0).mean() <= vsp.prove(TWO).areas["goal"]
+    starts = np.random.default_rng(2).uniform(size=(20_000, 2))
+    found, own = vsp.rollout(TWO, SIMPLEGOAL, starts), steps[tuple((starts * 100).astype(int).T)]
+    assert (found.outcomes[own > 0] == GOAL).all() and (found.lengths[own > 0] <= own[own > 0]).all()
+
+
+def test_the_largest_disturbance_is_smaller_than_what_breaks_it():
+    around = policy_of([[0.2, 0.5], [0.8, 0.5]], [[[0, 0], [0, 0], [-1, -1]], [[0, 0], [0, 0], [0, -1]]])
+    assert not proved(steps_to_goal(around, n=50)) and np.isnan(largest_disturbance(around, n=50))
+    calm = vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{SIMPLEGOAL}.policy")
+    assert proved(steps_to_goal(calm, n=300)) and not proved(steps_to_goal(calm, disturbance=0.05, n=300))
+
+
+@settings(max_examples=12, deadline=None)
+@given(policies(), st.integers(0, 2**31))
+def test_what_boxes_prove_no_disturbance_breaks(policy, seed):
+    steps, rng = steps_to_goal(policy, disturbance=0.01, n=60), np.random.default_rng(seed)
+    state = rng.uniform(size=(2000, 2))
+    left, alive = steps[tuple((state * 60).astype(int).clip(max=59).T)], np.ones(2000, bool)
+    state, left = state[left > 0], left[left > 0]
+    alive = np.ones(len(state), bool)
+    for t in range(50):
+        action = policy.predict(state.astype(np.float32))[0] + rng.uniform(-0.1, 0.1, size=state.shape)
+        state = np.clip(state + 0.1 * np.clip(action, -1, 1), 0, 1)
+        assert not (alive & ((state > 0.4) & (state < 0.6)).all(axis=1)).any()
+        alive &= ~(state < 0.1).all(axis=1)
+        assert not (alive & (left <= t + 1)).any()
+
+
+# The certificate, and a checker that shares no code with the prover
+
+
+@pytest.fixture(scope="module")
+def certificate():
+    return vsp.prove(TWO).certificate()
+
+
+def test_a_certificate_is_written_sealed_and_checked(tmp_path, certificate):
+    vsp.prove(TWO).save(path := tmp_path / "two.json")
+    assert json.loads(sealed.read_sealed(path)) == certificate and checker.check(path) == certificate["claim"]
+    path.write_bytes(path.read_bytes().replace(b"goal", b"goat", 1))
+    with pytest.raises(checker.Refused, match="checksum"):
+        checker.check(path)
+
+
+@settings(max_examples=5, deadline=None)
+@given(policies())
+def test_the_checker_finds_the_same_areas(policy):
+    certificate = Proof(policy, tuple(followed(policy))).certificate()
+    assert checker.check_content(certificate) == certificate["claim"]
+
+
+def mutants(content, n, rng):
+    """Certificates whose claim is false, or whose pieces do not prove it."""
+    for kind in rng.choice(["drop", "end", "step", "swap", "area", "longest", "policy"], size=n):
+        mutant = copy.deepcopy(content)
+        pieces, claim = mutant["pieces"], mutant["claim"]
+        i, j = rng.choice(len(pieces), size=2, replace=False)
+        end, *steps = pieces[i].split(" ")
+        at = rng.integers(len(steps))
+        if kind == "drop":
+            del pieces[i]
+        elif kind == "end":
+            pieces[i] = " ".join([rng.choice([name for name in ENDS.values() if name != end]), *steps])
+        elif kind == "step":
+            other = steps[at][:-4] + "".join(rng.choice(list("-=+"), size=4))
+            pieces[i] = " ".join([end, *steps[:at], other if other != steps[at] else "1====", *steps[at + 1 :]])
+        elif kind == "swap":
+            pieces[i], pieces[j] = pieces[i] + " " + steps[0], pieces[j][:-6]
+        elif kind == "area":
+            gain = Fraction(1, int(rng.integers(2, 10**9)))
+            claim["goal"], claim["pit"] = str(Fraction(claim["goal"]) + gain), str(Fraction(claim["pit"]) - gain)
+        elif kind == "longest":
+            claim["longest"] -= 1
+        else:
+            mutant["policy"]["coefficients"][0][2][0] += 0.3
+        yield kind, mutant
+
+
+def test_the_checker_refuses_every_mutant(certificate):
+    for kind, mutant in mutants(certificate, 40, np.random.default_rng(3)):
+        with pytest.raises(checker.Refused):
+            checker.check_content(mutant)
+            pytest.fail(f"accepted a mutant: {kind}")
+
+
+def test_the_checker_shares_no_code_with_the_prover():
+    source = open(checker.__file__, encoding="utf-8").read()
+    assert "vsp" not in source.split('"""', 2)[2] and "from ." not in source
+
+
+def test_outcomes_have_names():
+    assert set(ENDS) == {GOAL, PIT, TRUNCATED}

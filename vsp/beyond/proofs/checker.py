@@ -1,0 +1,268 @@
+"""Checks certificates. Shares no code with the prover, and works otherwise: it moves the corners of polygons.
+
+    python -m vsp.beyond.proofs.checker FILE
+
+A certificate names a policy, a claim, and the itineraries of all starts: per step the cell, which actions are at a
+limit and which coordinates at a wall. For each itinerary the checker cuts from the square of starts what follows it.
+No start follows two itineraries, so the parts do not overlap; if their areas add up to 1, nothing is missing but lines
+without area. All numbers are fractions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from fractions import Fraction
+from functools import cache
+
+SQUARE = [(Fraction(x), Fraction(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+STRIDE, GOAL, PIT, N_STEPS = Fraction(1, 10), Fraction(1, 10), (Fraction(2, 5), Fraction(3, 5)), 50
+OWN = [(Fraction(1), Fraction(0), Fraction(0)), (Fraction(0), Fraction(1), Fraction(0))]  # the coordinates of a state
+DOUBT = 1e-9  # share of the numbers added up: far more than rounding can do
+SIDES = {"-": -1, "=": 0, "+": 1}
+
+
+class Refused(Exception):
+    """The certificate does not prove its claim."""
+
+
+def check(path) -> dict:
+    """The claim of the certificate in `path`. Raises `Refused` where the itineraries do not prove it."""
+    with open(path, "rb") as file:
+        seal, _, payload = file.read().partition(b"\n")
+    if hashlib.sha256(payload).hexdigest().encode() != seal:
+        raise Refused(f"{path}: the checksum in its first line is not that of the rest")
+    return check_content(json.loads(payload))
+
+
+def check_content(content: dict) -> dict:
+    """The claim of a certificate that was read. Raises `Refused`."""
+    if content["task"] != "SimpleGoal-v0":
+        raise Refused(f"the task is {content['task']!r}, expected 'SimpleGoal-v0'")
+    policy, areas, longest = Policy(**content["policy"]), {"goal": 0, "pit": 0, "left": 0}, 0
+    pieces = [line.split(" ") for line in content["pieces"]]
+    corners = [[corner(start, start) for start in SQUARE]]
+    for end, depth, area in followed(policy, corners, sorted((steps, end) for end, *steps in pieces), 0):
+        areas[end] += area
+        longest = max(longest, depth)
+    claim, found = content["claim"], {**{end: str(Fraction(area)) for end, area in areas.items()}, "longest": longest}
+    claimed = {name: str(Fraction(value)) for name, value in claim.items()}
+    if sum(areas.values()) != 1:
+        raise Refused(f"the pieces cover {float(sum(areas.values()))!r} of the square, expected all of it")
+    if claimed != {name: str(value) for name, value in found.items()}:
+        raise Refused(f"the pieces prove {found}, but the claim is {claim}")
+    return claim
+
+
+def followed(policy: Policy, polygons: list, pieces: list[tuple[list[str], str]], depth: int):
+    """End, depth and area of all `pieces`, which share their first `depth` steps; `polygons` are the starts of these.
+
+    A polygon is a list of corners, as `corner` makes them.
+    """
+    ended = {end for steps, end in pieces if len(steps) == depth}
+    if ended and depth == N_STEPS:
+        if ended != {"left"}:
+            raise Refused(f"a piece ends as {ended} after {N_STEPS} steps, expected 'left'")
+        yield "left", depth, area(polygons)
+    longer = [piece for piece in pieces if len(piece[0]) > depth]
+    while longer:
+        step = longer[0][0][depth]
+        alike = [piece for piece in longer if piece[0][depth] == step]
+        longer = longer[len(alike) :]
+        goal, rest = inside(policy.step(polygons, step), IN_GOAL)
+        pit, rest = inside(rest, IN_PIT)
+        ends = {end for steps, end in alike if len(steps) == depth + 1 and end != "left"}
+        for end, polygons_there in (("goal", goal), ("pit", pit)):
+            if end in ends:
+                yield end, depth + 1, area(polygons_there)
+        going = [piece for piece in alike if len(piece[0]) > depth + 1 or piece[1] == "left"]
+        if going:
+            yield from followed(policy, rest, going, depth + 1)
+
+
+class Form:
+    """p x + q y + r of a state (x, y)."""
+
+    def __init__(self, p, q, r):
+        self.exact = p, q, r
+        self.rough = [float(number) for number in self.exact]
+        self.doubt = DOUBT * sum(map(abs, self.rough))
+
+    def at(self, state) -> Fraction:
+        (p, q, r), (x, y) = self.exact, state
+        value = r + (p * x if p else 0)
+        return value + (q * y if q else 0)
+
+    def signs(self, polygon: list) -> list:
+        """Numbers with the signs of the values at the corners: rounded ones, if these are beyond doubt."""
+        p, q, r = self.rough
+        values = [p * x + q * y + r for _, _, (x, y) in polygon]
+        sure = min(values) > self.doubt or max(values) < -self.doubt
+        return values if sure else [self.at(state) for _, state, _ in polygon]
+
+
+def corner(start, state) -> tuple:
+    """A start, the state that it leads to, and that state rounded."""
+    return start, state, (float(state[0]), float(state[1]))
+
+
+class Policy:
+    """Linear maps, each for the states that are nearest to its codeword; of equally near ones the first."""
+
+    def __init__(self, codewords, coefficients, scale, metric):
+        if metric not in ("euclidean", "manhattan"):
+            raise Refused(f"the metric is {metric!r}, expected 'euclidean' or 'manhattan'")
+        self.metric, self.scale = metric, [Fraction(s) for s in scale]
+        self.codewords = [[Fraction(number) for number in codeword] for codeword in codewords]
+        self.maps = [[[Fraction(row[axis]) for row in one] for axis in (0, 1)] for one in coefficients]
+
+    def step(self, polygons: list, step: str) -> list:
+        """The parts of `polygons` that make this step, such as "3+=--", with the states after it."""
+        number, limits, moves, stops, walls = self.plan(step)
+        parts = [part for polygon in polygons for part in self.cell(polygon, number)]
+        for one in limits:
+            parts = limited(parts, *one)
+        parts = [moved(one, moves) for one in parts]
+        for one in stops:
+            parts = limited(parts, *one)
+        return [moved(one, walls) for one in parts] if walls else parts
+
+    @cache  # noqa: B019 - it lives as long as the check
+    def plan(self, step: str) -> tuple:
+        """The cell of a step, the forms of its actions with their sides, the next state, that before the walls with its
+        sides, and that at the walls (None: there are none)."""
+        number, sides = int(step[:-4]), [SIDES[sign] for sign in step[-4:]]
+        actions = [(0, 0, side) if side else one for one, side in zip(self.maps[number], sides)]
+        moves = [Form(*(a + STRIDE * b for a, b in zip(own, action))) for own, action in zip(OWN, actions)]
+        walls = [Form(0, 0, Fraction(side > 0)) if side else Form(*own) for own, side in zip(OWN, sides[2:])]
+        limits = [(*between(one, -1), side) for one, side in zip(self.maps[number], sides)]
+        stops = [(*between(own, 0), side) for own, side in zip(OWN, sides[2:])]
+        return number, limits, moves, stops, walls if any(sides[2:]) else None
+
+    def cell(self, polygon: list, number: int) -> list:
+        """The convex parts of `polygon` in a cell."""
+        parts = [polygon]
+        for other in range(len(self.codewords)):
+            if other != number:
+                parts = [part for one in parts for part in self.nearer(one, number, other)]
+        return parts
+
+    def nearer(self, polygon: list, number: int, other: int) -> list:
+        """The convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
+        parts = [(polygon, ())]
+        if self.metric == "manhattan":
+            if self.surely_nearer(polygon, number, other):
+                return [polygon]
+            # Between the coordinates of the codewords, distances are linear
+            for axis in (0, 1):
+                for i in (number, other):
+                    (p, q, _), value = OWN[axis], self.codewords[i][axis]
+                    cut = [(halves(one, Form(p, q, -value)), at) for one, at in parts]
+                    parts = [(half, (*at, side)) for both, at in cut for half, side in zip(both, (-1, 1)) if half]
+        found = []
+        for one, at in parts:
+            gap = self.gap(number, other, at)
+            tied = not any(gap.signs(one))
+            if half := (one if number < other else None) if tied else halves(one, gap)[0]:
+                found.append(half)
+        return found
+
+    def surely_nearer(self, polygon: list, number: int, other: int) -> bool:
+        """Whether all of `polygon` is nearer to codeword `number`, beyond doubt from rounding. What a coordinate adds
+        to the difference of the distances is monotone, so it is largest at an end."""
+        most = doubt = 0.0
+        for axis, values in enumerate(zip(*(state for _, _, state in polygon))):
+            scale, c, d = (float(one[axis]) for one in (self.scale, self.codewords[number], self.codewords[other]))
+            most += max(abs(value - c) - abs(value - d) for value in (min(values), max(values))) / scale
+            doubt += DOUBT * (1.0 + abs(c) + abs(d)) / scale
+        return most < -doubt
+
+    @cache  # noqa: B019 - it lives as long as the check
+    def gap(self, number: int, other: int, at: tuple) -> Form:
+        """The distance to codeword `number` minus that to `other`; of squares, where the metric is Euclidean.
+
+        `at`: on which sides of the two codewords the first coordinate is, then the second.
+        """
+        slopes, constant = [], Fraction(0)
+        for axis, scale in enumerate(self.scale):
+            c, d = self.codewords[number][axis], self.codewords[other][axis]
+            if self.metric == "euclidean":
+                slopes.append(2 * (d - c) / scale**2)
+                constant += (c * c - d * d) / scale**2
+            else:
+                slopes.append((at[2 * axis] - at[2 * axis + 1]) / scale)
+                constant += (at[2 * axis + 1] * d - at[2 * axis] * c) / scale
+        return Form(*slopes, constant)
+
+
+def between(form, low: int) -> tuple[Form, Form]:
+    """Forms that are positive above `low`, and above 1."""
+    p, q, r = form
+    return Form(p, q, r - low), Form(p, q, r - 1)
+
+
+def limited(polygons: list, above_low: Form, above_high: Form, side: int) -> list:
+    """The parts below both (side -1), above both (side 1), or between (0)."""
+    if side <= 0:
+        polygons = [part for one in polygons if (part := halves(one, above_low)[side + 1])]
+    if side >= 0:
+        polygons = [part for one in polygons if (part := halves(one, above_high)[side])]
+    return polygons
+
+
+def moved(polygon: list, forms: list[Form]) -> list:
+    """The same starts, with the states that these forms are of the states before."""
+    return [corner(start, tuple(form.at(state) for form in forms)) for start, state, _ in polygon]
+
+
+def inside(polygons: list, forms: list) -> tuple[list, list]:
+    """The parts where all forms are positive, and the rest."""
+    rest = []
+    for form in forms:
+        both = [halves(polygon, form) for polygon in polygons]
+        rest += [low for low, _ in both if low]
+        polygons = [high for _, high in both if high]
+    return polygons, rest
+
+
+def halves(polygon: list, form: Form) -> tuple[list | None, list | None]:
+    """The parts of `polygon` where `form` is at most 0, and above; None for one without area."""
+    values = form.signs(polygon)
+    if max(values) <= 0:
+        return polygon, None
+    if min(values) >= 0:
+        return None, polygon
+    low, high = [], []
+    for here, there, one, following in zip(values, values[1:] + values[:1], polygon, polygon[1:] + polygon[:1]):
+        if here <= 0:
+            low.append(one)
+        if here >= 0:
+            high.append(one)
+        if here * there < 0:
+            share = here / (here - there)
+            new = corner(*(tuple(p + share * (q - p) for p, q in zip(one[i], following[i])) for i in (0, 1)))
+            low.append(new)
+            high.append(new)
+    return low, high
+
+
+def area(polygons: list) -> Fraction:
+    """The area of the starts."""
+    found = Fraction(0)
+    for polygon in polygons:
+        points = [start for start, _, _ in polygon]
+        found += sum(x * v - u * y for (x, y), (u, v) in zip(points, points[1:] + points[:1])) / 2
+    return found
+
+
+IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in OWN]  # where these are positive
+IN_PIT = [form for p, q, _ in OWN for form in (Form(p, q, -PIT[0]), Form(-p, -q, PIT[1]))]
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        try:
+            print(name, "proves", check(name))
+        except Refused as refusal:
+            sys.exit(f"{name}: {refusal}")

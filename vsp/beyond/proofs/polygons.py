@@ -1,0 +1,113 @@
+"""Convex polygons with exact corners: cut by lines, measured, never rounded.
+
+A line (a, b, c) of integers stands for a x + b y + c = 0, its positive side for a x + b y + c > 0. A corner (X, Y, W)
+of integers with W > 0 stands for the point (X / W, Y / W). Each corner is where two of the lines meet that cut the
+polygon, so numbers grow with those of the lines alone, and not with the number of cuts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import gcd, lcm
+
+Line = tuple[int, int, int]
+Corner = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A convex polygon of positive area. `edges[i]` joins `corners[i]` to the next one, anticlockwise."""
+
+    corners: tuple[Corner, ...]
+    edges: tuple[Line, ...]
+
+    def sign(self, line: Line) -> int:
+        """1 or -1: all of the inside lies on this side of the line; 0: the line cuts it, or is no line at all."""
+        signs = {_side(line, corner) for corner in self.corners} - {0}
+        return signs.pop() if len(signs) == 1 else 0
+
+    def cut(self, line: Line) -> tuple[Polygon | None, Polygon | None]:
+        """The parts on the negative and on the positive side; None for a part without area.
+
+        A line (0, 0, c) has everything on the side of the sign of c. Raises ValueError for (0, 0, 0), on which the
+        caller has to decide.
+        """
+        if line == (0, 0, 0):
+            raise ValueError("the line is 0 = 0, expected one with two sides")
+        sides = [_side(line, corner) for corner in self.corners]
+        if min(sides) >= 0:
+            return None, self
+        if max(sides) <= 0:
+            return self, None
+        return self._part(sides, line, -1), self._part(sides, line, 1)
+
+    def _part(self, sides: list[int], line: Line, wanted: int) -> Polygon:
+        """The part where the sides are `wanted` or 0. (Sutherland and Hodgman 1974)"""
+        corners, edges = [], []
+        for i, (corner, edge) in enumerate(zip(self.corners, self.edges)):
+            here, there = wanted * sides[i], wanted * sides[(i + 1) % len(sides)]
+            if here >= 0:
+                corners.append(corner)
+                edges.append(line if here == 0 > there else edge)
+            if here * there < 0:
+                corners.append(meet(edge, line))
+                edges.append(edge if here < 0 else line)
+        return Polygon(tuple(corners), tuple(edges))
+
+    def middle(self) -> tuple[float, float]:
+        """The mean of the corners, rounded."""
+        n = len(self.corners)
+        return sum(x / w for x, _, w in self.corners) / n, sum(y / w for _, y, w in self.corners) / n
+
+    def points(self) -> list[tuple[Fraction, Fraction]]:
+        """The corners as pairs of fractions."""
+        return [(Fraction(x, w), Fraction(y, w)) for x, y, w in self.corners]
+
+    def area(self) -> Fraction:
+        """Exact, by the shoelace formula."""
+        common = lcm(*(w for _, _, w in self.corners))
+        points = [(x * (common // w), y * (common // w)) for x, y, w in self.corners]
+        twice = sum(x * v - u * y for (x, y), (u, v) in zip(points, points[1:] + points[:1]))
+        return Fraction(twice, 2 * common * common)
+
+
+def box(x: tuple[Fraction, Fraction], y: tuple[Fraction, Fraction]) -> Polygon:
+    """The rectangle between two values of x and two of y."""
+    edges = [line_of((0, 1, -y[0])), line_of((-1, 0, x[1])), line_of((0, -1, y[1])), line_of((1, 0, -x[0]))]
+    return Polygon(tuple(meet(edges[i - 1], edges[i]) for i in range(4)), tuple(edges))
+
+
+@lru_cache(maxsize=10_000)
+def line_of(numbers: tuple[Fraction, Fraction, Fraction]) -> Line:
+    """The line with coefficients in the ratio of `numbers`, in the smallest integers."""
+    fractions = [Fraction(number) for number in numbers]
+    common = lcm(*(number.denominator for number in fractions))
+    return reduced(tuple(number.numerator * (common // number.denominator) for number in fractions))
+
+
+def reduced(line: Line) -> Line:
+    """The same line, in the smallest integers."""
+    shared = gcd(*line) or 1
+    return tuple(number // shared for number in line)
+
+
+def meet(one: Line, other: Line) -> Corner:
+    """Where two lines meet, which are not parallel."""
+    (a, b, c), (d, e, f) = one, other
+    w = a * e - b * d
+    corner = (b * f - c * e, c * d - a * f, w)
+    return corner if w > 0 else tuple(-number for number in corner)
+
+
+def total(numbers: list[Fraction]) -> Fraction:
+    """The exact sum; in pairs, so that few of the additions have large denominators."""
+    while len(numbers) > 1:
+        numbers = [sum(numbers[i : i + 2], Fraction(0)) for i in range(0, len(numbers), 2)]
+    return numbers[0] if numbers else Fraction(0)
+
+
+def _side(line: Line, corner: Corner) -> int:
+    value = line[0] * corner[0] + line[1] * corner[1] + line[2] * corner[2]
+    return (value > 0) - (value < 0)

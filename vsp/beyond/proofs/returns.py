@@ -1,0 +1,87 @@
+"""What SimpleGoal's episodes return, from the pieces: bounds of the mean over the square, and the worst start.
+
+The progress of all steps but the last adds up, so an episode returns 10 |s| - 10 |s'| + 10, with s the start and s'
+the state before it enters the goal. In the pit the last term is -10; after 50 steps it is 0, and s' the last state.
+Distances are convex: over a triangle the mean of |s'| is at least its value at the centroid, and at most the mean of
+its values at the corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...tasks.base import GOAL, PIT, TRUNCATED
+from .simplegoal import Piece
+
+LAST = {GOAL: 10.0, PIT: -10.0, TRUNCATED: 0.0}
+MEAN_DISTANCE = (np.sqrt(2.0) + np.arcsinh(1.0)) / 3  # of the square's points from the origin
+ROUNDING = 1e-11  # far more than float64 loses in these sums
+
+
+def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float, float]:
+    """Bounds of the mean return from all starts of the square, at most `width` apart. `pieces`: of `follow`."""
+    starts, ends, last = _triangles(pieces)
+    areas = _areas(starts)
+    sure = 10.0 * MEAN_DISTANCE + float(areas @ last)
+    low = high = 0.0
+    while True:
+        at_corners, at_centre = _distance(ends).mean(axis=1), _distance(ends.mean(axis=1))
+        doubt = areas * (at_corners - at_centre)
+        done = doubt <= width / 10.0 * areas  # all areas add up to 1
+        low, high = low + float(areas[done] @ at_centre[done]), high + float(areas[done] @ at_corners[done])
+        if done.all():
+            return sure - 10.0 * high - ROUNDING, sure - 10.0 * low + ROUNDING
+        starts, ends, areas = _quarters(starts[~done]), _quarters(ends[~done]), np.repeat(areas[~done] / 4, 4)
+
+
+def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.ndarray, float]:
+    """A start (2,) whose return is the lowest, to `width`, and this return. It lies inside its piece."""
+    starts, ends, last = _triangles(pieces)
+    found, least = starts[0].mean(axis=0), np.inf
+    while len(starts):
+        inside = starts.mean(axis=1)
+        returns = 10.0 * (_distance(inside) - _distance(ends.mean(axis=1))) + last
+        if returns.min() < least:
+            found, least = inside[returns.argmin()], returns.min()
+        # |s| is at least its tangent at the centroid, |s'| at most the plane through its corners: the sum is linear
+        centre = starts.mean(axis=1, keepdims=True)
+        tangent = (starts * centre).sum(axis=2) / np.maximum(_distance(centre), 1e-12)
+        bound = (10.0 * (tangent - _distance(ends)) + last[:, None]).min(axis=1)
+        open_ = bound < least - width
+        starts, ends, last = _quarters(starts[open_]), _quarters(ends[open_]), np.repeat(last[open_], 4)
+    return found, float(least)
+
+
+def _triangles(pieces: Sequence[Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles (n, 3, 2) of which the pieces consist, the largest first; the states before the last reward there; and
+    that reward (n,)."""
+    starts, ends, last = [], [], []
+    for piece in pieces:
+        corners = [(x / w, y / w) for x, y, w in piece.starts.corners]
+        state = piece.state if piece.outcome == TRUNCATED else piece.before
+        after = [state.at(*corner) for corner in corners]
+        for i in range(1, len(corners) - 1):
+            starts.append([corners[0], corners[i], corners[i + 1]])
+            ends.append([after[0], after[i], after[i + 1]])
+            last.append(LAST[piece.outcome])
+    order = np.argsort(-_areas(np.array(starts)), kind="stable")
+    return np.array(starts)[order], np.array(ends)[order], np.array(last)[order]
+
+
+def _areas(triangles: np.ndarray) -> np.ndarray:
+    (a, b), (c, d) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
+    return 0.5 * np.abs(a * d - b * c)
+
+
+def _distance(points: np.ndarray) -> np.ndarray:
+    return np.hypot(points[..., 0], points[..., 1])
+
+
+def _quarters(triangles: np.ndarray) -> np.ndarray:
+    """Each triangle (n, 3, 2) as four equal ones, in a row. (4 n, 3, 2)"""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 2)

@@ -1,0 +1,112 @@
+"""What holds of SimpleGoal's program, and under disturbances: boxes of a grid, and where they can go.
+
+The square is cut into equal boxes. From each box a step leads into the boxes that its next states can touch, over all
+cells in which the box may lie, all roundings, and all disturbances. A box is good if all of these are, or are surely in
+the goal. Boxes that are good within so many steps are found backwards. Whatever is proved in this way holds for every
+start, also on borders; what is not proved may hold nevertheless.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...checks import check_count, check_number
+from ...policy import VoronoiPolicy
+from ...tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
+from .simplegoal import check_provable
+
+SEEN = 1e-7  # observations are float32, and may be so far from the state
+ROUNDING = 1e-9  # far more than float64 loses in a step; goal and pit are narrower and wider by as much
+
+
+def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1000) -> np.ndarray:
+    """The most steps from every state of a box into the goal, never into the pit; 0 where this is not proved. (n, n)
+
+    Row i, column j: the box from (i / n, j / n). Each step may be disturbed by up to `disturbance` in both coordinates.
+    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, and for numbers out of range.
+    """
+    check_provable(policy)
+    check_number("disturbance", disturbance, least=0.0, most=1.0)
+    check_count("n", n, most=4000)
+    edges = np.linspace(0.0, 1.0, n + 1)
+    low, high = (np.stack(np.meshgrid(one, one, indexing="ij")) for one in (edges[:-1], edges[1:]))
+    ended = (high < GOAL_EDGE - ROUNDING).all(axis=0)
+    ways = [_way(policy, cell, low, high, disturbance + ROUNDING, n) for cell in range(len(policy))]
+    found = np.zeros((n, n), dtype=np.int64)
+    for t in range(1, TASK.max_steps + 1):
+        count = np.zeros((n + 1, n + 1), dtype=np.int64)
+        count[1:, 1:] = (~ended & (found == 0)).cumsum(axis=0).cumsum(axis=1)
+        good = np.logical_and.reduce([safe & (_within(count, *corners) == 0) for safe, *corners in ways])
+        if not (new := good & (found == 0)).any():
+            break
+        found[new] = t
+    return found
+
+
+def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
+    """The largest disturbance of a step under which every start outside the pit is proved to arrive; NaN: not even
+    without one. To `tolerance`; the boxes of the grid, 1 / n wide, cost about as much again."""
+    check_number("tolerance", tolerance, least=1e-6, most=0.1)
+    low, high = 0.0, STRIDE
+    if not proved(steps_to_goal(policy, n=n)):
+        return float("nan")
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        low, high = (middle, high) if proved(steps_to_goal(policy, disturbance=middle, n=n)) else (low, middle)
+    return low
+
+
+def proved(steps: np.ndarray) -> bool:
+    """Whether every start outside the pit arrives, from `steps_to_goal`."""
+    middle = (np.arange(len(steps)) + 0.5) / len(steps)
+    between = (middle > PIT_LOW) & (middle < PIT_HIGH)
+    return bool((steps > 0)[~np.logical_and.outer(between, between)].all())
+
+
+def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int):
+    """Where a step by the map of `cell` leads from each box: whether never into the pit, and the first and last box in
+    both coordinates. Boxes that do not touch the cell go nowhere. `low`, `high` (2, n, n)."""
+    seen_low, seen_high = low - SEEN, high + SEEN
+    touched = np.ones(low.shape[1:], dtype=bool)
+    for other in range(len(policy)):
+        if other != cell:
+            touched &= _least_gap(policy, cell, other, seen_low, seen_high) <= ROUNDING
+    after_low, after_high = np.empty_like(low), np.empty_like(high)
+    for axis in (0, 1):
+        *weights, bias = policy.coefficients[cell, :, axis]
+        raw = np.stack(_bounds(weights, bias, seen_low, seen_high))
+        free = (np.abs(raw) <= 1.0).all(axis=0)  # no limit acts: state and action together, which is narrower
+        both = _bounds([(i == axis) + STRIDE * w for i, w in enumerate(weights)], STRIDE * bias, low, high)
+        slack = spread + STRIDE * SEEN * np.abs(weights).sum()
+        for after, own, action, one, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
+            limited = own[axis] + STRIDE * np.clip(action, -1.0, 1.0)
+            after[axis] = np.clip(np.where(free, one + sign * slack, limited + sign * spread), 0.0, 1.0)
+    in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
+    first = np.clip(np.ceil(after_low * n - ROUNDING) - 1, 0, n - 1).astype(np.int64)
+    last = np.clip(np.floor(after_high * n + ROUNDING), 0, n - 1).astype(np.int64)
+    return ~touched | ~in_pit, first, np.where(touched, last + 1, first)
+
+
+def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest value of a linear function over boxes."""
+    ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
+    return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
+
+
+def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """How much farther a box is from codeword `cell` than from `other`, at least, as the look-up measures (in squares,
+    where it is Euclidean): each coordinate adds a monotone function."""
+    found = 0.0
+    for axis, scale in enumerate(policy.scale):
+        gaps = []
+        for end in (low[axis], high[axis]):
+            own, others = ((end - policy.codewords[i, axis]) / scale for i in (cell, other))
+            gaps.append(np.abs(own) - np.abs(others) if policy.metric == "manhattan" else own**2 - others**2)
+        found = found + np.minimum(*gaps)
+    return found
+
+
+def _within(count: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """How many boxes are counted in the rectangle from `first` to before `last` (2, n, n), by a summed-area table."""
+    (a, b), (c, d) = first, last
+    return count[c, d] - count[a, d] - count[c, b] + count[a, b]
