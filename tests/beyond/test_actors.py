@@ -6,6 +6,7 @@ import torch
 from support import PENDULUM
 
 from vsp.baselines.trees import ObliqueLinearTree
+from vsp.beyond.comparison.methods import Budget, trained_further
 from vsp.beyond.comparison.tuning import in_units
 from vsp.beyond.refinement.search import local_maps
 from vsp.beyond.refinement.units import Frame
@@ -68,3 +69,9 @@ def test_nothing_learns_until_the_replay_buffer_is_filled():
     frame, numbers, policy = pieces("cells")
     waits = replace(FEW, n_filling=10_000)
     assert np.allclose(train_further(frame, numbers, TEACHER, waits, seed=0).coefficients, policy.coefficients)
+
+
+def test_a_single_cell_can_be_trained_further():
+    one = FRAME.policy(local_maps(FRAME.labelled(TEACHER, STATES), 1, np.random.default_rng(1)))
+    found = trained_further(Budget(TEACHER, TASK, FEW), 1, 0, imitation=lambda budget, size, seed: one)
+    assert len(found) == 1 and found.coefficients.shape == one.coefficients.shape

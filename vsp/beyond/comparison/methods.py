@@ -22,6 +22,7 @@ from ...baselines.small_network import SmallNetwork, units_for
 from ...baselines.soft_tree import SoftTree
 from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
 from ...config import Config
+from ...policy import VoronoiPolicy
 from ...rollouts import Policy, visited_states
 from ...tasks.base import Task
 from ..optimum import at_the_limit
@@ -116,7 +117,12 @@ def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable
 
     start, task = imitation(budget, size, seed), budget.task
     states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
-    frame, numbers = in_units(start, Frame.of(task, states))
+    frame = Frame.of(task, states)
+    if isinstance(start, VoronoiPolicy):  # a single cell too
+        frame = replace(frame, scale=start.scale)
+        numbers = frame.cells(start)
+    else:
+        frame, numbers = in_units(start, frame)
     return train_further(frame, numbers, budget.teacher, budget.config, seed=seed)
 
 
