@@ -628,8 +628,8 @@ EXEMPT = {
         beyond.robots.choice beyond.robots.imitation.Pushed beyond.robots.imitation.cells_fit
         beyond.robots.random_search.RunningMoments""",
     "follow a policy, which they check, or work on what `follow` found: see their own tests": """
-        beyond.proofs.polygons beyond.proofs.proof beyond.proofs.returns beyond.proofs.simplegoal
-        beyond.proofs.robust.proved""",
+        beyond.proofs.dead_points beyond.proofs.polygons beyond.proofs.proof beyond.proofs.returns
+        beyond.proofs.robust.proved beyond.proofs.simplegoal""",
     "of robots with an engine, and what it recorded: see their own tests": "beyond.robots.gait",
     "trains networks for minutes: see their own tests": "beyond.robots.actors beyond.robots.further_training",
     "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",
