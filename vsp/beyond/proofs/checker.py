@@ -90,6 +90,7 @@ class Form:
         self.doubt = DOUBT * sum(map(abs, self.rough))
 
     def at(self, state) -> Fraction:
+        """Its value in a state."""
         (p, q, r), (x, y) = self.exact, state
         value = r + (p * x if p else 0)
         return value + (q * y if q else 0)
