@@ -26,7 +26,7 @@ case $* in
 *" hash "*) echo "--hash=sha256:${{FAKE_HASH:-cccc}}" ;;
 *" pip "* | *font_manager) ;;
 *"-m vsp"*)
-  for argument in "$@"; do printf '<%s>' "$argument" >> asked; done; echo >> asked
+  line=$(printf '<%s>' "$@"); printf '%s\n' "$line" >> asked
   case $* in *run_notebook*)
     until test "$1" = --expect; do case $1 in --out=*) cd "${{1#--out=}}" ;; esac; shift; done; shift
     for file in "$@"; do mkdir -p "${{file%/*}}"; echo made > "$file"; done ;;
