@@ -82,8 +82,8 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
-.PHONY: help quick paper-figures all lab runs study lookup course site test test-long lint test-site manifest lock \
-  clean bench beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
+.PHONY: help quick paper-figures all lab runs study lookup proofs proofs-teacher course site test test-long lint \
+  test-site manifest lock clean bench beyond short-teachers beyond-long faults teachers begin $(ENVIRONMENTS) $(NOTEBOOKS)
 
 help:
 	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
@@ -126,6 +126,12 @@ study: begin venv ## the studies of the interpretations and of the teachers, int
 lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimensions, into data/results/: 4 minutes
 	$(PY) -m vsp.beyond.benchmarks.lookup --out="$$OUT"
 	$(PY) -m vsp.beyond.benchmarks.fits --out="$$OUT"
+
+proofs: begin venv ## what is certain of ten policies: certificates into data/proofs/, and tables: 20 minutes, resumable
+	$(PY) -m vsp.beyond.proofs.make_proofs --out="$$OUT"
+
+proofs-teacher: begin venv ## the same questions put to a network, for an HOUR at most, into data/results/
+	$(PY) -m vsp.beyond.proofs.make_proofs --teacher --out="$$OUT"
 
 ## Study
 course: begin venv ## three lessons: hand-out for students, solutions, the lecturer's guide, into build/course/: 3 s

@@ -29,7 +29,8 @@ from vsp.baselines import critics, dagger, simple, small_network, tdavq, trees
 from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.optimum import best_policy, best_returns, limit_preset
-from vsp.beyond.proofs import largest_disturbance, steps_to_goal
+from vsp.beyond.proofs import largest_disturbance, steps_to_goal, teacher_steps_to_goal
+from vsp.beyond.proofs.pendulum import prove_pendulum
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
 from vsp.beyond.robots.fewest import fewest_numbers
@@ -50,7 +51,7 @@ OUTSIDE = {
     "draw such tables, histories and runs, with tests of what they refuse": """
         show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.replay
         show.stage""",
-    "checks certificates, which its own tests spoil": "beyond.proofs.checker",
+    "checks certificates, which its own tests spoil; writes them": "beyond.proofs.check beyond.proofs.make_proofs",
     "machinery around the method, and the course, with tests of their own faults": "run course",
     "what the others check with": "checks",
 }
@@ -284,6 +285,14 @@ CASES = {
     "beyond.proofs.robust.largest_disturbance": (
         functools.partial(largest_disturbance, TWO),
         {"n": count(10, most=4000), "tolerance": number(0.05, least=1e-6, most=0.1)},
+    ),
+    "beyond.proofs.pendulum.prove_pendulum": (
+        functools.partial(prove_pendulum, vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")),
+        {"n": count(16, most=8000)},
+    ),
+    "beyond.proofs.network.teacher_steps_to_goal": (
+        functools.partial(teacher_steps_to_goal, load_teacher("SimpleGoal-v0")),
+        {"n": count(20, most=8000)},
     ),
     "beyond.robots.settings.Walking": (Walking, settings_of(Walking, WALKING)),
     "beyond.robots.settings.walking_preset": (walking_preset, {"task": task}),
@@ -628,8 +637,11 @@ EXEMPT = {
         beyond.robots.choice beyond.robots.imitation.Pushed beyond.robots.imitation.cells_fit
         beyond.robots.random_search.RunningMoments""",
     "follow a policy, which they check, or work on what `follow` found: see their own tests": """
-        beyond.proofs.dead_points beyond.proofs.polygons beyond.proofs.proof beyond.proofs.returns
-        beyond.proofs.robust.proved beyond.proofs.simplegoal""",
+        beyond.proofs.dead_points beyond.proofs.grid beyond.proofs.mountaincar beyond.proofs.network.affine_outputs
+        beyond.proofs.pendulum.PendulumProof beyond.proofs.pendulum.check_swinging beyond.proofs.polygons
+        beyond.proofs.proof beyond.proofs.prove beyond.proofs.returns beyond.proofs.robust.least_gap
+        beyond.proofs.robust.outside_pit beyond.proofs.robust.proved beyond.proofs.robust.way_to
+        beyond.proofs.simplegoal beyond.proofs.simplegoal_proof""",
     "of robots with an engine, and what it recorded: see their own tests": "beyond.robots.gait",
     "trains networks for minutes: see their own tests": "beyond.robots.actors beyond.robots.further_training",
     "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",

@@ -21,18 +21,18 @@ def start(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def step(
-    states: np.ndarray, actions: np.ndarray, *, goal_reward: str = "replace"
+    states: np.ndarray, actions: np.ndarray, *, goal_reward: str = "replace", margin: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move by a tenth of the action; the reward is ten times the distance gained towards the origin.
 
     Entering the goal pays +10, entering the pit -10. `goal_reward` says whether this replaces the progress term
     ("replace", which fits the paper's numbers: its teacher's minimum is exactly -10.0) or is added to it ("add", as in
-    the paper's text).
+    the paper's text). `margin`: by how much the goal is smaller, and the pit larger, on every side.
     """
     moved = np.clip(states + STRIDE * np.clip(actions, -1.0, 1.0), 0.0, 1.0)
     progress = 10.0 * (np.hypot(states[:, 0], states[:, 1]) - np.hypot(moved[:, 0], moved[:, 1]))
-    in_goal = (moved < GOAL_EDGE).all(axis=1)
-    in_pit = ((moved > PIT_LOW) & (moved < PIT_HIGH)).all(axis=1)
+    in_goal = (moved < GOAL_EDGE - margin).all(axis=1)
+    in_pit = ((moved > PIT_LOW - margin) & (moved < PIT_HIGH + margin)).all(axis=1)
     bonus = 10.0 * in_goal - 10.0 * in_pit
     rewards = progress + bonus if goal_reward == "add" else np.where(in_goal | in_pit, bonus, progress)
     outcomes = np.select([in_goal, in_pit], [GOAL, PIT], RUNNING)

@@ -1,85 +1,41 @@
-"""`prove`: how the episodes of a policy end, from every start, and a certificate that others can check."""
+"""What every proof has: a certificate, which `vsp.beyond.proofs.check` verifies without the code of the prover."""
 
 from __future__ import annotations
 
 import json
 import os
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cached_property
-
-import numpy as np
 
 from ...policy import VoronoiPolicy
 from ...run import sealed
-from ...tasks.base import GOAL, PIT, TRUNCATED
-from . import returns
-from .polygons import total
-from .simplegoal import Piece, follow
-
-ENDS = {GOAL: "goal", PIT: "pit", TRUNCATED: "left"}
-SIDES = {-1: "-", 0: "=", 1: "+"}  # the low limit or wall, none, the high one
 
 
 @dataclass(frozen=True)
-class Proof:
-    """What `prove` found: convex pieces of the square of starts, which share every step.
-
-    It is about real numbers. The program rounds, so near the borders of pieces it may do otherwise. The lines between
-    pieces have no area, and nothing is said of them. `steps_to_goal` covers both.
-    """
+class Proof(ABC):
+    """What was proved of a policy."""
 
     policy: VoronoiPolicy
-    pieces: tuple[Piece, ...]
-
-    @cached_property
-    def areas(self) -> dict[str, Fraction]:
-        """The exact areas of the starts by how their episodes end: "goal", "pit", or "left" after all steps."""
-        return {
-            name: total([piece.starts.area() for piece in self.pieces if piece.outcome == end])
-            for end, name in ENDS.items()
-        }
 
     @property
-    def longest(self) -> int:
-        """The most steps of an episode."""
-        return max(len(piece.steps) for piece in self.pieces)
+    @abstractmethod
+    def claim(self) -> dict:
+        """What is proved, as JSON-able values."""
 
-    def mean_return(self) -> tuple[float, float]:
-        """Bounds of the mean return over all starts, at most 1e-6 apart."""
-        return returns.mean_return(self.pieces)
-
-    def worst_start(self) -> tuple[np.ndarray, float]:
-        """A start (2,) whose return is the lowest, to 1e-6, and this return."""
-        return returns.worst_start(self.pieces)
+    @abstractmethod
+    def parts(self) -> list:
+        """The parts of the proof, as JSON-able values."""
 
     def certificate(self) -> dict:
-        """Policy, claim and itineraries, as JSON-able values.
-
-        The claim: the areas, as fractions, and the most steps. An itinerary is a line "end step step ...": each step is
-        the cell, at which limits the two actions are, and at which walls the next state, as in "3+=--".
-        """
+        """Task, policy, claim and pieces, as JSON-able values."""
         numbers = {name: getattr(self.policy, name).tolist() for name in ("codewords", "coefficients", "scale")}
         return {
             "task": self.policy.task.name,
             "policy": {**numbers, "metric": self.policy.metric},
-            "claim": {**{name: str(area) for name, area in self.areas.items()}, "longest": self.longest},
-            "pieces": sorted({_itinerary(piece) for piece in self.pieces}),
+            "claim": self.claim,
+            "pieces": self.parts(),
         }
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write the certificate to one sealed file, which `vsp.beyond.proofs.checker` verifies."""
+        """Write the certificate to one sealed file."""
         sealed.write_sealed(path, json.dumps(self.certificate(), separators=(",", ":"), sort_keys=True).encode())
-
-
-def prove(policy: VoronoiPolicy) -> Proof:
-    """Follow `policy` from every start of SimpleGoal to the end, in exact arithmetic; seconds to a minute.
-
-    Raises ValueError for a policy of another task or class, or with the metric "chebyshev".
-    """
-    return Proof(policy, tuple(follow(policy)))
-
-
-def _itinerary(piece: Piece) -> str:
-    steps = [f"{step.cell}{''.join(SIDES[side] for side in (*step.limits, *step.walls))}" for step in piece.steps]
-    return " ".join([ENDS[piece.outcome], *steps])

@@ -32,7 +32,7 @@ def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float,
         done = doubt <= width / 10.0 * areas  # all areas add up to 1
         low, high = low + float(areas[done] @ at_centre[done]), high + float(areas[done] @ at_corners[done])
         if done.all():
-            return sure - 10.0 * high - ROUNDING, sure - 10.0 * low + ROUNDING
+            return float(sure - 10.0 * high - ROUNDING), float(sure - 10.0 * low + ROUNDING)
         starts, ends, areas = _quarters(starts[~done]), _quarters(ends[~done]), np.repeat(areas[~done] / 4, 4)
 
 

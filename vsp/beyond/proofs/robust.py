@@ -13,6 +13,7 @@ import numpy as np
 from ...checks import check_count, check_number
 from ...policy import VoronoiPolicy
 from ...tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
+from .grid import Way, around, steps_into
 from .simplegoal import check_provable
 
 SEEN = 1e-7  # observations are float32, and may be so far from the state
@@ -29,18 +30,10 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
     check_number("disturbance", disturbance, least=0.0, most=1.0)
     check_count("n", n, most=4000)
     edges = np.linspace(0.0, 1.0, n + 1)
-    low, high = (np.stack(np.meshgrid(one, one, indexing="ij")) for one in (edges[:-1], edges[1:]))
-    ended = (high < GOAL_EDGE - ROUNDING).all(axis=0)
+    low, high = (np.stack(np.meshgrid(one, one, indexing="ij")).reshape(2, -1) for one in (edges[:-1], edges[1:]))
+    ended = (high < GOAL_EDGE - ROUNDING).all(axis=0).reshape(n, n)
     ways = [_way(policy, cell, low, high, disturbance + ROUNDING, n) for cell in range(len(policy))]
-    found = np.zeros((n, n), dtype=np.int64)
-    for t in range(1, TASK.max_steps + 1):
-        count = np.zeros((n + 1, n + 1), dtype=np.int64)
-        count[1:, 1:] = (~ended & (found == 0)).cumsum(axis=0).cumsum(axis=1)
-        good = np.logical_and.reduce([safe & (_within(count, *corners) == 0) for safe, *corners in ways])
-        if not (new := good & (found == 0)).any():
-            break
-        found[new] = t
-    return found
+    return steps_into(ended, ways, TASK.max_steps)
 
 
 def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
@@ -58,19 +51,24 @@ def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: floa
 
 def proved(steps: np.ndarray) -> bool:
     """Whether every start outside the pit arrives, from `steps_to_goal`."""
-    middle = (np.arange(len(steps)) + 0.5) / len(steps)
-    between = (middle > PIT_LOW) & (middle < PIT_HIGH)
-    return bool((steps > 0)[~np.logical_and.outer(between, between)].all())
+    return bool((steps > 0)[outside_pit(steps)].all())
 
 
-def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int):
-    """Where a step by the map of `cell` leads from each box: whether never into the pit, and the first and last box in
-    both coordinates. Boxes that do not touch the cell go nowhere. `low`, `high` (2, n, n)."""
+def outside_pit(steps: np.ndarray) -> np.ndarray:
+    """Which boxes of a grid like `steps` (n, n) have starts outside the pit. (n, n)"""
+    low, high = (np.arange(len(steps)) + end for end in (0, 1))
+    within = (low > PIT_LOW * len(steps) - ROUNDING) & (high < PIT_HIGH * len(steps) + ROUNDING)
+    return ~np.logical_and.outer(within, within)
+
+
+def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int) -> Way:
+    """Where a step by the map of `cell` leads from each box `low` to `high` (2, n * n) that touches the cell."""
     seen_low, seen_high = low - SEEN, high + SEEN
-    touched = np.ones(low.shape[1:], dtype=bool)
+    touched = np.ones(low.shape[1], dtype=bool)
     for other in range(len(policy)):
         if other != cell:
-            touched &= _least_gap(policy, cell, other, seen_low, seen_high) <= ROUNDING
+            touched &= least_gap(policy, cell, other, seen_low, seen_high) <= ROUNDING
+    low, high, seen_low, seen_high = (one[:, touched] for one in (low, high, seen_low, seen_high))
     after_low, after_high = np.empty_like(low), np.empty_like(high)
     for axis in (0, 1):
         *weights, bias = policy.coefficients[cell, :, axis]
@@ -80,11 +78,15 @@ def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, sp
         slack = spread + STRIDE * SEEN * np.abs(weights).sum()
         for after, own, action, one, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
             limited = own[axis] + STRIDE * np.clip(action, -1.0, 1.0)
-            after[axis] = np.clip(np.where(free, one + sign * slack, limited + sign * spread), 0.0, 1.0)
+            after[axis] = np.where(free, one + sign * slack, limited + sign * spread)
+    return way_to(np.flatnonzero(touched), after_low, after_high, n)
+
+
+def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: int) -> Way:
+    """The way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls."""
+    after_low, after_high = (np.clip(one, 0.0, 1.0) for one in (after_low, after_high))
     in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
-    first = np.clip(np.ceil(after_low * n - ROUNDING) - 1, 0, n - 1).astype(np.int64)
-    last = np.clip(np.floor(after_high * n + ROUNDING), 0, n - 1).astype(np.int64)
-    return ~touched | ~in_pit, first, np.where(touched, last + 1, first)
+    return Way(boxes, *around(after_low * n - ROUNDING, after_high * n + ROUNDING, n), ~in_pit)
 
 
 def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,9 +95,9 @@ def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np
     return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
 
 
-def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """How much farther a box is from codeword `cell` than from `other`, at least, as the look-up measures (in squares,
-    where it is Euclidean): each coordinate adds a monotone function."""
+def least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """How much farther observations in a box are from codeword `cell` than from `other`, at least, as the look-up
+    measures (in squares, where it is Euclidean): each coordinate adds a monotone function. `low`, `high` (d, m)."""
     found = 0.0
     for axis, scale in enumerate(policy.scale):
         gaps = []
@@ -104,9 +106,3 @@ def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, hi
             gaps.append(np.abs(own) - np.abs(others) if policy.metric == "manhattan" else own**2 - others**2)
         found = found + np.minimum(*gaps)
     return found
-
-
-def _within(count: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """How many boxes are counted in the rectangle from `first` to before `last` (2, n, n), by a summed-area table."""
-    (a, b), (c, d) = first, last
-    return count[c, d] - count[a, d] - count[c, b] + count[a, b]

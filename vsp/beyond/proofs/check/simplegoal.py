@@ -1,6 +1,4 @@
-"""Checks certificates. Shares no code with the prover, and works otherwise: it moves the corners of polygons.
-
-    python -m vsp.beyond.proofs.checker FILE
+"""Checks SimpleGoal's certificates. It works otherwise than the prover: it moves the corners of polygons.
 
 A certificate names a policy, a claim, and the itineraries of all starts: per step the cell, which actions are at a
 limit and which coordinates at a wall. For each itinerary the checker cuts from the square of starts what follows it.
@@ -10,11 +8,10 @@ without area. All numbers are fractions.
 
 from __future__ import annotations
 
-import hashlib
-import json
-import sys
 from fractions import Fraction
 from functools import cache
+
+from .refused import Refused
 
 SQUARE = [(Fraction(x), Fraction(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 STRIDE, GOAL, PIT, N_STEPS = Fraction(1, 10), Fraction(1, 10), (Fraction(2, 5), Fraction(3, 5)), 50
@@ -23,23 +20,8 @@ DOUBT = 1e-9  # share of the numbers added up: far more than rounding can do
 SIDES = {"-": -1, "=": 0, "+": 1}
 
 
-class Refused(Exception):
-    """The certificate does not prove its claim."""
-
-
-def check(path) -> dict:
-    """The claim of the certificate in `path`. Raises `Refused` where the itineraries do not prove it."""
-    with open(path, "rb") as file:
-        seal, _, payload = file.read().partition(b"\n")
-    if hashlib.sha256(payload).hexdigest().encode() != seal:
-        raise Refused(f"{path}: the checksum in its first line is not that of the rest")
-    return check_content(json.loads(payload))
-
-
 def check_content(content: dict) -> dict:
     """The claim of a certificate that was read. Raises `Refused`."""
-    if content["task"] != "SimpleGoal-v0":
-        raise Refused(f"the task is {content['task']!r}, expected 'SimpleGoal-v0'")
     policy, areas, longest = Policy(**content["policy"]), {"goal": 0, "pit": 0, "left": 0}, 0
     pieces = [line.split(" ") for line in content["pieces"]]
     corners = [[corner(start, start) for start in SQUARE]]
@@ -259,11 +241,3 @@ def area(polygons: list) -> Fraction:
 
 IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in OWN]  # where these are positive
 IN_PIT = [form for p, q, _ in OWN for form in (Form(p, q, -PIT[0]), Form(-p, -q, PIT[1]))]
-
-
-if __name__ == "__main__":
-    for name in sys.argv[1:]:
-        try:
-            print(name, "proves", check(name))
-        except Refused as refusal:
-            sys.exit(f"{name}: {refusal}")

@@ -1,0 +1,172 @@
+"""Proofs over a grid: of Pendulum, and of a network."""
+
+import numpy as np
+import pytest
+from support import PENDULUM, SIMPLEGOAL
+
+import vsp
+from vsp.beyond import comparison
+from vsp.beyond.proofs import check, teacher_steps_to_goal
+from vsp.beyond.proofs.grid import Way, around, invariant, steps_into
+from vsp.beyond.proofs.network import affine_outputs
+from vsp.beyond.proofs.pendulum import prove_pendulum
+from vsp.tasks import GOAL
+
+N = 400
+
+
+def way(boxes, first, last, safe=True):
+    return Way(np.array(boxes), np.array(first).T, np.array(last).T, np.full(len(boxes), safe))
+
+
+def test_steps_into_a_target_by_hand():
+    target = np.zeros((2, 3), dtype=bool)
+    target[0, 0] = True
+    # 0 stays; 1 to 0; 2 to 0 or 1; 3 to 5; 4 to 1, by another way to 3; 5 to itself
+    ways = [
+        way([0, 1, 2, 3, 4, 5], [[0, 0], [0, 0], [0, 0], [1, 2], [0, 1], [1, 2]],
+            [[1, 1], [1, 1], [1, 2], [2, 3], [1, 2], [2, 3]]),
+        way([4], [[1, 0]], [[2, 1]]),
+    ]  # fmt: skip
+    assert steps_into(target, ways, 10).tolist() == [[1, 1, 2], [0, 0, 0]]
+    assert steps_into(target, ways, 1).tolist() == [[1, 1, 0], [0, 0, 0]]
+    assert steps_into(target, [ways[0]], 10).tolist() == [[1, 1, 2], [0, 2, 0]]
+    assert not steps_into(target, [way([0, 1], [[0, 0], [0, 0]], [[1, 1], [1, 1]], safe=False), *ways], 10)[0, :2].any()
+
+
+def test_what_stays_by_hand():
+    ways = [way([0, 1, 2], [[0, 0], [0, 0], [0, 2]], [[1, 2], [1, 3], [1, 3]])]
+    assert invariant(np.ones((1, 3), dtype=bool), ways).tolist() == [[True, True, True]]
+    assert invariant(np.array([[True, True, False]]), ways).tolist() == [[False, False, False]]
+
+
+def test_an_angle_comes_round():
+    target = np.array([[True], [False], [False]])
+    ways = [way([0, 1, 2], [[0, 0], [2, 0], [2, 0]], [[1, 1], [4, 1], [3, 1]])]  # from 1 to 2 or, a turn on, 0
+    assert steps_into(target, ways, 10, periodic=True).tolist() == [[1], [0], [0]]
+    ways = [way([0, 1, 2], [[0, 0], [3, 0], [2, 0]], [[1, 1], [4, 1], [4, 1]])]
+    assert steps_into(target, ways, 10, periodic=True).tolist() == [[1], [1], [0]]
+
+
+def test_boxes_around_numbers():
+    first, last = around(np.array([0.5, 1.0, -3.0, 2.9]), np.array([1.5, 1.0, -2.0, 9.0]), 3)
+    assert first.tolist() == [0, 0, 0, 2] and last.tolist() == [2, 2, 1, 3]
+
+
+# Pendulum
+
+
+@pytest.fixture(scope="module")
+def proof():
+    return prove_pendulum(vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{PENDULUM}.policy"), n=N)
+
+
+def boxes_of(states):
+    angle = (states[:, 0] + np.pi) % (2 * np.pi)
+    return np.clip((angle / (2 * np.pi) * N).astype(int), 0, N - 1), np.clip(
+        ((states[:, 1] + 8) / 16 * N).astype(int), 0, N - 1
+    )
+
+
+def test_episodes_do_what_is_proved(proof):
+    task, rng = vsp.get_task(PENDULUM), np.random.default_rng(0)
+    states = rng.uniform([-np.pi, -8.0], [np.pi, 8.0], size=(20_000, 2))
+    states = states[proof.steps[boxes_of(states)] > 0]
+    promised, arrived = proof.steps[boxes_of(states)], proof.kept[boxes_of(states)]
+    assert len(states) > 10_000
+    for t in range(1, 130):
+        states = task.step(states, proof.policy.predict(task.see(states).astype(np.float32))[0])[0]
+        inside = proof.kept[boxes_of(states)]
+        assert not (arrived & ~inside).any()  # it is never left
+        arrived |= inside
+        assert arrived[promised <= t].all()
+
+
+def test_the_set_is_around_upright_and_most_starts_get_there(proof):
+    angles = np.abs(np.pi * (2 * (np.arange(N) + 0.5) / N - 1))
+    assert proof.kept[N // 2, N // 2] and not proof.kept[angles > 0.5].any()
+    assert 0.6 < proof.share < 1.0
+    assert proof.share == proof.claim["proved"] / proof.claim["starts"]
+
+
+def test_without_a_torque_nothing_is_proved():
+    still = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
+    proof = prove_pendulum(still, n=80)
+    assert not proof.kept.any() and proof.share == 0.0 and proof.claim["longest"] == 0
+    assert check.check_content(proof.certificate()) == proof.claim
+
+
+def mutants(content, rng):
+    """Certificates of Pendulum whose claim is false, or whose boxes do not prove it."""
+    for kind in ("claim", "longest", "sooner", "proved", "kept", "policy", "row"):
+        mutant = {**content, "claim": dict(content["claim"]), "pieces": [list(row) for row in content["pieces"]]}
+        runs = [(i, j) for i, row in enumerate(mutant["pieces"]) for j in range(0, len(row), 2)]
+        of = {name: [(i, j) for i, j in runs if wanted(mutant["pieces"][i][j])] for name, wanted in
+              (("later", lambda n: n > 5), ("unproved", lambda n: n == 0))}  # fmt: skip
+        i, j = of["unproved" if kind in ("proved", "kept") else "later"][rng.integers(20)]
+        if kind == "claim":
+            mutant["claim"]["proved"] += 1
+        elif kind == "longest":
+            mutant["claim"]["longest"] -= 1
+        elif kind == "sooner":
+            mutant["pieces"][i][j] -= 3
+        elif kind in ("proved", "kept"):
+            mutant["pieces"][i][j] = 100 if kind == "proved" else -1
+            numbers = check.pendulum.unpacked(mutant["pieces"])
+            middle = (2 * (np.arange(len(numbers)) + 0.5) / len(numbers) - 1) * 8
+            mutant["claim"]["proved"] = int((numbers[:, np.abs(middle) < 1.0] != 0).sum())
+            mutant["claim"]["longest"] = int(numbers.max())
+        elif kind == "policy":
+            coefficients = (np.array(content["policy"]["coefficients"]) * 0.5).tolist()
+            mutant["policy"] = {**content["policy"], "coefficients": coefficients}
+        else:
+            mutant["pieces"][i], mutant["pieces"][i - 90] = mutant["pieces"][i - 90], mutant["pieces"][i]
+        yield kind, mutant
+
+
+def test_the_checker_agrees_and_refuses_every_mutant(proof):
+    content = proof.certificate()
+    assert check.check_content(content) == content["claim"]
+    for kind, mutant in mutants(content, np.random.default_rng(3)):
+        with pytest.raises(check.Refused):
+            check.check_content(mutant)
+            pytest.fail(f"accepted a mutant: {kind}")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "n", "match"),
+    [("a name", 80, "expected a VoronoiPolicy"),
+     (vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), 80, PENDULUM),
+     (vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task=PENDULUM), 100, "n is 100, expected a multiple of 16")],
+)  # fmt: skip
+def test_other_policies_and_grids_get_one_clear_error(wrong, n, match):
+    with pytest.raises(ValueError, match=match):
+        prove_pendulum(wrong, n=n)
+
+
+# The teacher
+
+
+def test_units_are_within_their_bounds():
+    teacher, rng, half = vsp.load_teacher(SIMPLEGOAL), np.random.default_rng(0), 0.003
+    states = rng.uniform(size=(300, 2))
+    value, slopes, error = affine_outputs(teacher, states, half)
+    weights = [(w.astype(float), b.astype(float)) for w, b in teacher.layers]
+    for _ in range(10):
+        shift = rng.uniform(-half, half, size=(300, 2))
+        hidden = states + shift
+        for i, (w, b) in enumerate(weights):
+            hidden = hidden @ w + b if i == len(weights) - 1 else np.maximum(hidden @ w + b, 0.0)
+        assert (np.abs(hidden - value - np.einsum("nd,dnm->nm", shift, slopes)) <= error + 1e-9).all()
+
+
+def test_the_teacher_does_what_is_proved_of_it():
+    teacher, n = vsp.load_teacher(SIMPLEGOAL), 100
+    steps = teacher_steps_to_goal(teacher, n=n)
+    starts = np.random.default_rng(1).uniform(size=(20_000, 2))
+    promised = steps[tuple((starts * n).astype(int).T)]
+    found = vsp.rollout(teacher, SIMPLEGOAL, starts)
+    assert (promised > 0).mean() > 0.9
+    assert (found.outcomes[promised > 0] == GOAL).all() and (found.lengths <= promised)[promised > 0].all()
+    with pytest.raises(ValueError, match="expected a Teacher"):
+        teacher_steps_to_goal("a name")

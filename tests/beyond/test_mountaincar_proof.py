@@ -1,0 +1,124 @@
+import shutil
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL
+
+import vsp
+from vsp.beyond import comparison
+from vsp.beyond.proofs import check, mountaincar
+from vsp.beyond.proofs.mountaincar import MountainCarProof, Program, first_steps, prove_mountaincar, run_block, step
+
+
+def policy_of(codewords, maps):
+    return vsp.VoronoiPolicy(codewords, maps, task=MOUNTAINCAR, metric="euclidean")
+
+
+PUSHING = policy_of([[-0.5, -0.01], [-0.5, 0.01]], [[[0], [0], [-1]], [[0], [0], [1]]])
+MANY = policy_of(np.arange(130).reshape(65, 2), np.zeros((65, 3, 1)))
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return vsp.VoronoiPolicy.load(comparison.RESULTS / f"limit_{MOUNTAINCAR}.policy")
+
+
+@pytest.fixture(scope="module")
+def env():
+    found = gymnasium.make(MOUNTAINCAR).unwrapped
+    found.reset(seed=0)
+    return found
+
+
+def stepped(env, state, action):
+    env.state = state
+    seen, _, ended, *_ = env.step(np.array([action]))
+    return *seen, ended
+
+
+def test_the_step_is_gymnasiums_bit_for_bit(env):
+    rng, n = np.random.default_rng(0), 20_000
+    states = rng.uniform([-1.2, -0.07], [0.6, 0.07], size=(n, 2)).astype(np.float32)
+    states[::50, 0], states[1::50, 1], states[2::50, 1] = -1.2, 0.0699, -0.0699  # the wall, and the highest speed
+    actions = np.clip(rng.uniform(-1.5, 1.5, size=n), -1, 1)
+    found = step(states, actions)
+    wanted = np.array([stepped(env, *one) for one in zip(states, actions)])
+    assert np.array_equal(np.column_stack([found["x"], found["v"], found["ended"]]), wanted.astype(np.float32))
+
+
+@pytest.mark.parametrize("first", [0, 2_500_000, 5_033_166 - 300])
+def test_all_first_steps_are_among_those_found(policy, env, first):
+    low, high = (check.mountaincar.edge(first + i, -1) for i in (0, 300))
+    seen = mountaincar._floats(mountaincar._numbers(np.float32(-0.6)) + np.arange(first, first + 300))
+    edges = np.array([check.mountaincar.edge(first + i, -1) for i in range(301)])
+    states, owner, returns = first_steps(Program(policy), seen, edges[:-1], edges[1:])
+    starts, found = np.random.default_rng(1).uniform(low, high, size=3000), {tuple(one) for one in states.tolist()}
+    played = set()
+    for start in starts:
+        action = policy.predict(np.array([start, 0.0], dtype=np.float32))[0][0]
+        played.add(tuple(float(one) for one in stepped(env, np.array([start, 0.0]), action)[:2]))
+    assert played <= found and len(found) < 3 * len(played)
+    assert set(owner) == set(range(300)) and (returns <= 0).all()
+
+
+def test_a_block_is_what_the_checker_plays(policy):
+    block = run_block(policy, 100_000, 200)
+    low, high = (check.mountaincar.edge(100_000 + i, -1) for i in (0, 200))
+    player = check.mountaincar.Policy(
+        policy.codewords.tolist(), policy.coefficients.tolist(), policy.scale.tolist(), policy.metric
+    )
+    played = [player.play(start) for start in np.random.default_rng(2).uniform(low, high, size=100)]
+    returns, steps, arrived = map(np.array, zip(*played))
+    assert arrived.all() and block.n_left == 0 and block.least <= returns.min() and steps.max() <= block.longest
+    deviation = returns.std() / np.sqrt(len(returns))
+    assert block.mean_low - 5 * deviation < returns.mean() < block.mean_high + 5 * deviation
+    assert block.n_states > 200 and block.mean_high - block.mean_low < 1e-4
+    assert block.width == pytest.approx((high - low) / 0.2)
+
+
+def test_on_a_border_both_ways_are_followed():
+    block = run_block(PUSHING, 0, 100)  # at rest both codewords are as near
+    pushes = [
+        vsp.VoronoiPolicy([[0, 0]], [[[0], [0], [side]]], task=MOUNTAINCAR, metric="euclidean") for side in (-1, 1)
+    ]
+    alone = [run_block(policy, 0, 100).n_states for policy in pushes]
+    assert block.n_states == sum(alone) and block.n_left == 0
+
+
+def test_a_car_that_does_not_move_is_not_run():
+    still = policy_of([[-0.5, 0.0]], np.zeros((1, 3, 1)))
+    at_the_bottom = int(mountaincar._numbers(np.float32(-np.pi / 6)) - mountaincar._numbers(np.float32(-0.6)))
+    with pytest.raises(ValueError, match="does not move"):
+        run_block(still, at_the_bottom - 5, 10)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [("a name", "expected a VoronoiPolicy"),
+     (vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR), "metric 'euclidean'"),
+     (vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), MOUNTAINCAR),
+     (MANY, "at most 64")],
+)  # fmt: skip
+def test_other_policies_get_one_clear_error(wrong, match):
+    with pytest.raises(ValueError, match=match):
+        prove_mountaincar(wrong)
+
+
+def test_without_a_compiler_one_sentence_says_so(monkeypatch):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(FileNotFoundError, match="install one"):
+        mountaincar._compiled.__wrapped__()
+
+
+def test_blocks_make_the_claim(policy):
+    blocks = tuple(run_block(policy, first, 50) for first in (0, 50))
+    claim = MountainCarProof(policy, blocks).claim
+    assert claim["n"] == 100 and claim["least"] == min(block.least for block in blocks)
+    assert claim["mean_low"] == pytest.approx(sum(block.mean_low * block.width for block in blocks))
+    gap = replace(blocks[1], first=60)
+    content = MountainCarProof(policy, (blocks[0], gap)).certificate()
+    with pytest.raises(check.Refused, match="expected one or more from 50"):
+        check.check_content(content)

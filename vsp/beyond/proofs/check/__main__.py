@@ -1,0 +1,18 @@
+"""Check certificates: `python -m vsp.beyond.proofs.check FILE ...`."""
+
+import sys
+
+from . import Refused, check
+
+
+def main() -> None:
+    """Print what each file proves; end at the first that does not prove its claim."""
+    for name in sys.argv[1:]:
+        try:
+            print(name, "proves", check(name))
+        except Refused as refusal:
+            sys.exit(f"{name}: {refusal}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,104 @@
+"""Checks MountainCar's certificates: whether blocks of starts cover all, and bear out the claim; and plays a sample.
+
+To run all states again takes as long as the proof. Here one start of each block, drawn at random, is played in Python,
+with the types that Gymnasium uses, and has to end within what the block says.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+
+from .refused import Refused
+
+LOW, HIGH, N_STEPS = -0.6, -0.4, 999
+SAME = 1e-9  # of returns, in another order of the sums
+ERRORS = 5  # standard errors that the sample's mean may be away
+
+
+def check_content(content: dict) -> dict:
+    """The claim of a certificate that was read. Raises `Refused`."""
+    claim, blocks, policy, n = content["claim"], content["pieces"], Policy(**content["policy"]), 0
+    for block in blocks:
+        if block["first"] != n or block["n"] < 1:
+            raise Refused(f"a block has {block['n']} observations from {block['first']}, expected one or more from {n}")
+        n += block["n"]
+    if n != magnitude(LOW) - magnitude(HIGH) + 1:
+        raise Refused(f"the blocks have {n} observations, expected {magnitude(LOW) - magnitude(HIGH) + 1}")
+    widths = [edge(block["first"] + block["n"], -1) - edge(block["first"], -1) for block in blocks]
+    found = {name: sum(block[name] for block in blocks) for name in ("n", "n_states", "n_left")}
+    found |= {"longest": max(block["longest"] for block in blocks), "least": min(block["least"] for block in blocks)}
+    for name in ("mean_low", "mean_high"):
+        found[name] = sum(width * block[name] for width, block in zip(widths, blocks)) / sum(widths)
+    if set(claim) != set(found) or any(abs(claim[name] - found[name]) > SAME for name in found):
+        raise Refused(f"the blocks prove {found}, but the claim is {claim}")
+    gaps = [played(policy, block) for block in blocks]
+    deviation = math.sqrt(sum(gap * gap for gap in gaps) / len(gaps) / len(gaps))
+    if abs(sum(gaps) / len(gaps)) > ERRORS * deviation + SAME:
+        raise Refused(f"one start of each block returns {sum(gaps) / len(gaps)} more in the mean than the blocks say")
+    return claim
+
+
+def played(policy: Policy, block: dict) -> float:
+    """How much more than the block's mean one of its starts returns. Raises `Refused` where the block is wrong."""
+    draw = random.Random(block["first"])
+    start = draw.uniform(edge(block["first"], -1), edge(block["first"] + block["n"], -1))
+    total, steps, arrived = policy.play(start)
+    if total < block["least"] - SAME or steps > block["longest"] or arrived < (block["n_left"] == 0):
+        raise Refused(f"from {start} the car returns {total} in {steps} steps (arrived: {arrived}), against {block}")
+    return total - (block["mean_low"] + block["mean_high"]) / 2
+
+
+class Policy:
+    """Linear maps, each for the states that are nearest to its codeword; of equally near ones the first."""
+
+    def __init__(self, codewords, coefficients, scale, metric):
+        if metric != "euclidean":
+            raise Refused(f"the metric is {metric!r}, expected 'euclidean'")
+        self.cells = list(zip(codewords, coefficients))
+        self.scale = scale
+
+    def action(self, x: float, v: float) -> float:
+        """The limited force."""
+        _, ((a,), (b,), (c,)) = min(
+            self.cells, key=lambda cell: sum(((s - w) / r) ** 2 for s, w, r in zip((x, v), cell[0], self.scale))
+        )
+        return max(-1.0, min(1.0, a * x + b * v + c))
+
+    def play(self, start: float) -> tuple[float, int, bool]:
+        """Return, steps, and whether the car arrives, as Gymnasium has it: the first step in float64, then the state in
+        float32."""
+        x, v, total = start, 0.0, 0.0
+        for t in range(1, N_STEPS + 1):
+            action = self.action(single(x), v)
+            triple = 3 * x if t == 1 else single(3 * x)
+            speed = v + action * 0.0015 - 0.0025 * math.cos(triple)
+            if abs(speed) > 0.07:  # a limited speed is a Python float, so the sum is one of float32
+                speed = math.copysign(0.07, speed)
+                after, wall, flag = single(x + single(speed)), single(-1.2), single(0.45)
+            else:
+                after, wall, flag = x + speed, -1.2, 0.45
+            if (after := min(after, 0.6)) <= wall:
+                after, speed = wall, max(speed, 0.0)
+            total -= 0.1 * action**2
+            if after >= flag and speed >= 0:
+                return total + 100.0, t, True
+            x, v = single(after), single(speed)
+        return total, N_STEPS, False
+
+
+def single(value: float) -> float:
+    """The nearest float32."""
+    return struct.unpack("f", struct.pack("f", value))[0]
+
+
+def magnitude(value: float) -> int:
+    """The number of the nearest float32 among those of its sign, by their size."""
+    return struct.unpack("I", struct.pack("f", abs(value)))[0]
+
+
+def edge(i: int, side: int) -> float:
+    """Where the starts end that are seen as the float32 number `i` from -0.6 on: left (side -1) or right (1)."""
+    own, other = (-struct.unpack("f", struct.pack("I", magnitude(LOW) - j))[0] for j in (i, i + side))
+    return min(HIGH, max(LOW, (own + other) / 2))

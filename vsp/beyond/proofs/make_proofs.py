@@ -1,0 +1,175 @@
+"""`make proofs` and `make proofs-teacher`: certificates into data/proofs/, and what they say into data/results/."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ...algorithms import distill
+from ...baselines import linear_map
+from ...config import paper_preset
+from ...evaluation import start_states
+from ...paper.printed import published_policy
+from ...paper.results import RESULTS, read_results, write_results
+from ...policy import VoronoiPolicy
+from ...rollouts import collect_episodes, rollout
+from ...run import command, listed
+from ...run.progress import progress
+from ...tasks import simplegoal
+from ...teachers.teacher import load_teacher
+from ..comparison.kept import simplest
+from ..refinement.config import tuned_preset
+from ..refinement.refine import refine
+from . import check
+from .network import teacher_steps_to_goal
+from .pendulum import prove_pendulum
+from .prove import prove
+from .robust import largest_disturbance, outside_pit, steps_to_goal
+from .simplegoal_proof import ENDS, SimpleGoalProof
+
+SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
+N_SAMPLED = 1_000_000  # episodes beside a proof
+MARGIN = 0.01  # of the policy that is tuned to be proved: a tenth of a step
+GRIDS = (1008, 2000, 4000)  # of Pendulum
+CERTIFIED = GRIDS[0]  # whose certificate is kept: 0.4 MB
+TEACHER_GRIDS = (500, 1000, 2000, 4000, 8000)
+HOUR = 3600.0
+
+
+def main() -> None:
+    """Prove what is not proved yet, and write a certificate of each policy to data/proofs/, what they say to
+    data/results/proofs.csv, and grids to data/results/proofs_grid.csv. --teacher: proofs_teacher.csv instead."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
+    parser.add_argument("--teacher", action="store_true", help="how much can be proved of a network within an hour")
+    arguments = parser.parse_args()
+    if arguments.teacher:
+        write_results(of_teacher(), "proofs_teacher", out=arguments.out)
+        return
+    certificates(Path(arguments.out))
+    write_results(pd.DataFrame(grid(n) for n in GRIDS), "proofs_grid", out=arguments.out)
+
+
+def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
+    """The policies that are proved, by the names of their certificates."""
+    teacher, config, own = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
+    best = int(read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
+    spacious = replace(own, step=partial(simplegoal.step, margin=MARGIN))
+    return {
+        "simplegoal_paper": lambda: published_policy(SIMPLEGOAL),
+        "simplegoal_best_run": lambda: distill(teacher, own, paper_preset(SIMPLEGOAL), seed=best)[0],
+        "simplegoal_faithful": lambda: _kept("faithful", SIMPLEGOAL),
+        "simplegoal_tuned": lambda: refine(teacher, own, config, seed=0)[0],
+        "simplegoal_limit": lambda: _kept("limit", SIMPLEGOAL),
+        "simplegoal_simplified": lambda: simplest(SIMPLEGOAL),
+        "simplegoal_one_map": lambda: _one_map(teacher),
+        "simplegoal_margin": lambda: _of_simplegoal(refine(teacher, spacious, replace(config, n_cells=3), seed=1)[0]),
+        "mountaincar_limit": lambda: _kept("limit", MOUNTAINCAR),
+        "pendulum_faithful": lambda: _kept("faithful", PENDULUM),
+    }
+
+
+def certificates(out: Path) -> None:
+    """Write the certificates that are missing, and the table, row by row: what is killed goes on."""
+    table = out / "data" / "results" / "proofs.csv"
+    rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
+    makers = policies()
+    missing = [name for name in makers if name not in {row["name"] for row in rows}]
+    for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
+        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json"))
+        write_results(pd.DataFrame(rows), "proofs", out=out)
+
+
+def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
+    """Prove one policy: its row, and its certificate at `path`."""
+    began = time.perf_counter()
+    proof = prove_pendulum(policy, n=CERTIFIED) if policy.task.name == PENDULUM else prove(policy)
+    seconds = time.perf_counter() - began
+    path.parent.mkdir(parents=True, exist_ok=True)
+    proof.save(path)
+    listed.list_file(path)
+    checking = time.perf_counter()
+    claim = check.check(path)
+    times = {"seconds": seconds, "check_seconds": time.perf_counter() - checking}
+    row = {"name": name, "task": policy.task.name, "cells": len(policy), "metric": policy.metric}
+    row |= {"longest": claim["longest"], "bytes": path.stat().st_size}
+    row |= _of_simplegoal_proof(proof) if isinstance(proof, SimpleGoalProof) else {}
+    row |= {name: claim[name] for name in ("n_states", "least", "mean_low", "mean_high") if name in claim}
+    if policy.task.name == MOUNTAINCAR:
+        row["goal"] = 1.0 - claim["n_left"] / claim["n_states"]
+    if policy.task.name == PENDULUM:
+        row["goal"] = proof.share
+    return row | _sampled(policy) | times
+
+
+def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
+    low, high = proof.mean_return()
+    areas = {name: float(area) for name, area in proof.areas.items()}
+    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
+    outside = outside_pit(steps := steps_to_goal(proof.policy))
+    return found | {
+        "program": float(
+            (steps > 0)[outside].mean()
+        ),  # share outside the pit that the program surely takes to the goal
+        "disturbance": largest_disturbance(proof.policy),
+    }
+
+
+def _sampled(policy: VoronoiPolicy) -> dict:
+    """Mean return and shares of outcomes over `N_SAMPLED` episodes."""
+    n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
+    found = rollout(policy, policy.task, start_states(policy.task, n, 1))
+    shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
+    return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
+
+
+def grid(n: int) -> dict:
+    """From which share of its starts Pendulum surely gets upright, by a grid of n by n boxes."""
+    began, policy = time.perf_counter(), _kept("faithful", PENDULUM)
+    proof = prove_pendulum(policy, n=n)
+    longest = proof.claim["longest"]
+    return {"n": n, "share": proof.share, "longest": longest, "seconds": time.perf_counter() - began}
+
+
+def of_teacher() -> pd.DataFrame:
+    """Which share of SimpleGoal's starts outside the pit its teacher surely takes to the goal, by ever finer grids, as
+    long as the next one ends within an hour."""
+    began, rows = time.perf_counter(), []
+    for n in TEACHER_GRIDS:
+        last = time.perf_counter()
+        if rows and (last - began) + 4.5 * rows[-1]["seconds"] > HOUR:
+            break
+        steps = teacher_steps_to_goal(load_teacher(SIMPLEGOAL), n=n)
+        share = float((steps > 0)[outside_pit(steps)].mean())
+        rows.append({"n": n, "share": share, "longest": int(steps.max()), "seconds": time.perf_counter() - last})
+        print(f"{n} x {n} boxes: {share:.4%} proved", flush=True)
+    return pd.DataFrame(rows)
+
+
+def _kept(table: str, task: str) -> VoronoiPolicy:
+    return VoronoiPolicy.load(RESULTS / f"{table}_{task}.policy")
+
+
+def _one_map(teacher) -> VoronoiPolicy:
+    episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
+    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    return linear_map(states, actions, SIMPLEGOAL)
+
+
+def _of_simplegoal(policy: VoronoiPolicy) -> VoronoiPolicy:
+    """A policy of SimpleGoal with a margin, as one of SimpleGoal."""
+    return VoronoiPolicy(
+        policy.codewords, policy.coefficients, task=SIMPLEGOAL, metric=policy.metric, scale=policy.scale
+    )
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

@@ -1,0 +1,146 @@
+"""Pendulum under a policy of linear maps: a set around upright that it never leaves, and from where it gets there.
+
+The states, angle and angular velocity, are cut into boxes (`grid`). Each coordinate after a step is a smooth function
+of the state, so over a box it differs from its value in the middle by no more than its steepest slope allows. What is
+proved holds for the program, which sees float32 and rounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...checks import check_count
+from ...policy import VoronoiPolicy
+from ...tasks.pendulum import TASK
+from .grid import Way, around, invariant, steps_into
+from .proof import Proof
+from .robust import ROUNDING, SEEN, least_gap
+
+FASTEST, LIMIT = 8.0, 2.0  # rad/s; of the torque
+START_SPEED = 1.0  # rad/s, of starts
+DT, FALL, PUSH = 0.05, 0.75, 0.15  # of a step: seconds, and what sine and torque add to the angular velocity
+UPRIGHT = 0.5  # rad: a set "around upright" lies within
+
+
+@dataclass(frozen=True)
+class PendulumProof(Proof):
+    """What was proved, for boxes of an n by n grid: row i has angles from -pi + 2 pi i / n, column j angular velocities
+    from -8 + 16 j / n."""
+
+    kept: np.ndarray  # (n, n) whether the box belongs to a set around upright that no step leaves
+    steps: np.ndarray  # (n, n) the most steps into that set; 0: not proved
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Which columns hold the starts, slower than 1 rad/s. (n,)"""
+        n = len(self.steps)
+        middle = FASTEST * (2 * (np.arange(n) + 0.5) / n - 1)
+        return np.abs(middle) < START_SPEED
+
+    @property
+    def share(self) -> float:
+        """The share of starts from which the pendulum is proved to get there."""
+        return float((self.steps > 0)[:, self.starts].mean())
+
+    @property
+    def claim(self) -> dict:
+        """The grid's `n`, how many boxes of starts are proved, how many there are, and the most steps of any box."""
+        of_starts = (self.steps > 0)[:, self.starts]
+        counts = {"proved": int(of_starts.sum()), "starts": of_starts.size}
+        return {"n": len(self.steps), **counts, "longest": int(self.steps[~self.kept].max(initial=0))}
+
+    def parts(self) -> list:
+        """For each row, runs of boxes: steps (-1 in the set), length, steps, length, ..."""
+        found = []
+        for row in np.where(self.kept, -1, self.steps):
+            begins = np.flatnonzero(np.diff(row, prepend=row[0] - 1))
+            lengths = np.diff(begins, append=len(row))
+            found.append(np.column_stack([row[begins], lengths]).ravel().tolist())
+        return found
+
+
+def prove_pendulum(policy: VoronoiPolicy, *, n: int = 2000) -> PendulumProof:
+    """From which boxes the pendulum surely gets upright within 200 steps, and stays; a minute, and 200 bytes a box.
+
+    Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
+    for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
+    """
+    check_swinging(policy)
+    check_count("n", n, most=8000)
+    if n % 16:
+        raise ValueError(f"n is {n}, expected a multiple of 16")
+    ways = [_way(policy, cell, n) for cell in range(len(policy))]
+    angle = np.pi * (2 * (np.arange(n) + 0.5) / n - 1)
+    near = np.repeat((np.abs(angle) + np.pi / n < UPRIGHT)[:, None], n, axis=1)
+    kept = invariant(near, ways, periodic=True)
+    return PendulumProof(policy, kept, steps_into(kept, ways, TASK.max_steps, periodic=True))
+
+
+def check_swinging(policy: VoronoiPolicy) -> None:
+    """Raise ValueError unless `policy` is made of linear maps for Pendulum, without the metric "chebyshev"."""
+    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric == "chebyshev":
+        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, not 'chebyshev'")
+    policy.check_linear()
+
+
+def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
+    """Where a step by the map of `cell` leads from each box that touches the cell."""
+    half = np.array([np.pi, FASTEST]) / n  # of a box
+    angles, speeds = (width * (2 * np.arange(n) + 1 - n) for width in half)  # their middles
+    touched = _touched(policy, cell, angles, speeds, half)
+    angle, speed = angles[touched // n], speeds[touched % n]
+    (w_cos, w_sin, w_speed, bias), (cos, sin) = policy.coefficients[cell, :, 0], (np.cos(angle), np.sin(angle))
+    slack = SEEN * (abs(w_cos) + abs(w_sin) + FASTEST * abs(w_speed)) + ROUNDING
+
+    raw = w_cos * cos + w_sin * sin + w_speed * speed + bias
+    slope = np.abs(w_sin * cos - w_cos * sin) + (abs(w_cos) + abs(w_sin)) * half[0]
+    spread = slope * half[0] + abs(w_speed) * half[1] + slack
+    low, high = (np.clip(raw + side * spread, -LIMIT, LIMIT) for side in (-1, 1))
+    free, fixed = np.abs(raw) + spread <= LIMIT, low == high
+    # The new speed in the middle, and how steep it is along the angle and along the speed
+    torque = np.where(free, raw, (low + high) / 2)
+    along = np.where(free, (FALL + PUSH * w_sin) * cos - PUSH * w_cos * sin, FALL * cos)
+    bend = FALL + PUSH * (abs(w_cos) + abs(w_sin)) * free
+    across = np.where(free, 1 + PUSH * w_speed, 1.0)
+    rest = PUSH * np.where(free, slack, np.where(fixed, 0.0, (high - low) / 2)) + ROUNDING
+    new_speed = speed + FALL * sin + PUSH * torque
+    new_angle = angle + DT * new_speed
+    speed_by = (np.abs(along) + bend * half[0]) * half[0] + np.abs(across) * half[1] + rest
+    angle_by = (np.abs(1 + DT * along) + DT * bend * half[0]) * half[0] + DT * (np.abs(across) * half[1] + rest)
+
+    limited = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
+    at_limit = np.abs(new_speed) + speed_by > FASTEST  # there the new angle follows from the limited speed
+    ends = [
+        np.where(at_limit, angle + side * half[0] + DT * one, new_angle + side * angle_by)
+        for side, one in zip((-1, 1), limited)
+    ]
+    return _into_boxes(touched, ends, limited, n)
+
+
+def _into_boxes(boxes: np.ndarray, angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> Way:
+    """The way from `boxes` to between these angles and speeds; angles may be up to a turn beyond half a turn."""
+    first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
+    begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
+    begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
+    turns = begin // n * n
+    return Way(boxes, np.stack([begin - turns, first]), np.stack([end - turns, last]), np.ones(len(boxes), dtype=bool))
+
+
+def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
+    """The boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
+    n, found = len(angles), []
+    ranges = [(np.maximum(f(angles) - half[0], -1.0), np.minimum(f(angles) + half[0], 1.0)) for f in (np.cos, np.sin)]
+    for i in range(n):  # a row at a time
+        low, high = (
+            np.stack([np.full(n, ranges[0][side][i]), np.full(n, ranges[1][side][i]), speeds + sign * half[1]])
+            + sign * SEEN * FASTEST
+            for side, sign in ((0, -1), (1, 1))
+        )
+        row = np.ones(n, dtype=bool)
+        for other in range(len(policy)):
+            if other != cell:
+                row &= least_gap(policy, cell, other, low, high) <= ROUNDING
+        found.append(np.flatnonzero(row) + i * n)
+    return np.concatenate(found)

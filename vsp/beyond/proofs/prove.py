@@ -1,0 +1,30 @@
+"""`prove`: what is certain of a policy of linear maps, from every start of its task."""
+
+from __future__ import annotations
+
+from ...policy import VoronoiPolicy
+from .mountaincar import prove_mountaincar
+from .pendulum import prove_pendulum
+from .proof import Proof
+from .simplegoal_proof import prove_simplegoal
+
+PROVERS = {
+    "SimpleGoal-v0": prove_simplegoal,
+    "MountainCarContinuous-v0": prove_mountaincar,
+    "Pendulum-v1": prove_pendulum,
+}
+
+
+def prove(policy: VoronoiPolicy) -> Proof:
+    """What is certain of `policy`: on SimpleGoal how every episode ends, exactly (seconds to a minute); on MountainCar
+    what Gymnasium's program does from every start (ten minutes on two cores); on Pendulum from which starts it surely
+    gets upright and stays (a minute).
+
+    Raises ValueError for a policy of another task or class: a proof needs a bound of where a step leads.
+    """
+    if not isinstance(policy, VoronoiPolicy):
+        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy: others have no cells to follow")
+    if policy.task.name not in PROVERS:
+        needs = "others need a bound of where a step of theirs leads from a set of states"
+        raise ValueError(f"the policy is for {policy.task.name}, expected one of {sorted(PROVERS)}: {needs}")
+    return PROVERS[policy.task.name](policy)
