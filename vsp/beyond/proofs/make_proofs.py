@@ -84,7 +84,7 @@ def certificates(out: Path) -> None:
     missing = [name for name in makers if name not in {row["name"] for row in rows}]
     for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
         rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json"))
-        write_results(pd.DataFrame(rows), "proofs", out=out)
+        write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
 
 
 def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
