@@ -19,6 +19,7 @@ from .methods import (
     return_over_cells,
     simplified,
 )
+from .proofs import basins, upright
 from .returns import (
     again,
     box_plot,

@@ -9,6 +9,7 @@ which the car never moves.
 
 from .dead_points import at_rest
 from .network import teacher_steps_to_goal
-from .proof import Proof
+from .proof import Proof, load_certificate
 from .prove import prove
 from .robust import largest_disturbance, proved, steps_to_goal
+from .tables import dead_point_table, least_returns, pendulum_steps, simplegoal_table

@@ -28,6 +28,7 @@ from ..comparison.kept import simplest
 from ..refinement.config import tuned_preset
 from ..refinement.refine import refine
 from . import check
+from .mountaincar_reals import prove_reals
 from .network import teacher_steps_to_goal
 from .pendulum import prove_pendulum
 from .prove import prove
@@ -45,7 +46,8 @@ HOUR = 3600.0
 
 def main() -> None:
     """Prove what is not proved yet, and write a certificate of each policy to data/proofs/, what they say to
-    data/results/proofs.csv, and grids to data/results/proofs_grid.csv. --teacher: proofs_teacher.csv instead."""
+    data/results/proofs.csv; MountainCar over the reals to proofs_reals.csv, and Pendulum over finer grids to
+    proofs_grid.csv. --teacher: proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
     parser.add_argument("--teacher", action="store_true", help="how much can be proved of a network within an hour")
@@ -54,6 +56,7 @@ def main() -> None:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
     certificates(Path(arguments.out))
+    write_results(pd.DataFrame([reals()]), "proofs_reals", out=arguments.out)
     write_results(pd.DataFrame(grid(n) for n in GRIDS), "proofs_grid", out=arguments.out)
 
 
@@ -112,6 +115,7 @@ def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
 def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
     low, high = proof.mean_return()
     areas = {name: float(area) for name, area in proof.areas.items()}
+    areas["failing_outside"] = float(proof.failing_outside)  # the pit
     found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
     return found | {
@@ -128,6 +132,14 @@ def _sampled(policy: VoronoiPolicy) -> dict:
     found = rollout(policy, policy.task, start_states(policy.task, n, 1))
     shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
     return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
+
+
+def reals() -> dict:
+    """From which share of its starts MountainCar's car surely arrives, in real numbers."""
+    began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
+    parts = prove_reals(policy)
+    found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
+    return found | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
 
 
 def grid(n: int) -> dict:

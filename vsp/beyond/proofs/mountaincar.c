@@ -2,7 +2,7 @@
  * sums. Actions and cosines are known up to a bound; where it decides, all ways are followed. */
 #include <math.h>
 
-enum { MOST_CELLS = 64 };
+enum { MOST_CELLS = 64, MOST_STEPS = 1000 };
 
 typedef struct {
     const double *slopes, *offsets; /* (k, 2), (k,): how near a codeword is, as a linear function of the state */
@@ -21,6 +21,13 @@ typedef struct {
     float x, v;
     int ended;
 } State;
+
+/* The last episode without a doubt. An episode that comes to one of its states at the same time goes on as it did. */
+typedef struct {
+    State states[MOST_STEPS];  /* after so many steps */
+    double rest[MOST_STEPS];   /* return from there on */
+    int n, left;               /* steps; 0: there is none */
+} Path;
 
 /* The state after a step in which the velocity changes by `push`. Python's own numbers take on the type of their
  * partner: where the speed is at its limit, all that follows is float32. */
@@ -46,7 +53,7 @@ static void end(Ends *ends, double total, int t) {
     if (t > ends->longest) ends->longest = t;
 }
 
-static void play(const Program *p, State s, int t, double total, Ends *ends);
+static void play(const Program *p, State s, int t, double total, Ends *ends, Path *path);
 
 /* One of the states after step `t` with the map of `cell`; episodes through the others are played. */
 static State step(const Program *p, State s, int cell, int t, double *total, Ends *ends) {
@@ -66,15 +73,21 @@ static State step(const Program *p, State s, int cell, int t, double *total, End
                 ends->doubts = -1;
                 return low;
             }
-            if (!low.ended && ways > 1) play(p, (State){x, v, 0}, t, *total, ends);
+            if (!low.ended && ways > 1) play(p, (State){x, v, 0}, t, *total, ends, 0);
         }
     ends->doubts += ends->doubts >= 0;
     return low;
 }
 
-/* Adds to `ends` how episodes end that are in `s` after `t` steps, with `total` for them. */
-static void play(const Program *p, State s, int t, double total, Ends *ends) {
+/* Adds to `ends` how episodes end that are in `s` after `t` steps, with `total` for them. `path`: 0, or an earlier one
+ * to join; it becomes this one. */
+static void play(const Program *p, State s, int t, double total, Ends *ends, Path *path) {
+    int first = t, doubts = ends->doubts, left = 0;
     while (!s.ended && t < p->most_steps && ends->doubts >= 0) {
+        if (path) {
+            if (t < path->n && path->states[t].x == s.x && path->states[t].v == s.v) break;
+            path->states[t] = s, path->rest[t] = total;
+        }
         double near[MOST_CELLS], best = -INFINITY, before = total;
         int cell = 0;
         for (int i = 0; i < p->k; i++) {
@@ -86,19 +99,30 @@ static void play(const Program *p, State s, int t, double total, Ends *ends) {
             if (i != cell && near[i] >= best - p->tie && ends->doubts >= 0) {
                 double other = before;
                 ends->doubts++;
-                play(p, step(p, s, i, t, &other, ends), t, other, ends);
+                play(p, step(p, s, i, t, &other, ends), t, other, ends, 0);
             }
         s = after;
     }
-    end(ends, s.ended ? total + 100 : total, t);
-    ends->left += !s.ended;
+    int played = t, joins = path && t < path->n && !s.ended && t < p->most_steps && ends->doubts >= 0;
+    if (joins) {
+        total += path->rest[t], left = path->left, t = path->n;
+    } else {
+        total += s.ended ? 100 : 0, left = !s.ended;
+    }
+    end(ends, total, t);
+    ends->left += left;
+    if (path) {
+        for (int i = first; i < played; i++) path->rest[i] = total - path->rest[i];
+        path->n = ends->doubts == doubts ? t : 0, path->left = left;
+    }
 }
 
 /* How the episodes end that are in the states (n, 2) after one step, with these returns so far. */
 void play_all(const Program *p, long n, const float *states, const double *returns, Ends *ends) {
+    Path path = {.n = 0};
     for (long i = 0; i < n; i++) {
         ends[i] = (Ends){INFINITY, -INFINITY, 0, 0, 0};
-        play(p, (State){states[2 * i], states[2 * i + 1], 0}, 1, returns[i], ends + i);
+        play(p, (State){states[2 * i], states[2 * i + 1], 0}, 1, returns[i], ends + i, &path);
     }
 }
 

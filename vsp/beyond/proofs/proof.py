@@ -7,8 +7,12 @@ import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...policy import VoronoiPolicy
-from ...run import sealed
+from ...run import atomic, sealed
+
+CERTIFICATES = atomic.ROOT / "data" / "proofs"
 
 
 @dataclass(frozen=True)
@@ -39,3 +43,10 @@ class Proof(ABC):
     def save(self, path: str | os.PathLike) -> None:
         """Write the certificate to one sealed file."""
         sealed.write_sealed(path, json.dumps(self.certificate(), separators=(",", ":"), sort_keys=True).encode())
+
+
+def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
+    """The policy of the certificate data/proofs/NAME.json, and all that it says. Raises `DamagedFile`."""
+    content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
+    numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
+    return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content

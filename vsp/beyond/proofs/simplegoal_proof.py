@@ -11,9 +11,9 @@ import numpy as np
 from ...policy import VoronoiPolicy
 from ...tasks.base import GOAL, PIT, TRUNCATED
 from . import returns
-from .polygons import total
+from .polygons import Polygon, line_of, total
 from .proof import Proof
-from .simplegoal import Piece, follow
+from .simplegoal import IN_PIT, Piece, follow
 
 ENDS = {GOAL: "goal", PIT: "pit", TRUNCATED: "left"}
 SIDES = {-1: "-", 0: "=", 1: "+"}  # the low limit or wall, none, the high one
@@ -36,6 +36,17 @@ class SimpleGoalProof(Proof):
             name: total([piece.starts.area() for piece in self.pieces if piece.outcome == end])
             for end, name in ENDS.items()
         }
+
+    @cached_property
+    def failing_outside(self) -> Fraction:
+        """The exact area of the starts outside the pit that do not reach the goal."""
+        failing = [piece.starts for piece in self.pieces if piece.outcome != GOAL]
+        inside = [part.area() for starts in failing if (part := _in_pit(starts))]
+        return total([starts.area() for starts in failing]) - total(inside)
+
+    def polygons(self) -> list[np.ndarray]:
+        """The corners of every piece (k, 2), as floats, for pictures."""
+        return [np.array([(float(x), float(y)) for x, y in piece.starts.points()]) for piece in self.pieces]
 
     @property
     def longest(self) -> int:
@@ -67,6 +78,13 @@ def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
     Raises ValueError for a policy of another task or class, or with the metric "chebyshev".
     """
     return SimpleGoalProof(policy, tuple(follow(policy)))
+
+
+def _in_pit(starts: Polygon) -> Polygon | None:
+    """The part of `starts` inside the pit."""
+    for form in IN_PIT:
+        starts = starts and starts.cut(line_of(form))[1]
+    return starts
 
 
 def _itinerary(piece: Piece) -> str:

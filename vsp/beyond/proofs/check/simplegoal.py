@@ -98,6 +98,7 @@ class Policy:
             raise Refused(f"the metric is {metric!r}, expected 'euclidean' or 'manhattan'")
         self.metric, self.scale = metric, [Fraction(s) for s in scale]
         self.codewords = [[Fraction(number) for number in codeword] for codeword in codewords]
+        self.rough = [[number / s for number, s in zip(codeword, scale)] for codeword in codewords]
         self.maps = [[[Fraction(row[axis]) for row in one] for axis in (0, 1)] for one in coefficients]
 
     def step(self, polygons: list, step: str) -> list:
@@ -156,9 +157,10 @@ class Policy:
         to the difference of the distances is monotone, so it is largest at an end."""
         most = doubt = 0.0
         for axis, values in enumerate(zip(*(state for _, _, state in polygon))):
-            scale, c, d = (float(one[axis]) for one in (self.scale, self.codewords[number], self.codewords[other]))
-            most += max(abs(value - c) - abs(value - d) for value in (min(values), max(values))) / scale
-            doubt += DOUBT * (1.0 + abs(c) + abs(d)) / scale
+            c, d, scale = self.rough[number][axis], self.rough[other][axis], float(self.scale[axis])
+            low, high = min(values) / scale, max(values) / scale
+            most += max(abs(low - c) - abs(low - d), abs(high - c) - abs(high - d))
+            doubt += DOUBT * (1.0 / scale + abs(c) + abs(d))
         return most < -doubt
 
     @cache  # noqa: B019 - it lives as long as the check

@@ -1,0 +1,241 @@
+"""MountainCar over the reals: short pieces of the line of starts, followed to the flag with bounds of the error.
+
+The states of a piece are c + g t + r, with t from -1 to 1 along it. The remainder r is bounded in a norm in which
+the car's swing at the bottom of the valley is a rotation, so that it hardly grows there (a mean-value form; boxes would
+grow with every step). Where a piece crosses a border of cells, a limit of the action, or the flag, it is cut in three:
+of two parts it is sure on which side they are, and of the sliver between them both ways are followed.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ...policy import VoronoiPolicy
+from ...run import workers
+from ...tasks.mountaincar import FLAG, TASK
+from .mountaincar import LEFT, RIGHT, check_runnable
+
+SWING = 0.0866  # rad per step, at the bottom: a velocity counts 1 / SWING as much as a position
+BOTH = np.hypot(1.0, 1.0 / SWING)  # norm of an error of 1 in both coordinates
+POWER, PULL = 0.0015, 0.0025
+BEND = 4.5 * PULL  # half the largest second derivative of the pull along the position
+ROUNDING = 1e-15  # of each coordinate and step: several times what float64 loses
+FASTEST, WALL = 0.07, -1.2
+LOST = 1e-3  # remainder of a piece that is given up
+N_PIECES, N_PARTS = 100_000, 100  # of the line, and how many of them at a time
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of the line of starts, each with its states after some steps."""
+
+    low: np.ndarray  # (n,) of the starts
+    high: np.ndarray
+    centre: np.ndarray  # (2, n) c
+    along: np.ndarray  # (2, n) g
+    rest: np.ndarray  # (n,) bound of r, in the norm of x and v / SWING
+    cost: np.ndarray  # (n,) of the actions so far, at most
+    cell: np.ndarray  # (n,) in which the states are; -1: not decided
+
+    def __len__(self) -> int:
+        return len(self.low)
+
+    def at(self, index: np.ndarray) -> Pieces:
+        """Some of them."""
+        return Pieces(*(getattr(self, field.name)[..., index] for field in fields(self)))
+
+    def between(self, begin: np.ndarray, end: np.ndarray) -> Pieces:
+        """The part of each piece from t = `begin` to `end`; empty ones are left out."""
+        kept = np.flatnonzero(end > begin)
+        whole, begin, end = self.at(kept), begin[kept], end[kept]
+        low, high = (whole.low + (t + 1) / 2 * (whole.high - whole.low) for t in (begin, end))
+        centre, along = whole.centre + (begin + end) / 2 * whole.along, (end - begin) / 2 * whole.along
+        return replace(whole, low=low, high=high, centre=centre, along=along, rest=whole.rest + ROUNDING * BOTH)
+
+    def ranges(self, x, v, constant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of a linear function: its value in the middle, how much it changes from there to the end of the piece, and
+        what the remainder may add. (n,) each"""
+        size = self.rest * np.hypot(x, v * SWING) + ROUNDING * (np.abs(x) + np.abs(v) + np.abs(constant))
+        return x * self.centre[0] + v * self.centre[1] + constant, x * self.along[0] + v * self.along[1], size
+
+    def cut(self, x, v, constant) -> tuple[Pieces, Pieces, Pieces]:
+        """The parts where a linear function of the state is surely below 0, in doubt, and surely above."""
+        value, change, size = self.ranges(x, v, constant)
+        change = np.where(np.abs(change) > 1e-300, change, 1e-300)
+        up, ends = change > 0, np.ones(len(self))
+        first, last = np.sort([(-2 * size - value) / change, (2 * size - value) / change], axis=0).clip(-1.0, 1.0)
+        below = self.between(np.where(up, -ends, last), np.where(up, first, ends))
+        return below, self.between(first, last), self.between(np.where(up, last, -ends), np.where(up, ends, first))
+
+
+def joined(parts: list[Pieces]) -> Pieces:
+    """All pieces of `parts`."""
+    return Pieces(*(np.concatenate([getattr(part, one.name) for part in parts], axis=-1) for one in fields(Pieces)))
+
+
+@dataclass(frozen=True)
+class Part:
+    """What was found from a part of the line of starts."""
+
+    share: float  # of the starts, from which the car surely arrives
+    longest: int  # steps from these
+    least: float  # return from these, at least
+
+
+def prove_reals(policy: VoronoiPolicy, *, jobs: int | str | None = None) -> list[Part]:
+    """From which starts the car surely arrives, in real numbers, for each part of the line; minutes.
+
+    `jobs` as in `vsp.run.workers`, by default one per core. Raises ValueError for a policy that is not made of linear
+    maps and Euclidean cells for MountainCar.
+    """
+    check_runnable(policy)
+    ends = np.linspace(LEFT, RIGHT, N_PARTS + 1).tolist()
+    work, jobs = [(policy, low, high) for low, high in zip(ends[:-1], ends[1:])], jobs or os.cpu_count() or 1
+    found = dict(workers.results(prove_part, work, "all starts", jobs=jobs, total=len(work), unit="parts"))
+    return [found[i] for i in range(len(work))]
+
+
+def prove_part(policy: VoronoiPolicy, low: float, high: float, n: int = N_PIECES // N_PARTS) -> Part:
+    """From which starts between `low` and `high` the car surely arrives, by `n` pieces that are cut where needed."""
+    ends = np.linspace(low, high, n + 1)
+    pieces, loop, lost = started(ends[:-1], ends[1:]), Loop(policy), []
+    longest, least = 0, np.inf
+    for t in range(1, TASK.max_steps + 1):
+        pieces, arrived, failed = loop.step(pieces)
+        lost += list(zip(failed.low.tolist(), failed.high.tolist()))
+        if len(arrived):
+            longest, least = t, min(least, 100.0 - float(arrived.cost.max()))
+        if not len(pieces):
+            break
+    lost += list(zip(pieces.low.tolist(), pieces.high.tolist()))
+    return Part(1.0 - _length(lost) / (high - low), longest, least)
+
+
+def started(low: np.ndarray, high: np.ndarray) -> Pieces:
+    """Pieces of the line of starts, at rest."""
+    zero, half = np.zeros(len(low)), (high - low) / 2
+    centre, along = np.stack([(low + high) / 2, zero]), np.stack([half, zero])
+    return Pieces(low, high, centre, along, np.full(len(low), ROUNDING), zero, np.full(len(low), -1))
+
+
+class Loop:
+    """The closed loop: a policy, and the car that answers it."""
+
+    def __init__(self, policy: VoronoiPolicy):
+        weights = 1.0 / policy.scale**2
+        self.slopes, self.offsets = 2 * policy.codewords * weights, np.square(policy.codewords) @ weights
+        self.maps = policy.coefficients[:, :, 0]
+
+    def step(self, pieces: Pieces) -> tuple[Pieces, Pieces, Pieces]:
+        """Pieces that go on after a step, that arrived, and that are given up."""
+        moved = self.moved(self.in_cells(pieces))
+        speed, change, size = moved.ranges(0.0, 1.0, 0.0)
+        sure = (np.abs(speed) + np.abs(change) + size < FASTEST) & (moved.rest < LOST)
+        failed, (stopped, doubt, moved) = moved.at(~sure), _sides(moved.at(sure), WALL)
+        moved = joined([moved, doubt, _at_wall(joined([stopped, doubt]))])
+        below, doubt, above = _sides(moved, FLAG)
+        arrived = joined([above, doubt])
+        speed, change, size = arrived.ranges(0.0, 1.0, 0.0)
+        forward = speed - np.abs(change) - size > 0  # to arrive, it must not roll back
+        return joined([below, doubt]), arrived.at(forward), joined([failed, arrived.at(~forward)])
+
+    def in_cells(self, pieces: Pieces) -> Pieces:
+        """The parts of `pieces` with their cells; slivers on a border stand in several."""
+        decided = []
+        while len(pieces):
+            near = self.slopes @ pieces.centre - self.offsets[:, None]  # (k, n)
+            best = near.argmax(axis=0)
+            doubt = self._doubt(pieces, best, near)  # (k, n), at least 0 where another codeword may be nearer
+            rival = doubt.argmax(axis=0)
+            sure = doubt.max(axis=0) < 0
+            decided.append(replace(pieces.at(sure), cell=best[sure]))
+            pieces, best, rival = pieces.at(~sure), best[~sure], rival[~sure]
+            if not len(pieces):
+                break
+            below, sliver, above = pieces.cut(*(self.slopes[best] - self.slopes[rival]).T,
+                                              self.offsets[rival] - self.offsets[best])  # fmt: skip
+            near = self.slopes @ sliver.centre - self.offsets[:, None]
+            best = near.argmax(axis=0)
+            doubt = self._doubt(sliver, best, near)
+            doubt[best, np.arange(len(best))] = 0.0
+            cells, index = np.nonzero(doubt >= 0)
+            decided.append(replace(sliver.at(index), cell=cells))
+            pieces = joined([below, above])
+        return joined(decided)
+
+    def _doubt(self, pieces: Pieces, best: np.ndarray, near: np.ndarray) -> np.ndarray:
+        """By how much another codeword may be nearer than the best in the middle; -inf for that one. (k, n)"""
+        columns, found = np.arange(len(best)), np.empty_like(near)
+        for k in range(len(near)):
+            x, v = (self.slopes[best] - self.slopes[k]).T
+            _, change, size = pieces.ranges(x, v, self.offsets[k] - self.offsets[best])
+            found[k] = np.abs(change) + size - (near[best, columns] - near[k])
+        found[best, columns] = -np.inf
+        return found
+
+    def moved(self, pieces: Pieces) -> Pieces:
+        """The pieces after a step, cut where the action comes to a limit."""
+        parts = []
+        for side in (1, -1):
+            x, v, bias = side * self.maps[pieces.cell].T
+            value, change, size = pieces.ranges(x, v, bias - 1.0)
+            beyond = value - np.abs(change) - size > 0
+            doubtful = ~beyond & (value + np.abs(change) + size > 0)
+            parts.append(self._after(pieces.at(beyond), side))
+            if doubtful.any():
+                x, v, bias = side * self.maps[pieces.cell[doubtful]].T
+                below, sliver, above = pieces.at(doubtful).cut(x, v, bias - 1.0)
+                parts += [self._after(above, side), self._after(sliver, 0)]
+                pieces = joined([pieces.at(~beyond & ~doubtful), below])
+            elif beyond.any():
+                pieces = pieces.at(~beyond)
+        return joined([*parts, self._after(pieces, 0)])
+
+    def _after(self, pieces: Pieces, side: int) -> Pieces:
+        """The pieces after a step with the action at a limit, or with that of the map (side 0), be it a little beyond
+        a limit: then the rest grows by as much."""
+        x, v, bias = (0.0 if side else 1.0) * self.maps[pieces.cell].T
+        action, change, size = pieces.ranges(x, v, bias + side)
+        most = np.abs(action) + np.abs(change) + size
+        position, velocity = pieces.centre
+        p, q = POWER * x + 3 * PULL * np.sin(3 * position), 1.0 + POWER * v
+        velocity = velocity + POWER * action - PULL * np.cos(3 * position)
+        rise = p * pieces.along[0] + q * pieces.along[1]
+        width = np.abs(pieces.along[0]) + pieces.rest
+        error = BEND * width**2 + POWER * np.maximum(most - 1.0, 0.0) + 4 * ROUNDING
+        rest = _norm(1.0 + p, q * SWING, p / SWING, q) * pieces.rest * (1 + 1e-12) + BOTH * error
+        return replace(
+            pieces, centre=np.stack([position + velocity, velocity]), along=np.stack([pieces.along[0] + rise, rise]),
+            rest=rest, cost=pieces.cost + 0.1 * np.minimum(most, 1.0) ** 2, cell=np.full(len(pieces), -1),
+        )  # fmt: skip
+
+
+def _sides(pieces: Pieces, position: float) -> tuple[Pieces, Pieces, Pieces]:
+    """The parts surely to the left of a position, in doubt, and surely to the right."""
+    gap, change, size = pieces.ranges(1.0, 0.0, -position)
+    near = np.abs(gap) <= np.abs(change) + size
+    left, doubt, right = pieces.at(near).cut(1.0, 0.0, -position)
+    return joined([pieces.at(~near & (gap < 0)), left]), doubt, joined([pieces.at(~near & (gap > 0)), right])
+
+
+def _at_wall(pieces: Pieces) -> Pieces:
+    """The pieces stopped by the wall on the left: all in one state."""
+    centre, zero = np.array([[WALL], [0.0]]) + 0 * pieces.centre, np.zeros(len(pieces))
+    return replace(pieces, centre=centre, along=0 * pieces.along, rest=zero)
+
+
+def _norm(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """The largest singular value of ((a, b), (c, d))."""
+    first, second, mixed = a * a + c * c, b * b + d * d, a * b + c * d
+    return np.sqrt((first + second) / 2 + np.hypot((first - second) / 2, mixed))
+
+
+def _length(intervals: list[tuple[float, float]]) -> float:
+    """Of the union."""
+    total, end = 0.0, -np.inf
+    for low, high in sorted(intervals):
+        total, end = total + max(0.0, high - max(low, end)), max(end, high)
+    return total
