@@ -19,13 +19,15 @@ TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equa
 FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times limit_strides
 ANIMATIONS_07_limits := gait_halfcheetah
 TABLES_07_limits := $(addprefix limit_,references sizes starts losses robots gait fewest)
-FIGURES_08_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
+FIGURES_08_proofs := proofs_basins proofs_mountaincar proofs_pendulum
+TABLES_08_proofs := $(addprefix proofs_,simplegoal dead_points pendulum teacher)
+FIGURES_09_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
   beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
-TABLES_08_methods := beyond_headline beyond_ablation beyond_lunarlander \
+TABLES_09_methods := beyond_headline beyond_ablation beyond_lunarlander \
   $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
 # In an order in which no core waits; which of them read data/runs, and which committed results.
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
-OURS := 08_methods 06_few_equations 07_limits
+OURS := 08_proofs 09_methods 06_few_equations 07_limits
 NOTEBOOKS := $(sort $(PAPER) $(OURS))
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
@@ -39,9 +41,12 @@ READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL)) starts_Mount
   $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
   $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
   data/results/faithful_Pendulum-v1.policy data/results/robots_HalfCheetah-v5.policy
-READS_08_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
+READS_08_proofs := $(foreach n,paper tuned,data/proofs/simplegoal_$(n).json) data/proofs/mountaincar_limit.json \
+  data/proofs/pendulum_faithful.json data/results/faithful_MountainCarContinuous-v0.policy \
+  $(foreach n,proofs proofs_grid proofs_teacher,data/results/$(n).csv)
+READS_09_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
-READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_08_methods)))
+READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_09_methods)))
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -105,7 +110,7 @@ lab: venv ## opens JupyterLab on the notebooks
 	$(PY) -m jupyterlab notebooks
 
 ## Reproduce
-all: begin venv ## the same and our own method beside it, notebooks 06 to 08: about 4 minutes
+all: begin venv ## the same and our own method beside it, notebooks 06 to 09: about 4 minutes
 paper-figures all:
 	@: > "$$STATE/made"
 	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)

@@ -30,7 +30,7 @@ from vsp.baselines.soft_tree import SoftTree
 from vsp.beyond.explain import lime, rules
 from vsp.beyond.optimum import best_policy, best_returns, limit_preset
 from vsp.beyond.proofs import largest_disturbance, steps_to_goal, teacher_steps_to_goal
-from vsp.beyond.proofs.pendulum import prove_pendulum
+from vsp.beyond.proofs.pendulum import equilibria, prove_pendulum
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
 from vsp.beyond.robots.fewest import fewest_numbers
@@ -49,9 +49,10 @@ OUTSIDE = {
         paper.audit paper.beside paper.ledger paper.make_runs paper.runs paper.studies beyond.benchmarks
         beyond.comparison teachers.recipes teachers.train""",
     "draw such tables, histories and runs, with tests of what they refuse": """
-        show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.replay
-        show.stage""",
-    "checks certificates, which its own tests spoil; writes them": "beyond.proofs.check beyond.proofs.make_proofs",
+        show.animation show.benchmarks show.explanation show.gait show.laboratory show.methods show.page show.proofs
+        show.replay show.stage""",
+    "checks certificates, which its own tests spoil; writes and reads them": """
+        beyond.proofs.check beyond.proofs.make_proofs beyond.proofs.tables""",
     "machinery around the method, and the course, with tests of their own faults": "run course",
     "what the others check with": "checks",
 }
@@ -289,6 +290,10 @@ CASES = {
     "beyond.proofs.pendulum.prove_pendulum": (
         functools.partial(prove_pendulum, vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")),
         {"n": count(16, most=8000)},
+    ),
+    "beyond.proofs.pendulum.equilibria": (
+        functools.partial(equilibria, vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")),
+        {"n": count(50, least=16)},
     ),
     "beyond.proofs.network.teacher_steps_to_goal": (
         functools.partial(teacher_steps_to_goal, load_teacher("SimpleGoal-v0")),
@@ -637,7 +642,8 @@ EXEMPT = {
         beyond.robots.choice beyond.robots.imitation.Pushed beyond.robots.imitation.cells_fit
         beyond.robots.random_search.RunningMoments""",
     "follow a policy, which they check, or work on what `follow` found: see their own tests": """
-        beyond.proofs.dead_points beyond.proofs.grid beyond.proofs.mountaincar beyond.proofs.network.affine_outputs
+        beyond.proofs.dead_points beyond.proofs.grid beyond.proofs.mountaincar beyond.proofs.mountaincar_reals
+        beyond.proofs.network.affine_outputs
         beyond.proofs.pendulum.PendulumProof beyond.proofs.pendulum.check_swinging beyond.proofs.polygons
         beyond.proofs.proof beyond.proofs.prove beyond.proofs.returns beyond.proofs.robust.least_gap
         beyond.proofs.robust.outside_pit beyond.proofs.robust.proved beyond.proofs.robust.way_to

@@ -237,6 +237,30 @@ def test_what_cells_buy_is_that_of_the_table():
         assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}
 
 
+def test_what_is_said_to_be_certain_is_in_its_tables():
+    block = " ".join(RESULTS.partition("## What is certain?")[2].partition("\n## ")[0].split())
+    rows = pd.read_csv(ROOT / "data/results/proofs.csv").set_index("name")
+    paper, one, tuned, margin, car = (
+        rows.loc[name]
+        for name in (
+            "simplegoal_paper",
+            "simplegoal_one_map",
+            "simplegoal_tuned",
+            "simplegoal_margin",
+            "mountaincar_limit",
+        )
+    )
+    assert f"pit from {paper['pit']:.4%}".replace("%", " %") in block and f"map from {one['pit']:.4%}"[:-1] in block
+    assert tuned["program"] == margin["program"] == 1.0 and (tuned["cells"], margin["cells"]) == (4, 3)
+    assert f"goal within {tuned['longest']} steps" in block and f"same within {margin['longest']} steps" in block
+    assert f"off by {margin['disturbance']:.4f}" in block
+    assert f"({car['n_states']:,.0f} states) and returns at least {car['least']:.3f}" in block
+    assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0
+    for name in ("grid", "teacher"):
+        share = pd.read_csv(ROOT / f"data/results/proofs_{name}.csv")["share"].iloc[-1]
+        assert f"from {100 * share:.1f} % of the starts" in block
+
+
 def test_what_is_said_of_the_limit_is_in_its_tables():
     block = RESULTS.partition("## How good can a few cells be?")[2].partition("\n## ")[0]
     best, sizes, starts, robots = (

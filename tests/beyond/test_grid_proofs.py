@@ -9,7 +9,7 @@ from vsp.beyond import comparison
 from vsp.beyond.proofs import check, teacher_steps_to_goal
 from vsp.beyond.proofs.grid import Way, around, invariant, steps_into
 from vsp.beyond.proofs.network import affine_outputs
-from vsp.beyond.proofs.pendulum import prove_pendulum
+from vsp.beyond.proofs.pendulum import equilibria, prove_pendulum
 from vsp.tasks import GOAL
 
 N = 400
@@ -94,6 +94,16 @@ def test_without_a_torque_nothing_is_proved():
     proof = prove_pendulum(still, n=80)
     assert not proof.kept.any() and proof.share == 0.0 and proof.claim["longest"] == 0
     assert check.check_content(proof.certificate()) == proof.claim
+
+
+def test_where_a_pendulum_at_rest_stays(proof):
+    still = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
+    assert equilibria(still) == pytest.approx([0.0, np.pi], abs=1e-9)
+    left, upright, right = equilibria(proof.policy)  # beside upright the torque's limit just holds the rod
+    assert abs(upright) < 0.1 and left == pytest.approx(-right) and 15 * np.sin(right) == pytest.approx(3 * 2)
+    states = np.array([[angle, 0.0] for angle in (left, upright, right)])
+    moved = vsp.get_task(PENDULUM).step(states, proof.policy.predict(vsp.get_task(PENDULUM).see(states))[0])[0]
+    assert np.allclose(moved, states, atol=1e-9)
 
 
 def mutants(content, rng):

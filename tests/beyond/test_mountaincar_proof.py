@@ -1,3 +1,4 @@
+import copy
 import shutil
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL
 
 import vsp
 from vsp.beyond import comparison
-from vsp.beyond.proofs import check, mountaincar
+from vsp.beyond.proofs import check, load_certificate, mountaincar
 from vsp.beyond.proofs.mountaincar import MountainCarProof, Program, first_steps, prove_mountaincar, run_block, step
 
 
@@ -122,3 +123,41 @@ def test_blocks_make_the_claim(policy):
     content = MountainCarProof(policy, (blocks[0], gap)).certificate()
     with pytest.raises(check.Refused, match="expected one or more from 50"):
         check.check_content(content)
+
+
+def mutants(content):
+    """Certificates whose claim is false, or whose blocks do not prove it."""
+    for kind in ("drop", "swap", "shift", "claim", "least", "longest", "mean", "policy"):
+        mutant = copy.deepcopy(content)
+        blocks, claim = mutant["pieces"], mutant["claim"]
+        worst = min(blocks, key=lambda block: block["least"])
+        if kind == "drop":
+            del blocks[7]
+        elif kind == "swap":
+            blocks[3], blocks[4] = blocks[4], blocks[3]
+        elif kind == "shift":
+            blocks[3]["n"] -= 1
+            blocks[4]["first"] -= 1
+        elif kind == "claim":
+            claim["least"] += 1e-3
+        elif kind == "least":
+            for block in blocks:
+                block["least"] = max(block["least"], claim["least"] + 0.1)
+            claim["least"] = min(block["least"] for block in blocks)
+        elif kind == "longest":
+            for block in blocks:
+                block["longest"] = min(block["longest"], claim["longest"] - 50)
+            claim["longest"] -= 50
+        elif kind == "mean":
+            for part in (*blocks, claim):
+                part["mean_low"], part["mean_high"] = part["mean_low"] + 0.02, part["mean_high"] + 0.02
+        else:
+            mutant["policy"]["coefficients"][worst["n"] % 3][1][0] += 2.0
+        yield kind, mutant
+
+
+def test_the_checker_refuses_every_mutant():
+    for kind, mutant in mutants(load_certificate("mountaincar_limit")[1]):
+        with pytest.raises(check.Refused):
+            check.check_content(mutant)
+            pytest.fail(f"accepted a mutant: {kind}")

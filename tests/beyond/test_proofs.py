@@ -12,10 +12,12 @@ from support import MOUNTAINCAR, SIMPLEGOAL
 
 import vsp
 from vsp.beyond import comparison
-from vsp.beyond.proofs import check, largest_disturbance, proved, returns, steps_to_goal
+from vsp.beyond.proofs import check, largest_disturbance, load_certificate, proved, returns, steps_to_goal
 from vsp.beyond.proofs.polygons import box, line_of, meet, total
+from vsp.beyond.proofs.proof import CERTIFICATES
 from vsp.beyond.proofs.simplegoal import follow
 from vsp.beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
+from vsp.paper.results import read_results
 from vsp.run import sealed
 from vsp.tasks import GOAL, PIT, TRUNCATED
 
@@ -264,3 +266,39 @@ def test_the_checker_shares_no_code_with_the_prover():
 
 def test_outcomes_have_names():
     assert set(ENDS) == {GOAL, PIT, TRUNCATED}
+
+
+# The committed certificates
+
+
+@pytest.mark.parametrize("path", sorted(CERTIFICATES.glob("*.json")), ids=lambda path: path.stem)
+def test_committed_certificates_prove_what_the_table_says(path):
+    claim = check.check(path)
+    row = read_results("proofs").set_index("name").loc[path.stem]
+    assert row["longest"] == claim["longest"] and path.stat().st_size < 2e6
+    for name in ("goal", "pit", "left"):
+        if name in claim:
+            assert row[name] == pytest.approx(float(Fraction(claim[name])), rel=1e-9)
+            error = np.sqrt(row[name] * (1 - row[name]) / row["sampled"])
+            assert abs(row[f"sampled_{name}"] - row[name]) < 5 * error + 2e-6
+    for name in ("least", "mean_low", "mean_high"):
+        if name in claim:
+            assert row[name] == pytest.approx(claim[name], abs=1e-6)
+
+
+def test_certificates_are_of_the_kept_policies():
+    for name in ("simplegoal_faithful", "simplegoal_limit", "mountaincar_limit", "pendulum_faithful"):
+        policy = load_certificate(name)[0]
+        kept = vsp.VoronoiPolicy.load(comparison.RESULTS / f"{name.split('_')[1]}_{policy.task.name}.policy")
+        for part in ("codewords", "coefficients", "scale"):
+            assert np.array_equal(getattr(policy, part), getattr(kept, part))
+
+
+def test_policies_with_the_theorem():
+    """From every start outside the pit the program reaches the goal."""
+    rows = read_results("proofs").set_index("name")
+    certain = rows.index[rows["program"] == 1.0]
+    assert {"simplegoal_tuned", "simplegoal_faithful", "simplegoal_margin"} <= set(certain)
+    assert (rows.loc[certain, "failing_outside"] == 0).all()
+    steps = steps_to_goal(load_certificate("simplegoal_tuned")[0])
+    assert proved(steps) and steps.max() == rows.loc["simplegoal_tuned", "longest"]

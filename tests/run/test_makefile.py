@@ -172,7 +172,7 @@ def test_a_killed_set_up_blocks_nobody(checkout):
 
 
 PARTS = {
-    "paper-figures all quick lab course runs study lookup 01_teacher 08_methods figures/ledger.pdf": {"draw"},
+    "paper-figures all quick lab course runs study lookup 01_teacher 09_methods figures/ledger.pdf": {"draw"},
     "short-teachers beyond": {"draw", "train"},
     "teachers beyond-long": {"draw", "train", "mujoco"},
     "test test-long bench faults": {"draw", "train", "test", "dask"},

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from ..tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW
 from .style import COLOURS, PIT
 
-FAILING = COLOURS[3]
+FAILING, KEPT = COLOURS[3], COLOURS[4]
 STEPS = "viridis_r"  # few steps are light
 
 
@@ -37,11 +37,11 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
 
 def upright(ax: Axes, numbers: np.ndarray, most: int) -> ScalarMappable:
     """Pendulum's states, in boxes of angle by angular velocity `numbers` (n, n): steps to a set around upright that is
-    never left, -1 in the set (orange), 0 where nothing is proved (white)."""
+    never left, -1 in the set (pink), 0 where nothing is proved (white)."""
     colours = ScalarMappable(Normalize(0, most), STEPS)
     pixels = colours.to_rgba(np.maximum(numbers.T, 0).astype(float))
     pixels[numbers.T == 0] = 1.0
-    pixels[numbers.T == -1] = mpl.colors.to_rgba(FAILING)
+    pixels[numbers.T == -1] = mpl.colors.to_rgba(KEPT)
     ax.imshow(pixels, origin="lower", extent=(-np.pi, np.pi, -8, 8), aspect="auto", interpolation="nearest")
     ax.set(xlabel="angle (rad)", ylabel="angular velocity (rad/s)")
     ax.set_xticks([-np.pi, 0, np.pi], ["−π", "0", "π"])

@@ -12,4 +12,3 @@ from .network import teacher_steps_to_goal
 from .proof import Proof, load_certificate
 from .prove import prove
 from .robust import largest_disturbance, proved, steps_to_goal
-from .tables import dead_point_table, least_returns, pendulum_steps, simplegoal_table

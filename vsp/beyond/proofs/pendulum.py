@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...checks import check_count
 from ...policy import VoronoiPolicy
-from ...tasks.pendulum import TASK
+from ...tasks.pendulum import TASK, see
 from .grid import Way, around, invariant, steps_into
 from .proof import Proof
 from .robust import ROUNDING, SEEN, least_gap
@@ -76,6 +77,26 @@ def prove_pendulum(policy: VoronoiPolicy, *, n: int = 2000) -> PendulumProof:
     near = np.repeat((np.abs(angle) + np.pi / n < UPRIGHT)[:, None], n, axis=1)
     kept = invariant(near, ways, periodic=True)
     return PendulumProof(policy, kept, steps_into(kept, ways, TASK.max_steps, periodic=True))
+
+
+def equilibria(policy: VoronoiPolicy, *, n: int = 100_000) -> np.ndarray:
+    """Angles (rad) at which a pendulum at rest stays, in increasing order: starts from which nothing moves.
+
+    Looked for between `n` angles, where the acceleration changes its sign within a cell; not proved to be all. Raises
+    ValueError as `prove_pendulum` does.
+    """
+    check_swinging(policy)
+    check_count("n", n, least=16)
+
+    def acceleration(angle: np.ndarray) -> np.ndarray:
+        states = np.column_stack([angle, np.zeros_like(angle)])
+        return FALL * np.sin(angle) + PUSH * policy.predict(see(states))[0][:, 0]
+
+    angles = np.linspace(-np.pi, np.pi, n) + 1e-7  # no root by symmetry lies on one of them
+    found, cells = acceleration(angles), policy.cells(see(np.column_stack([angles, np.zeros(n)])))
+    crossed = np.flatnonzero((np.sign(found[:-1]) != np.sign(found[1:])) & (cells[:-1] == cells[1:]))
+    pairs = zip(angles[crossed], angles[crossed + 1])
+    return np.array([brentq(lambda angle: acceleration(np.array([angle]))[0], *pair) for pair in pairs])
 
 
 def check_swinging(policy: VoronoiPolicy) -> None:

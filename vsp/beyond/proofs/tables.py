@@ -17,11 +17,11 @@ from .proof import load_certificate
 NAMES = {
     "simplegoal_paper": "the paper's, as published",
     "simplegoal_best_run": "the paper's method, best rerun",
-    "simplegoal_faithful": "faithful",
-    "simplegoal_tuned": "tuned",
-    "simplegoal_limit": "at the limit",
-    "simplegoal_simplified": "simplified",
     "simplegoal_one_map": "one linear map",
+    "simplegoal_limit": "at the limit",
+    "simplegoal_faithful": "faithful",
+    "simplegoal_simplified": "simplified",
+    "simplegoal_tuned": "tuned",
     "simplegoal_margin": "tuned with a margin",
 }
 N_RETURNS = 2000  # starts whose mean return stands beside a dead point
@@ -63,6 +63,19 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
             "mean return": found.returns.mean(), "failing": (found.lengths == mountaincar.TASK.max_steps).mean(),
         })  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def pendulum_table() -> pd.DataFrame:
+    """What is proved of Pendulum by finer and finer grids. Columns: boxes (per axis), share of starts, steps (the most,
+    from any box)."""
+    return read_results("proofs_grid").rename(columns={"n": "boxes", "longest": "steps"})[["boxes", "share", "steps"]]
+
+
+def teacher_table() -> pd.DataFrame:
+    """What is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit, steps (at
+    most), minutes that it took."""
+    found = read_results("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
+    return found.assign(minutes=found["seconds"] / 60).drop(columns="seconds")
 
 
 def least_returns() -> tuple[np.ndarray, np.ndarray]:

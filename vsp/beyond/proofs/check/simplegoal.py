@@ -98,6 +98,7 @@ class Policy:
             raise Refused(f"the metric is {metric!r}, expected 'euclidean' or 'manhattan'")
         self.metric, self.scale = metric, [Fraction(s) for s in scale]
         self.codewords = [[Fraction(number) for number in codeword] for codeword in codewords]
+        self.sizes = [float(s) for s in scale]
         self.rough = [[number / s for number, s in zip(codeword, scale)] for codeword in codewords]
         self.maps = [[[Fraction(row[axis]) for row in one] for axis in (0, 1)] for one in coefficients]
 
@@ -127,18 +128,34 @@ class Policy:
     def cell(self, polygon: list, number: int) -> list:
         """The convex parts of `polygon` in a cell."""
         parts = [polygon]
-        for other in range(len(self.codewords)):
-            if other != number:
-                parts = [part for one in parts for part in self.nearer(one, number, other)]
+        for other in self.rivals(polygon, number):
+            parts = [part for one in parts for part in self.nearer(one, number, other)]
         return parts
+
+    def rivals(self, polygon: list, number: int) -> list[int]:
+        """Other codewords that may be nearer to some of `polygon`, if only for rounding.
+
+        In the Manhattan distance, what a coordinate adds to the difference is monotone, so it is largest at an end.
+        """
+        others = [other for other in range(len(self.codewords)) if other != number]
+        if self.metric == "euclidean":
+            return others
+        ends = [(min(values) / s, max(values) / s) for values, s in zip(zip(*(p[2] for p in polygon)), self.sizes)]
+        own = [(abs(low - c), abs(high - c)) for (low, high), c in zip(ends, self.rough[number])]
+        found = []
+        for other in others:
+            most, doubt = 0.0, DOUBT
+            for (low, high), (at_low, at_high), d in zip(ends, own, self.rough[other]):
+                most += max(at_low - abs(low - d), at_high - abs(high - d))
+                doubt += DOUBT * (at_low + at_high + abs(d))
+            if most >= -doubt:
+                found.append(other)
+        return found
 
     def nearer(self, polygon: list, number: int, other: int) -> list:
         """The convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
         parts = [(polygon, ())]
-        if self.metric == "manhattan":
-            if self.surely_nearer(polygon, number, other):
-                return [polygon]
-            # Between the coordinates of the codewords, distances are linear
+        if self.metric == "manhattan":  # between the coordinates of the codewords, distances are linear
             for axis in (0, 1):
                 for i in (number, other):
                     (p, q, _), value = OWN[axis], self.codewords[i][axis]
@@ -151,17 +168,6 @@ class Policy:
             if half := (one if number < other else None) if tied else halves(one, gap)[0]:
                 found.append(half)
         return found
-
-    def surely_nearer(self, polygon: list, number: int, other: int) -> bool:
-        """Whether all of `polygon` is nearer to codeword `number`, beyond doubt from rounding. What a coordinate adds
-        to the difference of the distances is monotone, so it is largest at an end."""
-        most = doubt = 0.0
-        for axis, values in enumerate(zip(*(state for _, _, state in polygon))):
-            c, d, scale = self.rough[number][axis], self.rough[other][axis], float(self.scale[axis])
-            low, high = min(values) / scale, max(values) / scale
-            most += max(abs(low - c) - abs(low - d), abs(high - c) - abs(high - d))
-            doubt += DOUBT * (1.0 / scale + abs(c) + abs(d))
-        return most < -doubt
 
     @cache  # noqa: B019 - it lives as long as the check
     def gap(self, number: int, other: int, at: tuple) -> Form:
