@@ -272,10 +272,11 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
         returns = f"{known['best']:.3f} | {known['teacher']:.3f} | {row['size']} | {row['mean']:.3f}"
         assert f"| {row['task']} | {returns} | {near} |" in block
     assert f"generations reach {starts['mean'][1]:.3f}" in block
-    mean = robots.set_index(["task", "method"])["mean"]
-    walker, cheetah = mean["BipedalWalker"], mean["HalfCheetah"]
-    ours, teacher = "cells, trained further", "robot's teacher"
-    said = " ".join(block.split())
-    assert f"eight cells returns {walker[ours]:.1f} and" in said and f"teacher returns {walker[teacher]:.1f}." in said
-    assert f"cells returns {cheetah[ours]:.0f}, which is {100 * cheetah[ours] / cheetah[teacher]:.0f} % of" in said
-    assert f"found by random search, {cheetah['one map, random search']:.0f}." in said
+    mean, said = robots.set_index(["task", "method", "size"])["mean"], " ".join(block.split())
+    walker, cheetah, ours = mean["BipedalWalker"], mean["HalfCheetah"], "cells, trained further"
+    teacher = walker["robot's teacher", 0], cheetah["robot's teacher", 0]
+    share = 100 * cheetah[ours, 8] / teacher[1]
+    assert f"eight return {cheetah[ours, 8]:.0f}, which is {share:.0f} % of its teacher's return." in said
+    assert f"training returns {cheetah[ours, 1]:.0f}, and" in said
+    assert f"random search, {cheetah['one map, random search', 0]:.0f}." in said
+    assert f"cells return {walker[ours, 8]:.1f}, one cell {walker[ours, 1]:.1f}, its teacher {teacher[0]:.1f}." in said

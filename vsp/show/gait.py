@@ -103,4 +103,10 @@ def save_gait(
 
 def _name_cells(ax: Axes, colors: dict[int, str]) -> None:
     marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell + 1}") for cell, color in colors.items()]
-    ax.legend(handles=marks, ncol=len(marks), frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    place = {
+        "loc": "lower right",
+        "bbox_to_anchor": (1.0, 1.0),
+        "handlelength": 1.0,
+        "columnspacing": 1.0,
+    }  # beside a title
+    ax.legend(handles=marks, ncol=len(marks), frameon=False, **place)

@@ -17,6 +17,7 @@ from .settings import Walking
 
 N_CHOICES = 20  # times, evenly spread over the training, that the actor is kept
 NOISE = 0.1  # of exploration, as in the teacher's own training
+STEPS_PER_UPDATE = 2  # twice as many updates for the same steps return no more
 
 
 def train_further(frame: Frame, numbers, teacher: Teacher, config: Walking, *, seed: int) -> Policy:
@@ -57,21 +58,29 @@ def _model(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int):
     from .actors import SoftActor
 
     class Patient(TD3):
-        """TD3 that waits until the replay buffer is filled, and whose actor has its own learning rate."""
+        """TD3 that waits until the replay buffer is filled, and whose actor has its own, falling learning rate."""
 
         def train(self, gradient_steps: int, batch_size: int = 100) -> None:
             if self.num_timesteps > config.n_filling:
                 super().train(gradient_steps, batch_size)
 
         def _update_learning_rate(self, optimizers: list) -> None:
-            """They stay as they were set."""
+            """The cells' falls to 0, so that they come to rest; the critics' to a tenth, so that they follow."""
+            left = max(0.0, 1 - self.num_timesteps / config.n_steps)
+            for optimizer, rate in (
+                (self.actor.optimizer, config.learning_rate * left),
+                (self.critic.optimizer, config.critic_rate * max(left, 0.1)),
+            ):
+                for group in optimizer.param_groups:
+                    group["lr"] = rate
 
     critics = {name: torch.tensor(value) for name, value in teacher.critic_weights().items()}
     hidden = [len(value) for name, value in critics.items() if name.startswith("qf0") and name.endswith("bias")][:-1]
     m = len(frame.task.action_low)
     model = Patient(
         "MlpPolicy", gymnasium.make(frame.task.name), learning_rate=config.critic_rate, gamma=config.gamma,
-        buffer_size=config.n_steps, learning_starts=0, batch_size=config.batch_size, seed=seed, device="cpu",
+        buffer_size=config.n_steps, learning_starts=0, batch_size=config.batch_size, train_freq=STEPS_PER_UPDATE,
+        gradient_steps=1, seed=seed, device="cpu",
         action_noise=NormalActionNoise(np.zeros(m), NOISE * np.ones(m)),
         policy_kwargs={"net_arch": {"pi": [], "qf": hidden}, "optimizer_kwargs": {"fused": True}},
     )  # fmt: skip

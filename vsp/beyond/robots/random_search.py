@@ -18,6 +18,7 @@ from .settings import Walking
 
 EVERY = 8  # of so many observations, one counts for their mean and deviation
 N_CHOICES = 20  # times, evenly spread over the search, that the map is kept
+LEAST_REWARD = -10.0  # per step, in the search: the price of a fall, 100, hides what a map did before it
 
 
 class RunningMoments:
@@ -49,14 +50,14 @@ def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPo
     """
     check_seed(seed)
     task = get_task(task)
-    d, m = len(task.low), len(task.action_low)
+    forgiving, d, m = _forgiving(task), len(task.low), len(task.action_low)
     starts, noise, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3))
     weights, moments, played, on_the_way = np.zeros((d, m)), RunningMoments(d), 0, []
     while played < config.n_random_steps:
         directions = noise.normal(size=(config.n_directions, d, m))
         both = np.concatenate([directions, -directions])
         tried = [_policy(weights + config.search_noise * one, moments, task) for one in both]
-        results, seen = _played(tried, task, task.start(starts, 1))
+        results, seen = _played(tried, forgiving, task.start(starts, 1))
         played += sum(int(result.lengths.sum()) for result in results)
         returns = np.array([result.returns.mean() for result in results]).reshape(2, -1)
         kept = np.argsort(-returns.max(axis=0), kind="stable")[: config.n_best]
@@ -67,6 +68,16 @@ def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPo
         if played * N_CHOICES // config.n_random_steps > len(on_the_way):
             on_the_way.append(_policy(weights, moments, task))
     return most_rewarding(on_the_way, task, config.n_validation, validation)
+
+
+def _forgiving(task: Task) -> Task:
+    """`task` without rewards below `LEAST_REWARD`."""
+
+    def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        moved, rewards, outcomes = task.step(states, actions)
+        return moved, np.maximum(rewards, LEAST_REWARD), outcomes
+
+    return replace(task, step=step)
 
 
 def _policy(weights: np.ndarray, moments: RunningMoments, task: Task) -> VoronoiPolicy:
