@@ -1,12 +1,20 @@
+import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 from matplotlib.colors import to_rgba
 
 from vsp import show
 from vsp.show.proofs import FAILING, KEPT
 
 
-def test_basins_show_failing_pieces_above_the_others():
-    _, (ax,) = show.panels()
+@pytest.fixture
+def ax():
+    fig, (ax,) = show.panels()
+    yield ax
+    plt.close(fig)
+
+
+def test_basins_show_failing_pieces_above_the_others(ax):
     halves = [np.array([[0, 0], [1, 0], [1, 1]]), np.array([[0, 0], [1, 1], [0, 1]])]
     colours = show.basins(ax, halves, [3, 5], np.array([True, False]), most=10)
     reached, failing = ax.collections
@@ -14,8 +22,7 @@ def test_basins_show_failing_pieces_above_the_others():
     assert np.allclose(failing.get_facecolor(), to_rgba(FAILING)) and len(ax.patches) == 2
 
 
-def test_upright_has_a_colour_for_each_kind_of_box():
-    _, (ax,) = show.panels()
+def test_upright_has_a_colour_for_each_kind_of_box(ax):
     numbers = np.zeros((4, 4), dtype=int)
     numbers[0, 1], numbers[2, 3] = -1, 7
     colours = show.upright(ax, numbers, most=10)
