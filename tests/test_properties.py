@@ -645,9 +645,9 @@ EXEMPT = {
         beyond.proofs.dead_points beyond.proofs.grid beyond.proofs.mountaincar beyond.proofs.mountaincar_reals
         beyond.proofs.network.affine_outputs
         beyond.proofs.pendulum.PendulumProof beyond.proofs.pendulum.check_swinging beyond.proofs.polygons
-        beyond.proofs.proof beyond.proofs.prove beyond.proofs.returns beyond.proofs.robust.least_gap
-        beyond.proofs.robust.outside_pit beyond.proofs.robust.proved beyond.proofs.robust.way_to
-        beyond.proofs.simplegoal beyond.proofs.simplegoal_proof""",
+        beyond.proofs.proof beyond.proofs.prove beyond.proofs.returns beyond.proofs.robust.largest_tie
+        beyond.proofs.robust.least_gap beyond.proofs.robust.outside_pit beyond.proofs.robust.proved
+        beyond.proofs.robust.way_to beyond.proofs.simplegoal beyond.proofs.simplegoal_proof""",
     "of robots with an engine, and what it recorded: see their own tests": "beyond.robots.gait",
     "trains networks for minutes: see their own tests": "beyond.robots.actors beyond.robots.further_training",
     "distils several times: see its own tests": "beyond.optimum.limit.at_the_limit",

@@ -252,7 +252,8 @@ def test_what_is_said_to_be_certain_is_in_its_tables():
     )
     assert f"pit from {paper['pit']:.4%}".replace("%", " %") in block and f"map from {one['pit']:.4%}"[:-1] in block
     assert tuned["program"] == margin["program"] == 1.0 and (tuned["cells"], margin["cells"]) == (4, 3)
-    assert f"goal within {tuned['longest']} steps" in block and f"same within {margin['longest']} steps" in block
+    assert f"goal within {tuned['program_steps']:.0f} steps" in block
+    assert f"same within {margin['program_steps']:.0f} steps" in block
     assert f"off by {margin['disturbance']:.4f}" in block
     assert f"({car['n_states']:,.0f} states) and returns at least {car['least']:.3f}" in block
     assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0

@@ -1,5 +1,7 @@
 """Proofs over a grid: of Pendulum, and of a network."""
 
+import copy
+
 import numpy as np
 import pytest
 from support import PENDULUM, SIMPLEGOAL
@@ -141,6 +143,19 @@ def test_the_checker_agrees_and_refuses_every_mutant(proof):
         with pytest.raises(check.Refused):
             check.check_content(mutant)
             pytest.fail(f"accepted a mutant: {kind}")
+
+
+@pytest.mark.parametrize(
+    ("alter", "match"),
+    [(lambda c: c["pieces"].__setitem__(0, [-0.5, N]), "whole numbers"),
+     (lambda c: c["pieces"].__setitem__(0, [201, N]), "numbers are -1 to 201"),
+     (lambda c: c["policy"]["codewords"].__setitem__(0, [1e200] * 3), "malformed"),
+     (lambda c: c["policy"]["coefficients"].pop(), "8 codewords, but 7 maps")],
+)  # fmt: skip
+def test_a_forged_certificate_is_refused(proof, alter, match):
+    alter(forged := copy.deepcopy(proof.certificate()))
+    with pytest.raises(check.Refused, match=match):
+        check.check_content(forged)
 
 
 @pytest.mark.parametrize(

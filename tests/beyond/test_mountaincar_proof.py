@@ -49,6 +49,16 @@ def test_the_step_is_gymnasiums_bit_for_bit(env):
     assert np.array_equal(np.column_stack([found["x"], found["v"], found["ended"]]), wanted.astype(np.float32))
 
 
+def test_our_batched_step_rounds_otherwise_in_some_steps(env):
+    rng = np.random.default_rng(0)
+    states = rng.uniform([-1.2, -0.07], [0.6, 0.07], size=(20_000, 2)).astype(np.float32)
+    actions = rng.uniform(-1, 1, size=len(states))
+    ours = vsp.get_task(MOUNTAINCAR).step(states.astype(float), actions[:, None])[0].astype(np.float32)
+    program = step(states, actions)
+    differ = (ours != np.column_stack([program["x"], program["v"]])).any(axis=1)
+    assert 0.03 < differ.mean() < 0.06  # "about 4 %" in notebook 08
+
+
 @pytest.mark.parametrize("first", [0, 2_500_000, 5_033_166 - 300])
 def test_all_first_steps_are_among_those_found(policy, env, first):
     low, high = (check.mountaincar.edge(first + i, -1) for i in (0, 300))
@@ -121,8 +131,17 @@ def test_blocks_make_the_claim(policy):
     assert claim["mean_low"] == pytest.approx(sum(block.mean_low * block.width for block in blocks))
     gap = replace(blocks[1], first=60)
     content = MountainCarProof(policy, (blocks[0], gap)).certificate()
-    with pytest.raises(check.Refused, match="expected one or more from 50"):
+    with pytest.raises(check.Refused, match="expected 1 to 10000 observations from 50"):
         check.check_content(content)
+
+
+def test_one_block_of_all_is_refused(policy):
+    """A check plays a start of each block: with few blocks it would look at few starts."""
+    content = load_certificate("mountaincar_limit")[1]
+    n = sum(block["n"] for block in content["pieces"])
+    one = {**content["pieces"][0], **content["claim"], "n": n}
+    with pytest.raises(check.Refused, match=f"{n}.*expected 1 to 10000 observations"):
+        check.check_content({**content, "pieces": [one]})
 
 
 def mutants(content):

@@ -65,7 +65,9 @@ def _all_within(good: np.ndarray, ways: Sequence[Way], periodic: bool) -> np.nda
     others = ~good
     count = np.zeros((len(good) * (1 + periodic) + 1, good.shape[1] + 1), dtype=np.int32)  # a summed-area table
     count[1:, 1:] = np.concatenate([others] * (1 + periodic)).cumsum(axis=0, dtype=np.int32).cumsum(axis=1)
-    found = np.ones(good.size, dtype=bool)
+    found = np.zeros(good.size, dtype=bool)  # a box without a way is not known
+    for way in ways:
+        found[way.boxes] = True
     for way in ways:
         (a, b), (c, d) = way.first, way.last
         outside = count[c, d] - count[a, d] - count[c, b] + count[a, b]

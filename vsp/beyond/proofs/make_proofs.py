@@ -56,8 +56,8 @@ def main() -> None:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
     certificates(Path(arguments.out))
-    write_results(pd.DataFrame([reals()]), "proofs_reals", out=arguments.out)
-    write_results(pd.DataFrame(grid(n) for n in GRIDS), "proofs_grid", out=arguments.out)
+    write_results(pd.DataFrame([reals()]), "proofs_reals", out=arguments.out, float_format="%.17g")
+    write_results(pd.DataFrame(grid(n) for n in GRIDS), "proofs_grid", out=arguments.out, float_format="%.12g")
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
@@ -118,12 +118,8 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
     areas["failing_outside"] = float(proof.failing_outside)  # the pit
     found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
-    return found | {
-        "program": float(
-            (steps > 0)[outside].mean()
-        ),  # share outside the pit that the program surely takes to the goal
-        "disturbance": largest_disturbance(proof.policy),
-    }
+    of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
+    return found | of_program | {"disturbance": largest_disturbance(proof.policy)}
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:

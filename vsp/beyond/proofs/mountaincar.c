@@ -66,6 +66,10 @@ static State step(const Program *p, State s, int cell, int t, double *total, End
     *total -= 0.1 * fmax(least * least, most * most);
     if (low.x == high.x && low.v == high.v && low.ended == high.ended) return low;
     if (high.ended) end(ends, *total + 100, t);
+    if (high.v < low.v) { /* the wall may stop the car, or not: too rare to follow */
+        ends->doubts = -1;
+        return low;
+    }
     int ways = 0;
     for (float x = low.x; x <= high.x; x = nextafterf(x, INFINITY))
         for (float v = low.v; v <= high.v; v = nextafterf(v, INFINITY)) {

@@ -4,7 +4,8 @@ Gymnasium keeps the state in float32 after the first step, so there are finitely
 policy sees them in float32: some five million observations, from each of which the first step leads to a few states.
 From every one of these, C plays the episode to its end (mountaincar.c). What an action or a cosine may differ by, from
 one library to the next, is bounded; where it decides how a state is rounded or which cell is nearest, all ways are
-followed. So what is found holds for Gymnasium's `step`, with any library whose cosine is right to `COSINE`.
+followed. So what is found holds for Gymnasium's `step` with NumPy 2 and the float64 actions of `VoronoiPolicy.predict`,
+and any library whose cosine is right to `COSINE`.
 """
 
 from __future__ import annotations
@@ -145,13 +146,14 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     # Along the starts the velocity falls and the position rises, for 3 x is near -pi / 2
     most = actions[1] * 0.0015 - 0.0025 * (np.cos(3 * low) - COSINE)
     least = actions[0] * 0.0015 - 0.0025 * (np.cos(3 * high) + COSINE)
+    doubt = (actions[1] - actions[0]) * 0.0015 + 0.005 * COSINE
     which, velocities = _between(least, most)
-    low, high, least, most = low[which], high[which], least[which], most[which]
+    low, high, least, most, doubt = (one[which] for one in (low, high, least, most, doubt))
     above, below = (np.clip(_halfway(velocities, side), least, most) for side in (1, -1))
     steepness = 0.0075 * np.abs(np.sin(3 * low))
-    begin = np.maximum(low, low + (most - above) / steepness * (1 - 1e-6) - 1e-12)
-    end = np.minimum(high, low + (most - below) / steepness * (1 + 1e-6) + 1e-12)
-    again, positions = _between(begin + above, end + below)
+    begin = np.maximum(low, low + (most - above - doubt) / steepness * (1 - 1e-6) - 1e-12)
+    end = np.minimum(high, low + (most - below + doubt) / steepness * (1 + 1e-6) + 1e-12)
+    again, positions = _between(begin + above - doubt, end + below + doubt)
     which = which[again]
     rewards = -0.1 * np.square(actions).max(axis=0)
     return np.column_stack([positions, velocities[again]]), index[which], rewards[which]

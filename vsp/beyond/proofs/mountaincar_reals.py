@@ -55,15 +55,15 @@ class Pieces:
         centre, along = whole.centre + (begin + end) / 2 * whole.along, (end - begin) / 2 * whole.along
         return replace(whole, low=low, high=high, centre=centre, along=along, rest=whole.rest + ROUNDING * BOTH)
 
-    def ranges(self, x, v, constant) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def ranges(self, x, v, constant, lost=0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of a linear function: its value in the middle, how much it changes from there to the end of the piece, and
-        what the remainder may add. (n,) each"""
-        size = self.rest * np.hypot(x, v * SWING) + ROUNDING * (np.abs(x) + np.abs(v) + np.abs(constant))
+        what the remainder may add. (n,) each. `lost`: the size of what cancelled in its numbers"""
+        size = self.rest * np.hypot(x, v * SWING) + ROUNDING * (np.abs(x) + np.abs(v) + np.abs(constant) + lost)
         return x * self.centre[0] + v * self.centre[1] + constant, x * self.along[0] + v * self.along[1], size
 
-    def cut(self, x, v, constant) -> tuple[Pieces, Pieces, Pieces]:
+    def cut(self, x, v, constant, lost=0.0) -> tuple[Pieces, Pieces, Pieces]:
         """The parts where a linear function of the state is surely below 0, in doubt, and surely above."""
-        value, change, size = self.ranges(x, v, constant)
+        value, change, size = self.ranges(x, v, constant, lost)
         change = np.where(np.abs(change) > 1e-300, change, 1e-300)
         up, ends = change > 0, np.ones(len(self))
         first, last = np.sort([(-2 * size - value) / change, (2 * size - value) / change], axis=0).clip(-1.0, 1.0)
@@ -128,6 +128,7 @@ class Loop:
         weights = 1.0 / policy.scale**2
         self.slopes, self.offsets = 2 * policy.codewords * weights, np.square(policy.codewords) @ weights
         self.maps = policy.coefficients[:, :, 0]
+        self.largest = float(np.abs(self.slopes).sum(axis=1).max() + self.offsets.max())  # before they cancel
 
     def step(self, pieces: Pieces) -> tuple[Pieces, Pieces, Pieces]:
         """Pieces that go on after a step, that arrived, and that are given up."""
@@ -155,8 +156,8 @@ class Loop:
             pieces, best, rival = pieces.at(~sure), best[~sure], rival[~sure]
             if not len(pieces):
                 break
-            below, sliver, above = pieces.cut(*(self.slopes[best] - self.slopes[rival]).T,
-                                              self.offsets[rival] - self.offsets[best])  # fmt: skip
+            border = *(self.slopes[best] - self.slopes[rival]).T, self.offsets[rival] - self.offsets[best]
+            below, sliver, above = pieces.cut(*border, self.largest)
             near = self.slopes @ sliver.centre - self.offsets[:, None]
             best = near.argmax(axis=0)
             doubt = self._doubt(sliver, best, near)
@@ -171,7 +172,7 @@ class Loop:
         columns, found = np.arange(len(best)), np.empty_like(near)
         for k in range(len(near)):
             x, v = (self.slopes[best] - self.slopes[k]).T
-            _, change, size = pieces.ranges(x, v, self.offsets[k] - self.offsets[best])
+            _, change, size = pieces.ranges(x, v, self.offsets[k] - self.offsets[best], self.largest)
             found[k] = np.abs(change) + size - (near[best, columns] - near[k])
         found[best, columns] = -np.inf
         return found
@@ -206,6 +207,7 @@ class Loop:
         rise = p * pieces.along[0] + q * pieces.along[1]
         width = np.abs(pieces.along[0]) + pieces.rest
         error = BEND * width**2 + POWER * np.maximum(most - 1.0, 0.0) + 4 * ROUNDING
+        error = error + POWER * ROUNDING * (np.abs(x) + np.abs(v) + np.abs(bias))
         rest = _norm(1.0 + p, q * SWING, p / SWING, q) * pieces.rest * (1 + 1e-12) + BOTH * error
         return replace(
             pieces, centre=np.stack([position + velocity, velocity]), along=np.stack([pieces.along[0] + rise, rise]),

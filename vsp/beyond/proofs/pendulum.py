@@ -17,7 +17,7 @@ from ...policy import VoronoiPolicy
 from ...tasks.pendulum import TASK, see
 from .grid import Way, around, invariant, steps_into
 from .proof import Proof
-from .robust import ROUNDING, SEEN, least_gap
+from .robust import ROUNDING, SEEN, largest_tie, least_gap
 
 FASTEST, LIMIT = 8.0, 2.0  # rad/s; of the torque
 START_SPEED = 1.0  # rad/s, of starts
@@ -151,7 +151,7 @@ def _into_boxes(boxes: np.ndarray, angles: list[np.ndarray], speeds: list[np.nda
 
 def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
     """The boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
-    n, found = len(angles), []
+    n, found, tie = len(angles), [], largest_tie(policy, np.array([1.0, 1.0, FASTEST]))
     ranges = [(np.maximum(f(angles) - half[0], -1.0), np.minimum(f(angles) + half[0], 1.0)) for f in (np.cos, np.sin)]
     for i in range(n):  # a row at a time
         low, high = (
@@ -162,6 +162,6 @@ def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarr
         row = np.ones(n, dtype=bool)
         for other in range(len(policy)):
             if other != cell:
-                row &= least_gap(policy, cell, other, low, high) <= ROUNDING
+                row &= least_gap(policy, cell, other, low, high) <= tie
         found.append(np.flatnonzero(row) + i * n)
     return np.concatenate(found)

@@ -17,6 +17,7 @@ from .grid import Way, around, steps_into
 from .simplegoal import check_provable
 
 SEEN = 1e-7  # observations are float32, and may be so far from the state
+TIES = 1e-12  # share of the distances: far more than float64 loses in one
 ROUNDING = 1e-9  # far more than float64 loses in a step; goal and pit are narrower and wider by as much
 
 
@@ -38,7 +39,7 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
 
 def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
     """The largest disturbance of a step under which every start outside the pit is proved to arrive; NaN: not even
-    without one. To `tolerance`; the boxes of the grid, 1 / n wide, cost about as much again."""
+    without one. To `tolerance`. A coarse grid finds less, by about 1 / n."""
     check_number("tolerance", tolerance, least=1e-6, most=0.1)
     low, high = 0.0, STRIDE
     if not proved(steps_to_goal(policy, n=n)):
@@ -63,11 +64,11 @@ def outside_pit(steps: np.ndarray) -> np.ndarray:
 
 def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int) -> Way:
     """Where a step by the map of `cell` leads from each box `low` to `high` (2, n * n) that touches the cell."""
-    seen_low, seen_high = low - SEEN, high + SEEN
+    seen_low, seen_high, tie = low - SEEN, high + SEEN, largest_tie(policy, np.ones(2))
     touched = np.ones(low.shape[1], dtype=bool)
     for other in range(len(policy)):
         if other != cell:
-            touched &= least_gap(policy, cell, other, seen_low, seen_high) <= ROUNDING
+            touched &= least_gap(policy, cell, other, seen_low, seen_high) <= tie
     low, high, seen_low, seen_high = (one[:, touched] for one in (low, high, seen_low, seen_high))
     after_low, after_high = np.empty_like(low), np.empty_like(high)
     for axis in (0, 1):
@@ -93,6 +94,13 @@ def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np
     """The least and the largest value of a linear function over boxes."""
     ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
     return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
+
+
+def largest_tie(policy: VoronoiPolicy, reach: np.ndarray) -> float:
+    """Up to which difference of two distances (of squares, where it is Euclidean) rounding may decide, for observations
+    up to `reach` (d,) in size."""
+    sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
+    return TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
 
 
 def least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""Checks certificates, and shares no code with the prover: who trusts these files need not trust the others.
+"""Checks certificates, and shares no code with the prover: who trusts these files need not trust the others. Only of
+MountainCar, whose proof is a run of all states, a check is a sample.
 
 python -m vsp.beyond.proofs.check FILE ...
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 
 from . import mountaincar, pendulum, simplegoal
 from .refused import Refused
@@ -24,4 +25,18 @@ def check_content(content: dict) -> dict:
     """The claim of a certificate that was read. Raises `Refused`."""
     if content["task"] not in CHECKS:
         raise Refused(f"the task is {content['task']!r}, expected one of {sorted(CHECKS)}")
-    return CHECKS[content["task"]].check_content(content)
+    try:
+        check_numbers(**content["policy"])
+        return CHECKS[content["task"]].check_content(content)
+    except (ValueError, TypeError, LookupError, ArithmeticError) as error:
+        raise Refused(f"the certificate is malformed: {error!r}") from error
+
+
+def check_numbers(codewords: list, coefficients: list, scale: list, metric: str) -> None:
+    """Raise `Refused` for numbers that are not finite, scales that are not positive, or a codeword without a map."""
+    if len(codewords) != len(coefficients):
+        raise Refused(f"the policy has {len(codewords)} codewords, but {len(coefficients)} maps")
+    numbers = [*scale, *(one for codeword in codewords for one in codeword)]
+    numbers += [one for rows in coefficients for row in rows for one in row]
+    if not all(map(math.isfinite, numbers)) or min(scale) <= 0:
+        raise Refused("the policy has numbers that are not finite, or a scale that is not positive")

@@ -1,4 +1,4 @@
-"""Checks Pendulum's certificates: from every box of a grid, a step leads to boxes that are nearer to the set upright.
+"""Checks Pendulum's certificates: from every box of a grid, a step leads to boxes that need a step less.
 
 A certificate names a policy, a claim, and for each row of boxes (one range of angles) runs of boxes (along the angular
 velocity) with a number each: -1 in the set that no step leaves, n for "at most n steps to it", 0 for nothing claimed.
@@ -16,13 +16,16 @@ FASTEST, LIMIT, N_STEPS = 8.0, 2.0, 200
 DT, FALL, PUSH = 0.05, 0.75, 0.15
 SIDES = np.array([[-1.0], [1.0]])
 SEEN, ROUNDING = 1e-7, 1e-10  # observations are float32; float64 loses less
+TIES = 1e-12  # share of the distances that rounding may decide
 
 
 def check_content(content: dict) -> dict:
     """The claim of a certificate that was read. Raises `Refused`."""
     claim, numbers = content["claim"], unpacked(content["pieces"])
     n = len(numbers)
-    if n % 16 or numbers.shape != (n, n) or numbers.min() < -1 or numbers.max() > N_STEPS:
+    if numbers.dtype.kind != "i":
+        raise Refused("the numbers of the boxes are not whole numbers")
+    if n % 16 or numbers.shape != (n, n) or not -1 <= numbers.min() <= numbers.max() <= N_STEPS:
         raise Refused(f"the grid is {numbers.shape}, numbers are {numbers.min()} to {numbers.max()}")
     middle = (2 * (np.arange(n) + 0.5) / n - 1) * FASTEST
     starts = numbers[:, np.abs(middle) < 1.0]
@@ -33,9 +36,10 @@ def check_content(content: dict) -> dict:
     if (numbers[angles > 0.5] == -1).any():
         raise Refused("a box of the set is more than 0.5 rad from upright")
     worst = np.tile(np.where(numbers == 0, N_STEPS + 1, np.maximum(numbers, 0)), (2, 1))
-    policy = Policy(**content["policy"])
-    for i in range(n):
-        check_row(policy, i, numbers[i], worst)
+    with np.errstate(over="raise", invalid="raise"):
+        policy = Policy(**content["policy"])
+        for i in range(n):
+            check_row(policy, i, numbers[i], worst)
     return claim
 
 
@@ -50,9 +54,10 @@ def check_row(policy: Policy, i: int, numbers: np.ndarray, worst: np.ndarray) ->
     boxes = np.flatnonzero(numbers)
     angle = (2 * np.array([i, i + 1]) / n - 1) * np.pi
     speed = (2 * np.stack([boxes, boxes + 1]) / n - 1) * FASTEST
-    allowed = np.maximum(numbers[boxes] - 1, 0)
+    allowed, found = np.maximum(numbers[boxes] - 1, 0), np.zeros(len(boxes), dtype=bool)
     for cell in range(len(policy.maps)):
         next_angle, next_speed, kept = policy.after(cell, angle, speed)
+        found[kept] = True
         rows = np.floor((next_angle / np.pi + 1) * n / 2).astype(int)
         columns = np.floor((next_speed / FASTEST + 1) * n / 2).astype(int).clip(0, n - 1)
         rows -= rows[0] // n * n  # full turns
@@ -62,6 +67,8 @@ def check_row(policy: Policy, i: int, numbers: np.ndarray, worst: np.ndarray) ->
                 if (bad := worst[at] > allowed[kept]).any():
                     box = boxes[kept][bad][0]
                     raise Refused(f"box {i}, {box} has {numbers[box]}, but may lead to one with {worst[at][bad][0]}")
+    if not found.all():
+        raise Refused(f"a box of row {i} is in no cell")
 
 
 class Policy:
@@ -72,6 +79,8 @@ class Policy:
             raise Refused(f"the metric is {metric!r}, expected 'euclidean' or 'manhattan'")
         self.power = 1 if metric == "manhattan" else 2
         self.codewords, self.scale, self.maps = np.array(codewords), np.array(scale), np.array(coefficients)[:, :, 0]
+        reach = (np.abs(self.codewords).max(axis=0) + [1.0, 1.0, FASTEST]) / self.scale
+        self.tie = TIES * float(np.sum(reach**self.power))
 
     def after(self, cell: int, angle: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """From those boxes of a row that touch a cell: between which angles and speeds a step leads (2, m), and which
@@ -106,7 +115,7 @@ class Policy:
             for values, own, rival, scale in zip(ranges, self.codewords[cell], self.codewords[other], self.scale):
                 ends = np.abs((values - own) / scale) ** self.power - np.abs((values - rival) / scale) ** self.power
                 gap = gap + ends.min(axis=0)
-            found &= (gap <= ROUNDING) | (other == cell)
+            found &= (gap <= self.tie) | (other == cell)
         return found
 
 

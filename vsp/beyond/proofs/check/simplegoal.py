@@ -47,7 +47,7 @@ def followed(policy: Policy, polygons: list, pieces: list[tuple[list[str], str]]
         if ended != {"left"}:
             raise Refused(f"a piece ends as {ended} after {N_STEPS} steps, expected 'left'")
         yield "left", depth, area(polygons)
-    longer = [piece for piece in pieces if len(piece[0]) > depth]
+    longer = [piece for piece in pieces if len(piece[0]) > depth] if depth < N_STEPS else []
     while longer:
         step = longer[0][0][depth]
         alike = [piece for piece in longer if piece[0][depth] == step]
@@ -117,6 +117,8 @@ class Policy:
     def plan(self, step: str) -> tuple:
         """The cell of a step, the forms of its actions with their sides, the next state, that before the walls with its
         sides, and that at the walls (None: there are none)."""
+        if step[:-4] not in map(str, range(len(self.maps))):  # one way to write it: no start is counted twice
+            raise Refused(f"a step is {step!r}, expected one in a cell from 0 to {len(self.maps) - 1}")
         number, sides = int(step[:-4]), [SIDES[sign] for sign in step[-4:]]
         actions = [(0, 0, side) if side else one for one, side in zip(self.maps[number], sides)]
         moves = [Form(*(a + STRIDE * b for a, b in zip(own, action))) for own, action in zip(OWN, actions)]

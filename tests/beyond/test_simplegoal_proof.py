@@ -257,6 +257,22 @@ def test_the_checker_refuses_every_mutant(certificate):
             pytest.fail(f"accepted a mutant: {kind}")
 
 
+@pytest.mark.parametrize(
+    ("alter", "match"),
+    [(lambda c: c["pieces"].append(c["pieces"][0].replace(" 0", " 00", 1)), "expected one in a cell from 0 to 1"),
+     (lambda c: c["pieces"].__setitem__(0, c["pieces"][0] + " 0====" * 60), "cover"),
+     (lambda c: c["policy"]["codewords"][0].__setitem__(0, float("nan")), "not finite"),
+     (lambda c: c["policy"]["scale"].__setitem__(0, 0.0), "not positive"),
+     (lambda c: c["policy"].update(metric="cosine"), "'cosine'"),
+     (lambda c: c["policy"]["coefficients"].__setitem__(0, []), "malformed"),
+     (lambda c: c["claim"].pop("goal"), "the claim is")],
+)  # fmt: skip
+def test_a_forged_certificate_gets_one_clear_refusal(certificate, alter, match):
+    alter(forged := copy.deepcopy(certificate))
+    with pytest.raises(check.Refused, match=match):
+        check.check_content(forged)
+
+
 def test_the_checker_shares_no_code_with_the_prover():
     own = {"json", "math", "random", "struct", "hashlib", "numpy", "fractions", "functools", "sys", "__future__"}
     for path in Path(check.__file__).parent.glob("*.py"):
@@ -301,4 +317,4 @@ def test_policies_with_the_theorem():
     assert {"simplegoal_tuned", "simplegoal_faithful", "simplegoal_margin"} <= set(certain)
     assert (rows.loc[certain, "failing_outside"] == 0).all()
     steps = steps_to_goal(load_certificate("simplegoal_tuned")[0])
-    assert proved(steps) and steps.max() == rows.loc["simplegoal_tuned", "longest"]
+    assert proved(steps) and steps.max() == rows.loc["simplegoal_tuned", "program_steps"]
