@@ -31,6 +31,7 @@ from vsp.beyond.explain import lime, rules
 from vsp.beyond.optimum import best_policy, best_returns, limit_preset
 from vsp.beyond.proofs import largest_disturbance, steps_to_goal, teacher_steps_to_goal
 from vsp.beyond.proofs.pendulum import equilibria, prove_pendulum
+from vsp.beyond.proofs.pendulum_starts import shares_of_starts
 from vsp.beyond.refinement import config, faithful, imitate, refine, simplification
 from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
 from vsp.beyond.robots.fewest import fewest_numbers
@@ -172,6 +173,7 @@ WALKING = Walking(
     n_cells=2, n_episodes=2, n_corrections=1, n_correction_episodes=2, n_states=20, n_restarts=1, n_validation=2,
     n_random_steps=10, n_directions=2, n_best=1,
 )  # fmt: skip
+STILL = policy.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 RULES = [
     rules.Rule(0, np.array([-np.inf, -np.inf]), np.array([0.5, np.inf])),
@@ -288,11 +290,15 @@ CASES = {
         {"n": count(10, most=4000), "tolerance": number(0.05, least=1e-6, most=0.1)},
     ),
     "beyond.proofs.pendulum.prove_pendulum": (
-        functools.partial(prove_pendulum, vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")),
+        functools.partial(prove_pendulum, STILL),
         {"n": count(16, most=8000)},
     ),
+    "beyond.proofs.pendulum_starts.shares_of_starts": (
+        functools.partial(shares_of_starts, prove_pendulum(STILL, n=16)),
+        {"parts": count(2, most=64), "levels": count(1, most=8)},
+    ),
     "beyond.proofs.pendulum.equilibria": (
-        functools.partial(equilibria, vsp.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")),
+        functools.partial(equilibria, STILL),
         {"n": count(50, least=16)},
     ),
     "beyond.proofs.network.teacher_steps_to_goal": (
@@ -644,7 +650,9 @@ EXEMPT = {
     "follow a policy, which they check, or work on what `follow` found: see their own tests": """
         beyond.proofs.dead_points beyond.proofs.grid beyond.proofs.mountaincar beyond.proofs.mountaincar_reals
         beyond.proofs.network.affine_outputs
-        beyond.proofs.pendulum.PendulumProof beyond.proofs.pendulum.check_swinging beyond.proofs.polygons
+        beyond.proofs.pendulum.PendulumProof beyond.proofs.pendulum.boxes_between
+        beyond.proofs.pendulum.check_swinging beyond.proofs.pendulum_starts.Boxes
+        beyond.proofs.pendulum_starts.stepped beyond.proofs.polygons
         beyond.proofs.proof beyond.proofs.prove beyond.proofs.returns beyond.proofs.robust.largest_tie
         beyond.proofs.robust.least_gap beyond.proofs.robust.outside_pit beyond.proofs.robust.proved
         beyond.proofs.robust.way_to beyond.proofs.simplegoal beyond.proofs.simplegoal_proof""",

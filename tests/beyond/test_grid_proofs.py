@@ -4,6 +4,8 @@ import copy
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from support import PENDULUM, SIMPLEGOAL
 
 import vsp
@@ -12,9 +14,11 @@ from vsp.beyond.proofs import check, teacher_steps_to_goal
 from vsp.beyond.proofs.grid import Way, around, invariant, steps_into
 from vsp.beyond.proofs.network import affine_outputs
 from vsp.beyond.proofs.pendulum import equilibria, prove_pendulum
+from vsp.beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 from vsp.tasks import GOAL
 
 N = 400
+STILL = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
 
 
 def way(boxes, first, last, safe=True):
@@ -92,20 +96,56 @@ def test_the_set_is_around_upright_and_most_starts_get_there(proof):
 
 
 def test_without_a_torque_nothing_is_proved():
-    still = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
-    proof = prove_pendulum(still, n=80)
+    proof = prove_pendulum(STILL, n=80)
     assert not proof.kept.any() and proof.share == 0.0 and proof.claim["longest"] == 0
     assert check.check_content(proof.certificate()) == proof.claim
 
 
 def test_where_a_pendulum_at_rest_stays(proof):
-    still = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
-    assert equilibria(still) == pytest.approx([0.0, np.pi], abs=1e-9)
+    assert equilibria(STILL) == pytest.approx([0.0, np.pi], abs=1e-9)
     left, upright, right = equilibria(proof.policy)  # beside upright the torque's limit just holds the rod
     assert abs(upright) < 0.1 and left == pytest.approx(-right) and 15 * np.sin(right) == pytest.approx(3 * 2)
     states = np.array([[angle, 0.0] for angle in (left, upright, right)])
     moved = vsp.get_task(PENDULUM).step(states, proof.policy.predict(vsp.get_task(PENDULUM).see(states))[0])[0]
     assert np.allclose(moved, states, atol=1e-9)
+
+
+# Smaller boxes of starts
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**31), st.floats(1e-4, 0.05))
+def test_a_step_of_small_boxes_holds_all_that_happens(seed, half):
+    rng, task, m = np.random.default_rng(seed), vsp.get_task(PENDULUM), 500
+    policy = vsp.VoronoiPolicy([[0, 0, 0]], rng.normal(size=(1, 4, 1)) * [[4], [4], [2], [1]], task=PENDULUM)
+    slopes, rest = rng.uniform(-half, half, size=(2, 2, m)), rng.uniform(0, half, size=(2, m))
+    boxes = Boxes(np.arange(m), rng.uniform([[-4], [-8]], [[4], [8]], size=(2, m)), slopes, rest)
+    after = stepped(policy, 0, boxes)
+    for _ in range(20):
+        along, off = rng.uniform(-1, 1, size=(2, m)), rng.uniform(-rest, rest)
+        states = np.clip(boxes.centre + np.einsum("ijm,jm->im", slopes, along) + off, [[-9], [-8]], [[9], [8]]).T
+        off = states.T - boxes.centre - np.einsum("ijm,jm->im", slopes, along)
+        inside = (np.abs(off) <= rest).all(axis=0)
+        found = task.step(states, policy.predict(task.see(states).astype(np.float32))[0])[0].T
+        gap = np.abs(found - after.centre - np.einsum("ijm,jm->im", after.slopes, along))
+        assert (gap <= after.rest)[:, inside].all()
+
+
+def test_small_boxes_prove_more_and_episodes_agree(proof):
+    shares = shares_of_starts(proof, levels=2)
+    assert shares[0] == proof.share and shares[1] > 0.98 and shares[2] > 0.995
+    task, rng = vsp.get_task(PENDULUM), np.random.default_rng(0)
+    states = task.start(rng, 20_000)
+    for _ in range(200):
+        states = task.step(states, proof.policy.predict(task.see(states).astype(np.float32))[0])[0]
+    there = proof.kept[boxes_of(states)]
+    assert there.mean() >= shares[2] - 0.001
+
+
+def test_without_a_torque_small_boxes_prove_nothing_either():
+    assert shares_of_starts(prove_pendulum(STILL, n=16), parts=2, levels=1) == [0.0, 0.0]
+    with pytest.raises(ValueError, match="expected a PendulumProof"):
+        shares_of_starts("a name")
 
 
 def mutants(content, rng):

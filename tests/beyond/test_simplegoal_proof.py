@@ -126,16 +126,37 @@ def test_a_tie_over_an_area_goes_to_the_lowest_cell():
 @WANDERING
 @given(policies(), st.integers(0, 2**31))
 def test_pieces_do_what_the_program_does(policy, seed):
+    """Of 10^5 starts none contradicts its piece, but where an episode passes what decides so closely that rounding may
+    decide."""
     pieces = followed(policy)
     assert total([piece.starts.area() for piece in pieces]) == 1
-    rng = np.random.default_rng(seed)
-    chosen = [pieces[i] for i in rng.integers(len(pieces), size=200)]
-    starts = np.array([piece.starts.middle() for piece in chosen])
-    found = vsp.rollout(policy, SIMPLEGOAL, starts)
-    wanted = [(piece.outcome, len(piece.steps)) for piece in chosen]
-    inner = np.array([piece.starts.area() > 1e-9 for piece in chosen])  # in slivers the program's rounding decides
-    differ = np.array([one != pair for one, pair in zip(zip(found.outcomes, found.lengths), wanted)])
-    assert (differ & inner).mean() < 0.03
+    starts = np.random.default_rng(seed).uniform(size=(100_000, 2))
+    found, close = vsp.rollout(policy, SIMPLEGOAL, starts), closest(policy, starts) < 1e-4
+    n_found = np.zeros(len(starts), dtype=int)
+    for piece in pieces:
+        corners = np.array(piece.starts.points(), dtype=float)
+        along, to = np.roll(corners, -1, axis=0) - corners, starts[:, None] - corners
+        inside = (along[:, 0] * to[..., 1] >= along[:, 1] * to[..., 0]).all(axis=1)
+        n_found += inside
+        agree = (found.outcomes == piece.outcome) & (found.lengths == len(piece.steps))
+        assert (agree | close)[inside].all()
+    assert (n_found == 1).mean() > 0.999 and close.mean() < 0.5
+
+
+def closest(policy, starts):
+    """How closely the episodes from `starts` (n, 2) pass what decides: another codeword as near, or an edge of goal and
+    pit. (n,)"""
+    states, found, going = starts.copy(), np.full(len(starts), np.inf), np.ones(len(starts), dtype=bool)
+    power = 1 if policy.metric == "manhattan" else 2
+    for _ in range(50):
+        off = np.abs(states[:, None] - policy.codewords) / policy.scale
+        distances = np.sort((off**power).sum(axis=-1), axis=1)
+        gap = distances[:, 1] - distances[:, 0] if len(policy) > 1 else np.inf
+        states = vsp.get_task(SIMPLEGOAL).step(states, policy.predict(states)[0])[0]
+        edges = np.abs(states[..., None] - [0.1, 0.4, 0.6]).min(axis=(1, 2))
+        found[going] = np.minimum(found, np.minimum(gap, edges))[going]
+        going &= ~((states < 0.1).all(axis=1) | ((states > 0.4) & (states < 0.6)).all(axis=1))
+    return found
 
 
 def test_returns_are_those_of_the_pieces():

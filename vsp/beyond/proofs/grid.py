@@ -60,16 +60,26 @@ def around(low: np.ndarray, high: np.ndarray, n: int) -> tuple[np.ndarray, np.nd
     return first, np.clip(np.floor(high) + 1, 1, n).astype(np.int32)
 
 
+def summed(others: np.ndarray, *, periodic: bool = False) -> np.ndarray:
+    """How many boxes up to each one are marked in `others` (n, n), a summed-area table; `periodic`: of a turn and the
+    next. (n + 1, or 2 n + 1, n + 1)"""
+    count = np.zeros((len(others) * (1 + periodic) + 1, others.shape[1] + 1), dtype=np.int32)
+    count[1:, 1:] = np.concatenate([others] * (1 + periodic)).cumsum(axis=0, dtype=np.int32).cumsum(axis=1)
+    return count
+
+
+def rectangles_within(count: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Which rectangles of boxes, as in `Way`, hold no marked one, by a table that `summed` made. (m,)"""
+    (a, b), (c, d) = first, last
+    return count[c, d] - count[a, d] - count[c, b] + count[a, b] == 0
+
+
 def _all_within(good: np.ndarray, ways: Sequence[Way], periodic: bool) -> np.ndarray:
     """Of which boxes all ways are safe, and lead into boxes that are `good`."""
-    others = ~good
-    count = np.zeros((len(good) * (1 + periodic) + 1, good.shape[1] + 1), dtype=np.int32)  # a summed-area table
-    count[1:, 1:] = np.concatenate([others] * (1 + periodic)).cumsum(axis=0, dtype=np.int32).cumsum(axis=1)
+    count = summed(~good, periodic=periodic)
     found = np.zeros(good.size, dtype=bool)  # a box without a way is not known
     for way in ways:
         found[way.boxes] = True
     for way in ways:
-        (a, b), (c, d) = way.first, way.last
-        outside = count[c, d] - count[a, d] - count[c, b] + count[a, b]
-        found[way.boxes[(outside > 0) | ~way.safe]] = False
+        found[way.boxes[~(rectangles_within(count, way.first, way.last) & way.safe)]] = False
     return found.reshape(good.shape)

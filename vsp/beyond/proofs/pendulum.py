@@ -62,8 +62,8 @@ class PendulumProof(Proof):
         return found
 
 
-def prove_pendulum(policy: VoronoiPolicy, *, n: int = 2000) -> PendulumProof:
-    """From which boxes the pendulum surely gets upright within 200 steps, and stays; a minute, and 200 bytes a box.
+def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
+    """From which boxes the pendulum surely gets upright within 200 steps, and stays; seconds, and 200 bytes a box.
 
     Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
     for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
@@ -137,16 +137,17 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
         np.where(at_limit, angle + side * half[0] + DT * one, new_angle + side * angle_by)
         for side, one in zip((-1, 1), limited)
     ]
-    return _into_boxes(touched, ends, limited, n)
+    return Way(touched, *boxes_between(ends, limited, n), np.ones(len(touched), dtype=bool))
 
 
-def _into_boxes(boxes: np.ndarray, angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> Way:
-    """The way from `boxes` to between these angles and speeds; angles may be up to a turn beyond half a turn."""
+def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first box between two angles and two speeds, and before which box these end, as in `Way`. Angles may be any
+    number of turns away, but less than a turn apart."""
     first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
     begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
     begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
     turns = begin // n * n
-    return Way(boxes, np.stack([begin - turns, first]), np.stack([end - turns, last]), np.ones(len(boxes), dtype=bool))
+    return np.stack([begin - turns, first]), np.stack([end - turns, last])
 
 
 def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
