@@ -2,6 +2,7 @@
 
 import functools
 import io
+import math
 import pydoc
 import re
 import subprocess
@@ -259,7 +260,7 @@ def test_what_is_said_to_be_certain_is_in_its_tables():
     assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0
     for name in ("grid", "teacher"):
         share = pd.read_csv(ROOT / f"data/results/proofs_{name}.csv")["share"].iloc[-1]
-        assert f"from {100 * share:.1f} % of the starts" in block
+        assert f"from {math.floor(1e4 * share) / 100:.2f} % of the starts" in block
 
 
 def test_what_is_said_of_the_limit_is_in_its_tables():

@@ -73,9 +73,11 @@ class Form:
 
     def at(self, state) -> Fraction:
         """Its value in a state."""
-        (p, q, r), (x, y) = self.exact, state
-        value = r + (p * x if p else 0)
-        return value + (q * y if q else 0)
+        *slopes, value = self.exact
+        for slope, one in zip(slopes, state):
+            if slope:
+                value += one if slope == 1 else slope * one
+        return value
 
     def signs(self, polygon: list) -> list:
         """Numbers with the signs of the values at the corners: rounded ones, if these are beyond doubt."""
