@@ -9,7 +9,16 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 project = "vsp"
 author = "the vsp authors"
 language = "en"
-extensions = ["myst_nb", "sphinx.ext.autodoc", "mathematics", "outputs", "docstrings", "pages", "trust_tables"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "mathematics",
+    "outputs",
+    "docstrings",
+    "pages",
+    "trust_tables",
+    "explorer",
+]
 exclude_patterns = ["README.md"]  # its parts are included in the pages
 
 # Notebooks: shown as they were executed

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 from types import ModuleType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 
@@ -30,6 +30,9 @@ from .policy import VoronoiPolicy
 from .rollouts import Policy, collect_episodes, rollout, visited_states
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
+
+if TYPE_CHECKING:
+    from .show.explorer import Explorer
 
 
 def distill(
@@ -85,6 +88,22 @@ def preset(
     if (n_cells, min_r2) != (None, None):
         raise ValueError(f"n_cells and min_r2 choose a 'faithful' policy, but kind is {kind!r}")
     return paper_preset(task) if kind == "paper" else tuned_preset(task)
+
+
+def explore(
+    policies: VoronoiPolicy | dict[str, VoronoiPolicy],
+    *,
+    teacher: Policy | None = None,
+    history: History | None = None,
+) -> Explorer:
+    """Replay, ask and change a policy in a browser: shown by JupyterLab, or saved to an HTML file of its own.
+
+    `policies`: one with linear maps for SimpleGoal, MountainCarContinuous or Pendulum, or some by name; `teacher`: its
+    actions stand beside theirs; `history` of a distillation: replays the first policy. Raises ValueError for others.
+    """
+    from .show.explorer import Explorer  # which imports matplotlib
+
+    return Explorer(policies if isinstance(policies, dict) else {"policy": policies}, teacher=teacher, history=history)
 
 
 def __getattr__(name: str) -> ModuleType:

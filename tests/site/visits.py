@@ -17,7 +17,7 @@ class Visit:
         self.page.wait_for_function("[...document.images].every(image => image.complete)")
 
     def _request(self, request):
-        if not request.url.startswith((self.address, "data:")):
+        if not request.url.startswith((self.address, "data:", "blob:")):
             self.troubles.append(f"another host: {request.url}")
 
     def _response(self, response):

@@ -1,0 +1,58 @@
+"""The directive `explorer`: the companion's policies for one task, to be replayed, asked and changed."""
+
+import json
+import shutil
+
+import numpy as np
+from docutils import nodes
+from sphinx.util.docutils import SphinxDirective
+
+import vsp
+from vsp.baselines import linear_map
+from vsp.beyond import comparison
+from vsp.paper.printed import TASKS, published_policy
+from vsp.paper.results import read_results
+from vsp.show.explorer import SCRIPT
+
+
+def of_task(task: str) -> vsp.show.explorer.Explorer:
+    """The paper's policy, its method's best rerun with the run, ours, and one linear map."""
+    teacher, policies, history = vsp.load_teacher(task), {}, None
+    if task in TASKS:
+        best = int(read_results(task).set_index("seed")["mean"].idxmax())
+        policies["the paper's method, best rerun"], history = vsp.distill(teacher, task, vsp.preset(task), seed=best)
+        policies["the paper's, as published"] = published_policy(task)
+    for name, kept in (("ours, faithful", "faithful"), ("ours, tuned for return", "limit")):
+        policies[name] = vsp.VoronoiPolicy.load(comparison.RESULTS / f"{kept}_{task}.policy")
+    episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
+    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    policies["one linear map"] = linear_map(states, actions, task)
+    return vsp.explore(policies, teacher=teacher, history=history)
+
+
+class Shown(SphinxDirective):
+    """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view."""
+
+    required_arguments = 1
+
+    def run(self):
+        explorer, top = of_task(self.arguments[0]), "../" * self.env.docname.count("/")
+        name = f"explorer_{self.arguments[0]}.json"
+        self.env.app.explorers[name] = json.dumps(explorer.scene, separators=(",", ":"), allow_nan=False)
+        start = f'<script type="module">import {{ mountAll }} from "./{top}_static/explorer.js"; mountAll()</script>'
+        return [nodes.raw("", explorer.element(source=f"{top}_static/{name}") + start, format="html")]
+
+
+def _write(app, error):
+    """The script and the scenes, beside the pages."""
+    if error is None and app.explorers:
+        shutil.copy(SCRIPT, app.outdir / "_static")
+        for name, scene in app.explorers.items():
+            (app.outdir / "_static" / name).write_text(scene, "utf-8")
+
+
+def setup(app):
+    app.explorers = {}
+    app.add_directive("explorer", Shown)
+    app.connect("build-finished", _write)
+    return {"parallel_read_safe": False, "parallel_write_safe": True}

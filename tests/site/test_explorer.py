@@ -1,0 +1,263 @@
+"""The explorer in Chromium: it computes what Python computes, answers to every control, and is quick."""
+
+import base64
+import json
+
+import numpy as np
+import pytest
+from visits import Visit
+
+import vsp
+from vsp.beyond import comparison
+from vsp.paper.printed import published_policy
+from vsp.show.explorer import SCRIPT
+
+SIMPLEGOAL, MOUNTAINCAR, PENDULUM = TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
+SOURCE = json.dumps(SCRIPT.read_text("utf-8"))
+LOADED = f"const vsp = await import(URL.createObjectURL(new Blob([{SOURCE}], {{type: 'text/javascript'}})))"
+PARITY = f"""async ([scene, which, encoded]) => {{
+  {LOADED}
+  const bytes = Uint8Array.from(atob(encoded), one => one.charCodeAt(0)), numbers = new Float64Array(bytes.buffer)
+  const {{see, step}} = vsp.dynamics(scene.task.name), policy = vsp.ready(scene.policies[which])
+  const found = {{steps: 0, ties: 0, cells: 0, off: 0}}
+  for (let i = 0; i < numbers.length; i += 7) {{
+    const [x, y, cell, to_x, to_y, reward, outcome] = numbers.subarray(i, i + 7), seen = see([x, y])
+    found.steps += 1
+    if (vsp.margin(policy, seen) < 1e-9) {{ found.ties += 1; continue }}
+    const acted = vsp.act(scene, policy, seen), [to, paid, end] = step([x, y], acted.action)
+    const off = [to[0] - to_x, to[1] - to_y, paid - reward].some(gap => Math.abs(gap) > 1e-9)
+    found.cells += acted.cell !== cell
+    found.off += off || end !== outcome
+  }}
+  return found
+}}"""
+RETURNS = f"""async ([scene, starts]) => {{
+  {LOADED}
+  return scene.policies.map(vsp.ready).map(policy => starts.map(start => vsp.rollout(scene, policy, start).total))
+}}"""
+QUICK = f"""async ([scene, renewed]) => {{
+  {LOADED}
+  const root = document.body.appendChild(document.createElement("div")), times = []
+  const view = vsp.mount(root, scene)
+  await new Promise(requestAnimationFrame)
+  for (let i = 0; i < 60; i++) {{
+    const begun = performance.now()
+    view.asked = view.asked.map((value, axis) => value + (i % 2 ? 1 : -1) * (axis + 1) * 0.01)
+    view.redo(renewed)
+    times.push(performance.now() - begun)
+  }}
+  root.remove()
+  return times.sort((a, b) => a - b)[30]
+}}"""
+
+
+def policies_of(task):
+    kept = {name: f"{name}_{task}.policy" for name in ("faithful", "limit")}
+    found = {name: vsp.VoronoiPolicy.load(comparison.RESULTS / file) for name, file in kept.items()}
+    return found if task == PENDULUM else {"paper, as published": published_policy(task)} | found
+
+
+@pytest.fixture(scope="module")
+def explorers():
+    """Each task's policies, and for SimpleGoal a replay."""
+    found = {}
+    for task in TASKS:
+        teacher, policies, history = vsp.load_teacher(task), policies_of(task), None
+        if task == SIMPLEGOAL:
+            run, history = vsp.distill(teacher, task, seed=0)
+            policies = {"rerun": run} | policies
+        found[task] = vsp.explore(policies, teacher=teacher, history=history)
+    return found
+
+
+@pytest.fixture(scope="module")
+def opened(explorers, browser, tmp_path_factory):
+    """An explorer's own file, opened from disk, for each size of window that is asked for."""
+    folder, visits = tmp_path_factory.mktemp("explorers"), []
+
+    def visit(task, **context):
+        explorers[task].save(folder / f"{task}.html")
+        visits.append(Visit(browser, folder.as_uri() + "/", f"{task}.html", **context))
+        visits[-1].page.locator(".vsp-explorer canvas").wait_for()
+        return visits[-1]
+
+    yield visit
+    for one in visits:
+        one.close()
+
+
+@pytest.fixture(scope="module")
+def desk(opened):
+    return {task: opened(task, viewport={"width": 1200, "height": 900}) for task in TASKS}
+
+
+def recorded(policy, task, starts):
+    """Every step of these episodes: state (2), cell, next state (2), reward and outcome. (t, 7)"""
+    state, steps = starts, []
+    for _ in range(task.max_steps):
+        seen = task.see(state)
+        following, reward, outcome = task.step(state, policy.predict(seen)[0])
+        steps.append(np.column_stack([state, policy.cells(seen), following, reward, outcome]))
+        state = following[outcome == 0]
+        if not len(state):
+            break
+    return np.concatenate(steps)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_each_step_is_pythons(desk, explorers, task):
+    explorer, starts = explorers[task], vsp.start_states(task, 1000, 3)
+    for i, policy in enumerate(explorer.policies.values()):
+        steps, found = recorded(policy, explorer.task, starts), {"steps": 0, "ties": 0, "cells": 0, "off": 0}
+        for part in np.array_split(steps, 1 + len(steps) // 100_000):
+            counts = desk[task].page.evaluate(PARITY, [explorer.scene, i, base64.b64encode(part.tobytes()).decode()])
+            found = {name: found[name] + counts[name] for name in found}
+        assert found.pop("steps") == len(steps) > 5000 and found.pop("ties") < 10
+        assert found == {"cells": 0, "off": 0}
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_whole_episodes_return_what_pythons_do(desk, explorers, task):
+    explorer, starts = explorers[task], vsp.start_states(task, 1000, 4)
+    found = desk[task].page.evaluate(RETURNS, [explorer.scene, starts.tolist()])
+    for policy, returns in zip(explorer.policies.values(), found):
+        wanted = vsp.rollout(policy, task, starts).returns
+        assert np.mean(returns) == pytest.approx(wanted.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("renewed", [False, True], ids=["another state", "another policy"])
+@pytest.mark.parametrize("task", TASKS)
+def test_a_picture_takes_less_than_33_ms(desk, explorers, task, renewed):
+    assert desk[task].page.evaluate(QUICK, [explorers[task].scene, renewed]) < 33
+
+
+class Shown:
+    """What a reader sees of an explorer."""
+
+    def __init__(self, visit):
+        self.page, self.root = visit.page, visit.page.locator(".vsp-explorer")
+        self.canvas = self.root.locator("canvas")
+
+    def picture(self):
+        return self.canvas.evaluate("canvas => canvas.toDataURL()")
+
+    def changes(self, act):
+        """Whether picture and text change by this."""
+        before, text = self.picture(), self.root.inner_text()
+        act()
+        self.page.wait_for_timeout(400)  # until the map is sharp
+        return before != self.picture(), text != self.root.inner_text()
+
+    def at(self, x, y):
+        """Where a point of the unit square is on the page."""
+        box, inner = self.canvas.bounding_box(), self.canvas.bounding_box()["width"] - 52
+        return box["x"] + 44 + x * inner, box["y"] + 8 + (1 - y) * (box["height"] - 42)
+
+
+@pytest.fixture
+def shown(desk):
+    one = Shown(desk[SIMPLEGOAL])
+    one.root.get_by_label("policy", exact=True).select_option("0")
+    one.page.wait_for_timeout(400)
+    return one
+
+
+def test_a_click_and_a_drag_choose_a_state(shown):
+    assert shown.changes(lambda: shown.page.mouse.click(*shown.at(0.3, 0.6))) == (True, True)
+    assert "x = 0.30" in shown.root.inner_text()
+
+    def drag():
+        shown.page.mouse.move(*shown.at(0.3, 0.6))
+        shown.page.mouse.down()
+        shown.page.mouse.move(*shown.at(0.8, 0.55), steps=5)
+        shown.page.mouse.up()
+
+    assert shown.changes(drag) == (True, True)
+    assert "x = 0.80" in shown.root.inner_text()
+
+
+def test_arrow_keys_move_the_state(shown):
+    shown.canvas.focus()
+    assert shown.changes(lambda: shown.page.keyboard.press("ArrowLeft")) == (True, True)
+    assert shown.changes(lambda: shown.page.keyboard.press("Shift+ArrowDown")) == (True, True)
+
+
+def test_the_replay_goes_to_changes_plays_and_stops(shown):
+    slider = shown.root.get_by_label("iteration")
+    assert shown.changes(lambda: slider.press("Home")) == (True, True)
+    assert "iteration 0: 1 cell" in shown.root.inner_text()
+    assert shown.changes(lambda: shown.root.get_by_role("button", name="next change").click()) == (True, True)
+    assert "split" in shown.root.inner_text()
+    shown.root.get_by_role("button", name="play").click()
+    shown.page.wait_for_timeout(300)
+    shown.root.get_by_role("button", name="pause").click()
+    assert 0 < int(slider.input_value()) < int(slider.get_attribute("max"))
+    shown.page.wait_for_timeout(400)
+    assert not any(shown.changes(lambda: None))
+
+
+def test_a_codeword_is_dragged_and_a_coefficient_turned(shown, explorers):
+    x, y = explorers[SIMPLEGOAL].scene["policies"][0]["codewords"][0]
+
+    def drag():
+        shown.page.mouse.move(*shown.at(x, y))
+        shown.page.mouse.down()
+        shown.page.mouse.move(*shown.at(0.5 * x + 0.25, 0.5 * y + 0.25), steps=4)
+        shown.page.mouse.up()
+
+    assert shown.changes(drag) == (True, True)
+    assert "Cell 1 of" in shown.root.inner_text()
+    weight = shown.root.get_by_label("Δx: bias")
+    assert shown.changes(lambda: weight.fill("3")) == (True, True)
+    assert shown.changes(lambda: shown.root.get_by_role("button", name="reset").click()) == (True, True)
+
+
+def test_what_a_reader_changes_decides_the_returns(shown, explorers):
+    """A policy that pushes away from the goal everywhere: no episode from outside arrives."""
+    shown.root.get_by_label("policy", exact=True).select_option("2")
+    k = len(explorers[SIMPLEGOAL].scene["policies"][2]["codewords"])
+    before = shown.root.inner_text()
+    for label in ("Δx: bias", "Δy: bias"):
+        shown.root.get_by_label(label).fill("9")
+    shown.page.wait_for_timeout(100)
+    after = shown.root.inner_text()
+    assert k > 1 and before != after and "fail" in after
+
+
+def test_a_policy_without_a_run_has_no_replay(desk):
+    one = Shown(desk[PENDULUM])
+    assert not one.root.get_by_label("iteration").is_visible()
+    assert one.changes(lambda: one.page.mouse.click(*one.at(0.2, 0.8))) == (True, True)
+
+
+def test_on_a_phone_nothing_is_cut(opened):
+    visit = opened(SIMPLEGOAL, viewport={"width": 390, "height": 844}, has_touch=True)
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+    one = Shown(visit)
+    assert one.changes(lambda: visit.page.touchscreen.tap(*one.at(0.2, 0.3))) == (True, True)
+
+
+def test_with_little_motion_asked_for_the_player_goes_slowly(opened):
+    visit = opened(SIMPLEGOAL, viewport={"width": 1200, "height": 900}, reduced_motion="reduce")
+    root = visit.page.locator(".vsp-explorer")
+    root.get_by_label("iteration").press("Home")
+    root.get_by_role("button", name="play").click()
+    visit.page.wait_for_timeout(700)
+    assert int(root.get_by_label("iteration").input_value()) <= 2
+
+
+def test_without_a_script_a_picture_stands_there(explorers, browser, tmp_path):
+    explorers[SIMPLEGOAL].save(tmp_path / "one.html")
+    page = browser.new_context(java_script_enabled=False).new_page()
+    page.goto((tmp_path / "one.html").as_uri())
+    assert page.locator(".vsp-explorer img").is_visible() and not page.locator("canvas").count()
+    page.context.close()
+
+
+def test_nothing_fails_and_everyone_can_use_it(desk):
+    from axe_playwright_python.sync_playwright import Axe
+
+    for visit in desk.values():
+        assert visit.troubles == []
+        found = Axe().run(visit.page).response["violations"]
+        assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
