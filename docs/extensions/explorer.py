@@ -39,13 +39,12 @@ class Shown(SphinxDirective):
         explorer, top = of_task(self.arguments[0]), "../" * self.env.docname.count("/")
         name = f"explorer_{self.arguments[0]}.json"
         self.env.app.explorers[name] = json.dumps(explorer.scene, separators=(",", ":"), allow_nan=False)
-        start = f'<script type="module">import {{ mountAll }} from "./{top}_static/explorer.js"; mountAll()</script>'
-        return [nodes.raw("", explorer.element(source=f"{top}_static/{name}") + start, format="html")]
+        return [nodes.raw("", explorer.element(source=f"{top}_static/{name}"), format="html")]
 
 
 def _write(app, error):
-    """The script and the scenes, beside the pages."""
-    if error is None and app.explorers:
+    """The script, which notebooks need too, and the scenes, beside the pages."""
+    if error is None:
         shutil.copy(SCRIPT, app.outdir / "_static")
         for name, scene in app.explorers.items():
             (app.outdir / "_static" / name).write_text(scene, "utf-8")

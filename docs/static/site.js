@@ -6,6 +6,12 @@ addEventListener("beforeprint", () => {
 })
 addEventListener("afterprint", () => { document.documentElement.dataset.theme = shown })
 
+// Explorers begin to answer where the page has one.
+const folder = document.currentScript.src
+addEventListener("DOMContentLoaded", async () => {
+  if (document.querySelector(".vsp-explorer")) (await import(new URL("explorer.js", folder))).mountAll()
+})
+
 // Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
 const mark = box => box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
 addEventListener("load", () => {

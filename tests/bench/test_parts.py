@@ -11,7 +11,7 @@ from support import nearest_brute, nearest_kdtree
 import vsp
 from vsp import geometry
 from vsp.paper import printed
-from vsp.show import Laboratory, Replay
+from vsp.show import Laboratory
 
 
 def seconds(work, repeats: int = 5) -> float:
@@ -47,15 +47,6 @@ def test_look_up(k, capsys):
         taken = seconds(partial(look_up, codewords, states), repeats=20)
         report(capsys, f"{name}, 1000 states, {k} codewords", 1000 * taken, "ms")
     assert (nearest_brute(codewords, states) == nearest_kdtree(codewords, states)).all()
-
-
-@pytest.mark.parametrize("task", printed.TASKS)
-def test_a_slider_answers_at_once(task, record):
-    teacher = vsp.load_teacher(task)
-    shown = Replay(teacher, task, vsp.distill(teacher, task, seed=0)[1])
-    moments = iter(range(0, 2000, 100))
-    taken = seconds(lambda: setattr(shown.iteration, "value", next(moments)), repeats=15)
-    record("speed", f"a step of the slider of notebook 2, {task}", 1000 * taken, "ms", at_most=150)
 
 
 @pytest.mark.parametrize("task", printed.TASKS)

@@ -28,8 +28,8 @@ Explorer()"""
 
 EXPLORER = """\
 import numpy as np
-from vsp.show.page import Explorer, Page
-class Small(Explorer):
+from vsp.show.page import Controls, Page
+class Small(Controls):
     "Small."
     def strip(self):
         return [Page(np.zeros((2, 3, 3), np.uint8), "black", "on this page")]

@@ -33,7 +33,7 @@ def run(request):
 @pytest.fixture(scope="module")
 def growth(run):
     task, teacher, history = run
-    return Growth(history, teacher, task, dpi=60, chosen=True)
+    return Growth(history, teacher, task, dpi=60)
 
 
 def kinds(history, first, last):
@@ -93,11 +93,10 @@ def test_what_changed_is_marked(run, growth, monkeypatch):
     assert came == sorted(final) and went and not any(codeword in final for codeword in went)
 
 
-def test_a_shot_shows_the_iteration_and_the_state(growth):
+def test_a_shot_shows_the_iteration(growth):
     early, late, again = growth.shoot(0), growth.shoot(119), growth.shoot(0)
-    chosen = growth.shoot(119, point=np.mean([growth.maps.task.low, growth.maps.task.high], axis=0))
     assert np.array_equal(early, again) and early.shape == (156, 360, 3)
-    assert (early != late).any() and (late != chosen).any()
+    assert (early != late).any()
     assert not plt.get_fignums()
 
 
@@ -106,13 +105,11 @@ def test_actions_borders_and_mark_are_those_of_the_policy_then(run, growth, monk
     history, seen, acting, marked = run[2], [], [], []
     monkeypatch.setattr(growth.maps, "policy", lambda ax, policy: acting.append((ax, policy)))
     monkeypatch.setattr(animation, "moment", lambda ax, n, cells: marked.append((ax, n, cells)))
-    monkeypatch.setattr(animation, "borders", lambda ax, x, y, index, chosen: seen.append((x, y, index, chosen)))
-    point = growth.maps.task.low + 0.3 * (growth.maps.task.high - growth.maps.task.low)
-    growth.shoot(60, point=point)
+    monkeypatch.setattr(animation, "borders", lambda ax, x, y, index: seen.append((x, y, index)))
+    growth.shoot(60)
     policy = history.policy_at(60)
-    for x, y, index, chosen in seen:
+    for x, y, index in seen:
         assert np.array_equal(index, policy.cells(np.column_stack([x.ravel(), y.ravel()])))
-        assert chosen == policy.cells(point)
     assert len(seen) == 2  # over the teacher's map and over the copy's
     assert acting == [(growth._axes[1], policy)] and marked == [(growth._axes[2], 60, history.cells[60])]
 

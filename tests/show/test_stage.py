@@ -11,7 +11,6 @@ from PIL import Image
 
 from vsp.show import state_space
 from vsp.show.stage import (
-    THICK,
     Stage,
     borders,
     cells_and_changes,
@@ -20,7 +19,6 @@ from vsp.show.stage import (
     moment,
     png,
     policy_map,
-    state,
     trials,
 )
 from vsp.show.style import panels
@@ -137,25 +135,14 @@ def test_borders_by_hand(ax):
     assert not np.asarray(ax.images[2].get_array())[..., 3].any()
 
 
-def test_a_chosen_cell_has_a_thick_black_border(ax):
-    x, y, states = state_space.grid(np.zeros(2), np.ones(2), 60)
-    index = (states[:, 0] > 0.5).astype(int)
-    borders(ax, x, y, index, chosen=1)
-    black = (np.asarray(ax.images[0].get_array()) == [0, 0, 0, 1]).all(axis=2)
-    assert not black[:, :30].any()
-    inner = black[THICK:-THICK, 30 + THICK : -THICK]
-    assert black.sum() == 60 * 30 - inner.size and not inner.any()
-
-
-def test_changes_and_the_chosen_state_are_where_they_belong(ax):
+def test_changes_are_where_they_belong(ax):
     changes(ax, np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([[0.5, 0.6]]))
-    state(ax, np.array([0.7, 0.8]))
     found = {name: dots.get_offsets().tolist() for name, dots in named(ax).items()}
     assert found == {
-        "came by a split": [[0.1, 0.2], [0.3, 0.4]], "went by a merge": [[0.5, 0.6]], "chosen state": [[0.7, 0.8]],
+        "came by a split": [[0.1, 0.2], [0.3, 0.4]], "went by a merge": [[0.5, 0.6]]
     }  # fmt: skip
     shapes = {dots.get_paths()[0].vertices.tobytes() for dots in named(ax).values()}
-    assert len(shapes) == 3  # told apart without colours
+    assert len(shapes) == 2  # told apart without colours
 
 
 def test_cells_over_iterations_with_every_pass_below(ax):

@@ -5,7 +5,6 @@ import io
 import re
 
 import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,7 +12,7 @@ from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTea
 
 import vsp
 from vsp import distill
-from vsp.show import Laboratory, Replay, laboratory, page, replay
+from vsp.show import Laboratory, laboratory, page
 from vsp.show.laboratory import SHOWN, Remembered
 
 mpl.use("Agg")
@@ -62,133 +61,8 @@ def interrupted(*_, **__):
 @pytest.fixture(scope="module", autouse=True)
 def small_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        for module in (replay, laboratory):
-            patch.setattr(module, "DPI", 60)
+        patch.setattr(laboratory, "DPI", 60)
         yield
-
-
-@pytest.fixture(scope="module", params=TEACHERS)
-def run(request):
-    teacher = TEACHERS[request.param]
-    config = CONFIG if request.param == SIMPLEGOAL else tiny(min_pol_distance=0.1)
-    return request.param, teacher, distill(teacher, request.param, config, seed=0)[1]
-
-
-@pytest.fixture(scope="module")
-def stage(run):
-    task, teacher, history = run
-    return Replay(teacher, task, history).growth
-
-
-@pytest.fixture
-def shown(run, stage, monkeypatch):
-    """One stage for all tests: a slider draws into it again and again, too."""
-    task, teacher, history = run
-    with monkeypatch.context() as patch:
-        patch.setattr(replay, "Growth", lambda *given, **named: stage)
-        return Replay(teacher, task, history)
-
-
-def test_the_slider_turns_the_pages(shown, run):
-    history, images = run[2], []
-    for n in (1, 40, 119):
-        shown.iteration.value = n
-        image, alt, text = seen(shown)
-        cells = f"After iteration {n} (0 to 119): {history.cells[n]} cell{'s' * (history.cells[n] > 1)}."
-        assert alt.startswith(cells) and cells in text
-        images.append(image)
-    assert (images[0] != images[1]).any() and (images[1] != images[2]).any()
-    assert not plt.get_fignums()  # or a notebook would show them
-
-
-@pytest.mark.parametrize("n", [0, 119])
-def test_a_chosen_state_shows_its_codeword_its_equations_and_both_actions(shown, run, n):
-    task, teacher, history = run
-    shown.iteration.value = n
-    before = seen(shown)[0]
-    for slider, share in zip(shown.point, (0.3, 0.4)):
-        slider.value = slider.min + share * (slider.max - slider.min)
-    point = np.array([slider.value for slider in shown.point])
-    policy, (image, _, text) = history.policy_at(n), seen(shown)
-    why = policy.explain(point)
-    assert f"is in the cell of the codeword ({', '.join(f'{c:.3f}' for c in why.codeword)})" in text
-    assert [html.unescape(line) for line in re.findall(r"<code>(.*?)</code>", text)] == list(why.equations)
-    (table,) = tables(text)
-    actions = zip(policy.task.outputs, teacher.predict(point[None])[0][0], why.raw, why.action, strict=True)
-    assert table[0] == ["action", "teacher", "equation gives", "limits", "copy"]
-    assert table[1:] == [[name, f"{a:.3f}", f"{raw:.3f}", "-1 to 1", f"{b:.3f}"] for name, a, raw, b in actions]
-    assert (image != before).any()
-
-
-def test_a_state_can_be_chosen_finely(shown):
-    for slider, low, high in zip(shown.point, shown.task.low, shown.task.high):
-        assert (slider.min, slider.max) == (low, high) and slider.step == pytest.approx((high - low) / 100)
-
-
-def test_buttons_go_from_change_to_change(shown, run):
-    passes, stops = sorted({e.iteration for e in run[2].events}), []
-    assert shown.previous.disabled and not shown.next.disabled
-    for _ in passes:
-        shown.next.click()
-        stops.append(shown.iteration.value)
-    assert stops == passes and shown.next.disabled and not shown.previous.disabled
-    shown.iteration.value += 1
-    shown.previous.click()
-    assert shown.iteration.value == passes[-1]
-    shown.previous.click()
-    assert shown.iteration.value == passes[-2] and not shown.next.disabled
-
-
-def test_the_player_shows_the_beginning_every_change_and_the_end(shown, run, monkeypatch):
-    """As a browser plays: one place after the other."""
-    played = []
-    monkeypatch.setattr(shown.growth, "shoot", lambda n, point: np.zeros((2, 3, 3), np.uint8))  # for speed
-    for place in range(shown.player.max + 1):
-        shown.player.value = place
-        played.append(shown.iteration.value)
-    assert played[:3] == [0, 1, 2] and played[-1] == 119 and played == sorted(set(played))
-    assert {e.iteration for e in run[2].events} <= set(played)
-    shown.player.value = 3
-    assert seen(shown)[1].startswith(f"After iteration {played[3]} ")
-
-
-def test_the_player_goes_on_from_the_slider(shown):
-    shown.iteration.value = 118  # between two places
-    assert shown.iteration.value == 118 and shown.player.value == shown.player.max - 1
-    shown.player.value += 1
-    assert shown.iteration.value == 119
-
-
-def test_the_player_has_a_name(shown):
-    row = shown.view.children[0].children[0].children[0]
-    assert row.children[0].value == shown.player.tooltip == "play the run" and row.children[1] is shown.player
-
-
-@pytest.mark.parametrize(
-    ("fault", "said"), [(fails, "RuntimeError: no &lt;room&gt; left"), (interrupted, "KeyboardInterrupt: ")]
-)
-def test_a_page_that_fails_leaves_no_doubt(shown, monkeypatch, fault, said):
-    shown.iteration.value = 30
-    before = seen(shown)
-    with monkeypatch.context() as patch, pytest.raises((RuntimeError, KeyboardInterrupt)):
-        patch.setattr(shown.growth, "shoot", fault)
-        shown.iteration.value = 60
-    assert shown.status.value == f"<b>failed</b>: {said}. The picture below is that of iteration 30."
-    assert np.array_equal(seen(shown)[0], before[0]) and seen(shown)[2] == before[2]
-    shown.iteration.value = 61
-    assert shown.status.value == "" and seen(shown)[1].startswith("After iteration 61 ")
-
-
-def test_without_a_kernel_there_are_still_pages(shown, run, monkeypatch):
-    controls, strip = displayed(shown, monkeypatch)
-    assert controls[VIEW]["model_id"] == shown.view.model_id and set(controls) == {VIEW, "text/plain"}
-    assert controls["text/plain"] == strip["text/plain"] and strip["text/plain"].startswith("Replay of a dist")
-    images, alts = pictures(strip["text/html"])
-    assert [alt.split(" (")[0] for alt in alts] == [f"After iteration {n}" for n in (1, 12, 119)]
-    assert len(images) == strip["text/html"].count("<figure>") == 3 and strip["text/html"].count("<code>") >= 3
-    task, teacher, history = run
-    again = displayed(Replay(teacher, task, history), monkeypatch)
-    assert again[1] == strip and set(strip) == {"text/html", "text/plain"}  # the same bytes
 
 
 # Laboratory
@@ -357,10 +231,8 @@ def test_without_a_kernel_there_are_the_first_trials(lab, monkeypatch):
     ],
 )
 def test_a_teacher_that_does_not_play_the_task_is_refused(teacher, message):
-    history = distill(CurvedTeacher(), SIMPLEGOAL, tiny(n_epochs=3, n_freeze=3), seed=0)[1]
-    for make in (lambda: Laboratory(teacher, SIMPLEGOAL, CONFIG), lambda: Replay(teacher, SIMPLEGOAL, history)):
-        with pytest.raises(ValueError, match=message):
-            make()
+    with pytest.raises(ValueError, match=message):
+        Laboratory(teacher, SIMPLEGOAL, CONFIG)
 
 
 def test_a_laboratory_needs_cells_to_split():

@@ -136,51 +136,46 @@ def _expect(place):
 
 
 @pytest.fixture(scope="module")
-def replay(notebook):
-    return Controls(notebook, "iteration n")
+def explorer(notebook):
+    """That of SimpleGoal, the first."""
+    _below(notebook, ".vsp-explorer.vsp-controls canvas")
+    return notebook.locator(".vsp-explorer.vsp-controls").first
 
 
 @pytest.fixture(scope="module")
-def laboratory(notebook, replay):  # further down
+def laboratory(notebook, explorer):  # further down
     return Controls(notebook, "min_pol_distance")
 
 
-def test_the_slider_of_the_replay_changes_the_picture(replay):
-    assert replay.press(replay.slider("iteration n"), "PageUp", "PageUp", "PageUp") > 0
-    assert replay.press(replay.slider("iteration n"), "Home") < 0
+def _drawn(explorer):
+    explorer.page.wait_for_timeout(500)
+    return explorer.locator("canvas").evaluate("canvas => canvas.toDataURL()")
 
 
-def test_a_state_is_chosen_in_small_steps(replay):
-    replay.expect_text("x = 0.700, y = 0.700")
-    replay.press(replay.slider("state: x"), "ArrowLeft")
-    replay.expect_text("x = 0.690, y = 0.700")
+def test_the_explorer_replays_and_answers(explorer):
+    explorer.scroll_into_view_if_needed()
+    pictures = [_drawn(explorer)]
+    for act in (
+        lambda: explorer.get_by_label("iteration").press("Home"),
+        lambda: explorer.get_by_role("button", name="next change").click(),
+        lambda: explorer.locator("canvas").click(position={"x": 100, "y": 100}),
+        lambda: explorer.locator("canvas").press("ArrowRight"),
+        lambda: explorer.get_by_label("Δx: bias").fill("2"),
+    ):
+        act()
+        pictures.append(_drawn(explorer))
+    assert len(set(pictures)) == len(pictures)
+    assert "Mean return from 400 starts" in explorer.inner_text()
 
 
-def test_the_buttons_go_from_change_to_change_while_there_is_one(replay):
-    back, on = (replay.all.get_by_role("button", name=f"{way} change") for way in ("previous", "next"))
-    _expect(back).to_be_disabled()
-    for _ in range(2):
-        before = replay.picture.get_attribute("src")
-        on.click()
-        replay.expect_another(before)
-    back.click()
-    _expect(back).to_be_disabled()  # at the first
+def test_the_explorer_is_in_view_as_a_whole(explorer):
+    whole = explorer.bounding_box()
+    room = explorer.page.locator(".jp-WindowedPanel-outer").first.bounding_box()
+    assert whole["height"] < room["height"] and whole["x"] + whole["width"] <= room["x"] + room["width"]
 
 
-def test_the_player_comes_to_the_end(replay):
-    button, slider = replay.all.locator(".widget-play button").first, replay.slider("iteration n")
-    _expect(replay.all.get_by_text("play the run", exact=True)).to_be_visible()
-    replay.press(slider, "End")
-    last = float(slider.get_attribute("aria-valuenow"))
-    assert replay.press(slider, "PageDown", "PageDown") < 0
-    button.click()
-    _expect(slider).to_have_attribute("aria-valuenow", f"{last}", timeout=60_000)
-    replay.expect_text(f"After iteration {last:.0f} (0 to {last:.0f})")
-
-
-@pytest.mark.parametrize("label", ["iteration n", "min_pol_distance"])
-def test_controls_words_and_picture_are_in_view_together(notebook, laboratory, label):
-    shown = Controls(notebook, label)
+def test_controls_words_and_picture_are_in_view_together(notebook, laboratory):
+    shown = laboratory
     for width in (1400, 1024):
         notebook.set_viewport_size({"width": width, "height": 1000})
         notebook.wait_for_timeout(500)
@@ -205,15 +200,16 @@ def test_a_setting_of_the_laboratory_makes_a_trial_and_nothing_moves(laboratory)
 
 def test_the_strip_stands_in_for_the_controls_once_the_kernel_is_gone(lab, notebook, laboratory):
     """While they live it is hidden; in a notebook that is opened again they are, and JupyterLab's word on them."""
-    assert [strip.is_visible() for strip in notebook.locator(".vsp-strip").all()] == [False, False]
+    assert not any(strip.is_visible() for strip in notebook.locator(".vsp-strip").all())
     notebook.evaluate("window.jupyterapp.commands.execute('docmanager:save')")
     sessions = f"{lab}/api/sessions"
     for session in json.load(urllib.request.urlopen(f"{sessions}?token={TOKEN}")):
         end = urllib.request.Request(f"{sessions}/{session['id']}?token={TOKEN}", method="DELETE")
         urllib.request.urlopen(end)
     notebook.goto(f"{lab}/lab/tree/{NOTEBOOK}?token={TOKEN}&reset")
-    for place in (_below(notebook, ".vsp-strip"), _below(notebook, ".vsp-strip >> nth=1")):
-        _expect(place.locator("img")).to_have_count(3)
+    for i, n in enumerate((1, 1, 3)):  # two explorers, and the laboratory's first trials
+        place = _below(notebook, f".vsp-strip >> nth={i}")
+        _expect(place.locator("img")).to_have_count(n)
         _expect(place.locator("img").first).to_be_visible()
     notebook.get_by_text(GONE).nth(1).wait_for(state="attached")
-    assert [word.is_visible() for word in notebook.get_by_text(GONE).all()] == [False, False]
+    assert not any(word.is_visible() for word in notebook.get_by_text(GONE).all())

@@ -23,7 +23,7 @@ from ..run import atomic
 from ..tasks.base import Task
 from ..tasks.registry import get_task
 from . import state_space, style
-from .stage import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map, state
+from .stage import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map
 
 WIDTH, HEIGHT = 6.0, 2.6  # inches
 FINE = 301  # grid points per axis for the borders of cells
@@ -62,13 +62,11 @@ class Maps:
         x, y, states = self._grid
         return policy_map(ax, x, y, actor.predict(states)[0], color=color)
 
-    def cells(self, ax: Axes, policy: VoronoiPolicy, point: np.ndarray | None = None) -> None:
-        """The cells of `policy` with their codewords; the cell of the state `point` (2,) is outlined."""
+    def cells(self, ax: Axes, policy: VoronoiPolicy) -> None:
+        """The cells of `policy` with their codewords."""
         x, y, states = self._fine
-        borders(ax, x, y, policy.cells(states), chosen=None if point is None else int(policy.cells(point)))
+        borders(ax, x, y, policy.cells(states))
         state_space.codewords(ax, policy.codewords)
-        if point is not None:
-            state(ax, point)
 
 
 def check_plays(policy: Policy, task: Task) -> None:
@@ -83,7 +81,7 @@ class Growth:
     for a teacher that does not play it.
     """
 
-    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI, chosen: bool = False):
+    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI):
         if not isinstance(history, History):
             kind = type(history).__name__
             raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
@@ -91,7 +89,6 @@ class Growth:
         if (found := history.policy_at(0).task.name) != self.maps.task.name:
             raise ValueError(f"history is of a run on {found}, expected one on {self.maps.task.name}")
         check_plays(teacher, self.maps.task)
-        self._chosen = chosen  # whether a reader will choose states: then the legend names them
         self.stage, self._axes = self._set_stage(teacher, dpi)
 
     def __len__(self) -> int:
@@ -104,23 +101,20 @@ class Growth:
         style.letter(axes, ["teacher", "copy", "cells"])
         nothing = np.zeros((0, 2))
         changes(state_space.codewords(axes[1], nothing), nothing, nothing)  # for the legend
-        if self._chosen:
-            state(axes[1], np.full(2, np.nan))
         style.legend_below(fig, axes[1], ncol=6)
         return Stage(fig), axes
 
-    def shoot(self, n: int, *, since: int | None = None, point: np.ndarray | None = None) -> np.ndarray:
+    def shoot(self, n: int, *, since: int | None = None) -> np.ndarray:
         """The run after iteration n, as uint8 (height, width, 3). Raises ValueError for an iteration outside the run.
 
-        Marks what changed after iteration `since` (None: in the last pass with a change) and the cell of the state
-        `point` (2,).
+        Marks what changed after iteration `since` (None: in the last pass with a change).
         """
         policy = self.history.policy_at(n)
         came, went, _ = self._changed(n, self.last_change(n) - 1 if since is None else since)
 
         def paint() -> None:
             for ax in self._axes[:2]:
-                self.maps.cells(ax, policy, point)
+                self.maps.cells(ax, policy)
             self.maps.policy(self._axes[1], policy)
             changes(self._axes[1], *(np.reshape(sorted(places), (-1, 2)) for places in (came, went)))
             moment(self._axes[2], n, self.history.cells[n])

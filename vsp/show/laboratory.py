@@ -19,7 +19,7 @@ from ..tasks.base import Task
 from ..tasks.registry import get_task
 from . import state_space, style
 from .animation import Maps, check_plays
-from .page import _LABELS, DPI, Explorer, Page, _button, _table
+from .page import _LABELS, DPI, Controls, Page, _button, _table
 from .stage import Stage, trials
 
 N_STARTS, EVALUATION_SEED = 300, 1  # shared start states for the evaluation of every trial, and their seed
@@ -34,7 +34,7 @@ FIRST = ({}, {"max_pol_loss": 1e3}, {"min_pol_distance": 2.0})
 SHOWN = 8  # trials in the table
 
 
-class Laboratory(Explorer):
+class Laboratory(Controls):
     """Laboratory: a distillation at each change of a setting, with its cells and its return beside earlier trials.
 
     `config` holds the initial settings, by default the paper's preset. Raises ValueError for tasks other than the

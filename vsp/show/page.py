@@ -1,4 +1,4 @@
-"""Base of the widgets: a page beside controls, and static pages for notebooks that are read without a kernel."""
+"""Base of the widgets: a page beside controls; and what a notebook shows where no kernel runs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .stage import png
 DPI = 180
 
 _LABELS = {"style": {"description_width": "145px"}, "layout": {"width": "455px"}}
-# A notebook opened later shows an error in place of the controls. So the static pages are always in the output: hidden
-# while the controls are alive, and hiding that error afterwards.
+# A notebook opened later shows an error in place of the controls. So pictures are always in the output: hidden while
+# the controls are alive, and hiding that error afterwards.
 _STYLE = """<style>
 .jp-OutputArea-child:has(.vsp-controls) + .jp-OutputArea-child:has(.vsp-strip),
 .jp-OutputArea-child:has(+ .jp-OutputArea-child .vsp-strip):not(:has(.vsp-controls)) { display: none }
@@ -37,7 +37,7 @@ class Page(NamedTuple):
         return f"<figure>{picture}<figcaption>{self.text}</figcaption></figure>"
 
 
-class Explorer:
+class Controls:
     """Controls and a page where a kernel runs; three static pages elsewhere.
 
     A subclass has `turn`, which returns the name and the page for the current values of the controls, and `strip`,
@@ -72,21 +72,21 @@ class Explorer:
         self.picture.value = style.embedded(png(page.image), page.alt)
 
     def _ipython_display_(self) -> None:
-        """Display two outputs: of a single one JupyterLab would show only the widget, even where it cannot be drawn."""
-        about = {"text/plain": type(self).__doc__.split("\n")[0]}
-        display({**self.view._repr_mimebundle_(), **about}, raw=True)
         strip = "\n".join(page.still() for page in self.strip())
-        display({"text/html": f'{_STYLE}<div class="vsp-strip">{strip}</div>', **about}, raw=True)
+        show(self.view._repr_mimebundle_(), strip, type(self).__doc__.split("\n")[0])
+
+
+def show(view: dict, still: str, words: str) -> None:
+    """Display two outputs: of a single one JupyterLab would show only the widget, even where it cannot be drawn.
+
+    `view`: the widget's bundle of MIME types; `still`: HTML to show where no kernel runs; `words`: in a text.
+    """
+    display({**view, "text/plain": words}, raw=True)
+    display({"text/html": f'{_STYLE}<div class="vsp-strip">{still}</div>', "text/plain": words}, raw=True)
 
 
 def _button(description: str) -> widgets.Button:
     return widgets.Button(description=description, layout={"width": "auto", "align_self": "flex-start"})
-
-
-def _state(name: str, low: float, high: float) -> widgets.FloatSlider:
-    """A slider over one input, in a hundred steps."""
-    about = {"description": f"state: {name}", "readout_format": ".3f", **_LABELS}
-    return widgets.FloatSlider(low + 0.7 * (high - low), min=low, max=high, step=(high - low) / 100, **about)
 
 
 def _table(frame: pd.DataFrame, number: str) -> str:

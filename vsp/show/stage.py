@@ -19,10 +19,8 @@ from PIL import Image
 
 from .returns import over_iterations
 from .state_space import arrows, force_map, image, square
-from .style import BORDER, COLOURS, DISTILLED, TEACHER
+from .style import BORDER, DISTILLED, TEACHER
 
-CHOSEN = COLOURS[8]  # yellow
-THICK = 3  # half the width, in grid steps, of the border of a chosen cell
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -93,8 +91,8 @@ def policy_map(ax: Axes, x: np.ndarray, y: np.ndarray, actions: np.ndarray, *, c
     return force_map(ax, x, y, actions[:, 0])
 
 
-def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, chosen: int | None = None) -> Axes:
-    """Borders of Voronoi cells from the cell of each grid point; that of the cell `chosen` is thick.
+def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray) -> Axes:
+    """Borders of Voronoi cells from the cell of each grid point.
 
     Draws one image, which for many cells is much faster than the contours of `state_space.cells`.
     """
@@ -103,11 +101,6 @@ def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, chosen
     neighbours = outer[:-2, 1:-1], outer[2:, 1:-1], outer[1:-1, :-2], outer[1:-1, 2:]
     edge = np.any([index != other for other in neighbours], axis=0)
     picture = edge[..., None] * np.array(mpl.colors.to_rgba(BORDER))
-    if chosen is not None:
-        from scipy.ndimage import binary_erosion
-
-        inside = index == chosen
-        picture[inside & ~binary_erosion(inside, iterations=THICK)] = mpl.colors.to_rgba("black")
     image(ax, x, y, picture, aspect=ax.get_aspect(), interpolation="bilinear", zorder=4)
     return ax
 
@@ -117,13 +110,6 @@ def changes(ax: Axes, came: np.ndarray, went: np.ndarray) -> Axes:
     look = {"zorder": 6, "path_effects": _HALO, "clip_on": False}
     ax.scatter(*came.T, s=70, facecolor="none", edgecolor="black", lw=1.2, label="came by a split", **look)
     ax.scatter(*went.T, s=36, color="black", marker="x", lw=1.4, label="went by a merge", **look)
-    return ax
-
-
-def state(ax: Axes, point: np.ndarray) -> Axes:
-    """The state (2,) that a reader chose, as a diamond."""
-    look = {"s": 55, "color": CHOSEN, "edgecolor": "black", "marker": "D", "lw": 1.0}
-    ax.scatter(*point[:, None], **look, zorder=7, label="chosen state", clip_on=False)
     return ax
 
 

@@ -545,7 +545,12 @@ export function teacherAt(scene, point) {
 }
 
 /** For anywidget: the scene comes as text. */
-export default { render({ model, el }) { mount(el, JSON.parse(model.get("scene"))) } }
+export default {
+  render({ model, el }) {
+    el.classList.add("vsp-controls") // hides the picture that stands there without a kernel: vsp/show/page.py
+    mount(el, JSON.parse(model.get("scene")))
+  },
+}
 
 /** On a page: every explorer has its scene in itself, or in a file that loads when it comes into view. */
 export function mountAll() {

@@ -15,7 +15,7 @@ from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
-from .. import state_space, style
+from .. import page, state_space, style
 from .scene import PLANES, scene_of
 
 SCRIPT = Path(__file__).with_name("explorer.js")
@@ -69,6 +69,11 @@ class Explorer:
             return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
         scene = json.dumps(self.scene, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
         return f'<div class="vsp-explorer">{picture}<script type="application/json">{scene}</script></div>'
+
+    def _ipython_display_(self) -> None:
+        from .view import View  # with anywidget, which takes a while to import
+
+        page.show(View(scene=json.dumps(self.scene))._repr_mimebundle_()[0], self.element(), self._alt())
 
     def _alt(self) -> str:
         name, policy = next(iter(self.policies.items()))

@@ -1,0 +1,15 @@
+"""`View`: the explorer in JupyterLab, where a kernel runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import anywidget
+import traitlets
+
+
+class View(anywidget.AnyWidget):
+    """Draws a scene, which it gets as JSON."""
+
+    _esm = Path(__file__).with_name("explorer.js")
+    scene = traitlets.Unicode().tag(sync=True)
