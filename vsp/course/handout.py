@@ -14,7 +14,7 @@ from ..run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
 UNUSED = ("cma", "papermill")  # dependencies of the package that the lessons do not need
-FILES = ("LICENSE", "vsp/**/*.py", "data/paper/*", "data/teachers/*.*")
+FILES = ("LICENSE", "vsp/**/*.py", "vsp/**/*.js", "data/paper/*", "data/teachers/*.*")
 
 README = """# vsp: the course
 
