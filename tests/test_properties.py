@@ -732,8 +732,8 @@ def test_everything_in_the_face_of_the_package_is_covered():
     faces = {f"{module.removeprefix('vsp.')}.{name}" for name, module in ours.items() if not name.startswith("_")}
     assert len(faces) > 20
     checks, takes_nothing = {"checks.check_choice", "checks.check_seed"}, "tasks.registry.task_names"
-    elsewhere = {"vsp.preset", "vsp.explore"}  # which choose: see the tests of what they choose
-    assert {name for name in faces - set(CASES) if not exempt(name)} == checks | elsewhere | {takes_nothing}
+    chooses = "vsp.preset"
+    assert {name for name in faces - set(CASES) if not exempt(name)} == checks | {takes_nothing, chooses}
 
 
 def call(case, /, **changes):

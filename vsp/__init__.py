@@ -9,8 +9,9 @@ between the paper's method and ours.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from types import ModuleType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import pandas as pd
 
@@ -30,9 +31,6 @@ from .policy import VoronoiPolicy
 from .rollouts import Policy, collect_episodes, rollout, visited_states
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
-
-if TYPE_CHECKING:
-    from .show.explorer import Explorer
 
 
 def distill(
@@ -90,24 +88,10 @@ def preset(
     return paper_preset(task) if kind == "paper" else tuned_preset(task)
 
 
-def explore(
-    policies: VoronoiPolicy | dict[str, VoronoiPolicy],
-    *,
-    teacher: Policy | None = None,
-    history: History | None = None,
-) -> Explorer:
-    """Replay, ask and change a policy in a browser: shown by JupyterLab, or saved to an HTML file of its own.
-
-    `policies`: one with linear maps for SimpleGoal, MountainCarContinuous or Pendulum, or some by name; `teacher`: its
-    actions stand beside theirs; `history` of a distillation: replays the first policy. Raises ValueError for others.
-    """
-    from .show.explorer import Explorer  # which imports matplotlib
-
-    return Explorer(policies if isinstance(policies, dict) else {"policy": policies}, teacher=teacher, history=history)
-
-
-def __getattr__(name: str) -> ModuleType:
-    """The other wings, as in `vsp.paper.published_policy`, imported when asked for."""
+def __getattr__(name: str) -> ModuleType | Callable:
+    """The other wings, as in `vsp.paper.published_policy`, and `vsp.explore`, imported when asked for."""
+    if name == "explore":
+        return importlib.import_module("vsp.show.explorer").explore
     if name in ("baselines", "beyond", "course", "paper", "show"):
         return importlib.import_module(f"vsp.{name}")
     raise AttributeError(f"module 'vsp' has no attribute {name!r}")

@@ -97,3 +97,17 @@ class Explorer:
         fig.savefig(file, format="png", dpi=150, metadata={"Software": None})
         plt.close(fig)
         return file.getvalue()
+
+
+def explore(
+    policies: VoronoiPolicy | dict[str, VoronoiPolicy],
+    *,
+    teacher: Policy | None = None,
+    history: History | None = None,
+) -> Explorer:
+    """Replay, ask and change a policy in a browser: shown by JupyterLab, or saved to an HTML file of its own.
+
+    `policies`: one with linear maps for SimpleGoal, MountainCarContinuous or Pendulum, or some by name; `teacher`: its
+    actions stand beside theirs; `history` of a distillation: replays the first policy. Raises ValueError for others.
+    """
+    return Explorer(policies if isinstance(policies, dict) else {"policy": policies}, teacher=teacher, history=history)
