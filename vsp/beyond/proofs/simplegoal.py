@@ -3,6 +3,9 @@
 In each step the square of starts is cut into convex pieces on which the next state is one affine function of the start:
 by the borders of the cells, the limits of the actions, and the walls. Goal and pit cut once more. The numbers of the
 policy are taken as they are stored, those of the task as they are written: a stride of 1/10, a pit from 2/5 to 3/5.
+
+The time goes into long integers: each step makes the corners some 50 to 90 binary digits longer. For the paper's policy
+of 13 cells they have 115 after one step, and up to 1,400 after 16.
 """
 
 from __future__ import annotations
