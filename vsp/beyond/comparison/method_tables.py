@@ -230,6 +230,6 @@ LONG_TABLES = {
 ROBOT_TABLES = {
     "robots": Table(
         {name: method for name, method in ROBOTS.items() if "tree" not in name},
-        seeds=range(1), fewer=range(1), sizes=(*OWN, 1, 8), by_task={"HalfCheetah-v5": {"seeds": range(2)}},
+        seeds=range(1), fewer=range(1), sizes=(*OWN, 1, 8), by_task={"HalfCheetah-v5": {"seeds": range(3)}},
     ),
 }  # fmt: skip
