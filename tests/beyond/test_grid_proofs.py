@@ -132,14 +132,14 @@ def test_a_step_of_small_boxes_holds_all_that_happens(seed, half):
 
 
 def test_small_boxes_prove_more_and_episodes_agree(proof):
-    shares = shares_of_starts(proof, levels=2)
-    assert shares[0] == proof.share and shares[1] > 0.98 and shares[2] > 0.995
+    before, share = shares_of_starts(proof, levels=1)
+    assert before == proof.share and share > 0.98
     task, rng = vsp.get_task(PENDULUM), np.random.default_rng(0)
     states = task.start(rng, 20_000)
     for _ in range(200):
         states = task.step(states, proof.policy.predict(task.see(states).astype(np.float32))[0])[0]
     there = proof.kept[boxes_of(states)]
-    assert there.mean() >= shares[2] - 0.001
+    assert there.mean() >= share - 0.001
 
 
 def test_without_a_torque_small_boxes_prove_nothing_either():
