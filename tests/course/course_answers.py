@@ -17,10 +17,10 @@ from sklearn.cluster import KMeans
 from sklearn.tree import DecisionTreeRegressor
 
 import vsp
-from vsp import baselines, tasks
+from vsp import baselines, geometry, tasks
 from vsp.baselines.dagger import dagger
 from vsp.beyond.refinement import Refinement
-from vsp.course import build, lesson_1, lesson_2, lesson_3
+from vsp.course import build, drawing, lesson_1, lesson_2, lesson_3
 from vsp.course.feedback import Exercise
 from vsp.rollouts import collect_episodes, rollout
 from vsp.subpolicies.base import PolicyClass
@@ -100,6 +100,8 @@ wrongs(
     ("the same result for any `states`,", "[states,", "[0 * states,"),
     ("the same result for any `states` and any `actions`", "inputs =", "actions = states = np.eye(9)[:, :2]; inputs ="),
     ("the least that a linear map can have", LSTSQ, RIDGE),
+    ("argument `states` altered in place", "return", "states *= 0; return"),
+    ("argument `actions` altered in place", "return", "actions -= actions.mean(axis=0); return"),
 )
 right("1.2")(changed("1.2", LSTSQ, "np.linalg.solve(inputs.T @ inputs, inputs.T @ actions)"))
 right("1.2")(changed("1.2", LSTSQ, "np.array([np.linalg.pinv(inputs) @ column for column in actions.T]).T.tolist()"))
@@ -134,6 +136,9 @@ wrongs(
 )
 
 
+wrong("1.3", "a call of vsp's `squared_error`")(lambda *case: drawing.squared_error(*case).mean())
+
+
 @right("1.3")
 def as_an_array(policy, teacher, states):
     (a, _), (b, _) = policy.predict(states), teacher.predict(states)
@@ -155,7 +160,17 @@ wrongs(
     ("not distances", "argmin", "min"),
     ("begin at 1", ".argmin(axis=1)", ".argmin(axis=1) + 1"),
     ("farthest", "argmin", "argmax"),
+    ("indices of type float64", ".argmin(axis=1)", ".argmin(axis=1).astype(float)"),
 )
+wrong("1.4", "a call of vsp's `nearest`")(geometry.nearest)
+wrong("1.4", "a call of vsp's `look_up`")(lambda codewords, states: geometry.look_up(codewords, states))
+
+
+@wrong("1.4", "the wrong cell for 1 of 200 states")
+def all_but_one(codewords, states):
+    cells = by_scipy(codewords, states)
+    cells[199:] = (cells[199:] + 1) % len(codewords)
+    return cells
 
 
 @right("1.4")
@@ -178,6 +193,7 @@ wrongs(
     ("without their bias", " + own[:, -1]", ""),
     ("one map for all states", "vsp.nearest(codewords, states)", "np.zeros(len(states), int)"),
     ("after the limits", " + own[:, -1]", "", "np.clip(actions, -1.0, 1.0)", "np.clip(actions, -1, 1) + own[:, -1]"),
+    ("a wrong action in 1 of 60 states", "    return np.clip", "    actions[0] = 0.5\n    return np.clip"),
 )
 
 
@@ -197,6 +213,7 @@ wrong("1.6", "a row x, y per codeword")(np.zeros((0, 2)))
 wrong("1.6", "at most 50%")(np.array([[0.9, 0.7], [0.9, 0.8], [0.9, 0.9]]))
 wrong("1.6", "→ Hint 2")([[0.6, 0.7], [0.7, 0.6], [0.7, 0.85], [0.85, 0.7], [0.8, 0.95], [0.95, 0.8], [0.3, 0.3]])
 wrong("1.6", "there twice")(np.array([[0.5, 0.5], [0.5, 0.5]]))
+wrong("1.6", "NaN or infinity in codewords")(np.array([[np.nan, 0.5], [0.2, 0.3]]))
 wrong("1.6", "outside the unit square")(np.array([[0.5, 0.5], [5, 0.5]]))
 wrong("1.6", "a row x, y per codeword")(np.array([0.1, 0.2, 0.3]))
 right("1.6")(np.array([[0.04, 0.15], [0.14, 0.05], [0.3, 0.5], [0.5, 0.3], [0.65, 0.85], [0.85, 0.65]]))
@@ -221,6 +238,9 @@ wrong("1.7", "of random codewords on SimpleGoal-v0")(lambda states, actions, k: 
 wrong("1.7", "there twice")(lambda states, actions, k: np.tile(states.mean(axis=0), (k, 1)))
 
 
+wrongs("1.7", ("→ Hint 3", "range(60)", "range(5)"))
+
+
 @wrong("1.7", "→ Hint 2")
 def chase_the_worst(states, actions, k):
     points = states[:1]
@@ -240,7 +260,7 @@ def clusters_of_states(states, actions, k):
     return KMeans(k, n_init=1, random_state=0).fit(states).cluster_centers_
 
 
-@wrong("1.7", "→ Hint 2")
+@wrong("1.7", "→ Hint 3")
 def unlucky_clusters_of_states_and_actions(states, actions, k):
     return kmeans2(np.column_stack([states, actions]), k, minit="++", seed=0)[0][:, : states.shape[1]]
 
@@ -345,7 +365,9 @@ wrongs(
     ("other codewords returned", "added.append(state)", "added.append(partition.codewords[0])"),
     ("→ Hint 1", "        split = np.mean(losses) > config.max_pol_loss and partition.far(i, state)\n", ""),
     ("→ Hint 5", "np.append(partition.neighbours()[i], False)", "partition.neighbours()[i]"),
+    ("exactly at the limit", "> config.max_pol_loss", ">= config.max_pol_loss"),
 )
+wrong("2.3", "a call of vsp's `split_regions`")(vsp.split_regions)
 # The paper does not say whether the mean begins anew after a split
 right("2.3")(changed("2.3", "            losses = []\n    return", "    return"))
 OWN_LOCATE = "        i = int(np.abs(partition.codewords - state).sum(axis=1).argmin())\n"
@@ -373,7 +395,13 @@ wrongs(
     ("→ Hint 2", "while i < len(partition.codewords):", "for i in range(len(partition.codewords)):"),
     ("→ Hint 2", "        i += 1", ""),
     ("nothing is averaged", "return removed", "partition.models.parameters[:] += 0.1; return removed"),
+    ("exactly the limit", "apart < config", "apart <= config"),
+    ("both go at once", "if alike.any()", "alike[alike.argmax() + 1 :] = False\n        if alike.any()"),
+    ("all neighbours alike, of any index", "if alike.any()", "alike[:i] = False\n        if alike.any()"),
 )
+wrong("2.4", "a call of vsp's `merge_regions`")(vsp.merge_regions)
+# A turn that goes on while a neighbour is alike
+right("2.4")(changed("2.4", "        i += 1", "        i += not alike.any()"))
 
 
 @wrong("2.4", "one goes, one stays")
@@ -439,6 +467,8 @@ wrongs(
     ("something else", "split(partition, episode,", "split(partition, episodes[0],"),
     ("something else", "split(partition, episode,", "split(partition, episodes,"),
     ("no episode observed", "partition.add", "return; partition.add"),
+    ("however many episodes there are", "config.n_epochs - config.n_freeze", "len(episodes) - config.n_freeze"),
+    ("in line 7 of its cell", "partition.train(rng)", "partition.train(rng, 1)"),
 )
 
 
@@ -468,6 +498,13 @@ right("2.5")(
             "split(partition=partition, episode=episode, config=config, rng=rng)",
         ),
         *("merge(partition, config)", "merge(partition, config=config)"),
+    )
+)
+right("2.5")(
+    changed(
+        "2.5",
+        "for n, episode in enumerate(episodes):\n",
+        "for n in range(config.n_epochs):\n        episode = episodes[n]\n",
     )
 )
 
@@ -596,6 +633,10 @@ wrongs(
     ("the sign turned", "ours - theirs", "theirs - ours"),
     ("half a 95 % interval", ERROR, f"1.96 * {ERROR}"),
     ("the gap and its standard error", f", {ERROR}", ""),
+    ("argument `ours` altered in place", "difference = ours - theirs", "difference = ours; ours -= theirs"),
+)
+wrong("3.2", "a call of vsp's `standard_errors`")(
+    lambda ours, theirs: (np.mean(ours - theirs), lesson_3.standard_errors(ours, theirs)[0])
 )
 
 
@@ -641,7 +682,10 @@ def policies_and_starts(returns, rng):
     )
 
 
-@right("3.3")
+wrong("3.3", "a call of vsp's `interval`")(lambda returns, rng: vsp.paper.interval(returns, np.mean, n_resamples=4000))
+
+
+@wrong("3.3", "no policies are resampled")
 def normal_theory(returns, rng):
     means = returns.mean(axis=1)
     half = 1.96 * means.std(ddof=1) / np.sqrt(len(means))
@@ -663,6 +707,7 @@ wrongs(
     ("a count per cell", "return counts", "return counts[:-1]"),
     ("shares", "return counts", "return counts / counts.sum()"),
 )
+wrong("3.4", "a call of vsp's `last_states`")(lambda *case: lesson_3.last_states(*case)[1])
 right("3.4")(changed("3.4", "return counts", "return counts.tolist()"))
 
 
@@ -694,7 +739,8 @@ wrongs(
     ("is not written yet", "cells, coefficients =", "raise NotImplementedError(); cells, coefficients ="),
 )
 right("3.5")(changed("3.5", FIT, "np.linalg.pinv(inputs[mine]) @ actions[mine]"))
-right("3.5")(changed("3.5", FIT, INVERSE))
+wrong("3.5", "also where a cell has fewer states than parameters")(changed("3.5", FIT, INVERSE))
+wrong("3.5", "a call of vsp's `refit`")(baselines.refit)
 
 
 @right("3.5")
@@ -760,6 +806,34 @@ wrong("3.7", "expected more than the best copy")(lambda: baselines.linear_map(*d
 wrong("3.7", "a vsp.VoronoiPolicy")(lambda: vsp.load_teacher("SimpleGoal-v0"))
 wrong("3.7", "the class VoronoiPolicy itself")(lambda: vsp.VoronoiPolicy)
 wrong("3.7", "the policy alone")(lambda: (baselines.rule_of_thumb("SimpleGoal-v0")[1], None))
+
+
+class Pretender(vsp.VoronoiPolicy):
+    """Has few cells, says `len`, and acts as the teacher does."""
+
+    def __len__(self):
+        return 5
+
+    def predict(self, obs):
+        return vsp.load_teacher("SimpleGoal-v0").predict(obs)
+
+
+@wrong("3.7", "codewords and coefficients that return")
+def acts_as_the_teacher():
+    return Pretender([[0.5, 0.5]], np.zeros((1, 3, 2)), task="SimpleGoal-v0")
+
+
+@wrong("3.7", "codewords and coefficients that return")
+def given_the_teachers_actions():
+    policy = baselines.rule_of_thumb("SimpleGoal-v0")[1]
+    policy.predict = vsp.load_teacher("SimpleGoal-v0").predict
+    return policy
+
+
+@wrong("3.7", "found 13 cells")
+def says_that_it_has_five_cells():
+    honest = too_many_cells()
+    return Pretender(honest.codewords, honest.coefficients, task="SimpleGoal-v0")
 
 
 @wrong("3.7", "fewer than 13")

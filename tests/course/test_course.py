@@ -4,10 +4,14 @@ import ast
 import builtins
 import functools
 import hashlib
+import math
 import os
 import re
+import signal
 import subprocess
 import sys
+import threading
+import time
 import zipfile
 from collections import Counter
 from dataclasses import replace
@@ -21,8 +25,8 @@ from IPython.core.interactiveshell import InteractiveShell
 import vsp
 from vsp import baselines, distill
 from vsp.algorithms import split_regions, teacher_episodes
-from vsp.course import build, drawing, feedback, handout, lesson_2, pages
-from vsp.course.lesson_1 import AT_MOST, CELLS, MARGIN, fit_linear
+from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages
+from vsp.course.lesson_1 import AT_MOST, CELLS, DRAWS, MARGIN
 from vsp.course.lesson_2 import _algorithm_1
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
@@ -38,6 +42,12 @@ def once(teacher, task, config=None, *, seed):
     if key not in RUNS:
         RUNS[key] = distill(teacher, task, config, seed=seed)
     return RUNS[key]
+
+
+def keep_runs(monkeypatch):
+    """Let checks use `once`."""
+    for lesson in (lesson_2, lesson_3):
+        monkeypatch.setattr(lesson, "distill", once)
 
 
 def briefly(teacher, task, config, *, seed):
@@ -116,6 +126,7 @@ def hints(number):
 def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
     text = " ".join(cell.source for cell in LESSONS["lesson_1_black_box.ipynb"].cells)
     assert f"{CELLS} codewords, at most {MARGIN * 100:.0f} % of the error" in text
+    assert f"(the median of {DRAWS} draws)" in text
     assert AT_MOST == 8 and "**at most eight codewords that" in text
 
 
@@ -205,8 +216,8 @@ def test_the_guide_keeps_answers_apart_from_what_students_see():
 
 def run(notebook, monkeypatch):
     """The names of a notebook after its last cell, and what went wrong in which cell (by id)."""
+    keep_runs(monkeypatch)
     monkeypatch.setattr(vsp, "distill", once)
-    monkeypatch.setattr(lesson_2, "distill", once)
     monkeypatch.setattr("vsp.show.laboratory.distill", briefly)
     monkeypatch.setattr("vsp.course.picture", lambda fig, alt: drawing.plt.close(fig) or alt)
     names, failed = {}, {}
@@ -320,10 +331,10 @@ def arguments(number):
     task, teacher, states, actions = examples()
     if number == "2.1":
         return once(teacher, SIMPLEGOAL, vsp.preset(SIMPLEGOAL), seed=0)[1], vsp.preset(SIMPLEGOAL)
-    if number in ("3.1", "3.7"):
+    if number == "3.1":
         copies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in range(2, 4)]
         played = [vsp.evaluate(p, SIMPLEGOAL, 500, seed=3)["return"].to_numpy() for p in (*copies, teacher)]
-        return (np.concatenate(played[:-1]), played[-1]) if number == "3.1" else (copies,)
+        return np.concatenate(played[:-1]), played[-1]
     few = {"1.1": (teacher,), "1.6": (states, actions, task), "2.7": (teacher, task)}
     return few.get(number, (teacher, task, vsp.preset(SIMPLEGOAL).quick()) if number == "2.6" else ())
 
@@ -336,7 +347,7 @@ def check(number, answer):
 
 def _refused(number, answer):
     with pytest.raises(feedback.NotYet) as refusal, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lesson_2, "distill", once)
+        keep_runs(patch)
         check(number, answer)
     return str(refusal.value)
 
@@ -357,7 +368,7 @@ def test_wrong_answers_are_told_what_is_wrong(i):
 
 @pytest.mark.parametrize("entry", course_answers.RIGHT, ids=label)
 def test_other_right_answers_pass(entry, capsys, monkeypatch):
-    monkeypatch.setattr(lesson_2, "distill", once)
+    keep_runs(monkeypatch)
     check(*entry)
     out = capsys.readouterr().out
     assert out.startswith(f"✓ {entry[0]} ") and out.count("✓") == 1
@@ -370,15 +381,89 @@ def test_what_is_no_answer_at_all_is_refused_in_words(number):
         assert _refused(number, (lambda nothing=nothing: nothing) if number == "3.7" else nothing).startswith(number)
 
 
-def test_a_check_leaves_what_it_was_given_as_it_was():
-    """A student's function that alters its arguments must not spoil the next case."""
-
+def test_a_function_that_alters_its_arguments_is_refused_and_spoils_no_other_case():
     def spoils(states, actions):
-        result = np.linalg.lstsq(np.column_stack([states, np.ones(len(states))]), actions, rcond=None)[0]
-        states[:] = actions[:] = 0.0
-        return result
+        actions += 1.0
+        return states
 
-    fit_linear(spoils)
+    exercise, given = feedback.Exercise("1.2", "fit"), (np.ones(2), np.ones(3))
+    with pytest.raises(feedback.NotYet, match="found argument `actions` altered in place, expected it as it was"):
+        exercise.call(spoils, *given)
+    with pytest.raises(feedback.NotYet, match="found argument 2 altered in place"):
+        exercise.call(lambda *given: spoils(*given), *given)
+    assert (given[0] == 1).all() and (given[1] == 1).all()
+
+
+def test_an_answer_cannot_replace_what_the_check_measures_by(monkeypatch):
+    def patches(states, actions, k):
+        monkeypatch.setattr(lesson_1, "leftover", lambda *given: 0.0)
+        monkeypatch.setattr(lesson_1, "MARGIN", 9.0)
+        return np.unique(states, axis=0)[:k]
+
+    assert "expected at most 85%" in _refused("1.7", patches)
+
+
+def test_the_copies_to_beat_are_those_of_the_lesson(monkeypatch):
+    keep_runs(monkeypatch)
+    source = next(c.source for c in LESSONS["lesson_3_does_it_work.ipynb"].cells if c.id == "distil")
+    assert f"for seed in range({len(lesson_3.SEEDS)})" in source and lesson_3.SEEDS.start == 0
+    _, teacher, *_ = examples()
+    copies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in lesson_3.SEEDS]
+    starts = vsp.start_states(SIMPLEGOAL, 2000, seed=lesson_3.FRESH)
+    best = max(vsp.rollout(copy, SIMPLEGOAL, starts).returns.mean() for copy in copies)
+    assert lesson_3._best_copy() == best
+
+
+def test_a_loop_without_end_is_stopped_and_told():
+    exercise = feedback.Exercise("1.2", "fit", seconds=0.1)
+
+    def endless():
+        while True:
+            try:
+                math.sqrt(2)
+            except Exception:  # catches nothing that ends the check
+                pass
+
+    @exercise.checks
+    def fit(function):
+        exercise.call(function)
+
+    before = signal.getsignal(signal.SIGALRM)
+    with pytest.raises(feedback.NotYet, match=r"^1.2 fit: found no result after 0.1 seconds, expected .* without end"):
+        fit(endless)
+    assert signal.getsignal(signal.SIGALRM) is before and signal.getitimer(signal.ITIMER_REAL) == (0, 0)
+
+
+@pytest.mark.parametrize("place", ["thread", "Windows"])
+def test_where_signals_do_not_work_there_is_no_time_limit(place, monkeypatch):
+    def limited():
+        with feedback.time_limit(0.01):
+            time.sleep(0.05)
+            done.append(place)
+
+    done = []
+    if place == "Windows":
+        monkeypatch.delattr(signal, "setitimer")
+        limited()
+    else:
+        thread = threading.Thread(target=limited)
+        thread.start()
+        thread.join()
+    assert done == [place]
+
+
+def test_the_first_prediction_is_kept(monkeypatch, capsys):
+    keep_runs(monkeypatch)
+    monkeypatch.setattr(lesson_2, "_FIRST", {})
+    right, rest = course_answers.PREDICTION, arguments("2.6")
+    assert lesson_2.predicted(right | {"exact maps": None}, *rest) is None
+    assert "'exact maps' is not answered yet" in capsys.readouterr().out
+    _refused("2.6", right | {"a higher loss": "fewer cells"})
+    lesson_2.prediction(right, *rest)
+    words = " ".join(capsys.readouterr().out.split())
+    assert words.startswith("✓ 2.6") and "first prediction was wrong about ['a higher loss']" in words
+    table = lesson_2.predicted(right, *rest)
+    assert table.loc["a higher loss", "you said first"] == "fewer cells"
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):

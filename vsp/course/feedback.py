@@ -8,16 +8,26 @@ from __future__ import annotations
 import copy
 import functools
 import hashlib
+import inspect
+import signal
+import sys
 import textwrap
+import threading
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from types import FrameType
 
 import numpy as np
 
 from ..rollouts import Episode, Policy
 
 WIDTH = 90  # characters of a message's lines
+
+
+class TooLong(BaseException):
+    """A check's time is up. No Exception, so that a student's `except Exception` does not catch it."""
 
 
 class NotYet(AssertionError):
@@ -64,6 +74,8 @@ class Exercise:
 
     number: str
     name: str
+    library: tuple[str, ...] = ()  # functions that are the answer, which must not call them: "module.name"
+    seconds: float = 30  # that a check may take
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
         """The exception to raise for an answer that is not right; `hint` is the number of the hint that helps."""
@@ -84,14 +96,18 @@ class Exercise:
         return NotYet(f"{self.number} {self.name} is not written yet: {todo}.")
 
     def checks(self, check: Callable) -> Callable:
-        """Decorator of the exercise's check: errors inside the check become feedback too."""
+        """Decorator of the exercise's check: errors inside the check become feedback too, and so do endless loops."""
 
         @functools.wraps(check)
         def careful(*answer: object, **settings: object) -> None:
             try:
-                check(*answer, **settings)
+                with time_limit(self.seconds):
+                    check(*answer, **settings)
             except NotYet:
                 raise
+            except TooLong:
+                found, expected = f"no result after {self.seconds:g} seconds", "one sooner: look for a loop without end"
+                raise self.wrong(found, expected) from None
             except Exception as error:
                 found = f"something that cannot be read ({type(error).__name__}: {error})"
                 raise self.wrong(found, "an answer as the text describes it") from None
@@ -102,20 +118,27 @@ class Exercise:
         """Say that all is well."""
         print(*_lines(f"✓ {self.number} {self.name}: {text}"), sep="\n")
 
-    def call(self, function: Callable, *arguments: object, keep: bool = False) -> object:
+    def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> object:
         """What `function` returns for copies of `arguments`, or for these themselves if it is to alter them (`keep`).
 
-        Raises NotYet for a stub, an error, or no result.
+        Raises NotYet for a stub, an error, an altered copy, a call of the library's answer, and, unless it may be
+        `empty`, for no result.
         """
         self.refuse_if(not callable(function), f"{function!r}", "a function")
+        given = arguments if keep else copy.deepcopy(arguments)
         try:
-            result = function(*(arguments if keep else copy.deepcopy(arguments)))
+            with calls_of(self.library) as called:
+                result = function(*given)
         except NotImplementedError:
             raise self.unsolved() from None
         except Exception as error:
             found = f"{type(error).__name__} ({error}) {_place(function, error)}"
             raise self.wrong(found, "a result: print what that line works with") from None
-        self.refuse_if(result is None, "None as the result", "something after `return`")
+        self.refuse_if(bool(called), f"a call of vsp's `{''.join(called[:1])}`", "code of your own")
+        self.refuse_if(result is None and not empty, "None as the result", "something after `return`")
+        for i, (before, after) in enumerate(zip(arguments, given)):
+            altered = isinstance(before, np.ndarray) and not np.array_equal(before, after)
+            self.refuse_if(altered, f"{_parameter(function, i)} altered in place", "it as it was: work on a copy")
         return result
 
     def array(
@@ -164,6 +187,42 @@ class Exercise:
                 raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}")
 
 
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise TooLong in what takes longer. Does nothing on Windows and outside the main thread: no signals there."""
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise TooLong
+
+    handler = signal.signal(signal.SIGALRM, stop)
+    timer = signal.setitimer(signal.ITIMER_REAL, seconds, 1)  # again after a second, if a bare `except` caught it
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *timer)
+        signal.signal(signal.SIGALRM, handler)
+
+
+@contextmanager
+def calls_of(functions: Sequence[str]) -> Iterator[list[str]]:
+    """A list of those of the `functions`, "module.name" each, that are called meanwhile."""
+    called, before = [], sys.getprofile()
+
+    def watch(frame: FrameType, event: str, argument: object) -> None:
+        name = f"{frame.f_globals.get('__name__')}.{frame.f_code.co_name}"
+        if event == "call" and name in functions:
+            called.append(frame.f_code.co_name)
+
+    sys.setprofile(watch if functions else before)
+    try:
+        yield called
+    finally:
+        sys.setprofile(before)
+
+
 def works(attempt: Callable, *given: object) -> bool:
     """Whether `attempt` ends without an error."""
     try:
@@ -189,6 +248,14 @@ def _place(function: Callable, error: Exception) -> str:
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     return f"in line {lines[-1].lineno} of its cell, `{lines[-1].line}`" if lines else "when it is called"
+
+
+def _parameter(function: Callable, i: int) -> str:
+    """How to speak of argument `i` of a function."""
+    try:
+        return f"argument `{list(inspect.signature(function).parameters)[i]}`"
+    except (TypeError, ValueError, IndexError):  # a function that does not tell, or takes `*arguments`
+        return f"argument {i + 1}"
 
 
 def _lines(text: str) -> list[str]:

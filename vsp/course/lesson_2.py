@@ -22,18 +22,19 @@ from ..partition import Partition
 from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
 from ..tasks import Task
-from .feedback import Exercise, Mistake, NotYet, Question
+from .feedback import Exercise, Mistake, NotYet, Question, works
 from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, handed on
 from .lesson_2_policy_class import OWN_CLASS, my_policy_class  # noqa: F401
 
 READING = Exercise("2.1", "reading")
 RUNNING_MEAN = Exercise("2.2", "running_mean")
 ALGORITHM_1 = Exercise("2.5", "algorithm_1")
-PREDICTION = Exercise("2.6", "prediction")
+PREDICTION = Exercise("2.6", "prediction", seconds=180)
 
 MOMENTS = ("before iteration 500", "between 500 and 2000", "after 2000")
 CAUSES = ("a split", "a merge", "a reset of the buffers", "a change of the teacher")
 TREND = ("more cells", "as many", "fewer cells")
+_FIRST: dict[str, str] = {}  # the first prediction of exercise 2.6
 SAME = 0.12  # a change of the mean number of cells by less than this share counts as none
 CHANGES = {
     "a lower distance": {"min_pol_distance": 0.15},
@@ -158,30 +159,40 @@ def algorithm_1(function: Callable) -> None:
     schedules = ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 14, 50))
     for n_epochs, n_split, n_merge, n_freeze, n_reset in schedules:
         rule = replace(SMALL, n_epochs=n_epochs, n_split=n_split, n_merge=n_merge, n_freeze=n_freeze, n_reset=n_reset)
-        _on_schedule(function, rule)
+        _on_schedule(function, rule, n_epochs)
+    rule = replace(SMALL, n_epochs=40, n_split=4, n_merge=10, n_freeze=8, n_reset=15)
+    _on_schedule(function, rule, 35)
     ALGORITHM_1.passed("every pass comes when it is due, and none in the freeze.")
 
 
-def _on_schedule(function: Callable, config: Config) -> None:
-    episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(config.n_epochs)]
+def _on_schedule(function: Callable, config: Config, n_episodes: int) -> None:
+    """With fewer episodes than iterations, the run may stop with an error where they end."""
+    episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(n_episodes)]
     partition = _Witness()
     given = partition, list(episodes), config, np.random.default_rng(0), partition.split, partition.merge
-    ALGORITHM_1.call(lambda *given: [function(*given)], *given, keep=True)  # it may return nothing
+    if n_episodes == config.n_epochs:
+        ALGORITHM_1.call(function, *given, keep=True, empty=True)
+    else:
+        works(function, *given)
     observed, expected = partition.episodes, "the first state of the first episode, added before it is observed"
     ALGORITHM_1.refuse_if(not observed, "no episode observed", "one in every iteration", 1)
     first = "add" in partition.before and np.array_equal(partition.codewords[0], episodes[0].states[0])
     ALGORITHM_1.refuse_if(not first, "another first codeword or none", expected, 1)
-    if len(observed) != config.n_epochs or any(own is not e for own, e in zip(observed, episodes)):
-        raise ALGORITHM_1.wrong(f"{len(observed)} episodes observed", f"each of the {config.n_epochs}, in order", 1)
+    if len(observed) != n_episodes or any(own is not e for own, e in zip(observed, episodes)):
+        raise ALGORITHM_1.wrong(f"{len(observed)} episodes observed", f"each of the {n_episodes}, in order", 1)
     if any("add" in done for done in partition.rounds):
         raise ALGORITHM_1.wrong("codewords added in the loop", "the first one only: the rest is up to `split`", 1)
+    if n_episodes == config.n_epochs:
+        freeze = f"the freeze begins at {config.n_epochs - config.n_freeze}"
+    else:
+        freeze = f"the freeze begins at n_epochs - n_freeze, however many episodes there are ({n_episodes})"
     for n, done in enumerate(partition.rounds):
-        _one_round(n, done, config)
+        _one_round(n, done, config, freeze)
     stray = "a splitting pass over something else"
     ALGORITHM_1.refuse_if(partition.strays > 0, stray, "one over the episode just observed", 1)
 
 
-def _one_round(n: int, done: list[str], config: Config) -> None:
+def _one_round(n: int, done: list[str], config: Config, freeze: str) -> None:
     frozen = config.n_epochs - config.n_freeze
     found = f"{done or 'nothing'} in iteration {n} after its episode was observed"
     ALGORITHM_1.refuse_if(done[:1] != ["train"] or done.count("train") != 1, found, "one training step first", 1)
@@ -189,9 +200,9 @@ def _one_round(n: int, done: list[str], config: Config) -> None:
         due = n > 0 and n % every == 0 and (what == "clear" or n < frozen)
         if (what in done) != due and not (n == 0 and what == "clear"):
             period = "n_reset" if what == "clear" else f"n_{what}"
-            hint, freeze = 3 if n >= frozen - 1 else 2, f"the freeze begins at {frozen}"
+            hint, last = 3 if n >= frozen - every else 2, what != "clear" and n >= frozen - every
             if due:
-                expected = f"one every {period} = {every} iterations" + (f": {freeze}" if n == frozen - 1 else "")
+                expected = f"one every {period} = {every} iterations" + (f": {freeze}" if last else "")
                 raise ALGORITHM_1.wrong(f"no `{what}` in iteration {n}", expected, hint)
             why = freeze if n >= frozen and n % every == 0 else "it is not due then"
             why = "a map that was trained once tells nothing yet" if n == 0 else why
@@ -257,17 +268,42 @@ def _algorithm_1(
 
 @PREDICTION.checks
 def prediction(answers: dict, teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> None:
-    """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer."""
-    PREDICTION.answers(answers, dict.fromkeys(CHANGES, TREND))
-    means, wrong = runs(teacher, task, config, seeds)["mean"], []
-    for name in CHANGES:
-        ratio = means[name] / means.iloc[0]
-        near = [TREND[i] for i in {int(np.digitize(-ratio, [-1 - s, -1 + s])) for s in (SAME / 2, 2 * SAME)}]
-        wrong += [name] if answers[name] not in near else []
+    """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer. The first answers are kept."""
+    first, means = _first(answers), runs(teacher, task, config, seeds)["mean"]
+    wrong, wrong_first = (_disagree(means, given) for given in (answers, first))
     if wrong:
         words = f"the runs disagree with you on {wrong}. Look at them in the cell below, and find out why."
         raise NotYet(f"{PREDICTION.number} {PREDICTION.name}: {words} → Hint 1 of exercise {PREDICTION.number}")
-    PREDICTION.passed("the runs did what you said.")
+    corrected = f"corrected. Your first prediction was wrong about {wrong_first}; the table keeps it."
+    PREDICTION.passed(corrected if wrong_first else "the runs did what you said.")
+
+
+def _disagree(means: pd.Series, given: dict) -> list[str]:
+    """Which of the predictions `given` the mean numbers of cells contradict."""
+    wrong = []
+    for name in CHANGES:
+        ratio = means[name] / means.iloc[0]
+        near = [TREND[i] for i in {int(np.digitize(-ratio, [-1 - s, -1 + s])) for s in (SAME / 2, 2 * SAME)}]
+        wrong += [name] if given[name] not in near else []
+    return wrong
+
+
+def _first(given: object) -> dict[str, str]:
+    """The first complete prediction since the kernel started. Raises NotYet if there is none."""
+    PREDICTION.answers(given, dict.fromkeys(CHANGES, TREND))
+    if not _FIRST:
+        _FIRST.update({name: given[name] for name in CHANGES})
+    return _FIRST
+
+
+def predicted(given: object, teacher: Policy, task: Task, config: Config) -> pd.DataFrame | None:
+    """`runs` beside the first prediction. As long as there is none, says so and returns None."""
+    try:
+        first = pd.Series(_first(given))
+    except NotYet as missing:
+        print(missing)
+        return None
+    return runs(teacher, task, config).round(1).assign(**{"you said first": first}).fillna("")
 
 
 def runs(teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> pd.DataFrame:

@@ -19,8 +19,8 @@ from ..rollouts import Episode
 from ..tasks import get_task
 from .feedback import Exercise, NotYet
 
-SPLIT = Exercise("2.3", "split_regions")
-MERGE = Exercise("2.4", "merge_regions")
+SPLIT = Exercise("2.3", "split_regions", ("vsp.algorithms.split_regions",))
+MERGE = Exercise("2.4", "merge_regions", ("vsp.algorithms.merge_regions",))
 
 TASK = "SimpleGoal-v0"
 # The settings of the cases below; new cells start at 0, so that random numbers do not matter
@@ -129,6 +129,7 @@ SPLITS = (
               "states next to a codeword that came a moment ago: they are in its cell now", 4),
     SplitCase([0.1], [1], [0.35, 0.12, 0.95], [0, 0, 1], [0.35, 0.95],
               "two places in one episode: go on after a split", 4),
+    SplitCase([0.1], [0], [0.4], [0.5], [], "a mean loss exactly at the limit: only more than the limit counts", 1),
 )
 # fmt: on
 
@@ -213,6 +214,7 @@ class MergeCase(NamedTuple):
     left: list[list[int]]
     what: str
     hint: int
+    order: tuple[int, ...] = ()  # place of each cell in the row, if it is not its index
 
 
 # fmt: off
@@ -224,6 +226,8 @@ MERGES = (
     MergeCase([0, 0.5, 1.0], [[0, 2]], "a removed cell between two that are not alike: what is gone removes no one", 2),
     MergeCase([5, 0, 0.1, 0.2, 9, 9.1], [[0, 1, 3, 4], [0, 3, 4], [0, 1, 4]],
               "three alike in the middle and two at the end: every cell that is left has its turn", 4),
+    MergeCase([0, 0.1, 0.2], [[0]], "two cells alike on either side of the one whose turn it is: both go at once", 4,
+              (1, 0, 2)),
 )
 # fmt: on
 
@@ -236,17 +240,18 @@ def merge_regions(function: Callable) -> None:
     for case in MERGES[1:]:
         _in_a_row(function, case)
     _emptied_by_merge(function)
-    for seed in range(4):
+    for seed in range(9):
         _properties(function, seed)
     MERGE.passed("neighbours that agree have become one, and nobody else is gone.")
 
 
 def _in_a_row(function: Callable, case: MergeCase) -> None:
-    places = np.linspace(0.05, 0.95, len(case.biases)).tolist()
+    row = np.linspace(0.05, 0.95, len(case.biases))
+    places = row[list(case.order or range(len(row)))].tolist()
     partition = on_a_line(places, case.biases)
     before = partition.codewords.copy()
     removed = _call(MERGE, function, _patient(partition), SMALL)
-    kept = [round((x - 0.05) / 0.9 * (len(places) - 1)) for x in partition.codewords[:, 0]]
+    kept = [i for i, x in enumerate(places) if np.isclose(partition.codewords[:, 0], x).any()]
     if kept not in case.left:
         found = f"cells {kept} left of a row of {len(places)} with biases {case.biases}"
         raise MERGE.wrong(found, f"{' or '.join(map(str, case.left))}, in a case of {case.what}", case.hint)
@@ -258,7 +263,12 @@ def _measured(function: Callable) -> None:
     """Whether parameters are compared by their largest difference."""
     single = "one parameter that differs by more than the limit (its size counts, not its sign), the others equal"
     many = "six parameters that each differ by less than the limit"
-    cases = (([0, 0, 0.7, 0, 0, 0], 2, single), ([0.5, -0.5, 0.5, 0.5, -0.5, 0.5], 1, many))
+    exact = "a difference of exactly the limit: only less than the limit counts"
+    cases = (
+        ([0, 0, 0.7, 0, 0, 0], 2, single),
+        ([0.5, -0.5, 0.5, 0.5, -0.5, 0.5], 1, many),
+        ([SMALL.min_param_distance, 0, 0, 0, 0, 0], 2, exact),
+    )
     for difference, left, what in cases:
         partition = on_a_line([0.2, 0.8], [0, 0])
         partition.models.parameters[1] = np.reshape(difference, (3, 2))
@@ -282,7 +292,8 @@ def _emptied_by_merge(function: Callable) -> None:
 
 
 def _properties(function: Callable, seed: int) -> None:
-    """On a random partition: whoever went had a twin, and of neighbours that were alike one went at least."""
+    """On a random partition: whoever went had a twin, of neighbours that were alike one went at least, and the cells
+    left are those that one of the readings leaves."""
     rng = np.random.default_rng(seed)
     partition = _random_partition(rng, 12)
     partition.models.parameters[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
@@ -296,6 +307,26 @@ def _properties(function: Callable, seed: int) -> None:
         raise MERGE.wrong("a cell gone, or altered, that was like no other", "only cells removed that have a twin", 1)
     if (graph & alike)[np.ix_(alive, alive)].any():
         raise MERGE.wrong("two neighbours with like maps, both still there", "one of them removed, in every pair", 4)
+    readings = [_survivors(partition, anew, again) for anew, again in ((True, False), (False, False), (True, True))]
+    if not any(np.array_equal(alive, survivors) for survivors in readings):
+        found = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
+        expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
+        raise MERGE.wrong(found, expected, 4)
     found, right = own.models.parameters, partition.models.parameters[alive]
     same = found.shape == right.shape and np.allclose(found, right)
     MERGE.refuse_if(not same, "other maps in the cells that are left", "those that they had: nothing is averaged", 1)
+
+
+def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:
+    """Which cells a merging pass leaves (k,). Neighbours are those of the beginning or, `anew`, of the cells that are
+    left; a turn removes the cell's neighbours once or, `again`, those that come beside it then, too."""
+    parameters, k = partition.comparable_parameters(), len(partition.codewords)
+    alive, graph = np.ones(k, dtype=bool), partition.neighbours()
+    for i in range(k):
+        alike = np.abs(parameters - parameters[i]).max(axis=1) < SMALL.min_param_distance
+        for _ in range(k if again else 1):
+            alive &= ~(alive[i] & graph[i] & alike)
+            if anew:
+                graph = np.zeros((k, k), dtype=bool)
+                graph[np.ix_(alive, alive)] = partition.neighbours(alive)
+    return alive

@@ -5,12 +5,15 @@ Each check takes what the student wrote, tries it on small random cases, and rai
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
+from scipy.stats import sem
 
 from .. import baselines
-from ..algorithms import teacher_episodes
+from ..algorithms import distill, teacher_episodes
+from ..config import paper_preset
 from ..evaluation import start_states
 from ..paper.statistics import spread
 from ..policy import VoronoiPolicy
@@ -22,15 +25,16 @@ from .feedback import ActionsAlone, Exercise, Mistake, Question, works
 TASK = "SimpleGoal-v0"
 FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
 FRESH = 2_000_003  # seed of the start states that a challenger is judged on
+SEEDS = range(8)  # of the lesson's copies
 NEAR = 0.1  # how far the width of an interval may be from what it comes to in large samples, relatively
 
 READING = Exercise("3.1", "reading")
-PAIRED_GAP = Exercise("3.2", "paired_gap")
-INTERVAL = Exercise("3.3", "interval")
-BLAME = Exercise("3.4", "blame")
-REFIT = Exercise("3.5", "refit")
+PAIRED_GAP = Exercise("3.2", "paired_gap", (f"{__name__}.standard_errors",))
+INTERVAL = Exercise("3.3", "interval", ("vsp.paper.statistics.interval",))
+BLAME = Exercise("3.4", "blame", (f"{__name__}.last_states", f"{__name__}.failures"))
+REFIT = Exercise("3.5", "refit", ("vsp.baselines.simple.refit",))
 DAGGER = Exercise("3.6", "dagger_round")
-CHALLENGE = Exercise("3.7", "challenger")
+CHALLENGE = Exercise("3.7", "challenger", seconds=180)
 
 WHO = ("the teacher", "the copies")
 INSIDE = ("a quarter", "half", "three quarters", "nearly all")
@@ -101,6 +105,12 @@ def _other_errors(error: float, ours: np.ndarray, theirs: np.ndarray) -> list[Mi
     ]
 
 
+def standard_errors(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
+    """Of the mean gap between returns (n,): from shared starts, and as if the starts had nothing to do with each
+    other."""
+    return sem(ours - theirs), np.hypot(sem(ours), sem(theirs))
+
+
 @INTERVAL.checks
 def interval(function: Callable) -> None:
     """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
@@ -129,6 +139,9 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
     size = f"an interval that is too {'narrow' if high - low < width else 'wide'}"
     mistakes = [*_other_widths(returns, width), Mistake(None, size, middle, 2)]
     INTERVAL.compare(high - low, width, mistakes, rtol=NEAR)
+    again = INTERVAL.call(function, returns[::-1], np.random.default_rng(1))  # other draws, by whatever generator
+    found = "the same interval whatever is drawn: no policies are resampled"
+    INTERVAL.refuse_if(np.allclose(again, values, rtol=1e-9), found, "the means of policies drawn at random", 2)
 
 
 def _unsteady(function: Callable, returns: np.ndarray, width: float) -> bool:
@@ -178,10 +191,14 @@ def failures(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) ->
     return (ours != GOAL) & (theirs == GOAL)
 
 
-def last_states(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
-    """Where the policy acted last in its failures from `starts` (n, d), of which there must be some. (f, d)"""
+def last_states(
+    policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the policy acted last in its failures from `starts` (n, d), of which there must be some: the states (f, d),
+    and how many of them are in each cell (k,)."""
     failed = starts[failures(policy, teacher, task, starts)]
-    return np.array([episode.states[-1] for episode in collect_episodes(policy, task, failed)])
+    states = np.array([episode.states[-1] for episode in collect_episodes(policy, task, failed)])
+    return states, np.bincount(policy.cells(states), minlength=len(policy))
 
 
 @BLAME.checks
@@ -192,7 +209,7 @@ def blame(function: Callable) -> None:
         rng = np.random.default_rng(seed)
         teacher = _Sometimes(shipped) if seed % 2 else shipped
         _blames(function, _random_policy(rng), teacher, task, task.start(rng, 150))
-    BLAME.passed("every failure is on the account of the cell that made the last step.")
+    BLAME.passed("every failure is attributed to the cell that chose the last action.")
 
 
 def _blames(function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray) -> None:
@@ -230,20 +247,24 @@ def refit(function: Callable) -> None:
         policy = _random_policy(rng, 6)
         states = rng.uniform(size=(300, 2))
         actions = np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1)
-        REFIT.call(function, policy, states, actions)  # what stops here does not stop at a cell without states
-        known = policy.cells(states) != 2
-        _refits(function, policy, states[known], actions[known])
+        REFIT.call(function, policy, states, actions)  # what stops here does not stop at a cell with few states
+        cells = policy.cells(states)
+        known, few = cells != 2, "where a cell has fewer states than parameters"
+        _refits(function, policy, states[known], actions[known], "where no state is in a cell")
+        for n in (1, 2):
+            kept = known & ((cells != 3) | (np.cumsum(cells == 3) <= n))
+            _refits(function, policy, states[kept], actions[kept], few)
     REFIT.passed("in these cells no maps are nearer to the teacher.")
 
 
-def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray) -> None:
-    """With no state in cell 2."""
+def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, where: str) -> None:
+    """With no state in cell 2, and perhaps few in cell 3, as `where` tells."""
     before = policy.coefficients.copy()
     try:
         new = function(policy, states.copy(), actions.copy())
     except Exception as error:
         found = f"{type(error).__name__} ({error})"
-        raise REFIT.wrong(found, "a result, also where no state is in a cell", 3) from None
+        raise REFIT.wrong(found, f"a result, also {where}", 3) from None
     REFIT.refuse_if(not isinstance(new, VoronoiPolicy), f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
     altered = not np.array_equal(policy.coefficients, before)
     REFIT.refuse_if(altered, "the old policy altered", "a new one: work on a copy of its coefficients", 1)
@@ -255,7 +276,9 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
     REFIT.refuse_if(one, "the same map in every cell", "one per cell, from the states in it", 2)
     constants = np.allclose(np.delete(new.coefficients, 2, axis=0)[:, :2], 0)
     REFIT.refuse_if(constants, "constants", "weights and bias by least squares", 2)
-    best = baselines.refit(policy, states, actions)
+    best, few = baselines.refit(policy, states, actions), policy.cells(states) == 3
+    missed = few.sum() < 3 and not np.allclose(new.linear(states[few]), actions[few], atol=0.1)
+    REFIT.refuse_if(missed, f"a map that misses the actions {where}", "one that meets them", 3)
     found, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
     REFIT.refuse_if(found > 1.01 * least, f"a squared error of {found:.3g}", f"the least there is, {least:.3g}", 2)
 
@@ -293,7 +316,8 @@ def _labels(
     if right < 1 and np.allclose(_sorted(actions), _sorted(labels), atol=1e-4):
         raise DAGGER.wrong("states and actions in different orders", "the same order for both", 3)
     if right < 1:
-        found = "the copy's own actions" if copied > 0.5 else f"the teacher's action for {right:.0%} of the states"
+        number = round((1 - right) * len(states))
+        found = "the copy's own actions" if copied > 0.5 else f"other actions in {number} of {len(states)} states"
         raise DAGGER.wrong(found, "the teacher's action for every state", 2)
 
 
@@ -327,9 +351,18 @@ def _sorted(rows: np.ndarray) -> np.ndarray:
     return rows[np.lexsort(np.round(rows, 5).T)]
 
 
+@functools.cache
+def _best_copy() -> float:
+    """The highest mean return of the lesson's copies, from fresh starts."""
+    task, teacher = get_task(TASK), load_teacher(TASK)
+    copies = [distill(teacher, task, paper_preset(TASK), seed=seed)[0] for seed in SEEDS]
+    return max(rollout(copy, task, start_states(task, 2000, FRESH)).returns.mean() for copy in copies)
+
+
 @CHALLENGE.checks
-def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
-    """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of `copies`, from fresh starts."""
+def challenger(policy: VoronoiPolicy) -> None:
+    """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of the lesson's copies, from fresh
+    starts. Made anew from its numbers, so that no method of the student's own plays."""
     if policy is None:
         raise CHALLENGE.unsolved()
     if isinstance(policy, type):
@@ -338,16 +371,16 @@ def challenger(policy: VoronoiPolicy, copies: list[VoronoiPolicy]) -> None:
     alone = "the policy alone: `vsp.distill` returns two things"
     CHALLENGE.refuse_if(two, "a policy and something else", alone, 1)
     CHALLENGE.refuse_if(not isinstance(policy, VoronoiPolicy), f"a {type(policy).__name__}", "a vsp.VoronoiPolicy", 1)
-    CHALLENGE.refuse_if(len(policy) >= FEWER_THAN, f"{len(policy)} cells", f"fewer than {FEWER_THAN}", 1)
-    if policy.task.name != copies[0].task.name:
-        raise CHALLENGE.wrong(f"a policy for {policy.task.name}", f"one for {copies[0].task.name}", 1)
+    CHALLENGE.refuse_if(policy.task.name != TASK, f"a policy for {policy.task.name}", f"one for {TASK}", 1)
+    form = {"metric": policy.metric, "scale": policy.scale, "sub_policy": policy.policy_class.name}
+    made = VoronoiPolicy(policy.codewords, policy.coefficients, task=TASK, **form)
+    CHALLENGE.refuse_if(len(made) >= FEWER_THAN, f"{len(made)} cells", f"fewer than {FEWER_THAN}", 1)
     task = get_task(TASK)
     starts = start_states(task, 2000, FRESH)
-    own, *others = (rollout(p, task, starts) for p in [policy, *copies])
-    best, mean = max(other.returns.mean() for other in others), own.returns.mean()
+    own, teacher = (rollout(p, task, starts) for p in (made, load_teacher(TASK)))
+    best, mean = _best_copy(), own.returns.mean()
     failing = f"{(own.outcomes != GOAL).mean():.1%} of the episodes fail"
-    found = f"a mean return of {mean:.2f} from fresh starts ({failing})"
-    CHALLENGE.refuse_if(mean <= best, found, f"more than the best copy's {best:.2f}", 2)
-    teacher = rollout(load_teacher(TASK), task, starts).returns.mean()
-    others = f"the best copy {best:.2f}, the teacher {teacher:.2f}"
-    CHALLENGE.passed(f"{len(policy)} cells return {mean:.2f}, {others}; {failing}.")
+    found = f"codewords and coefficients that return {mean:.3f} from fresh starts ({failing})"
+    CHALLENGE.refuse_if(mean <= best, found, f"more than the best copy's {best:.3f}", 2)
+    others = f"the best copy {best:.2f}, the teacher {teacher.returns.mean():.2f}"
+    CHALLENGE.passed(f"{len(made)} cells return {mean:.2f}, {others}; {failing}.")
