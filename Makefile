@@ -14,17 +14,16 @@ TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_
   simplegoal_spread mountaincar_spread text_numbers
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
-FIGURES_06_few_equations := beyond_map beyond_likeness beyond_read
-TABLES_06_few_equations := $(addprefix beyond_,leaders faithful sizes apart equal tail budgets teachers)
+FIGURES_06_few_equations := $(addprefix beyond_,read explained map likeness)
+TABLES_06_few_equations := $(addprefix beyond_,leaders faithful)
 FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times limit_strides
 ANIMATIONS_07_limits := gait_halfcheetah
 TABLES_07_limits := $(addprefix limit_,references sizes starts losses robots gait fewest)
 FIGURES_08_proofs := proofs_basins proofs_mountaincar proofs_pendulum
 TABLES_08_proofs := $(addprefix proofs_,simplegoal dead_points pendulum teacher)
-FIGURES_09_methods := beyond_partitions beyond_simplify beyond_simplegoal beyond_mountaincar beyond_pendulum \
-  beyond_lunarlander beyond_ablation beyond_race beyond_explained lookup_times graph_times graph_shares
-TABLES_09_methods := beyond_headline beyond_ablation beyond_lunarlander \
-  $(foreach t,simplegoal mountaincar pendulum,beyond_$(t) beyond_$(t)_policy beyond_$(t)_rules)
+FIGURES_09_methods := beyond_rivals beyond_ablation lookup_times
+TABLES_09_methods := $(addprefix beyond_,equal headline tail apart sizes teachers budgets rules simplegoal mountaincar \
+  pendulum lunarlander ablation pendulum_policy)
 # In an order in which no core waits; which of them read data/runs, and which committed results.
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
 OURS := 08_proofs 09_methods 06_few_equations 07_limits
@@ -32,11 +31,11 @@ NOTEBOOKS := $(sort $(PAPER) $(OURS))
 NEED_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SMALL := SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1
 ROWS := $(foreach n,$(SMALL),beyond_$(n))
-READS_06_few_equations := $(foreach n,$(ROWS) \
-  $(foreach t,$(SMALL),$(foreach table,tuned apart faithful demanded teachers same,$(table)_$(t))) \
-  $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3) optimum \
-  $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
+READS_OURS := $(foreach n,$(ROWS) optimum \
+  $(foreach t,$(SMALL),$(foreach table,tuned apart faithful demanded same,$(table)_$(t))) \
+  $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
+READS_06_few_equations := $(READS_OURS)
 READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL)) starts_MountainCarContinuous-v0 optimum fits \
   $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
   $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
@@ -44,7 +43,8 @@ READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL)) starts_Mount
 READS_08_proofs := $(foreach n,paper tuned,data/proofs/simplegoal_$(n).json) data/proofs/mountaincar_limit.json \
   data/proofs/pendulum_faithful.json data/results/faithful_MountainCarContinuous-v0.policy \
   $(foreach n,proofs proofs_grid proofs_teacher,data/results/$(n).csv)
-READS_09_methods := $(foreach n,$(ROWS) beyond_race beyond_LunarLanderContinuous-v3 lookup,data/results/$(n).csv) \
+READS_09_methods := $(READS_OURS) $(foreach n,lookup $(foreach t,$(SMALL),teachers_$(t)) \
+  $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
 READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_09_methods)))
 
@@ -222,7 +222,7 @@ $(call outputs,$(1)): $(1) ;
 $(1): begin venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@for file in $$(READS_$(1)); do test -f "$$$$file" || { echo "error: $$$$file is missing: \`git checkout $$$$file\` \
 	brings it back; \`make study beyond beyond-long lookup\` makes all such files" >&2; exit 1; }; done; \
-	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb $$(READS_$(1)) \
+	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb notebooks/captions.toml $$(READS_$(1)) \
 	  $(if $(filter $(1),$(NEED_RUNS)),"$$$$STATE/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$$$QUICK"; (cd "$$$$OUT" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$$$STATE/$(1)"; then \

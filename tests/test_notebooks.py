@@ -6,19 +6,26 @@ import pydoc
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from vsp.run.notebook import nbformat
+from vsp.show import captions
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 @pytest.fixture(params=NOTEBOOKS, ids=lambda path: path.stem)
-def notebook(request):
-    return nbformat.read(request.param, as_version=4)
+def path(request):
+    return request.param
+
+
+@pytest.fixture
+def notebook(path):
+    return nbformat.read(path, as_version=4)
 
 
 def code_cells(notebook):
@@ -47,12 +54,33 @@ def test_more_words_than_code(notebook):
     assert words > code
 
 
-def test_every_saved_figure_has_alternative_text(notebook):
+KINDS = {"save_figure": "figures", "save_growth": "figures", "save_gait": "figures", "save_table": "tables"}
+
+
+def saved(notebook):
+    """What a notebook saves, in its order: kind and name."""
     for cell in code_cells(notebook):
-        for call in (node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)):
-            name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", None)
-            if name in ("save_figure", "save_growth", "save_gait"):
-                assert {"alt", "out", "quick"} <= {keyword.arg for keyword in call.keywords}, cell.id
+        calls = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)]
+        for call in sorted(calls, key=lambda call: call.lineno):
+            if (name := getattr(call.func, "attr", getattr(call.func, "id", None))) in KINDS:
+                yield KINDS[name], next(a.value for a in call.args if isinstance(a, ast.Constant))
+
+
+def test_every_saved_figure_and_table_has_its_caption_in_the_notebooks_order(path):
+    book = tomllib.loads((ROOT / "notebooks" / "captions.toml").read_text("utf-8")).get(path.stem, {})
+    listed = list(saved(nbformat.read(path, as_version=4)))
+    for kind in ("figures", "tables"):
+        assert list(book.get(kind, {})) == [name for one, name in listed if one == kind]
+        for about in book.get(kind, {}).values():
+            assert about["caption"].endswith((".", "?")) and len(about["caption"].split()) > 2
+            assert kind == "tables" or (about["alt"].endswith(".") and len(about["alt"]) > 60)
+
+
+def test_figures_and_tables_that_the_text_names_exist(notebook):
+    text = "".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
+    assert set(re.findall(r"\b(?:Figure|Table) \d\.\d+", text)) <= {
+        caption.label for caption in captions._book().values()
+    }
 
 
 def test_names_in_the_text_exist(notebook):
@@ -61,13 +89,15 @@ def test_names_in_the_text_exist(notebook):
     assert [path for path in re.findall(r"`(vsp/[\w/.]+)`", text) if not (ROOT / path).exists()] == []
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "figures" / "executed").glob("*.ipynb")), ids=lambda path: path.stem)
-def test_alternative_texts_are_sentences(path):
+@pytest.mark.parametrize(
+    "executed", sorted((ROOT / "figures" / "executed").glob("*.ipynb")), ids=lambda path: path.stem
+)
+def test_alternative_texts_are_sentences(executed):
     """They say what is to be seen, and nothing that only Python would say."""
-    pages = [output.data.get("text/html", "") for cell in code_cells(nbformat.read(path, as_version=4))
+    pages = [output.data.get("text/html", "") for cell in code_cells(nbformat.read(executed, as_version=4))
              for output in cell.outputs if "data" in output]  # fmt: skip
     texts = [html.unescape(text) for page in pages for text in re.findall(r'<img alt="([^"]*)"', page)]
-    assert texts or path.stem.startswith("04")
+    assert texts or executed.stem.startswith("04")
     for text in texts:
         assert len(text) > 60 and text.endswith(".") and not re.search(r"[{}]|\('|nan\b|\bTrue\b", text), text
 

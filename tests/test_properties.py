@@ -36,8 +36,8 @@ from vsp.beyond.refinement import config, faithful, imitate, refine, simplificat
 from vsp.beyond.robots import Walking, imitate_pushed, search_one_map, walking_preset
 from vsp.beyond.robots.fewest import fewest_numbers
 from vsp.config import Config, paper_preset
-from vsp.paper import printed, statistics, tables
-from vsp.show import state_space, style
+from vsp.paper import printed, shown, statistics, tables
+from vsp.show import captions, state_space, style
 from vsp.show.returns import box_plot, histogram, learning_curve, over_iterations, run_means
 from vsp.subpolicies import base
 from vsp.subpolicies.registry import policy_class
@@ -535,7 +535,11 @@ CASES = {
         {"sub_policy": Argument("linear", choice("linear").bad | st.just("pid"))},
     ),
     "subpolicies.base.number": (functools.partial(base.number, 0.5), {"digits": digits}),
-    "paper.tables.as_text": (functools.partial(tables.as_text, pd.DataFrame({"a": [0.5, 2.0]})), {"digits": digits}),
+    "show.captions.caption_of": (
+        functools.partial(captions.caption_of, name="mine", alt="What it shows."),
+        {"kind": choice("figures")},
+    ),
+    "paper.shown.as_text": (functools.partial(shown.as_text, pd.DataFrame({"a": [0.5, 2.0]})), {"digits": digits}),
     "paper.tables.equation_table": (functools.partial(tables.equation_table, TWO), {"digits": digits}),
     "paper.tables.hyperparameter_table": (lambda task: tables.hyperparameter_table([task]), {"task": task}),
     "paper.tables.interpretation_table": (tables.interpretation_table, {"task": task}),
@@ -684,12 +688,12 @@ EXEMPT = {
         paper.statistics.percentile_interval paper.statistics.quarters paper.statistics.quartiles_from_fences
         paper.statistics.remaining_mean paper.statistics.remaining_std""",
     "takes a frame, which pandas has checked, or parts of a figure": """
-        paper.tables.as_latex paper.tables.save_table paper.tables.show_table show.returns.again show.returns.boxes
+        paper.shown.present paper.shown.show_table paper.tables.save_table show.returns.again show.returns.boxes
         show.returns.by_group show.returns.intervals show.returns.ledger_gaps show.returns.margin show.returns.phase
         show.returns.reference show.returns.upper_bound show.state_space.force_bar show.state_space.image
         show.state_space.square
         show.state_space.trail show.style.Picture show.style.embedded show.style.legend_below show.style.letter
-        show.style.panels show.style.save_figure""",
+        show.style.panels show.style.save_figure show.captions.Caption""",
 }
 EXEMPT = {name: reason for reason, names in EXEMPT.items() for name in names.split()}
 

@@ -18,7 +18,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 from vsp import algorithms
 from vsp.baselines import tdavq
 from vsp.baselines.soft_tree import SoftTree
-from vsp.beyond.comparison import kept, measure, regret, time_to_quality
+from vsp.beyond.comparison import kept, measure, regret
 from vsp.beyond.comparison.method_tables import APART, LIKE, METHODS, RIVALS, ROBOTS
 from vsp.beyond.comparison.methods import Budget
 from vsp.beyond.optimum import TASKS as SOLVED
@@ -112,12 +112,6 @@ def by_method(name):
     return found
 
 
-def by_time_to_quality():
-    few = dataclasses.replace(SMALL, n_restarts=1, n_generations=0)
-    made = {name: make(TEACHERS[SIMPLEGOAL], few, 0) for name, (make, _) in time_to_quality.METHODS.items()}
-    return {name: actions(policy, SIMPLEGOAL) for name, policy in made.items()}
-
-
 def by_simplest():
     few = dataclasses.replace(SMALL, n_generations=2)
     policy, _ = simplify(TEACHERS[SIMPLEGOAL], SIMPLEGOAL, few, tolerance=1.0, seed=0)
@@ -152,7 +146,6 @@ CASES = {
     for name, method in known.items()
     if name != "robot's teacher"
 } | {
-    "time_to_quality": (by_time_to_quality, time_to_quality.VERSION),
     "kept.simplest": (by_simplest, kept.SIMPLIFY_VERSION),
     "beside": (beside_a_run, beside.VERSION),
     "measure": (by_measure, measure.VERSION),

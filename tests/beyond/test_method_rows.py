@@ -219,16 +219,14 @@ def test_an_ablated_row_is_that_of_the_changed_settings(monkeypatch):
 
 def test_the_command_writes_results_and_times_apart(small, tmp_path):
     small.setattr(make_rows, "TASKS", (SIMPLEGOAL,))
-    for name in ("time_to_quality", "optimum"):
-        small.setattr(make_rows, name, lambda: pd.DataFrame({"seconds": [0.5]}))
+    small.setattr(make_rows, "optimum", lambda: pd.DataFrame({"seconds": [0.5]}))
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
     results = tmp_path / "data" / "results"
     frame = read_rows(SIMPLEGOAL, results)
     assert len(frame) == 5 and "seconds" not in frame
     assert len(pd.read_csv(results / "beyond_seconds.csv")) == 5
-    for name in ("beyond_race", "optimum"):
-        assert (results / f"{name}.csv").read_text() == "seconds\n0.500000\n"
+    assert (results / "optimum.csv").read_text() == "seconds\n0.500000\n"
     listed.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
     assert read_rows("Pendulum-v1", results)["failing"].isna().all()
 
@@ -266,7 +264,7 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
     assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= kept.simplest_provenance(SIMPLEGOAL).items()
     assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5
-    assert not (results / "beyond_race.csv").exists()
+    assert not (results / "optimum.csv").exists()
     listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
 
 

@@ -10,7 +10,7 @@ import pytest
 from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.beyond.benchmarks import fits, lookup
-from vsp.beyond.comparison import kept, method_rows, method_tables, regret, stale_results, time_to_quality
+from vsp.beyond.comparison import kept, method_rows, method_tables, regret, stale_results
 from vsp.beyond.comparison.method_tables import METHODS, WALKERS
 from vsp.paper import results as results_module
 from vsp.paper import runs
@@ -149,7 +149,6 @@ def raised(name):
         (lambda patch: patch.setattr(runs, "VERSION", 2), STUDIES),
         (lambda patch: patch.setitem(METHODS, "CART", raised("CART")), BEYOND + LONG),
         (lambda patch: patch.setitem(METHODS, "TD-AVQ", raised("TD-AVQ")), BEYOND[:1]),
-        (lambda patch: patch.setattr(time_to_quality, "VERSION", 2), [says("beyond_race.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(regret, "VERSION", 2), [says("optimum.csv", "version", "beyond")]),
         (lambda patch: patch.setattr(lookup, "VERSION", 2), [says("lookup.csv", "version", "lookup")]),
         (lambda patch: patch.setattr(fits, "VERSION", 2), [says("fits.csv", "version", "lookup")]),
@@ -157,7 +156,7 @@ def raised(name):
          [says(f"beyond_{LUNARLANDER}.policy", "version", "beyond-long")]),
         (lambda patch: patch.setattr(interpretations, "VERSION", 2), [says("readings.csv", "settings", "study")]),
     ],
-    ids=["paper", "CART", "TD-AVQ", "race", "optimum", "lookup", "fits", "simplify", "study"],
+    ids=["paper", "CART", "TD-AVQ", "optimum", "lookup", "fits", "simplify", "study"],
 )  # fmt: skip
 def test_results_of_another_version_are_stale(results, monkeypatch, change, expected):
     change(monkeypatch)
@@ -194,12 +193,10 @@ def test_results_of_another_teacher_are_stale(results, monkeypatch):
     monkeypatch.setattr(teachers_module, "teachers", lambda task: dict(list(paths(task).items())[:-1]))
     monkeypatch.setattr(method_rows, "_teacher", lambda task, agent: SimpleNamespace(digest="f" * 64))
     monkeypatch.setattr(kept, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
-    monkeypatch.setattr(time_to_quality, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),
         *(says(name, "teacher", "beyond") for task in method_tables.TASKS for name in files_of(task)),
         *(says(name, "teacher", "beyond-long") for task in (LUNARLANDER, *WALKERS) for name in files_of(task)),
-        says("beyond_race.csv", "teacher", "beyond"),
         says(f"beyond_{LUNARLANDER}.policy", "teacher", "beyond-long"),
         *(
             says(f"{name}_{task}.csv", "settings and teacher", "beyond-long")  # those of the policy that walks

@@ -20,7 +20,16 @@ from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, make_run, paper_experiment
 from vsp.paper.statistics import interval, resample, spread
 from vsp.paper.studies import interpretations
-from vsp.paper.studies.interpretations import AS_PRINTED, READINGS, as_intervals, distance, landmarks, ranking, study
+from vsp.paper.studies.interpretations import (
+    AS_PRINTED,
+    READINGS,
+    SHOWN,
+    as_intervals,
+    distance,
+    landmarks,
+    ranking,
+    study,
+)
 from vsp.tasks import base
 
 CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer
@@ -301,51 +310,46 @@ def test_the_ranking_goes_by_the_distance():
     assert ranking(tied) == ["default", "a", "b"]  # as they were tried
 
 
-def test_intervals_are_those_of_the_choosing_phase():
-    found = as_intervals(FRAME, "both", "distance")
-    assert found.columns.tolist() == ["here", "low", "high"] and found.index.tolist() == ["default", "a", "b"]
-    assert found.loc["b"].tolist() == [1.0, 0.5, 1.5] and found.loc["default"].tolist() == [2.0, 1.5, 2.5]
-
-
 @pytest.fixture(scope="module")
 def committed():
     return read_results("readings")
 
 
-def test_all_readings_alone_are_shown_and_the_nearest_combinations(committed):
-    shown = interpretations.shown_variants(committed, n_combinations=3)
-    alone = [f"{number} {interpretations.name_of(change)}" for number, change in ALONE]
-    assert shown[:-3] == ["default", *alone, "algorithms as printed"] and all(" + " in name for name in shown[-3:])
-    chosen = committed[committed["phase"] == "choosing"]
-    away = chosen[chosen["task"] == "both"].set_index("variant")["distance"]
-    combined = away[away.index.str.contains(r" \+ ")].sort_values()
-    assert shown[-3:] == combined.index[:3].tolist()
-    assert len(interpretations.shown_variants(committed)) == len(alone) + 2 + 4
-    assert set(shown) <= set(as_intervals(committed, "both", "distance").index)
+def test_intervals_are_those_of_the_phase_and_have_names_in_words(committed):
+    found = as_intervals(committed, "both", "distance")
+    assert found.columns.tolist() == ["here", "low", "high"] and found.index.tolist() == list(SHOWN.values())
+    for variant, words in SHOWN.items():
+        chosen = committed[(committed["phase"] == "choosing") & (committed["task"] == "both")].set_index("variant")
+        wanted = chosen.loc[variant, ["distance", "distance_low", "distance_high"]]
+        assert found.loc[words].tolist() == wanted.tolist()
+    assert as_intervals(committed, "both", "distance", "confirming")["here"].isna().any()
 
 
-def test_the_brief_table_has_the_tasks_side_by_side(committed):
+def test_the_variants_shown_are_the_extremes(committed):
+    """On each task, the highest and the lowest mean of the readings on their own are among them."""
+    alone = committed[(committed["phase"] == "choosing") & ~committed["variant"].str.contains(r" \+ ")]
+    for task in TASKS:
+        means = alone[alone["task"] == task].set_index("variant")["mean"]
+        assert means.idxmin() in SHOWN
+    means = alone[alone["task"] == SIMPLEGOAL].set_index("variant")["mean"].sort_values()
+    assert set(means.index[-2:]) <= SHOWN.keys()
+
+
+def test_the_summary_has_a_row_per_variant_and_task(committed):
     frame, chosen = interpretations.interpretation_summary(committed), committed[committed["phase"] == "choosing"]
-    assert frame["variant"].tolist() == ranking(chosen) and set(frame["variant"]) == set(interpretations.variants())
-    columns = ["cells", "mean", "std", "failing (%)", "distance"]
-    expected = [f"{task} {name}" for name in columns for task in ("SG", "MC")]
-    assert frame.columns.tolist() == ["variant", *expected, "BOTH distance"]
-    by_name = frame.set_index("variant")
-    for row in chosen.itertuples():
-        prefix = {SIMPLEGOAL: "SG", MOUNTAINCAR: "MC", "both": "BOTH"}[row.task]
-        assert by_name.at[row.variant, f"{prefix} distance"] == round(row.distance, 3)
-        if prefix != "BOTH":
-            assert by_name.at[row.variant, f"{prefix} cells"] == row.cells
-            failing = 100 * (row.pit + row.truncated)
-            assert by_name.at[row.variant, f"{prefix} failing (%)"] == pytest.approx(failing, abs=6e-4)
+    assert frame["task"].tolist() == [task for task in TASKS for _ in SHOWN]
+    assert frame["variant"].tolist() == [*SHOWN.values()] * 2
+    rows = chosen.set_index(["task", "variant"])
+    for key, found in zip(itertools.product(TASKS, SHOWN), frame.to_dict("records")):
+        row = rows.loc[key]
+        assert found["failing"] == pytest.approx(row["pit"] + row["truncated"])
+        assert all(found[name] == row[name] for name in ("cells", "mean", "std", "distance"))
 
 
 def test_panels_show_columns_with_an_interval(committed):
-    shown = interpretations.shown_variants(committed)
     for task, column, label, (left, right) in interpretations.PANELS:
         found = as_intervals(committed, task, column)
         assert label and found.notna().all(axis=None) and (found["low"] <= found["high"]).all()
-        inside = found.loc[shown, "here"].between(left, right)
-        assert inside.all(), inside[~inside]
-        again = as_intervals(committed, task, column, "confirming")
+        assert found["here"].between(left, right).all()
+        again = as_intervals(committed, task, column, "confirming").dropna()
         assert again.loc["default"].between(left, right).all()

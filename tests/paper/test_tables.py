@@ -10,8 +10,9 @@ from vsp.config import EXTENSIONS, Config, paper_preset
 from vsp.paper import printed as printed_module
 from vsp.paper import tables
 from vsp.paper.printed import PREFIX, SHORT, printed_hyperparameters, printed_spread, printed_text_numbers
+from vsp.paper.shown import show_table
 from vsp.paper.statistics import spread
-from vsp.paper.tables import as_latex, as_text, equation_table, hyperparameter_table, save_table, text_number_table
+from vsp.paper.tables import equation_table, hyperparameter_table, save_table, text_number_table
 from vsp.policy import VoronoiPolicy
 
 FRAME = pd.DataFrame(
@@ -44,7 +45,8 @@ def unescaped(tex):
 def test_both_files_are_there_and_the_printed_form_comes_back(tmp_path):
     found = []
     for folder in (tmp_path / "a", tmp_path / "b"):
-        assert save_table(FRAME, "some_table", caption="Numbers.", out=folder).equals(as_text(FRAME))
+        shown = save_table(FRAME, "some_table", caption="Numbers.", out=folder)
+        assert shown.data == show_table(FRAME, caption="Numbers.").data
         found.append({path.name: path.read_bytes() for path in (folder / "figures" / "tables").iterdir()})
     assert found[0] == found[1] and found[0].keys() == {"some_table.csv", "some_table.tex"}
 
@@ -78,24 +80,6 @@ def test_numbers_in_a_csv_have_at_most_eight_digits_also_beside_words(tmp_path, 
     assert numbers and max(len(number.replace(".", "").lstrip("0")) for number in numbers) <= 8
 
 
-def test_as_text_by_hand():
-    values = {"a_b": [1.23456, 0.0, np.nan], "n": [1e-4, -2.0, 0.0005], "c": [3, True, "x_y%"]}
-    shown = as_text(pd.DataFrame(values, dtype=object))
-    assert shown["a_b"].tolist() == ["1.235", "0.000", tables.MISSING]
-    assert shown["n"].tolist() == ["0.0001", "-2.000", "0.0005"] and shown["c"].tolist() == ["3", "True", "x_y%"]
-
-
-def test_counts_have_no_decimals_and_a_missing_one_is_missing():
-    shown = as_text(pd.DataFrame({"cells": [13.0, np.nan], "share": [1.0, 0.5], "steps": [500_000.0, 0.0]}))
-    assert shown["cells"].tolist() == ["13", tables.MISSING] and shown["steps"].tolist() == ["500000", "0"]
-    assert shown["share"].tolist() == ["1.000", "0.500"]
-
-
-def test_a_notebook_shows_no_row_numbers():
-    page = tables.show_table(pd.DataFrame({"a": [7.25], "b": ["x < y"]})).data
-    assert re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", page) == ["a", "b", "7.250", "x &lt; y"]
-
-
 def test_hyperparameters_stand_beside_the_papers():
     frame = hyperparameter_table(list(TASKS))
     assert frame["hyperparameter"].tolist() == list(printed_hyperparameters(SIMPLEGOAL)) and frame.shape == (9, 5)
@@ -115,7 +99,7 @@ def test_a_equation_table_is_a_row_of_equations_per_cell(tmp_path, task):
     equation = shown.iloc[0, 1].split("}} ")[-1]
     signed = [float(s.replace(" ", "")) for s in re.findall(r"[+-]? ?\d+\.\d+", equation)]
     assert signed == pytest.approx(policy.coefficients[0, :, 0], abs=5e-4)
-    save_table(policy.to_frame(), "some_table", caption="c", out=tmp_path, latex=shown)
+    save_table(policy.to_frame(), "some_table", caption="c", out=tmp_path, shown=shown)
     tex, csv = written(tmp_path)
     assert balanced(tex) and not unescaped(tex)
     back = pd.read_csv(csv).to_numpy()
@@ -170,21 +154,18 @@ def test_readings_are_the_fields_that_the_papers_table_does_not_print():
     assert sorted([*frame.index, *others]) == sorted(field.name for field in dataclasses.fields(Config))
 
 
-def test_a_frame_as_latex_is_what_the_table_holds(tmp_path):
-    shown = as_latex(FRAME)
-    assert shown.columns.tolist() == [r"name\_of", "value", "count", "gap"]
-    assert shown[r"name\_of"].tolist() == [r"a\_b", r"c \& d"] and shown["gap"].tolist() == [tables.MISSING, "$-$2"]
-    assert shown["value"].tolist() == ["0.333", "0.0001"] and shown["count"].tolist() == ["10", "2000000"]
-    for name, latex in (("plain", None), ("given", shown)):
-        save_table(FRAME, name, caption="c", out=tmp_path, latex=latex)
-    (plain, _), (given, csv) = written(tmp_path, "plain"), written(tmp_path, "given")
-    assert plain.replace("plain", "given") == given and len(pd.read_csv(csv)) == 2
+def test_the_latex_escapes_text_and_leaves_mathematics(tmp_path):
+    save_table(FRAME, "some_table", caption="5 % of $x_0$", out=tmp_path)
+    tex, _ = written(tmp_path)
+    assert r"name\_of" in tex and r"a\_b" in tex and r"c \& d" in tex and r"5 \% of $x_0$" in tex
+    assert "–" in tex and "$-$2" in tex and "2,000,000" in tex
 
 
-def test_a_long_table_is_whole_in_the_csv_and_in_part_in_the_latex(tmp_path):
-    shown = save_table(FRAME, "some_table", caption="c", out=tmp_path, latex=as_latex(FRAME[["value"]][:1]))
+def test_a_long_table_is_whole_in_the_csv_and_in_part_in_print(tmp_path):
+    shown = save_table(FRAME, "some_table", caption="c", out=tmp_path, shown=FRAME[["value"]][:1])
     tex, csv = written(tmp_path)
-    assert shown.shape == (1, 1) and "0.333" in tex and "a\\_b" not in tex and len(pd.read_csv(csv).columns) == 4
+    assert "0.333" in shown.data and "a_b" not in shown.data
+    assert "0.333" in tex and "a\\_b" not in tex and len(pd.read_csv(csv).columns) == 4
 
 
 @pytest.mark.parametrize(("rows", "environment"), [(40, "table"), (41, "longtable")])

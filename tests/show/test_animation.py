@@ -164,7 +164,7 @@ from vsp import distill
 from vsp.show import animation
 animation.FRAMES = 8
 history = distill(CurvedTeacher(), {SIMPLEGOAL!r}, tiny(n_epochs=60), seed=0)[1]
-animation.save_growth(history, CurvedTeacher(), {SIMPLEGOAL!r}, "growth", out={str(folders[2])!r}, alt="")
+animation.save_growth(history, CurvedTeacher(), {SIMPLEGOAL!r}, "growth", out={str(folders[2])!r}, alt="x")
 """
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONHASHSEED": "7", "PATH": ""}, cwd=tmp_path)
     for name in ("growth.gif", "growth.png"):

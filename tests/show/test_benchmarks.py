@@ -24,16 +24,6 @@ def test_every_measured_method_has_a_colour():
     assert set(benchmarks._METHODS) == {method for method, _ in lookup.LOOKUPS} | set(lookup.GRAPHS)
 
 
-def test_shares_have_a_line_per_group_and_skip_what_is_missing(ax):
-    rows = [(256, 0.2, 2), (16384, 0.6, 2), (4096, 0.3, 2), (256, 0.1, 8), (4096, np.nan, 8), (256, np.nan, 11)]
-    frame = pd.DataFrame(rows, columns=["witnesses", "found", "d"])
-    benchmarks.shares_over(ax, frame, x="witnesses", y="found", by="d")
-    assert [line.get_label() for line in ax.lines] == ["d = 2", "d = 8"] and ax.get_ylim()[0] == 0
-    assert ax.lines[0].get_xydata().tolist() == [[256, 0.2], [4096, 0.3], [16384, 0.6]]
-    assert len({tuple(line.get_color()) for line in ax.lines}) == 2
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["256", "4k", "16k"]
-
-
 def test_kills_are_shares_of_the_undisturbed_time_and_failures_stand_out(ax):
     frame = pd.DataFrame({"moment": [1.0, 2, 3], "again": [9.0, 8, 7], "undisturbed": 10.0, "wrong": [None, "x", None]})
     benchmarks.kills(ax, frame)

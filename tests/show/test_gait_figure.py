@@ -50,7 +50,7 @@ def test_bands_are_the_cells_and_bars_the_feet_on_the_ground():
 
 def test_the_moving_picture_has_a_frame_per_step_in_the_colour_of_its_cell(tmp_path):
     made = [save_gait(GAIT, "gait", step_seconds=0.05, out=tmp_path / name, alt="a leg") for name in "ab"]
-    assert made[0].gif == made[1].gif and made[0].alt == "a leg"
+    assert made[0].gif == made[1].gif and made[0].about.alt == "a leg"
     with Image.open(tmp_path / "a/figures/gait.gif") as gif:
         frames = [np.asarray((gif.seek(i), gif.convert("RGB"))[1], dtype=int) for i in range(gif.n_frames)]
         assert gif.info["duration"] == 50

@@ -123,7 +123,12 @@ TRIED = pd.DataFrame(
 
 
 def test_return_over_cells_by_hand(ax):
-    methods.return_over_cells(ax, TRIED, 10.0, linear=0.1)
+    looks = {
+        "refined": {"color": style.DISTILLED},
+        "CART": {"color": "0.4"},
+        "the paper's method": {"color": "black", "marker": "D"},
+    }
+    methods.return_over_cells(ax, TRIED, 10.0, linear=0.1, looks=looks)
     drawn_as = named(ax)
     assert list(drawn_as) == ["refined", "CART", "teacher", "the paper's method"]
     assert drawn_as["refined"].get_xydata().tolist() == [[1, -2], [2, -1], [8, -0.25]]
@@ -139,27 +144,12 @@ def test_return_over_cells_by_hand(ax):
     assert ax.get_ylim()[0] > -40  # what is not drawn does not stretch the view
 
 
-def test_what_simplify_ended_with_is_a_mark_in_it(ax):
-    rows = [("cells", 1, 4.0, False), ("cells", 2, 9.0, True), ("prune", 2, 8.5, True), ("round", 2, 1.0, False)]
-    frame = pd.DataFrame(rows, columns=["stage", "cells", "mean", "kept"])
-    frame.attrs["teacher"] = 9.5
-    methods.simplified(ax, frame, 1.5)
-    assert named(ax)["simplified"].get_xydata().tolist() == [[2, -1]]
-    assert set(named(ax)["tolerance"].get_ydata()) == {-1.5}
-
-
-def test_every_method_of_the_comparison_has_a_look_of_its_own():
-    assert set(methods.METHODS) == set(method_tables.METHODS) - {"teacher"}
-    looks = {(s["color"], s.get("ls"), s.get("marker")) for s in methods.METHODS.values()}
-    assert len(looks) == len(methods.METHODS)
-    for name, look in methods.METHODS.items():
-        assert ("marker" in look) == (len(method_tables.METHODS[name].sizes) == 1)
-
-
-def test_so_has_every_method_beside_those_at_the_limit():
-    known, looks = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT, methods.LIMITS
+@pytest.mark.parametrize("looks", [methods.IMITATIONS, methods.LIMITS], ids=["imitations", "limits"])
+def test_every_method_has_a_look_and_a_name_of_its_own(looks):
+    known = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT
     assert set(looks) <= set(known)
     assert len({(s["color"], s.get("ls"), s.get("marker")) for s in looks.values()}) == len(looks)
+    assert len({s["label"] for s in looks.values()}) == len(looks)
     assert all(("marker" in look) == (known[name].sizes == method_tables.OWN) for name, look in looks.items())
 
 
@@ -177,23 +167,3 @@ def test_nothing_of_an_explanation_overlaps():
     clashes = [(one.get_text(), other.get_text()) for (one, a), (other, b) in pairs if a.overlaps(b)]
     plt.close(fig)
     assert not clashes
-
-
-def test_a_comparison_has_return_and_error_and_one_legend():
-    rows = TRIED.assign(error_teacher=0.1 * TRIED["size"].clip(lower=1))
-    fig = methods.method_comparison(rows, 10.0, linear=0.1)
-    left, right = fig.axes
-    assert named(right)["CART"].get_xydata()[:, 1] == pytest.approx([0.1, 0.2, 0.8])
-    assert right.get_yscale() == "log" and "teacher" not in named(right) and len(fig.legends) == 1
-    plt.close(fig)
-
-
-def test_shares_over_time_stand_at_their_medians(ax):
-    rows = [("CART, DAgger", "few", 0.1, 0.9), ("CART, DAgger", "few", 0.3, 0.92), ("CART, DAgger", "few", 0.2, 0.94)]
-    rows += [("refined, not tuned", "13 cells", 0.5, 1.0)]
-    frame = pd.DataFrame(rows, columns=["method", "setting", "seconds", "share"])
-    methods.against_time(ax, frame, enough=0.99)
-    assert ax.containers[0].lines[0].get_xydata().tolist() == [[0.2, 0.92]]
-    assert ax.containers[1].lines[0].get_xydata().tolist() == [[0.5, 1.0]] and ax.get_xscale() == "log"
-    (line,) = (line for line in ax.lines if set(line.get_ydata()) == {0.99})
-    assert line.get_label() == "99% of the teacher’s return"

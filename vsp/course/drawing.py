@@ -20,7 +20,7 @@ def picture(fig: Figure, alt: str) -> show.Picture:
     png = io.BytesIO()
     fig.savefig(png, dpi=150, metadata={"Software": None})
     plt.close(fig)
-    return show.Picture(png.getvalue(), alt)
+    return show.Picture(png.getvalue(), show.Caption("", "", alt))
 
 
 def squared_error(policy: Policy, teacher: Policy, states: np.ndarray) -> np.ndarray:

@@ -13,16 +13,14 @@ from .printed import (
     published_policy,
 )
 from .runs import EVALUATION_SEED, N_EPISODES, paper_results
+from .shown import show_table
 from .statistics import interval, quartiles_from_fences, spread
 from .tables import (
-    as_latex,
-    as_text,
     equation_table,
     hyperparameter_table,
     interpretation_table,
     run_overview,
     save_table,
-    show_table,
     spread_table,
     teacher_beside_runs,
     text_number_table,

@@ -17,42 +17,39 @@ from ..config import EXTENSIONS, paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
 from ..run import atomic, listed
+from ..show.captions import caption_of
 from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .results import write_results
 from .runs import SHARES, Experiment, Results, Run, outcome_shares
+from .shown import as_text, present, show_table
 from .statistics import interval, outlier_numbers, spread
 
 if TYPE_CHECKING:
     from IPython.display import HTML
 
-MISSING = "–"  # in print, where the paper gives no number
 PAGE = 40  # rows that fit on one
 
 
 def save_table(
-    frame: pd.DataFrame, name: str, *, caption: str, out: str | os.PathLike, latex: pd.DataFrame | None = None
-) -> pd.DataFrame:
-    """Write OUT/figures/tables/NAME.csv and .tex; returns the table as text, to show in a notebook.
+    frame: pd.DataFrame, name: str, *, out: str | os.PathLike, shown: pd.DataFrame | None = None,
+    caption: str | None = None,
+) -> HTML:  # fmt: skip
+    """Write OUT/figures/tables/NAME.csv and .tex; returns the table as a notebook shows it.
 
-    `latex` is the table as LaTeX code, for equations, or a part of it where the whole is too long for a page; without
-    it numbers get three decimals. The LaTeX needs the packages booktabs and xcolor, and longtable for more than `PAGE`
-    rows.
+    `shown` stands in print instead of the whole table: a part of it, or equations as LaTeX code. Without `caption`,
+    notebooks/captions.toml has one. The LaTeX needs the packages booktabs and xcolor, and longtable for more than
+    `PAGE` rows.
     """
-    path = Path(out) / "figures" / "tables" / name
+    path, shown = Path(out) / "figures" / "tables" / name, frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
     atomic.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
-    shown = as_text(frame) if latex is None else latex
-    code = as_latex(frame) if latex is None else latex
+    about, code = caption_of("tables", name, text=caption), as_text(present(shown)).map(_escape).rename(columns=_escape)
     place = {"environment": "longtable"} if len(code) > PAGE else {"position": "t", "position_float": "centering"}
-    body = code.style.hide(axis="index").to_latex(hrules=True, caption=caption, label=f"tab:{name}", **place)
+    styled = code.style.hide(axis="index")
+    body = styled.to_latex(hrules=True, caption=_escape(about.text), label=f"tab:{name}", **place)
     atomic.write_text(path.with_suffix(".tex"), body)
-    return shown
-
-
-def as_latex(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame as text that LaTeX prints as it stands: floats with three decimals, a minus as long as a plus."""
-    return as_text(frame).map(_escape).rename(columns=_escape)
+    return show_table(shown, name, caption=caption)
 
 
 def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
@@ -134,37 +131,12 @@ def _like(printed: float, here: float) -> float | int:
     return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
 
 
-def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
-    """The frame as text: floats with `digits` decimals, or none in a column of whole numbers; all else as it is."""
-    check_count("digits", digits, least=0)
-    return frame.apply(lambda column: column.map(lambda value: _text(value, 0 if _whole(column) else digits)))
-
-
-def _whole(column: pd.Series) -> bool:
-    """Whether all floats of a column are whole numbers: counts become floats beside a missing one."""
-    return all(value.is_integer() for value in column if isinstance(value, float) and not np.isnan(value))
-
-
-def show_table(frame: pd.DataFrame) -> HTML:
-    """The frame as text, as a notebook shows it, without an index."""
-    from IPython.display import HTML
-
-    return HTML(as_text(frame).to_html(index=False))
-
-
-def _text(value: object, digits: int) -> str:
-    if not isinstance(value, float):
-        return str(value)
-    if np.isnan(value):
-        return MISSING
-    if value and abs(value) < 0.001:
-        return np.format_float_positional(value, 2, fractional=False)
-    return f"{value:.{digits}f}"
-
-
 def _escape(text: str) -> str:
-    text = text.replace("_", r"\_").replace("%", r"\%").replace("&", r"\&")
-    return re.sub(r"^-(?=\d)", "$-$", text)
+    """Text for LaTeX, with a minus as long as a plus; mathematics between dollars stays as it is."""
+    parts = re.split(r"(\$[^$]*\$|\\textcolor.*?}} )", text)
+    parts[::2] = [re.sub(r"([_%&])", r"\\\1", part) for part in parts[::2]]
+    parts[::2] = [re.sub(r"(?<![\w.)-])-(?=\d)", "$-$", part) for part in parts[::2]]
+    return "".join(parts)
 
 
 def _patch(force: float) -> str:

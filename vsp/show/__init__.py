@@ -6,18 +6,16 @@ Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 import importlib
 
 from .animation import save_growth
-from .benchmarks import fit_times, kills, shares_over, times_over_dimension
+from .benchmarks import fit_times, kills, times_over_dimension
+from .captions import Caption, caption_of
 from .explanation import contributions, whereabouts
 from .gait import footfall, gait_strip, save_gait
 from .methods import (
     LIMITS,
-    against_time,
     fidelity_map,
     likeness_over_cells,
-    method_comparison,
     over_cells,
     return_over_cells,
-    simplified,
 )
 from .proofs import basins, upright
 from .returns import (

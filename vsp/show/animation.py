@@ -23,6 +23,7 @@ from ..run import atomic
 from ..tasks.base import Task
 from ..tasks.registry import get_task
 from . import state_space, style
+from .captions import Caption, caption_of
 from .stage import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map
 
 WIDTH, HEIGHT = 6.0, 2.6  # inches
@@ -153,22 +154,23 @@ class Growth:
 class Animation:
     """A GIF as a notebook shows it: its last frame, and the GIF folded away below, so that nothing moves unasked."""
 
-    def __init__(self, gif: bytes, still: bytes, alt: str):
-        self.gif, self.still, self.alt = gif, still, alt
+    def __init__(self, gif: bytes, still: bytes, about: Caption):
+        self.gif, self.still, self.about = gif, still, about
 
     def _repr_html_(self) -> str:
         width = int(WIDTH * DPI)
-        still = style.embedded(self.still, f"The last frame of the moving picture: {self.alt}", width=width)
-        moving = style.embedded(self.gif, self.alt, width=width)
-        return f"<figure>{still}<details><summary>play the moving picture</summary>{moving}</details></figure>"
+        still = style.embedded(self.still, f"The last frame of the moving picture: {self.about.alt}", width=width)
+        moving = style.embedded(self.gif, self.about.alt, width=width)
+        folded = f"<details><summary>play the moving picture</summary>{moving}</details>"
+        return f"<figure>{still}{folded}{self.about.to_html('figcaption')}</figure>"
 
     def __repr__(self) -> str:
-        return self.alt
+        return self.about.alt
 
 
 def save_growth(
-    history: History, teacher: Policy, task: str | Task, name: str, *, out: str | os.PathLike, alt: str,
-    quick: bool = False,
+    history: History, teacher: Policy, task: str | Task, name: str, *, out: str | os.PathLike, quick: bool = False,
+    alt: str | None = None,
 ) -> Animation:  # fmt: skip
     """Write OUT/figures/NAME.gif, and its last frame as NAME.png; return the animation to show.
 
@@ -185,18 +187,19 @@ def save_growth(
 
 
 def save_frames(
-    images: list[np.ndarray], name: str, *, out: str | os.PathLike, alt: str, step: int = STEP, hold: int = HOLD
-) -> Animation:
+    images: list[np.ndarray], name: str, *, out: str | os.PathLike, alt: str | None = None, step: int = STEP,
+    hold: int = HOLD,
+) -> Animation:  # fmt: skip
     """Write images (height, width, 3) as OUT/figures/NAME.gif, and the last one as NAME.png; return what to show.
 
     `step`: milliseconds per frame; `hold`: those of the last.
     """
-    path = Path(out) / "figures" / name
+    path, about = Path(out) / "figures" / name, caption_of("figures", name, alt=alt)
     with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
         _write_gif(temporary, images, step, hold)
     with atomic.atomic_path(path.with_suffix(".png")) as temporary:
         temporary.write_bytes(png(images[-1], small=True))
-    return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), alt)
+    return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), about)
 
 
 def _write_gif(path: Path, images: list[np.ndarray], step: int, hold: int) -> None:

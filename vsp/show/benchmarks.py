@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import matplotlib as mpl
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import PercentFormatter
@@ -45,17 +43,6 @@ def fit_times(ax: Axes, frame: pd.DataFrame, varied: str) -> Axes:
     ax.plot(rows[varied], taken.iloc[-1] * rows[varied] / rows[varied].iloc[-1], ":", color=OTHER, label="proportional")
     ax.set(xscale="log", yscale="log", xlabel=varied)
     return ticks_at(ax, rows[varied])
-
-
-def shares_over(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, by: str) -> Axes:
-    """A share over a number, logarithmic: a line per value of the column `by`, darker by its rank."""
-    groups = list(frame.dropna(subset=y).sort_values(x).groupby(by))
-    colours = mpl.colormaps["viridis_r"](np.linspace(0, 1, len(groups) + 3)[2:-1])
-    for color, (value, rows) in zip(colours, groups, strict=True):
-        ax.plot(rows[x], rows[y], marker=".", ms=3, color=color, label=f"{by} = {value}")
-    ax.set(xscale="log", ylim=(0, 1.03), xlabel=x, ylabel=y)
-    ax.legend(frameon=False, fontsize=7, handlelength=1.0, labelspacing=0.15, borderaxespad=0.1)
-    return ticks_at(ax, frame[x])
 
 
 def kills(ax: Axes, frame: pd.DataFrame) -> Axes:

@@ -69,7 +69,8 @@ def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
 
 
 def save_gait(
-    gait: pd.DataFrame, name: str, *, step_seconds: float, out: str | os.PathLike, alt: str, quick: bool = False
+    gait: pd.DataFrame, name: str, *, step_seconds: float, out: str | os.PathLike, quick: bool = False,
+    alt: str | None = None,
 ) -> Animation:  # fmt: skip
     """Write OUT/figures/NAME.gif, the body step by step in the colours of its cells above `footfall`, and its last
     frame as NAME.png; return the animation to show. The ground has a mark every metre.

@@ -5,54 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
 
-from .style import COLOURS, DISTILLED, OTHER, TEACHER, legend_below, letter, panels
+from .style import COLOURS, DISTILLED, OTHER, TEACHER
 
-# The methods of the comparison: a colour per family, dashed where a method lacks a part that its family has
-METHODS = {
-    "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5},
-    "refined, not tuned": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4},
-    "refined, closest": {"color": DISTILLED, "marker": "o"},
-    "refined, faithful": {"color": DISTILLED, "marker": "P"},
-    "oblique tree, linear leaves, DAgger": {"color": COLOURS[3]},
-    "CART, linear leaves, DAgger": {"color": COLOURS[4]},
-    "k-means cells, DAgger": {"color": COLOURS[2]},
-    "CART, DAgger": {"color": COLOURS[7]},
-    "CART": {"color": COLOURS[7], "ls": "--"},
-    "soft tree, DAgger": {"color": COLOURS[5]},
-    "the paper's method": {"color": "black", "marker": "D"},
-    "TD-AVQ": {"color": COLOURS[9], "marker": "^"},
-    "TD-AVQ, coarse": {"color": COLOURS[9], "marker": "v"},
-    "one linear map": {"color": "black", "marker": "s"},
-    "rule of thumb": {"color": "black", "marker": "*"},
-    "heuristic": {"color": "black", "marker": "P"},
-    "refined, no teacher": {"color": DISTILLED, "ls": ":"},
+# Methods before any tuning, and ours tuned: ours in its colour, two greys for the weakest
+IMITATIONS = {
+    "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, tuned on the return"},
+    "refined, not tuned": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
+    "oblique tree, linear leaves, DAgger": {"color": COLOURS[2], "label": "oblique tree, linear leaves"},
+    "CART, DAgger": {"color": OTHER, "label": "axis tree, constants"},
+    "k-means cells, DAgger": {"color": "0.65", "ls": "--", "label": "k-means cells, linear maps"},
 }
 
-# Of those at the limit
+# Policies at the limit and their rivals
 LIMITS = {
-    "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6},
-    "refined": METHODS["refined"],
-    "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3]},
-    "small network, DAgger, tuned": {"color": COLOURS[9]},
-    "one linear map, tuned": {"color": "black", "marker": "s"},
+    "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6, "label": "our cells, from the best policy"},
+    "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, from the teacher"},
+    "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
+    "small network, DAgger, tuned": {"color": COLOURS[9], "label": "small network"},
+    "one linear map, tuned": {"color": "black", "marker": "s", "label": "one linear map"},
 }
-
-
-def method_comparison(frame: pd.DataFrame, teacher: float, *, linear: float) -> Figure:
-    """All methods over their cells: mean return minus the teacher's, and the action error where the teacher goes."""
-    fig, axes = panels(2, height=3.6)
-    return_over_cells(axes[0], frame, teacher, linear=linear)
-    over_cells(axes[1], frame[frame["method"] != "teacher"], "error_teacher")
-    axes[1].set(yscale="log", ylabel="action error / half range")
-    axes[1].yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes[1].yaxis.set_major_formatter("{x:g}")
-    axes[1].yaxis.set_minor_locator(NullLocator())
-    letter(axes, ["return", "action error"])
-    legend_below(fig, axes[0], ncol=2)
-    return fig
 
 
 # Other methods by how their names begin: marker and label
@@ -112,8 +84,8 @@ def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
     ax.fill_between(table["size"], table["r2_least"], table["r2"], color=TEACHER, alpha=0.2, lw=0)
     for column, color, marker, label in (
         ("r2", TEACHER, "o", "R², median (band: to the lowest)"),
-        ("index", DISTILLED, "s", "index: same cells"),
-        ("ratio", COLOURS[2], "^", "ratio: different actions"),
+        ("index", DISTILLED, "s", "sameness of the cells"),
+        ("ratio", COLOURS[2], "^", "ratio of the actions’ differences"),
     ):
         ax.plot(table["size"], table[column], color=color, marker=marker, ms=3.5, label=label)
     ax.set_ylim(min(0.0, table["r2_least"].min()) - 0.05, 0.05 + max(1.0, table["ratio"].max()))
@@ -121,47 +93,19 @@ def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
     return ticks_at(ax, table.loc[table["size"] != 7, "size"])  # whose label would touch that of 8
 
 
-def against_time(ax: Axes, frame: pd.DataFrame, *, enough: float) -> Axes:
-    """Share of the teacher's return over seconds: the median of every method and setting.
-
-    `frame` has rows of `beyond.comparison.time_to_quality`. Bars span the 10 % to 90 % quantiles over the seeds;
-    `enough` is drawn as a line.
-    """
-    for method, rows in frame.groupby("method"):
-        style = {"color": METHODS[method]["color"], "ls": METHODS[method].get("ls", "-")}
-        low, middle, high = (rows.groupby("setting", sort=False)["share"].quantile(share) for share in (0.1, 0.5, 0.9))
-        seconds = rows.groupby("setting", sort=False)["seconds"].median()
-        ax.errorbar(
-            seconds, middle, [middle - low, high - middle], marker="o", ms=3, elinewidth=0.7, **style, label=method
-        )
-    ax.axhline(enough, color=TEACHER, ls="--", lw=1.0, label=f"{enough:.0%} of the teacher’s return")
-    ax.set(xscale="log", xlabel="seconds from the teacher’s weights", ylabel="share of the teacher’s return")
-    return ax
-
-
-def return_over_cells(ax: Axes, frame: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
+def return_over_cells(
+    ax: Axes, frame: pd.DataFrame, teacher: float, *, linear: float, looks: dict[str, dict] = IMITATIONS
+) -> Axes:
     """`over_cells` of the mean return minus the teacher's, on a scale linear up to `linear`, logarithmic beyond."""
     ax.set_yscale("symlog", linthresh=linear)
-    over_cells(ax, frame.assign(gap=frame["mean"] - teacher), "gap")
+    over_cells(ax, frame.assign(gap=frame["mean"] - teacher), "gap", looks)
     ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher")
     ax.set_ylabel("mean return − teacher’s")
     ax.yaxis.set_major_formatter("{x:g}")
     return ax
 
 
-def simplified(ax: Axes, frame: pd.DataFrame, tolerance: float) -> Axes:
-    """Add the policy that `vsp.simplify` ended with to `return_over_cells`, and its tolerance as a line.
-
-    `frame` is the one that `vsp.simplify` returns: a row per candidate.
-    """
-    last = frame[frame["kept"]].iloc[-1]
-    look = {"ls": "", "marker": "o", "ms": 5, "color": "black", "mec": "white", "mew": 0.5, "zorder": 7}
-    ax.plot(last["cells"], last["mean"] - frame.attrs["teacher"], **look, label="simplified")
-    ax.axhline(-tolerance, color="black", lw=0.8, ls=":", zorder=3, label="tolerance")
-    return ax
-
-
-def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict] = METHODS) -> Axes:
+def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict] = IMITATIONS) -> Axes:
     """A column of `frame` over the number of cells or leaves: a line per method, the median of its seeds.
 
     `frame` has method, size, seed and cells, as `beyond.comparison` makes it. Only the methods in `looks` are drawn;
@@ -175,12 +119,21 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
             continue
         low, middle, high = (rows.groupby("size")[column].quantile(share) for share in (0.1, 0.5, 0.9))
         if "marker" not in style:
-            ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, **style}, label=method)
+            ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, "label": method, **style})
             if style["color"] == DISTILLED and len(middle) > 2:  # of fewer sizes a band would hide more than it shows
                 ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
             continue
-        look = {"ls": "", "ms": 4.5, "mec": "white", "mew": 0.4, "elinewidth": 0.7, "zorder": 6, **style}
-        ax.errorbar(max(1, rows["cells"].median()), middle, [middle - low, high - middle], **look, label=method)
+        look = {
+            "ls": "",
+            "ms": 4.5,
+            "mec": "white",
+            "mew": 0.4,
+            "elinewidth": 0.7,
+            "zorder": 6,
+            "label": method,
+            **style,
+        }
+        ax.errorbar(max(1, rows["cells"].median()), middle, [middle - low, high - middle], **look)
     ax.set_xlabel("cells or leaves")
     return ticks_at(ax, frame.loc[frame["size"] > 0, "size"])
 

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..run import atomic
+from .captions import Caption, caption_of
 
 TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
 COLOURS = (  # seaborn's "colorblind" palette, written out: importing seaborn takes a second
@@ -75,33 +76,39 @@ def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
 class Picture:
     """A saved figure as a notebook shows it: HTML, because nbconvert drops the alternative text of a plain image."""
 
-    def __init__(self, png: bytes, alt: str):
-        self.png, self.alt = png, alt
+    def __init__(self, png: bytes, about: Caption):
+        self.png, self.about = png, about
 
     def _repr_html_(self) -> str:
-        return f"<figure>{embedded(self.png, self.alt)}</figure>"
+        return f"<figure>{embedded(self.png, self.about.alt)}{self.about.to_html('figcaption')}</figure>"
 
     def __repr__(self) -> str:
-        return self.alt
+        return self.about.alt
 
 
-def save_figure(fig: Figure, name: str, *, alt: str, out: str | os.PathLike, quick: bool = False) -> Picture:
+def save_figure(
+    fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str | None = None,
+    caption: str | None = None,
+) -> Picture:  # fmt: skip
     """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show.
 
-    `alt` describes the figure for readers who cannot see it; both files contain it. `quick` adds a watermark. The files
-    contain no dates or version numbers, so the same figure gives the same bytes.
+    `alt` describes the figure for readers who cannot see it; both files contain it. Without `alt` and `caption`,
+    notebooks/captions.toml has them. `quick` adds a watermark. The files contain no dates or version numbers, so the
+    same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
     """
+    about = caption_of("figures", name, text=caption, alt=alt)
     if quick:
         fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
     path = Path(out) / "figures" / name
     undated = {"CreationDate": None, "Creator": None, "Producer": None}
-    for form, about in (("pdf", {"Subject": alt, **undated}), ("png", {"Description": alt, "Software": None})):
+    said = (("pdf", {"Subject": about.alt, **undated}), ("png", {"Description": about.alt, "Software": None}))
+    for form, metadata in said:
         drawn = io.BytesIO()  # on a full disk, matplotlib's PDF writer would replace the disk's error by one of zlib's
-        fig.savefig(drawn, format=form, metadata={"Title": name, **about})
+        fig.savefig(drawn, format=form, metadata={"Title": name, **metadata})
         with atomic.atomic_path(path.with_suffix(f".{form}")) as temporary:
             temporary.write_bytes(drawn.getvalue())
     plt.close(fig)
-    return Picture(drawn.getvalue(), alt)
+    return Picture(drawn.getvalue(), about)
 
 
 def letter(axes: np.ndarray, titles: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""The comparison of methods: how each row is made, what the committed rows say, and how long methods take."""
+"""The comparison of methods: how each row is made, and what the committed rows say."""
 
 from ...paper.results import RESULTS, read_results
 from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail
@@ -7,7 +7,6 @@ from .limit_summary import limit_summary, near, references, starts_summary, walk
 from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good
 from .method_tables import TASKS
 from .regret import best_mean, with_regret
-from .time_to_quality import ENOUGH, quickest
 
 
 def stale_results() -> list[str]:

@@ -15,14 +15,13 @@ from .kept import KEPT, keep, keep_simplest
 from .method_rows import jobs_of, make_all, pairs, rows, tables_of
 from .method_tables import LONG, ROBOT_TABLES, TABLES, TASKS, WALKERS
 from .regret import optimum
-from .time_to_quality import time_to_quality
 
 
 def main() -> None:
     """Make the rows that are missing, and write data/results/<table>_<task>.csv and what is kept beside it: a policy,
     same_<task>.csv beside the faithful table. Times go to <table>_seconds.csv (_long: of the tasks that take hours).
 
-    Beside them: beyond_race.csv and optimum.csv; or, of the tasks that take hours, beyond_<task>.policy, and of robots
+    Beside them: optimum.csv; or, of the tasks that take hours, beyond_<task>.policy, and of robots
     gait_<task>.csv and fewest_<task>.csv.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
@@ -62,7 +61,6 @@ def _beside(long: bool, tables: set[str], out: Path) -> None:
         for task in LONG:
             keep_simplest(task, results / f"beyond_{task}.policy")
     elif "beyond" in tables:
-        write_results(time_to_quality(), "beyond_race", out=out)
         write_results(optimum(), "optimum", out=out)
 
 

@@ -69,7 +69,7 @@ def ahead(own: dict | pd.Series, other: pd.Series) -> str:
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     """`refined`, whole and with one part removed, at the size of the preset, as `method_summary` has it.
 
-    The column `part` names what was taken away, in the order of `ABLATION`; "all of it" comes first. Raises ValueError
+    The column `part` names what was removed, in the words and the order of `PARTS`. Raises ValueError
     for a task without such rows, one of `LONG`.
     """
     names = {f"refined, {part}": part for part in ABLATION} | {"refined": "all of it"}
@@ -78,7 +78,20 @@ def ablation(frame: pd.DataFrame) -> pd.DataFrame:
         raise ValueError(f"no method of {sorted(set(frame['method']))} is an ablation, expected one of {sorted(names)}")
     rows = frame[(frame["size"] == frame.loc[ablated, "size"].iloc[0]) & frame["method"].isin(names)]
     table = method_summary(rows).assign(part=lambda table: table["method"].map(names)).set_index("part")
-    return table.loc[[part for part in ("all of it", *ABLATION) if part in table.index]].reset_index()
+    return table.loc[[part for part in PARTS if part in table.index]].rename(index=PARTS).reset_index()
+
+
+PARTS = {  # of an ablation, in words
+    "all of it": "all parts",
+    "cold from the start": "no annealing",
+    "one beginning": "one restart",
+    "not corrected": "no correction",
+    "no leak": "no slope beyond the limits",
+    "not tuned": "no tuning",
+    "failures at no price": "no failure penalty",
+    "no teacher": "no teacher",
+    "drawn by stakes": "weighted by criticality",
+}
 
 
 def seeds_as_good(task: str, frame: pd.DataFrame, method: str = "refined") -> pd.DataFrame:

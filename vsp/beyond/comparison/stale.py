@@ -18,7 +18,7 @@ from ...paper import results
 from ...paper.studies import interpretations, teachers
 from ...run import atomic, command, sealed
 from ..benchmarks import fits, lookup
-from . import kept_robots, regret, time_to_quality
+from . import kept_robots, regret
 from .kept import KEPT, kept_job, simplest_provenance
 from .method_rows import Job, jobs_of, tables_of
 from .method_tables import LONG, TASKS, WALKERS
@@ -53,7 +53,6 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
                 yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
             if table in KEPT:
                 yield f"{table}_{task}.policy", target, lambda _, about=(task, table): [kept_job(*about).provenance]
-    yield "beyond_race.csv", "beyond", _race
     yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
     for task in LONG:
         yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
@@ -104,13 +103,6 @@ def _rows(task: str, table: str, frame: pd.DataFrame) -> Iterable[dict]:
         if kind not in made_with:
             made_with[kind] = kind.provenance
         yield {"seed": job.seed, **made_with[kind]}
-
-
-def _race(frame: pd.DataFrame) -> Iterable[dict]:
-    for method, (_, settings) in time_to_quality.METHODS.items():
-        for setting in settings:
-            made_with = time_to_quality.provenance_of(method, setting)
-            yield from ({**made_with, "seed": seed} for seed in time_to_quality.SEEDS)
 
 
 def main() -> None:

@@ -1,0 +1,120 @@
+"""Tables as people read them: headings in words, per cent, an interval in one column, no row numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from ..checks import check_count
+from ..show.captions import caption_of
+
+if TYPE_CHECKING:
+    from IPython.display import HTML
+
+MISSING = "–"  # where there is no number
+INTERVAL = "95 % interval"
+HEADINGS = {
+    "mean": "mean return",
+    "std": "std of the returns",
+    "r2": "R²",
+    "r2_least": "lowest R²",
+    "r2_worst": "R², worst action",
+    "index": "sameness",
+    "index_least": "lowest sameness",
+    "least": "lowest mean",
+    "worst": "worst 1 %",
+    "worst_least": "lowest worst 1 %",
+    "error_teacher": "action error",
+    "linear_error": "error of one map",
+    "teacher_mean": "teacher's mean",
+    "teacher_std": "teacher's std",
+    "own": "teacher's return",
+    "gap": "minus the teacher's",
+    "parameters": "numbers",
+    "one_cell": "with one cell",
+    "untuned mean": "untuned: mean return",
+    "untuned r2": "untuned: R²",
+}
+PERCENT = {
+    "failing": "failed (%)",
+    "reached": "as good (%)",
+    "rival reached": "rival as good (%)",
+    "good": "as good (%)",
+    "like": "alike (%)",
+    "both": "both (%)",
+    "off": "off by a tenth (%)",
+    "near": "near the best (%)",
+}
+
+
+def present(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame in words: named rows as columns, tasks by their short names, yes or nothing for true or false, shares
+    as per cent, `low` and `high` as one column of text, and headings."""
+    index = frame.index
+    if index.names != [None] or (len(index) and isinstance(index[0], str)):
+        frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
+    frame = frame.reset_index(drop=True).map(_in_words)
+    for name in [name for name in frame if _about(name) in PERCENT]:
+        frame[name] = [MISSING if value != value else f"{100 * value:.3g}" for value in frame[name].astype(float)]
+    for low in [name for name in frame if re.search(r"(^|[_ ])low$", str(name))]:
+        high, about = low.removesuffix("low") + "high", low.removesuffix("low")
+        ends = as_text(frame[[low, high]])
+        joined = (ends[low] + " to " + ends[high]).where(ends[low] != MISSING, MISSING)
+        heading = f"{_heading(about[:-1])}: {INTERVAL}" if about else INTERVAL
+        frame = frame.assign(**{low: joined}).drop(columns=high).rename(columns={low: heading})
+    return frame.rename(columns=_heading)
+
+
+def _in_words(value: object) -> object:
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else ""
+    return re.sub(r"^(\w+?)(Continuous)?-v\d$", r"\1", value) if isinstance(value, str) else value
+
+
+def _about(column: str) -> str:
+    """The quantity that a column or an end of its interval belongs to."""
+    return re.sub(r"_(low|high)$", "", str(column))
+
+
+def _heading(column: str) -> str:
+    return PERCENT.get(column, HEADINGS.get(column, column))
+
+
+def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
+    """The frame as a notebook shows it, below its caption: that of the table `name` in notebooks/captions.toml, or
+    `caption`."""
+    from IPython.display import HTML
+
+    above = caption_of("tables", name, text=caption).to_html("caption")
+    with pd.option_context("display.max_colwidth", None):
+        page = as_text(present(frame)).to_html(index=False, border=0)
+    return HTML(page.replace(">", f">\n  {above}", 1) if above else page)
+
+
+def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
+    """The frame as text. Floats have `digits` decimals, or as few as hold the whole column; from 100 on fewer, so that
+    five digits stand. All else is as it is."""
+    check_count("digits", digits, least=0)
+    return frame.apply(lambda column: column.map(lambda value: _text(value, min(digits, _decimals(column)))))
+
+
+def _decimals(column: pd.Series) -> int:
+    """How few decimals hold all floats of a column, at most 9: counts become floats beside a missing one."""
+    values = np.array([value for value in column if isinstance(value, float) and math.isfinite(value)])
+    return next((n for n in range(9) if (values.round(n) == values).all()), 9)
+
+
+def _text(value: object, digits: int) -> str:
+    if not isinstance(value, float):
+        return f"{value:,}" if isinstance(value, int | np.integer) and abs(value) >= 10_000 else str(value)
+    if np.isnan(value):
+        return MISSING
+    if value and abs(value) < 0.001:
+        return np.format_float_positional(value, 2, fractional=False)
+    before = int(math.log10(abs(value))) + 1 if abs(value) >= 100 and math.isfinite(value) else 2
+    thousands = "," if abs(value) >= 10_000 else ""
+    return f"{value:{thousands}.{max(digits - before + 2, 0)}f}"

@@ -1,0 +1,57 @@
+"""Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml.
+
+They stand there, in the order of the notebooks, so that a code cell holds code alone.
+"""
+
+from __future__ import annotations
+
+import html
+import tomllib
+from functools import cache
+from typing import NamedTuple
+
+from ..checks import check_choice
+from ..run import ROOT
+
+BOOK = ROOT / "notebooks" / "captions.toml"
+KINDS = {"figures": "Figure", "tables": "Table"}
+
+
+class Caption(NamedTuple):
+    """`label` such as "Figure 6.2", empty outside the notebooks; what to see; and for those who cannot see it."""
+
+    label: str
+    text: str
+    alt: str = ""
+
+    def to_html(self, tag: str) -> str:
+        """The caption as the element `tag`, empty if there is nothing to say."""
+        label = f"<b>{self.label}.</b> " if self.label else ""
+        return f"<{tag}>{label}{html.escape(self.text, quote=False)}</{tag}>" if self.text else ""
+
+
+@cache
+def _book() -> dict[tuple[str, str], Caption]:
+    """Every caption by kind and name. Kinds are numbered on their own in each notebook."""
+    found = {}
+    for notebook, kinds in (tomllib.loads(BOOK.read_text("utf-8")) if BOOK.exists() else {}).items():
+        for kind, entries in kinds.items():
+            for number, (name, about) in enumerate(entries.items(), 1):
+                label = f"{KINDS[kind]} {int(notebook[:2])}.{number}"
+                found[kind, name] = Caption(label, about["caption"], about.get("alt", ""))
+    return found
+
+
+def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None = None) -> Caption:
+    """The caption of a figure or table: `kind` is "figures" or "tables".
+
+    `text` and `alt` take the place of what the book says. Raises ValueError for a figure of which neither says `alt`.
+    """
+    check_choice("kind", kind, KINDS)
+    known = _book().get((kind, name), Caption("", ""))
+    found = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
+    if kind == "figures" and not found.alt:
+        raise ValueError(
+            f"figure {name!r} has no alternative text: hand in alt=, or write it into notebooks/{BOOK.name}"
+        )
+    return found
