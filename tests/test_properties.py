@@ -540,6 +540,7 @@ CASES = {
         {"kind": choice("figures")},
     ),
     "paper.shown.as_text": (functools.partial(shown.as_text, pd.DataFrame({"a": [0.5, 2.0]})), {"digits": digits}),
+    "paper.tables.show_policy": (functools.partial(tables.show_policy, TWO), {"digits": digits}),
     "paper.tables.equation_table": (functools.partial(tables.equation_table, TWO), {"digits": digits}),
     "paper.tables.hyperparameter_table": (lambda task: tables.hyperparameter_table([task]), {"task": task}),
     "paper.tables.interpretation_table": (tables.interpretation_table, {"task": task}),

@@ -2,7 +2,15 @@ import pandas as pd
 import pytest
 from support import SIMPLEGOAL
 
-from vsp.beyond.comparison.method_summary import AS_GOOD, ablation, headline, method_summary, rivals, seeds_as_good
+from vsp.beyond.comparison.method_summary import (
+    AS_GOOD,
+    PARTS,
+    ablation,
+    headline,
+    method_summary,
+    rivals,
+    seeds_as_good,
+)
 
 ROWS = pd.DataFrame(
     [("refined", 2, seed, mean, failing, 2) for seed, mean, failing in [(0, 9.0, 0.0), (1, 9.2, 0.0), (2, 7.0, 0.1)]]
@@ -64,8 +72,16 @@ def test_a_hundredth_of_a_negative_return_is_below_it():
 
 def test_an_ablation_is_that_of_the_size_of_the_preset():
     table = ablation(ROWS)
-    assert dict(zip(table["part"], table["mean"])) == {"all of it": 10.0, "no leak": 3.0, "not tuned": 20.0}
-    assert set(table["size"]) == {4} and table["part"].tolist() == ["all of it", "no leak", "not tuned"]
+    assert dict(zip(table["part"], table["mean"])) == {
+        "all parts": 10.0,
+        "no slope beyond the limits": 3.0,
+        "no tuning": 20.0,
+    }
+    assert set(table["size"]) == {4} and table["part"].tolist()[0] == "all parts"
+
+
+def test_every_part_of_an_ablation_has_words():
+    assert list(PARTS) == ["all of it", *ABLATION] and len(set(PARTS.values())) == len(PARTS)
 
 
 def test_a_task_without_an_ablation_has_none():

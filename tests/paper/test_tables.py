@@ -106,6 +106,19 @@ def test_a_equation_table_is_a_row_of_equations_per_cell(tmp_path, task):
     assert np.allclose(back[:, : len(policy.task.low)], policy.codewords, rtol=1e-5)
 
 
+def test_a_shown_policy_says_where_its_equations_hold_and_what_limits_them():
+    maps = np.array([[[1.0], [0.5], [0.25]], [[-2.0], [0.0], [0.0]]])
+    two = VoronoiPolicy([[-1.0, 0.0], [0.0, 0.0]], maps, task=MOUNTAINCAR, scale=[0.5, 0.02], metric="euclidean")
+    page = tables.show_policy(two, caption="A car.").data
+    distance = "(Euclidean distance of states divided by (0.5, 0.02))"
+    limits = "Limits: F from -1 to 1."
+    assert f"<caption>A car. Each row holds where its codeword is the nearest {distance}. {limits}</caption>" in page
+    assert page.count("<tr") == 3 and "1.000 x + 0.500 v + 0.250" in page
+    one = VoronoiPolicy([[0.0, 0.0]], maps[:1], task=MOUNTAINCAR)
+    page = tables.show_policy(one).data
+    assert "One map for all states. Limits" in page and "codeword" not in page
+
+
 def test_a_swatch_has_the_colour_of_the_force_at_the_codeword():
     left, none, right = ([0, 0, f] for f in (-1.0, 0.0, 5.0))
     policy = VoronoiPolicy([[-1, 0], [-0.5, 0], [0, 0]], np.array([left, none, right])[:, :, None], task=MOUNTAINCAR)

@@ -21,6 +21,7 @@ from .tables import (
     interpretation_table,
     run_overview,
     save_table,
+    show_policy,
     spread_table,
     teacher_beside_runs,
     text_number_table,

@@ -85,6 +85,24 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: boo
     return pd.DataFrame(rows)
 
 
+def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
+    """The policy as a notebook shows it: its equations, and below `caption` the distance and the limits of actions.
+
+    `digits`: decimals of the numbers; None: as many as they have. Raises ValueError unless the sub-policies are linear.
+    """
+    policy.check_linear()
+    frame, task = equation_table(policy, digits=digits), policy.task
+    where = "Each row holds where its codeword is the nearest" if len(policy) > 1 else "One map for all states"
+    units = (
+        "" if (policy.scale == 1).all() else f" of states divided by ({', '.join(f'{u:.3g}' for u in policy.scale)})"
+    )
+    distance = f" ({policy.metric.capitalize()} distance{units})" if len(policy) > 1 else ""
+    limits = ", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in
+                       zip(task.outputs, task.action_low, task.action_high))  # fmt: skip
+    about = f"{caption} {where}{distance}. Limits: {limits}.".strip()
+    return show_table(frame if len(policy) > 1 else frame.drop(columns="codeword"), caption=about)
+
+
 def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
     """T5 and T6: the paper's columns beside ours; `teacher` (n,) and `runs` (p, n) are returns. Coverage in percent."""
     printed, columns = printed_spread(task), {}
