@@ -11,6 +11,7 @@ from vsp.beyond.comparison.method_summary import (
     rivals,
     seeds_as_good,
 )
+from vsp.beyond.comparison.method_tables import ABLATION
 
 ROWS = pd.DataFrame(
     [("refined", 2, seed, mean, failing, 2) for seed, mean, failing in [(0, 9.0, 0.0), (1, 9.2, 0.0), (2, 7.0, 0.1)]]
