@@ -45,7 +45,7 @@ def test_a_shipped_teacher_is_what_its_card_says(task):
     assert tried["seed"] == card["seed"] and tried["mean"] == (max(means) if task in BEST_OF_CURVE else means[-1])
     assert {*train.PACKAGES, *train.ENGINES.get(task, ())} == set(card["versions"])
     assert card["sha256"] == atomic.sha256(SHIPPED / f"{task}.safetensors")
-    n = {LUNARLANDER: 30, WALKER: 10, CHEETAH: 10}.get(task, 400)  # a physics engine takes longer
+    n = {LUNARLANDER: 12, WALKER: 3, CHEETAH: 3}.get(task, 400)  # a physics engine takes longer
     found = rollout_from_seed(teacher, task, n, seed=20_242)  # starts that no one chose a seed on
     assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / n**0.5
     assert (teacher.criticality(np.zeros((3, len(teacher.task.low)))) >= 0).all()  # it has its critics with it
@@ -91,8 +91,9 @@ def test_a_resumed_training_ends_with_the_same_weights(short, tmp_path, monkeypa
         train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=interrupt)
     cut = train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=lines.append)
     assert same(weights(whole), weights(cut)) and len(lines) > stop_after
-    other = train.train(SIMPLEGOAL, seed=4, cache=tmp_path / "whole", report=lambda line: None)
-    assert not same(weights(whole), weights(other))
+    if recipe is SHORT:
+        other = train.train(SIMPLEGOAL, seed=4, cache=tmp_path / "whole", report=lambda line: None)
+        assert not same(weights(whole), weights(other))
 
 
 def test_on_another_machine_a_training_goes_on_without_its_replay_buffer(short, tmp_path, monkeypatch):
