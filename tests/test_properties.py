@@ -691,7 +691,7 @@ EXEMPT = {
     "takes a frame, which pandas has checked, or parts of a figure": """
         paper.shown.present paper.shown.show_table paper.tables.save_table show.returns.again show.returns.boxes
         show.returns.by_group show.returns.intervals show.returns.ledger_gaps show.returns.margin show.returns.phase
-        show.returns.reference show.returns.upper_bound show.state_space.force_bar show.state_space.image
+        show.returns.reference show.state_space.force_bar show.state_space.image
         show.state_space.square
         show.state_space.trail show.style.Picture show.style.embedded show.style.legend_below show.style.letter
         show.style.panels show.style.save_figure show.captions.Caption""",

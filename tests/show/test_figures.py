@@ -33,7 +33,6 @@ from vsp.show.returns import (
     over_iterations,
     reference,
     run_means,
-    upper_bound,
 )
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
@@ -186,9 +185,10 @@ def test_one_cell_has_no_border(ax):
 
 def test_codewords_lie_where_they_are(ax):
     points = np.array([[0.2, 0.5], [0.6, 0.1]])
-    state_space.codewords(ax, points, numbers=True)
+    state_space.codewords(state_space.square(ax), points, numbers=True)
     assert np.allclose(ax.collections[0].get_offsets(), points)
     assert [t.get_text() for t in ax.texts] == ["0", "1"]
+    assert [(t.get_ha(), t.get_va()) for t in ax.texts] == [("left", "top"), ("right", "bottom")]  # towards the middle
 
 
 def test_the_square_shows_goal_and_pit(ax):
@@ -241,11 +241,10 @@ def test_curves_and_histograms_show_their_numbers(ax):
     assert ax.lines[0].get_xydata().tolist() == [[0, 3], [1, 1], [2, 2]]
     assert (ax.get_ylabel(), ax.get_yscale()) == ("cells", "log")
     fig, (other,) = panels()
-    histogram(other, np.repeat([1.0, 2.0, 6.0], 10))
-    upper_bound(other, 7.0)
+    histogram(other, np.repeat([1.0, 2.0, 6.0], 10), bound=7.0)
     assert sum(bar.get_height() for bar in other.patches) == 30
-    assert [line.get_xdata()[0] for line in other.lines] == [3.0, 7.0]
-    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00", "bound 7.00"]
+    assert [line.get_xdata()[0] for line in other.lines] == [3.0]
+    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00\n(at most 7.00)"]
     plt.close(fig)
 
 

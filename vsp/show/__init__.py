@@ -32,7 +32,6 @@ from .returns import (
     phase,
     reference,
     run_means,
-    upper_bound,
 )
 from .state_space import arrows, cells, codewords, error_map, force_bar, force_map, grid, square, trail
 from .style import DISTILLED, OTHER, TEACHER, Picture, legend_below, letter, panels, save_figure

@@ -31,7 +31,7 @@ FINE = 301  # grid points per axis for the borders of cells
 MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map: few arrows
 FRAMES = 24
 STEP, HOLD = 200, 2500  # milliseconds per frame, and for the last one
-DPI, COLOURS = 100, 64  # of a GIF
+DPI, COLOURS = 120, 64  # of a GIF
 
 
 class Maps:
@@ -99,7 +99,7 @@ class Growth:
         fig, axes = self.maps.panels(teacher, dpi)
         passes = [[e.iteration for e in self.history.events if e.kind == kind] for kind in ("split", "merge")]
         cells_and_changes(axes[2], np.array(self.history.cells), *passes)
-        style.letter(axes, ["teacher", "copy", "cells"])
+        style.letter(axes, ["teacher", "distilled", "cells"])
         nothing = np.zeros((0, 2))
         changes(state_space.codewords(axes[1], nothing), nothing, nothing)  # for the legend
         style.legend_below(fig, axes[1], ncol=6)

@@ -56,21 +56,15 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
     return ax
 
 
-def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER) -> Axes:
-    """Histogram of the returns (n,) of one policy, with their mean as a line."""
+def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: float | None = None) -> Axes:
+    """Histogram of the returns (n,) of one policy, with their mean as a line; `bound`: the highest mean possible."""
     import seaborn as sns
 
     returns = check_array("returns", returns, (-1,))
     sns.histplot(returns, ax=ax, color=color, bins=40, edgecolor="white", linewidth=0.3)
-    ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}")
+    most = "" if bound is None else f"\n(at most {bound:.2f})"
+    ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}{most}")
     ax.set(xlabel="return per episode", ylabel="episodes")
-    ax.legend(frameon=False, loc="upper left")
-    return ax
-
-
-def upper_bound(ax: Axes, value: float) -> Axes:
-    """A dashed line at the highest mean return that any policy can reach."""
-    ax.axvline(value, color="black", lw=0.8, ls="--", label=f"bound {value:.2f}")
     ax.legend(frameon=False, loc="upper left")
     return ax
 

@@ -20,7 +20,10 @@ _PASTEL = (  # seaborn's palette of this name
 )  # fmt: skip
 
 
-def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6) -> Axes:
+def cells(
+    ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6,
+    color: str = BORDER,
+) -> Axes:  # fmt: skip
     """Borders of Voronoi cells, `width` points wide; `fill` colours the cells. `index`: the cell of each grid point."""
     index = _on_grid("cells", x, y, index).astype(int)
     if fill:
@@ -29,17 +32,22 @@ def cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bo
     for i in np.unique(index):
         inside = (index == i).astype(float)
         if inside.min() < 1:
-            ax.contour(x, y, inside, levels=[0.5], colors=BORDER, linewidths=width)
+            ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
     return ax
 
 
-def codewords(ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False) -> Axes:
-    """Codewords (k, 2) as black dots with a white rim."""
+def codewords(
+    ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False, size: float = 14
+) -> Axes:
+    """Codewords (k, 2) as black dots with a white rim; `numbers` are towards the middle of the axes, so inside."""
     points = check_array("codewords", points, (-1, 2))
-    ax.scatter(*points.T, s=14, color=CODEWORD, edgecolor="white", linewidth=0.6, zorder=5, label=label, clip_on=False)
-    if numbers:
-        for i, point in enumerate(points):
-            ax.annotate(str(i), point, xytext=(3, 3), textcoords="offset points", fontsize=6, zorder=6)
+    look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
+    ax.scatter(*points.T, s=size, label=label, **look)
+    for i, point in enumerate(points if numbers else ()):
+        right, up = point < [np.mean(ax.get_xlim()), np.mean(ax.get_ylim())]
+        place = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
+        offset = (3 if right else -3, 2 if up else -2)
+        ax.annotate(str(i), point, xytext=offset, textcoords="offset points", fontsize=7, zorder=6, **place)
     return ax
 
 
@@ -79,19 +87,25 @@ def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
     bar.ax.set_yticklabels(["−1 (left)", "0", "+1 (right)"])
 
 
-def error_map(ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str) -> AxesImage:
-    """A non-negative quantity over a two-dimensional state, darker where larger, with a colour bar. Returns it."""
-    drawn = image(ax, x, y, _on_grid("error", x, y, error), cmap="Greys", vmin=0)
-    ax.figure.colorbar(drawn, ax=ax, label=label)
+def error_map(
+    ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str, beside: np.ndarray | None = None
+) -> AxesImage:
+    """A non-negative quantity over a two-dimensional state, darker where larger, with a colour bar. Returns it.
+
+    All axes `beside` (None: `ax`) make room for the colour bar, so that they keep one size.
+    """
+    drawn = image(ax, x, y, _on_grid("error", x, y, error), cmap="Reds", vmin=0)
+    ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
     return drawn
 
 
 def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
-    """The states of one episode, joined: from a ring at the start to the state after the last action."""
+    """The states of one episode, joined: from a ring (labelled "start") to the state after the last action."""
     last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
     way = np.concatenate([episode.states, last])
     ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
-    ax.plot(*way[0], color=color, marker="o", mfc="white", ms=5, zorder=5)
+    named = any(line.get_label() == "start" for line in ax.lines)
+    ax.plot(*way[0], ls="", color=color, marker="o", mfc="white", ms=5, zorder=5, label=None if named else "start")
     return ax
 
 
