@@ -140,7 +140,7 @@ def test_it_is_shown_with_words_and_moves_only_when_asked(saved):
     shown, folder = saved
     text = shown._repr_html_()
     still, moving = re.findall(
-        r'<img alt="([^"]*)" src="data:image/(\w+);base64,([^"]+)" width="600" height="260"', text
+        r'<img alt="([^"]*)" src="data:image/(\w+);base64,([^"]+)" width="720" height="312"', text
     )
     assert [html.unescape(one[0]) for one in (still, moving)] == [f"The last frame of the moving picture: {ALT}", ALT]
     for (_, kind, data), name, held in ((still, "png", shown.still), (moving, "gif", shown.gif)):
