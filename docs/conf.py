@@ -18,6 +18,8 @@ extensions = [
     "pages",
     "trust_tables",
     "explorer",
+    "folding",
+    "sphinx_copybutton",
 ]
 exclude_patterns = ["README.md"]  # its parts are included in the pages
 
@@ -25,6 +27,7 @@ exclude_patterns = ["README.md"]  # its parts are included in the pages
 nb_execution_mode = "off"
 nb_ipywidgets_js = {}  # the default asks another host for its scripts
 nb_output_stderr = "show"
+copybutton_selector = "div.cell_input pre, section > div[class^=highlight-] pre"  # no outputs
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block"]
 myst_heading_anchors = 3
 

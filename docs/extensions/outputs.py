@@ -42,6 +42,9 @@ def _improve(text: str, folder: Path = None, top: str = "") -> str:
     for tag in soup.find_all(["img", "source"]):
         if found := _IMAGE.fullmatch(tag.get("src") or tag.get("srcset") or ""):
             _picture(tag, base64.b64decode(found[1]), folder, top)
+    for script in soup.select(".vsp-explorer > script[type='application/json']"):  # loads when it comes into view
+        script.parent["data-scene"] = top + _write(folder, script.get_text().encode(), "json")
+        script.decompose()
     for table in soup.find_all("table"):
         _table(soup, table)
     return str(soup)
@@ -67,9 +70,14 @@ def _save(folder: Path, image: bytes) -> str:
         kind, file = "webp", io.BytesIO()
         Image.open(io.BytesIO(image)).save(file, "WEBP", lossless=True)
         image = file.getvalue()
-    name = f"_images/{hashlib.sha256(image).hexdigest()[:16]}.{kind}"
+    return _write(folder, image, kind)
+
+
+def _write(folder: Path, content: bytes, kind: str) -> str:
+    """Write a file named by its content; returns where it is."""
+    name = f"_images/{hashlib.sha256(content).hexdigest()[:16]}.{kind}"
     (folder / "_images").mkdir(parents=True, exist_ok=True)
-    (folder / name).write_bytes(image)
+    (folder / name).write_bytes(content)
     return name
 
 

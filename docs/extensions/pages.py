@@ -5,8 +5,10 @@ import re
 import textwrap
 
 from docutils import nodes
+from fontTools import subset
 
 _UNUSED = ("*.js.map", "*.css.map", "scripts/fontawesome.js")
+_ICON = re.compile(r'((?:\.fa-[\w-]+,?)+)\{--fa:"\\([0-9a-f]+)"\}')
 _MAP = re.compile(rb"\n?(//# |/\*# )sourceMappingURL=[^\n*]*( \*/|\*/)?")
 
 
@@ -33,6 +35,28 @@ def _thin(app, error):
         path.unlink()
     for path in [*static.rglob("*.js"), *static.rglob("*.css")]:
         path.write_bytes(_MAP.sub(b"", path.read_bytes()))
+    _thin_icons(app.outdir, static)
+
+
+def _thin_icons(pages, static):
+    """Keep the icons that some page has: a dozen of two thousand."""
+    texts = [path.read_text("utf-8") for path in [*pages.rglob("*.html"), *static.rglob("scripts/*.js")]]
+    used, points = {name for text in texts for name in re.findall(r"\bfa-[\w-]+", text)}, set()
+
+    def kept(rule):
+        if not used & set(re.findall(r"fa-[\w-]+", rule[1])):
+            return ""
+        points.add(int(rule[2], 16))
+        return rule[0]
+
+    for path in static.rglob("*.css"):
+        path.write_text(_ICON.sub(kept, path.read_text("utf-8")), "utf-8")
+    options = subset.Options(flavor="woff2", layout_features=[])
+    for path in static.rglob("fa-*.woff2"):
+        font, subsetter = subset.load_font(path, options), subset.Subsetter(options)
+        subsetter.populate(unicodes=points)
+        subsetter.subset(font)
+        subset.save_font(font, path, options)
 
 
 def setup(app):

@@ -22,5 +22,15 @@ addEventListener("load", () => {
   }
 })
 
-// A letter by itself, as of L∞, would find every name that has it somewhere. (Sphinx's search takes this for its own.)
-var splitQuery = query => query.split(/[^\p{Letter}\p{Number}_]+/u).filter(term => term.length > 1)
+// A letter by itself would find every name that has it somewhere; ∞ is no letter. (Sphinx's search takes this for its own.)
+var splitQuery = query =>
+  query.replaceAll("∞", " infinity ").split(/[^\p{Letter}\p{Number}_]+/u).filter(term => term.length > 1)
+
+// A hit leads to the words, not to the top of a long page.
+addEventListener("DOMContentLoaded", () => {
+  const found = document.querySelector("#search-results"), [word] = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
+  if (found && word)
+    new MutationObserver(() => {
+      for (const link of found.querySelectorAll("a:not([href*='#'])")) link.hash = `:~:text=${encodeURIComponent(word)}`
+    }).observe(found, {childList: true, subtree: true})
+})

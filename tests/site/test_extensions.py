@@ -95,3 +95,21 @@ def test_comments_behind_fields_are_found(docstrings):
 
     assert ("raw", "(m,) output of the sub-policy") in docstrings._comments(Explanation)
     assert docstrings._comments(int) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "what"),
+    [
+        ("fig = 1\nshow.save_figure(fig, 'x')", "draws the figure"),
+        ("paper.save_table(t, 'x')", "makes the table"),
+        ("paper.show_table(t)", "makes the table"),
+        ("import numpy as np\nimport vsp", "settings and imports"),
+        ("out = 'build/lab'", "settings and imports"),
+        ("rows = comparison.all_rows(task)", "reads the results"),
+        ("policy, _ = vsp.distill(teacher, task)\nshow.save_figure(fig, 'x')", None),
+        ("why = policy.explain(state)", None),
+        ("print(1 + 1)", None),
+    ],
+)
+def test_code_that_only_draws_lists_or_sets_up_is_folded(code, what):
+    assert importlib.import_module("folding").kind(code) == what

@@ -97,6 +97,24 @@ def test_captions_are_set_as_text(page):
     assert all(style == ["left", "400"] for style in styles)
 
 
+def test_no_code_is_cut_off_and_all_can_be_copied(page):
+    cells = page.evaluate("""[...document.querySelectorAll('div.cell_input')].map(cell => [
+        cell.querySelectorAll('button.copybtn').length,
+        cell.querySelector('pre').scrollWidth - cell.querySelector('pre').clientWidth])""")
+    assert all(buttons == 1 and over <= 2 for buttons, over in cells)
+
+
+def test_every_figure_of_a_notebook_has_its_number_and_caption_and_every_table_a_caption(opened, page):
+    if not re.search(r"notebooks/\d", opened.name):
+        return
+    labels = page.locator("figure:has(img) figcaption b").all_inner_texts()
+    assert labels == [f"Figure {int(opened.name[10:12])}.{i}." for i in range(1, len(labels) + 1)]
+    assert page.locator("article figure:has(img):not(:has(figcaption))").count() == 0
+    tables = page.evaluate("""[...document.querySelectorAll('table.dataframe')].filter(t => !t.closest('.vsp-strip')).map(
+        table => [table.caption?.innerText.length ?? 0, table.tHead.rows[0].cells[0].innerText])""")
+    assert all(length > 10 and heading for length, heading in tables)
+
+
 def test_no_dollar_is_left_outside_of_code(page):
     text = page.evaluate("""[...document.querySelectorAll('article')].map(article => {
         const copy = article.cloneNode(true)
@@ -225,7 +243,7 @@ def test_nothing_moves_while_it_loads_and_little_comes_along(browser, address, n
         || setTimeout(() => done(0), 500))""")
     page.context.close()
     assert moved < 0.05
-    assert sum(size for url, size in got if re.search(r"\.(js|css|woff2)\b", url)) < 1_000_000
+    assert sum(size for _, size in got) < 1_000_000
 
 
 def test_nothing_is_shipped_that_no_page_asks_for():
@@ -285,9 +303,16 @@ def test_a_search_quotes_the_text_and_no_list_of_headings(start, address):
     assert not any("On this page" in text for text in start.locator("#search-results p.context").all_inner_texts())
 
 
-def test_a_search_for_one_letter_does_not_find_every_name(start, address):
-    start.goto(address + "search.html?q=L∞")
+def test_a_search_for_one_letter_finds_nothing_and_infinity_is_a_word(start, address):
+    start.goto(address + "search.html?q=L")
     start.wait_for_selector(".search-summary:has-text('did not match')")
+    start.goto(address + "search.html?q=L∞")
+    start.locator("#search-results a", has_text="Distillation").first.wait_for()
+
+
+def test_a_hit_leads_to_the_words(start, address):
+    start.goto(address + "search.html?q=Delaunay")
+    start.wait_for_selector("#search-results a[href$='02_distillation.html#:~:text=Delaunay']")
 
 
 def test_a_search_for_merge_finds_the_distillation(start):

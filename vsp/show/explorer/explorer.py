@@ -64,7 +64,8 @@ class Explorer:
 
     def element(self, *, source: str | None = None) -> str:
         """HTML in which the script finds its scene, in it or in the file `source`; without a script, a picture."""
-        picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}</figure>"
+        said = f"<figcaption>{html.escape(self._alt())}</figcaption>"
+        picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{said}</figure>"
         if source is not None:
             return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
         scene = json.dumps(self.scene, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")

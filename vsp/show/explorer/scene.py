@@ -17,7 +17,7 @@ PLANES = {  # of each task that the script can play: the states that are drawn, 
 }
 N_STARTS = 400
 TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid along an axis; states at which its error is measured
-N_MOMENTS = 120  # of a replay, in addition to those with a split or merge
+N_MOMENTS = 80  # of a replay, in addition to those with a split or merge
 
 
 def scene_of(
