@@ -107,7 +107,7 @@ quick: ## the paper's path with tiny runs, figures watermarked, into build/quick
 
 paper-figures: begin ## every figure and table of the paper, at the paper's scale: about 2 minutes
 lab: venv ## opens JupyterLab on the notebooks
-	$(PY) -m jupyterlab notebooks
+	@$(PY) -m vsp.run.lab
 
 ## Reproduce
 all: begin venv ## the same and our own method beside it, notebooks 06 to 09: about 4 minutes

@@ -2,6 +2,7 @@
 
 import ast
 import html
+import json
 import pydoc
 import re
 import subprocess
@@ -38,6 +39,13 @@ def test_there_are_notebooks():
 
 def test_sources_hold_no_output(notebook):
     assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(notebook))
+
+
+def test_every_notebook_has_the_metadata_that_jupyterlab_writes():
+    kinds = {json.dumps(nbformat.read(path, as_version=4).metadata, sort_keys=True)
+             for path in (ROOT / "notebooks").rglob("*.ipynb")}  # fmt: skip
+    (kind,) = map(json.loads, kinds)
+    assert kind["kernelspec"]["display_name"] == "Python 3 (ipykernel)" and kind["language_info"]["version"]
 
 
 def test_cells_are_short_and_define_no_helpers(notebook):

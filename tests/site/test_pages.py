@@ -110,8 +110,8 @@ def test_every_figure_of_a_notebook_has_its_number_and_caption_and_every_table_a
     labels = page.locator("figure:has(img) figcaption b").all_inner_texts()
     assert labels == [f"Figure {int(opened.name[10:12])}.{i}." for i in range(1, len(labels) + 1)]
     assert page.locator("article figure:has(img):not(:has(figcaption))").count() == 0
-    tables = page.evaluate("""[...document.querySelectorAll('table.dataframe')].filter(t => !t.closest('.vsp-strip')).map(
-        table => [table.caption?.innerText.length ?? 0, table.tHead.rows[0].cells[0].innerText])""")
+    tables = page.evaluate("""[...document.querySelectorAll('table.dataframe')].filter(t => !t.closest('.vsp-strip'))
+        .map(table => [table.caption?.innerText.length ?? 0, table.tHead.rows[0].cells[0].innerText])""")
     assert all(length > 10 and heading for length, heading in tables)
 
 
