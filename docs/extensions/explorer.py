@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 from docutils import nodes
+from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
 import vsp
@@ -15,29 +16,35 @@ from vsp.paper.results import read_results
 from vsp.show.explorer import SCRIPT
 
 
-def of_task(task: str) -> vsp.show.explorer.Explorer:
-    """The paper's policy, its method's best rerun with the run, ours, and one linear map."""
+def of_task(task: str, guess: str | None) -> vsp.show.explorer.Explorer:
+    """The paper's policy, its method's best rerun with the run, ours, and one linear map: those that the task has."""
     teacher, policies, history = vsp.load_teacher(task), {}, None
     if task in TASKS:
         best = int(read_results(task).set_index("seed")["mean"].idxmax())
         policies["the paper's method, best rerun"], history = vsp.distill(teacher, task, vsp.preset(task), seed=best)
         policies["the paper's, as published"] = published_policy(task)
     for name, kept in (("ours, faithful", "faithful"), ("ours, tuned for return", "limit")):
-        policies[name] = vsp.VoronoiPolicy.load(comparison.RESULTS / f"{kept}_{task}.policy")
+        if (path := comparison.RESULTS / f"{kept}_{task}.policy").exists():
+            policies[name] = vsp.VoronoiPolicy.load(path)
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
     states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
     policies["one linear map"] = linear_map(states, actions, task)
-    return vsp.explore(policies, teacher=teacher, history=history)
+    return vsp.explore(policies, teacher=teacher, history=history, guess=guess)
 
 
 class Shown(SphinxDirective):
-    """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view."""
+    """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view.
+
+    The option `guess` is a question that the reader answers first.
+    """
 
     required_arguments = 1
+    option_spec = {"guess": directives.unchanged_required}
 
     def run(self):
-        explorer, top = of_task(self.arguments[0]), "../" * self.env.docname.count("/")
-        name = f"explorer_{self.arguments[0]}.json"
+        guess, top = self.options.get("guess"), "../" * self.env.docname.count("/")
+        explorer = of_task(self.arguments[0], guess)
+        name = f"explorer_{self.arguments[0]}{'_guess' * (guess is not None)}.json"
         self.env.app.explorers[name] = json.dumps(explorer.scene, separators=(",", ":"), allow_nan=False)
         return [nodes.raw("", explorer.element(source=f"{top}_static/{name}"), format="html")]
 

@@ -261,3 +261,88 @@ def test_nothing_fails_and_everyone_can_use_it(desk):
         assert visit.troubles == []
         found = Axe().run(visit.page).response["violations"]
         assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+
+
+# Stored episodes
+
+LUNARLANDER, WALKER = "LunarLanderContinuous-v3", "BipedalWalker-v3"
+STORED = f"""async ([scene, encoded]) => {{
+  {LOADED}
+  return scene.policies.map(vsp.ready).map(policy => policy.episodes.map(({{states}}) => states.map(state => {{
+    const {{cell, action}} = vsp.act(scene, policy, state)
+    return [cell, ...action, vsp.margin(policy, state)]
+  }})))
+}}"""
+
+
+@pytest.fixture(scope="module")
+def lander(browser, tmp_path_factory):
+    policy, folder = (
+        vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{LUNARLANDER}.policy"),
+        tmp_path_factory.mktemp("x"),
+    )
+    explorer = vsp.explore({"faithful": policy}, teacher=vsp.load_teacher(LUNARLANDER), axes=("x", "y"))
+    explorer.save(folder / "lander.html")
+    visit = Visit(browser, folder.as_uri() + "/", "lander.html", viewport={"width": 1200, "height": 900})
+    visit.page.locator(".vsp-explorer canvas").wait_for()
+    yield Shown(visit), explorer
+    visit.close()
+
+
+def test_in_stored_states_cell_and_action_are_pythons(lander):
+    shown, explorer = lander
+    policy = explorer.policies["faithful"]
+    (episodes,) = shown.page.evaluate(STORED, [explorer.scene, ""])
+    for episode, found in zip(explorer.scene["policies"][0]["episodes"], map(np.array, episodes), strict=True):
+        states, sure = np.array(episode["states"]), found[:, -1] > 1e-9
+        assert np.array_equal(policy.cells(states)[sure], found[sure, 0]) and sure.mean() > 0.99
+        assert np.allclose(policy.predict(states)[0][sure], found[sure, 1:-1], atol=1e-9)
+
+
+def test_a_click_keys_and_the_slider_choose_stored_states(lander):
+    shown, _ = lander
+    box = shown.canvas.bounding_box()
+    assert shown.changes(lambda: shown.page.mouse.click(box["x"] + 200, box["y"] + 300)) == (True, True)
+    shown.canvas.focus()
+    assert shown.changes(lambda: shown.page.keyboard.press("ArrowRight")) == (True, True)
+    assert shown.changes(lambda: shown.page.keyboard.press("ArrowUp")) == (True, True)
+    assert shown.changes(lambda: shown.root.get_by_label("step").fill("5")) == (True, True)
+    assert "step 6 of" in shown.root.inner_text()
+    shown.root.get_by_role("button", name="play").click()
+    shown.page.wait_for_timeout(400)
+    shown.root.get_by_role("button", name="pause").click()
+    assert "step 6 of" not in shown.root.inner_text()
+
+
+def test_why_it_cannot_be_changed_is_said(lander):
+    text = lander[0].root.inner_text()
+    assert "Nothing can be changed here: the browser cannot play this task" in text and "the teacher's action" in text
+    assert lander[0].root.locator("fieldset").count() == 0
+
+
+def test_twenty_four_inputs_fit_on_a_phone(browser, tmp_path):
+    policy = vsp.VoronoiPolicy.load(comparison.RESULTS / f"robots_{WALKER}.policy")
+    vsp.explore(policy).save(tmp_path / "walker.html")
+    visit = Visit(browser, tmp_path.as_uri() + "/", "walker.html", viewport={"width": 390, "height": 844})
+    visit.page.locator(".vsp-explorer canvas").wait_for()
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert visit.page.locator(".vsp-explorer details summary").inner_text() == "equations"
+    visit.close()
+
+
+# The reader guesses first
+
+
+def test_results_are_hidden_until_the_reader_has_guessed(browser, tmp_path):
+    vsp.explore(policies_of(SIMPLEGOAL), guess="How many are lost?").save(tmp_path / "guess.html")
+    visit = Visit(browser, tmp_path.as_uri() + "/", "guess.html", viewport={"width": 1200, "height": 900})
+    root = visit.page.locator(".vsp-explorer")
+    root.locator("canvas").wait_for()
+    visit.page.wait_for_timeout(400)
+    assert "How many are lost?" in root.inner_text() and "Mean return" not in root.inner_text()
+    root.get_by_label("your guess").fill("7")
+    root.get_by_role("button", name="show").click()
+    visit.page.wait_for_timeout(400)
+    text = root.inner_text()
+    assert "Mean return" in text and "Your guess was 7." in text and "How many" not in text
+    visit.close()

@@ -113,6 +113,9 @@ const TASKS = {
   },
 }
 
+/** A task that is not played here: a policy sees the state as it is stored. */
+const UNKNOWN = { see: state => state, furniture: () => {} }
+
 /** The dynamics of a task: what a policy sees of a state, and a step. */
 export const dynamics = name => TASKS[name]
 
@@ -215,7 +218,7 @@ class Picture {
     ctx.lineWidth = 1
     ctx.strokeRect(left, top, this.wide, this.high)
     ctx.textAlign = "center"
-    const number = value => String(+value.toPrecision(3)).replace("-", "−")
+    const number = value => String(+value.toPrecision(2)).replace("-", "−")
     for (const share of [0, 0.5, 1]) {
       const point = low.map((value, i) => value + share * (high[i] - value)),
         [x, y] = this.at(point)
@@ -227,7 +230,7 @@ class Picture {
     ctx.textAlign = "center"
     ctx.fillText(labels[0], left + this.wide / 2, top + this.high + 29)
     ctx.save()
-    ctx.translate(11, top + this.high / 2)
+    ctx.translate(8, top + this.high / 2)
     ctx.rotate(-Math.PI / 2)
     ctx.fillText(labels[1], 0, 0)
     ctx.restore()
@@ -272,7 +275,7 @@ function drawMap(view, n) {
 
 /** The picture; a map that is out of date is drawn with few points first, and with many when nothing moves. */
 function draw(view) {
-  if (view.mapped !== view.cell) {
+  if (!view.stored && view.mapped !== view.cell) {
     drawMap(view, COARSE)
     view.mapped = view.cell
     clearTimeout(view.later)
@@ -291,22 +294,39 @@ function drawAll(view) {
   ctx.fillStyle = PAPER
   ctx.fillRect(0, 0, picture.side, picture.side)
   ctx.font = "12px system-ui, sans-serif"
-  ctx.drawImage(picture.map, picture.edge.left, picture.edge.top, picture.wide, picture.high)
-  view.task.furniture(picture)
-  if (scene.task.outputs.length === 2) drawArrows(view)
-  scene.starts.forEach((start, i) => {
-    const lost = view.ends[i]
-    picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : GOAL)
-  })
+  ctx.save()
+  if (view.stored) {
+    ctx.beginPath()
+    ctx.rect(picture.edge.left, picture.edge.top, picture.wide, picture.high)
+    ctx.clip() // codewords may lie far outside
+    drawStored(view)
+  } else {
+    ctx.drawImage(picture.map, picture.edge.left, picture.edge.top, picture.wide, picture.high)
+    view.task.furniture(picture)
+    if (scene.task.outputs.length === 2) drawArrows(view)
+    scene.starts.forEach((start, i) => {
+      const lost = view.guessed && view.ends[i]
+      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : GOAL)
+    })
+  }
   picture.line(view.path.map(view.place), PAPER, 4)
   picture.line(view.path.map(view.place), INK, 2)
-  view.path.slice(1).forEach(state => picture.dot(view.place(state), 2, INK))
+  if (!view.stored) view.path.slice(1).forEach(state => picture.dot(view.place(state), 2, INK))
   policy.codewords.forEach((codeword, i) =>
     picture.dot(view.placeSeen(codeword), 5, i === view.cell ? INK : PAPER, INK),
   )
-  picture.dot(asked, 7, null, FAILED)
-  picture.dot(asked, 2, FAILED)
+  const chosen = view.stored ? view.place(view.seen) : asked
+  picture.dot(chosen, 7, null, FAILED)
+  picture.dot(chosen, 2, FAILED)
+  ctx.restore()
   picture.axes()
+}
+
+/** The states of all stored episodes, in the colours of their cells. */
+function drawStored(view) {
+  for (const { states } of view.episodes)
+    for (const state of states)
+      view.picture.dot(view.place(state), 2, PALETTE[cellOf(view.policy, state) % PALETTE.length])
 }
 
 function drawArrows(view) {
@@ -343,12 +363,13 @@ const STYLE = `
 .vsp-explorer canvas:focus-visible { outline: 3px solid #0173b2 }
 .vsp-explorer .vsp-panel { flex: 1 1 260px; min-width: 0 }
 .vsp-explorer .vsp-row { display: flex; flex-wrap: wrap; gap: 0.3rem 0.6rem; align-items: center; margin: 0 0 0.6rem }
-.vsp-explorer table { border-collapse: collapse; margin: 0.3rem 0; display: block; overflow-x: auto }
+.vsp-explorer table { border-collapse: collapse; margin: 0.3rem 0; display: block; overflow: auto; max-height: 24rem }
 .vsp-explorer :is(td, th) { padding: 0.1rem 0.5rem; text-align: right; font-weight: normal }
 .vsp-explorer legend { font-size: inherit }
 .vsp-explorer [hidden] { display: none }
 .vsp-explorer .vsp-note { font-size: 0.85rem; opacity: 0.85 }
 .vsp-explorer fieldset { border: 1px solid #888; padding: 0.3rem 0.6rem; margin: 0.5rem 0; min-width: 0 }
+.vsp-explorer code { overflow-wrap: anywhere }
 .vsp-explorer input[type=number] { width: 5rem } .vsp-explorer input[type=range] { flex: 1 1 140px }
 .vsp-explorer p { margin: 0.3rem 0 }`
 
@@ -363,11 +384,11 @@ function element(tag, attributes = {}, ...children) {
   return made
 }
 
-/** A table: names of the columns, then rows that begin with their name. */
+/** A table: names of the columns, then rows that begin with their name. A long one scrolls, also by the keyboard. */
 const table = (head, rows) =>
   element(
     "table",
-    {},
+    rows.length > 12 ? { tabindex: 0 } : {},
     element("tr", {}, ...head.map(name => element(name ? "th" : "td", name ? { scope: "col" } : {}, name))),
     ...rows.map(([name, ...values]) =>
       element("tr", {}, element("th", { scope: "row" }, name), ...values.map(value => element("td", {}, value))),
@@ -375,309 +396,359 @@ const table = (head, rows) =>
   )
 
 const digits = value => (Math.abs(value) < 5e-4 ? "0.000" : value.toFixed(3)).replace("-", "\u2212")
+const minus = text => text.replaceAll("-", "\u2212")
 const copied = policy => structuredClone(policy)
+const button = (label, click) => element("button", { type: "button", click }, label)
 
-/** The explorer in `root`, in place of what stands there. Returns its view, for tests. */
-export function mount(root, scene) {
-  const task = dynamics(scene.task.name),
-    still = matchMedia("(prefers-reduced-motion: reduce)").matches
-  const canvas = element("canvas", { tabindex: 0, role: "img" })
-  const picture = new Picture(canvas, scene.plane)
-  const { low, high } = scene.plane
-  const angular = scene.task.name === "Pendulum-v1"
-  const view = {
-    scene,
-    task,
-    picture,
-    policy: copied(scene.policies[0]),
-    path: null,
-    ends: [],
-    frames: 0,
-    asked: low.map((value, i) => value + 0.7 * (high[i] - value)),
-    see: point => task.see(point),
-    place: angular
-      ? ([angle, speed]) => [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed]
-      : point => point,
-    placeSeen: angular ? seen => [Math.atan2(seen[1], seen[0]), seen[2]] : seen => seen,
+/** A row that moves through something: back, play, on, and a slider. */
+class Player {
+  constructor(name, labels, { turn, jump }) {
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches
+    Object.assign(this, { turn, wait: still ? 1000 : 0 }) // who asked for little motion gets a picture a second
+    const input = () => this.to(+this.slider.value)
+    this.slider = element("input", { type: "range", min: 0, value: 0, "aria-label": name, input })
+    this.toggle = button("play", () => (this.playing ? this.stop() : this.start()))
+    this.said = element("span", {})
+    const [back, on] = labels.map((label, i) => button(label, () => (this.stop(), jump(i ? 1 : -1))))
+    this.row = element("div", { class: "vsp-row" }, back, this.toggle, on, this.slider, this.said)
+  }
+  get at() {
+    return +this.slider.value
+  }
+  get last() {
+    return +this.slider.max
+  }
+  /** There are so many moments: go to one. */
+  restart(count, at) {
+    this.stop()
+    this.slider.max = count - 1
+    this.to(at)
+  }
+  to(i) {
+    this.slider.value = i
+    this.said.textContent = this.turn(this.at)
+    this.slider.setAttribute("aria-valuetext", this.said.textContent)
+  }
+  start() {
+    this.playing = true
+    this.toggle.textContent = "pause"
+    if (this.at === this.last) this.slider.value = 0
+    let before = 0
+    const frame = now => {
+      if (!this.playing || !this.slider.isConnected) return
+      if (now - before >= this.wait) {
+        before = now
+        this.to(this.at + 1)
+      }
+      this.at < this.last ? requestAnimationFrame(frame) : this.stop()
+    }
+    requestAnimationFrame(frame)
+  }
+  stop() {
+    this.playing = false
+    this.toggle.textContent = "play"
+  }
+}
+
+const UNCHANGED = [
+  "Dots are states of stored episodes, in the colours of their cells; circles are codewords.",
+  "Click a state, or move through its episode.",
+  "Nothing can be changed here: the browser cannot play this task, only SimpleGoal, MountainCar and Pendulum.",
+].join(" ")
+
+/** The explorer in `root`, in place of what stands there: a view with its policy, its chosen state and what is said. */
+class Explorer {
+  constructor(root, scene) {
+    const { low, high } = scene.plane
+    this.canvas = element("canvas", { tabindex: 0, role: "img" })
+    Object.assign(this, {
+      scene,
+      task: dynamics(scene.task.name) ?? UNKNOWN,
+      picture: new Picture(this.canvas, scene.plane),
+    })
+    Object.assign(this, { stored: scene.stored, path: null, ends: [], frames: 0, guessed: !scene.guess })
+    this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
+    this.angular = scene.task.name === "Pendulum-v1"
+    this.answer = element("div")
+    this.result = element("p", { "aria-live": "polite" })
+    this.form = element("div")
+    this.names = element(
+      "select",
+      { "aria-label": "policy", change: () => this.choose(+this.names.value) },
+      ...scene.policies.map((policy, i) => element("option", { value: i }, policy.name)),
+    )
+    this.replay = new Player("iteration", ["previous change", "next change"], {
+      turn: i => this.turnTo(i),
+      jump: way => this.jump(way),
+    })
+    this.steps = new Player("step", ["previous episode", "next episode"], {
+      turn: i => this.stepTo(i),
+      jump: way => this.episodeTo(this.episode + way),
+    })
+    const title = element("label", {}, "policy ", this.names)
+    const back = button("reset", () => this.choose(this.chosen))
+    const rows = [element("div", { class: "vsp-row" }, title, ...(this.stored ? [] : [back])), this.replay.row]
+    const said = [this.stored ? this.steps.row : "", this.guessed ? "" : this.question(), this.result, this.answer]
+    const panel = element("div", { class: "vsp-panel" }, ...rows, ...said, this.form, this.note())
+    root.classList.add("vsp-explorer")
+    root.replaceChildren(element("style", {}, STYLE), this.canvas, panel)
+    this.listen()
+    new ResizeObserver(() => this.path && draw(this)).observe(this.canvas)
+    this.choose(0)
+  }
+
+  // -- Places: of a state, and of an observation, in the picture
+  place = state => {
+    if (this.stored) return this.stored.axes.map(i => state[i])
+    if (!this.angular) return state
+    const [angle, speed] = state
+    return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed]
+  }
+  placeSeen = seen => {
+    if (this.stored) return this.place(seen)
+    return this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen
+  }
+  see = point => this.task.see(point)
+  /** The episodes that are stored of the chosen policy. */
+  get episodes() {
+    return this.scene.policies[this.chosen].episodes
+  }
+  get seen() {
+    return this.stored ? this.episodes[this.episode].states[this.steps.at] : this.see(this.asked)
   }
 
   // -- What is said
-  const answer = element("div"),
-    result = element("p", { "aria-live": "polite" }),
-    form = element("div")
-
-  function ask() {
-    const seen = view.see(view.asked),
-      { cell, raw: given, action } = act(scene, view.policy, seen)
-    view.cell = cell
-    const rows = view.policy.coefficients[cell],
-      { inputs, outputs } = scene.task
+  ask() {
+    const { inputs, outputs } = this.scene.task,
+      seen = this.seen,
+      { cell, raw: given, action } = act(this.scene, this.policy, seen),
+      rows = this.policy.coefficients[cell]
+    this.cell = cell
+    const adds = inputs.map((name, i) => [`${name} = ${digits(seen[i])} adds`, rows[i].map(w => digits(w * seen[i]))])
+    const teacher = this.teachers()
+    const written = outputs.map((name, k) => element("p", {}, element("code", {}, equation(name, inputs, rows, k))))
     const lines = [
-      ...inputs.map((name, i) => [
-        `${name} = ${digits(seen[i])} adds`,
-        outputs.map((_, k) => digits(rows[i][k] * seen[i])),
-      ]),
+      ...adds,
       ["the bias adds", rows[inputs.length].map(digits)],
       ["sum", given.map(digits)],
       ["action, within the limits", action.map(digits)],
-      ...(scene.teacher ? [["the teacher's action", teacherAt(scene, view.asked).map(digits)]] : []),
+      ...(teacher ? [["the teacher's action", teacher.map(digits)]] : []),
     ]
-    answer.replaceChildren(
-      element(
-        "p",
-        {},
-        element("b", {}, `Cell ${cell + 1} of ${view.policy.codewords.length}. `),
-        border(view, seen, cell),
-      ),
-      ...outputs.map((name, k) => element("p", {}, element("code", {}, equation(name, inputs, rows, k)))),
+    this.answer.replaceChildren(
+      element("p", {}, element("b", {}, `Cell ${cell + 1} of ${this.policy.codewords.length}. `), this.border()),
+      ...(inputs.length > 8 ? [element("details", {}, element("summary", {}, "equations"), ...written)] : written),
       table(
         ["", ...outputs],
         lines.map(([name, values]) => [name, ...values]),
       ),
     )
-    canvas.setAttribute("aria-label", `Map of the policy. The chosen state is in cell ${cell + 1}. Arrow keys move it.`)
+    const keys = this.stored ? "Left and right go through the episode." : "Arrow keys move it."
+    this.canvas.setAttribute("aria-label", `Map of the policy. The chosen state is in cell ${cell + 1}. ${keys}`)
   }
-
-  function judge() {
-    const found = scene.starts.map(start => rollout(scene, view.policy, start))
-    view.ends = found.map(one => scene.lost.includes(one.outcome))
-    const mean = found.reduce((sum, one) => sum + one.total, 0) / found.length
-    view.mean = mean
-    view.failures = view.ends.filter(Boolean).length
-    const fails = scene.lost.length ? ` ${view.failures} of ${found.length} fail.` : ""
+  teachers() {
+    if (this.stored) return this.episodes[this.episode].teacher?.[this.steps.at]
+    return this.scene.teacher && teacherAt(this.scene, this.asked)
+  }
+  border() {
+    const plane = this.stored ? { ...this.stored, labels: this.scene.task.inputs } : this.scene.plane
+    const point = this.stored ? this.seen : this.asked
+    return border(point, this.cell, plane, changed => cellOf(this.policy, this.see(changed)))
+  }
+  judge() {
+    const { scene } = this
+    const found = scene.starts.map(start => rollout(scene, this.policy, start))
+    this.ends = found.map(one => scene.lost.includes(one.outcome))
+    this.mean = found.reduce((sum, one) => sum + one.total, 0) / found.length
+    this.failures = this.ends.filter(Boolean).length
+    const fails = scene.lost.length ? ` ${this.failures} of ${found.length} fail.` : ""
     const teacher = scene.teacher ? ` The teacher: ${scene.teacher.mean.toFixed(2)}.` : ""
-    result.textContent = `Mean return from ${found.length} starts: ${mean.toFixed(2)}.${fails}${teacher}`.replaceAll(
-      "-",
-      "\u2212",
-    )
+    const guess = this.guess === undefined ? "" : ` Your guess was ${this.guess}.`
+    const text = `Mean return from ${found.length} starts: ${this.mean.toFixed(2)}.${fails}${teacher}${guess}`
+    this.result.textContent = this.guessed ? minus(text) : ""
+  }
+  /** Results stay hidden until the reader has guessed. */
+  question() {
+    const input = element("input", { type: "number", "aria-label": "your guess" })
+    const show = button("show", () => {
+      this.guessed = true
+      this.guess = Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : undefined
+      row.remove()
+      this.changed({ policy: true })
+    })
+    const row = element("div", { class: "vsp-row" }, element("span", {}, this.scene.guess), input, show)
+    return row
+  }
+  note() {
+    const { task, lost, teacher } = this.scene
+    if (this.stored) return element("p", { class: "vsp-note" }, UNCHANGED)
+    const said = [
+      task.outputs.length === 1
+        ? `Purple: ${task.outputs[0]} below 0; brown: above 0.`
+        : "An arrow is the action there.",
+      `Circles are codewords${this.angular ? "" : ": drag one"}. Click or drag elsewhere to choose a state; its episode is black.`,
+      lost.length ? "Orange starts fail." : "Small dots are starts.",
+      teacher
+        ? `The teacher's action is read from a grid: in nine of ten states off by at most ${teacher.usual.toFixed(3)}, in all by ${teacher.error.toFixed(2)}.`
+        : "",
+    ]
+    return element("p", { class: "vsp-note" }, said.join(" "))
   }
 
   // -- What can be changed
-  function number(label, value, step, put) {
+  number(label, value, step, put) {
     const input = element("input", {
       type: "number",
       step,
       value: +value.toFixed(4),
       "aria-label": label,
       input: () => {
-        if (Number.isFinite(input.valueAsNumber)) {
-          put(input.valueAsNumber)
-          changed({ policy: true, whole: false })
-        }
+        if (!Number.isFinite(input.valueAsNumber)) return
+        put(input.valueAsNumber)
+        this.changed({ policy: true, whole: false })
       },
     })
     return input
   }
-
-  function showForm() {
-    const { policy, cell } = view,
-      { inputs, outputs } = scene.task
+  showForm() {
+    const { policy, cell, angular } = this,
+      { inputs, outputs } = this.scene.task,
+      { low, high } = this.scene.plane
     const steps = policy.scale.map((_, i) => (angular ? 0.05 : +((high[i] - low[i]) / 50).toPrecision(1)))
+    const put = (row, i) => value => (row[i] = value)
     const codeword = i =>
-      i < inputs.length
-        ? number(`codeword: ${inputs[i]}`, policy.codewords[cell][i], steps[i], value => {
-            policy.codewords[cell][i] = value
-          })
-        : ""
+      this.number(`codeword: ${inputs[i]}`, policy.codewords[cell][i], steps[i], put(policy.codewords[cell], i))
     const weight = (i, name, k) =>
-      number(`${outputs[k]}: ${name}`, policy.coefficients[cell][i][k], 0.1, value => {
-        policy.coefficients[cell][i][k] = value
-      })
-    form.replaceChildren(
-      element(
-        "fieldset",
-        {},
-        element("legend", {}, `Change cell ${cell + 1}`),
-        table(
-          ["", "codeword", ...outputs],
-          [...inputs, "bias"].map((name, i) => [name, codeword(i), ...outputs.map((_, k) => weight(i, name, k))]),
-        ),
-      ),
-    )
+      this.number(`${outputs[k]}: ${name}`, policy.coefficients[cell][i][k], 0.1, put(policy.coefficients[cell][i], k))
+    const rows = [...inputs, "bias"].map((name, i) => [
+      name,
+      i < inputs.length ? codeword(i) : "",
+      ...outputs.map((_, k) => weight(i, name, k)),
+    ])
+    const legend = element("legend", {}, `Change cell ${cell + 1}`)
+    this.form.replaceChildren(element("fieldset", {}, legend, table(["", "codeword", ...outputs], rows)))
   }
 
-  /** What follows from policy and state, and the picture. `renewed`: the policy is another one. */
-  view.redo = (renewed = true) => {
-    const before = view.cell
+  // -- What follows from policy and state, and the picture. `renewed`: the policy is another one.
+  redo(renewed = true) {
+    const before = this.cell
     if (renewed) {
-      ready(view.policy)
-      view.mapped = null
-      judge()
+      ready(this.policy)
+      this.mapped = null
+      if (!this.stored) this.judge()
     }
-    ask()
-    view.path = rollout(scene, view.policy, view.asked, true).states
-    if (view.whole || view.cell !== before) showForm()
-    view.whole = false
-    draw(view)
-    view.frames += 1
+    this.ask()
+    this.path = this.stored ? this.recent() : rollout(this.scene, this.policy, this.asked, true).states
+    if (!this.stored && (this.whole || this.cell !== before)) this.showForm()
+    this.whole = false
+    draw(this)
+    this.frames += 1
   }
-  let waiting = 0,
-    renewed = false
+  /** The last steps of a stored episode up to the chosen one: the whole of it may fill the picture. */
+  recent() {
+    return this.episodes[this.episode].states.slice(Math.max(0, this.steps.at - 30), this.steps.at + 1)
+  }
   /** The same once before the next picture. `whole`: with the form, in which the reader may be writing. */
-  function changed({ policy = false, whole = true } = {}) {
-    renewed ||= policy
-    view.whole ||= whole
-    waiting ||= requestAnimationFrame(() => {
-      const anew = renewed
-      waiting = 0
-      renewed = false
-      view.redo(anew)
+  changed({ policy = false, whole = true } = {}) {
+    this.renewed ||= policy
+    this.whole ||= whole
+    this.waiting ||= requestAnimationFrame(() => {
+      const anew = this.renewed
+      this.waiting = 0
+      this.renewed = false
+      this.redo(anew)
     })
   }
 
-  // -- Choosing a policy; the replay
-  const replays = scene.policies.map(policy => policy.replay ?? null)
-  const names = element(
-    "select",
-    { "aria-label": "policy", change: () => choose(+names.value) },
-    ...scene.policies.map((policy, i) => element("option", { value: i }, policy.name)),
-  )
-  const slider = element("input", {
-    type: "range",
-    min: 0,
-    value: 0,
-    "aria-label": "iteration",
-    input: () => turn(+slider.value),
-  })
-  const when = element("span", {}),
-    replay = element("div", { class: "vsp-row" })
-  const button = (label, click) => element("button", { type: "button", click }, label)
-  const player = button("play", () => (view.playing ? stop() : start()))
-  replay.append(
-    button("previous change", () => jump(-1)),
-    player,
-    button("next change", () => jump(1)),
-    slider,
-    when,
-  )
-  let run = null
-
-  function choose(i) {
-    stop()
-    view.chosen = i
-    run = replays[i]
-    replay.hidden = !run
-    view.policy = copied(scene.policies[i])
-    if (run) {
-      slider.max = run.length - 1
-      slider.value = run.length - 1
-      turn(run.length - 1)
-    } else changed({ policy: true })
+  // -- Choosing a policy, an iteration, an episode
+  choose(i) {
+    const policy = this.scene.policies[i]
+    this.chosen = i
+    this.run = policy.replay ?? null
+    this.policy = copied(policy)
+    this.replay.stop()
+    this.replay.row.hidden = !this.run
+    if (this.stored) this.episodeTo(0)
+    if (this.run) this.replay.restart(this.run.length, this.run.length - 1)
+    this.changed({ policy: true })
   }
-  function turn(i) {
-    const one = run[i],
-      cells = one.codewords.length
-    view.policy = {
-      ...copied(scene.policies[view.chosen]),
-      codewords: copied(one.codewords),
-      coefficients: copied(one.coefficients),
-    }
-    when.textContent = `iteration ${one.n}: ${cells} cell${cells > 1 ? "s" : ""}${one.change ? `, ${one.change}` : ""}`
-    slider.setAttribute("aria-valuetext", when.textContent)
-    changed({ policy: true })
+  turnTo(i) {
+    const { n, codewords, coefficients, change } = this.run[i],
+      cells = codewords.length
+    const { replay, episodes, ...policy } = this.scene.policies[this.chosen]
+    this.policy = copied({ ...policy, codewords, coefficients })
+    this.changed({ policy: true })
+    return `iteration ${n}: ${cells} cell${cells > 1 ? "s" : ""}${change ? `, ${change}` : ""}`
   }
-  function jump(way) {
-    stop()
-    for (let i = +slider.value + way; i >= 0 && i < run.length; i += way) {
-      if (run[i].change || i === 0 || i === run.length - 1) {
-        slider.value = i
-        turn(i)
-        return
-      }
-    }
+  jump(way) {
+    const there = i => this.run[i].change || i === 0 || i === this.run.length - 1
+    let i = this.replay.at + way
+    while (i >= 0 && i < this.run.length && !there(i)) i += way
+    if (i >= 0 && i < this.run.length) this.replay.to(i)
   }
-  function start() {
-    view.playing = true
-    player.textContent = "pause"
-    if (+slider.value === run.length - 1) slider.value = 0
-    let last = 0
-    const frame = now => {
-      if (!view.playing || !canvas.isConnected) return
-      if (now - last >= (still ? 1000 : 0)) {
-        // who asked for little motion gets a picture a second
-        last = now
-        slider.value = +slider.value + 1
-        turn(+slider.value)
-      }
-      ;+slider.value < run.length - 1 ? requestAnimationFrame(frame) : stop()
-    }
-    requestAnimationFrame(frame)
+  episodeTo(i, step = 0) {
+    this.episode = (i + this.episodes.length) % this.episodes.length
+    this.steps.restart(this.episodes[this.episode].states.length, step)
   }
-  function stop() {
-    view.playing = false
-    player.textContent = "play"
+  stepTo(i) {
+    this.changed({ whole: false })
+    return `episode ${this.episode + 1} of ${this.episodes.length}, step ${i + 1} of ${this.steps.last + 1}`
   }
 
   // -- Pointer and keys
-  let dragged = null
-  const under = event => {
-    const box = canvas.getBoundingClientRect()
-    return [event.clientX - box.left, event.clientY - box.top]
-  }
-  canvas.addEventListener("pointerdown", event => {
-    const [px, py] = under(event)
-    canvas.setPointerCapture(event.pointerId)
-    const near = point => {
-      const [x, y] = picture.at(view.placeSeen(point))
-      return Math.hypot(x - px, y - py) < 11
+  listen() {
+    let dragged = null
+    const { canvas, picture } = this
+    const under = event => {
+      const box = canvas.getBoundingClientRect()
+      return [event.clientX - box.left, event.clientY - box.top]
     }
-    dragged = !angular ? view.policy.codewords.findIndex(near) : -1
-    move(event)
-  })
-  function move(event) {
-    if (dragged === null) return
-    const point = picture.point(...under(event))
-    if (dragged >= 0) view.policy.codewords[dragged] = point
-    view.asked = point
-    changed({ policy: dragged >= 0, whole: dragged >= 0 })
+    const far = (point, [px, py]) => {
+      const [x, y] = picture.at(point)
+      return Math.hypot(x - px, y - py)
+    }
+    const move = event => {
+      if (dragged === null) return
+      if (this.stored) return this.nearest(place => far(place, under(event)))
+      const point = picture.point(...under(event))
+      if (dragged >= 0) this.policy.codewords[dragged] = point
+      this.asked = point
+      this.changed({ policy: dragged >= 0, whole: dragged >= 0 })
+    }
+    canvas.addEventListener("pointerdown", event => {
+      canvas.setPointerCapture(event.pointerId)
+      const hit = codeword => far(this.placeSeen(codeword), under(event)) < 11
+      dragged = this.stored || this.angular ? -1 : this.policy.codewords.findIndex(hit)
+      move(event)
+    })
+    canvas.addEventListener("pointermove", move)
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => (dragged = null))
+    canvas.addEventListener("keydown", event => this.key(event))
   }
-  canvas.addEventListener("pointermove", move)
-  canvas.addEventListener("pointerup", () => {
-    dragged = null
-  })
-  canvas.addEventListener("pointercancel", () => {
-    dragged = null
-  })
-  canvas.addEventListener("keydown", event => {
+  /** Choose the stored state that is nearest, by a distance of places. */
+  nearest(distance) {
+    let best = { gap: Infinity }
+    this.episodes.forEach(({ states }, episode) =>
+      states.forEach((state, step) => {
+        const gap = distance(this.place(state))
+        if (gap < best.gap) best = { gap, episode, step }
+      }),
+    )
+    this.episodeTo(best.episode, best.step)
+  }
+  key(event) {
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }[event.key]
     if (!way) return
     event.preventDefault()
-    const by = event.shiftKey ? 0.1 : 0.01
-    view.asked = view.asked.map((value, i) => clip(value + way[i] * by * (high[i] - low[i]), low[i], high[i]))
-    changed({ whole: false })
-  })
-
-  const back = button("reset", () => choose(view.chosen))
-  const panel = element(
-    "div",
-    { class: "vsp-panel" },
-    element("div", { class: "vsp-row" }, element("label", {}, "policy ", names), back),
-    replay,
-    result,
-    answer,
-    form,
-  )
-  root.classList.add("vsp-explorer")
-  const single = scene.task.outputs.length === 1
-  panel.append(
-    element(
-      "p",
-      { class: "vsp-note" },
-      [
-        single ? `Purple: ${scene.task.outputs[0]} below 0; brown: above 0.` : "An arrow is the action there.",
-        `Circles are codewords${angular ? "" : ": drag one"}. Click or drag elsewhere to choose a state; its episode is black.`,
-        scene.lost.length ? "Orange starts fail." : "Small dots are starts.",
-        scene.teacher
-          ? `The teacher's action is read from a grid: in nine of ten states off by at most ${scene.teacher.usual.toFixed(3)}, in all by ${scene.teacher.error.toFixed(2)}.`
-          : "",
-      ].join(" "),
-    ),
-  )
-  root.replaceChildren(element("style", {}, STYLE), canvas, panel)
-  new ResizeObserver(() => view.path && draw(view)).observe(canvas)
-  choose(0)
-  return view
+    if (this.stored) return way[0] ? this.steps.to(this.steps.at + way[0]) : this.episodeTo(this.episode + way[1])
+    const { low, high } = this.scene.plane,
+      by = event.shiftKey ? 0.1 : 0.01
+    this.asked = this.asked.map((value, i) => clip(value + way[i] * by * (high[i] - low[i]), low[i], high[i]))
+    this.changed({ whole: false })
+  }
 }
+
+/** The explorer in `root`. Returns its view, for tests. */
+export const mount = (root, scene) => new Explorer(root, scene)
 
 function equation(name, inputs, rows, k) {
   const terms = [...inputs.map((input, i) => [rows[i][k], ` ${input}`]), [rows[inputs.length][k], ""]]
@@ -688,16 +759,16 @@ function equation(name, inputs, rows, k) {
   return `${name} = ${sum.join("")}`
 }
 
-/** The least change of one coordinate of the plane that leads to another cell. */
-function border(view, seen, cell) {
-  const { low, high, labels } = view.picture.plane
+/** The least change of one coordinate of `point`, as a share of its range, that leads from `cell` to another. */
+function border(point, cell, { low, high, labels }, cellAt) {
   let least = null
-  for (const axis of [0, 1])
+  for (const axis of point.keys())
     for (const end of [low[axis], high[axis]]) {
-      const at = value => cellOf(view.policy, view.see(view.asked.map((v, i) => (i === axis ? value : v))))
-      let [inside, outside] = [view.asked[axis], null]
+      if (end === point[axis]) continue
+      const at = value => cellAt(point.map((v, i) => (i === axis ? value : v)))
+      let [inside, outside] = [point[axis], null]
       for (let i = 1; i <= 200 && outside === null; i++) {
-        const value = view.asked[axis] + (i / 200) * (end - view.asked[axis])
+        const value = point[axis] + (i / 200) * (end - point[axis])
         if (at(value) === cell) inside = value
         else outside = value
       }
@@ -706,12 +777,12 @@ function border(view, seen, cell) {
         const half = (inside + outside) / 2
         at(half) === cell ? (inside = half) : (outside = half)
       }
-      const gap = outside - view.asked[axis],
+      const gap = outside - point[axis],
         share = Math.abs(gap) / (high[axis] - low[axis])
       if (!least || share < least.share) least = { share, gap, axis, to: at(outside) }
     }
   if (!least) return "No border lies straight ahead."
-  const gap = Math.abs(least.gap) < 0.005 ? least.gap.toPrecision(2).replace("-", "\u2212") : digits(least.gap)
+  const gap = Math.abs(least.gap) < 0.005 ? minus(least.gap.toPrecision(2)) : digits(least.gap)
   return `A change of ${gap} in ${labels[least.axis]} leads to cell ${least.to + 1}.`
 }
 

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
-from .scene import PLANES, scene_of
+from .scene import scene_of
 
 SCRIPT = Path(__file__).with_name("explorer.js")
 _PAGE = """<!doctype html>
@@ -39,22 +40,26 @@ mountAll()
 class Explorer:
     """Policies of one task, to be replayed, asked and changed in a browser.
 
-    `policies`: names and policies with linear maps, all of one task among SimpleGoal, MountainCarContinuous and
-    Pendulum; `history` replays the first of them. Raises ValueError for other policies.
+    `policies`: names and policies with linear maps, all of one task; `history` replays the first of them. The script
+    plays SimpleGoal, MountainCarContinuous and Pendulum itself; of other tasks it shows stored episodes, over the two
+    inputs `axes`. Raises ValueError for other policies and for unknown inputs.
     """
 
     def __init__(
-        self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
-    ):
+        self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None,
+        axes: tuple[str, str] | None = None, guess: str | None = None,
+    ):  # fmt: skip
         for policy in policies.values():
-            if not isinstance(policy, VoronoiPolicy) or policy.task.name not in PLANES:
-                raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for one of {', '.join(PLANES)}")
+            if not isinstance(policy, VoronoiPolicy):
+                raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy")
             policy.check_linear()
         tasks = {policy.task.name: policy.task for policy in policies.values()}
         if len(tasks) != 1:
             raise ValueError(f"the policies play {sorted(tasks) or 'nothing'}, expected one task")
         self.policies, (self.task,) = policies, tasks.values()
-        self.scene = scene_of(policies, self.task, teacher, history)
+        self.scene = scene_of(policies, self.task, teacher, history, axes)
+        if guess is not None:
+            self.scene["guess"] = guess
 
     def save(self, path: str | os.PathLike) -> None:
         """Write an HTML file that opens from disk, without any other file or host."""
@@ -78,26 +83,36 @@ class Explorer:
 
     def _alt(self) -> str:
         name, policy = next(iter(self.policies.items()))
-        plane = " and ".join(PLANES[self.task.name][2])
+        plane = " and ".join(self.scene["plane"]["labels"])
         return f"The map of one policy ({name}, {len(policy)} cells) over {plane}: cells and actions."
 
     def _still(self) -> bytes:
-        """The map of the first policy, as a PNG."""
-        policy, (low, high, labels) = next(iter(self.policies.values())), PLANES[self.task.name]
+        """The first policy, as a PNG: its map, or the states of its stored episodes in the colours of their cells."""
+        policy, (low, high, labels) = next(iter(self.policies.values())), self.scene["plane"].values()
         fig, (ax,) = style.panels(1, width=3.2, height=3.0)
-        x, y, points = state_space.grid(np.array(low), np.array(high), 201)
-        if len(self.task.outputs) == 1:
-            actions = policy.predict(self.task.see(points))[0][:, 0] / self.task.action_high[0]
-            state_space.force_map(ax, x, y, actions)
-        state_space.cells(ax, x, y, policy.cells(self.task.see(points)), fill=len(self.task.outputs) > 1)
-        if len(self.task.outputs) == 2:
-            coarse = state_space.grid(np.array(low), np.array(high), 15)[2]
-            state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
+        if "stored" in self.scene:
+            states = np.concatenate([one["states"] for one in self.scene["policies"][0]["episodes"]])
+            colours = [style.COLOURS[cell % len(style.COLOURS)] for cell in policy.cells(states)]
+            ax.scatter(*states[:, self.scene["stored"]["axes"]].T, s=3, color=colours)
+        else:
+            self._map(ax, policy, np.array(low), np.array(high))
         ax.set(xlabel=labels[0], ylabel=labels[1], xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         file = io.BytesIO()
         fig.savefig(file, format="png", dpi=150, metadata={"Software": None})
         plt.close(fig)
         return file.getvalue()
+
+    def _map(self, ax: Axes, policy: VoronoiPolicy, low: np.ndarray, high: np.ndarray) -> None:
+        """The policy over its plane: forces as colours, or cells and arrows."""
+        x, y, points = state_space.grid(low, high, 201)
+        single = len(self.task.outputs) == 1
+        if single:
+            actions = policy.predict(self.task.see(points))[0][:, 0] / self.task.action_high[0]
+            state_space.force_map(ax, x, y, actions)
+        state_space.cells(ax, x, y, policy.cells(self.task.see(points)), fill=not single)
+        if not single:
+            coarse = state_space.grid(low, high, 15)[2]
+            state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
 
 
 def explore(
@@ -105,10 +120,15 @@ def explore(
     *,
     teacher: Policy | None = None,
     history: History | None = None,
+    axes: tuple[str, str] | None = None,
+    guess: str | None = None,
 ) -> Explorer:
     """Replay, ask and change a policy in a browser: shown by JupyterLab, or saved to an HTML file of its own.
 
-    `policies`: one with linear maps for SimpleGoal, MountainCarContinuous or Pendulum, or some by name; `teacher`: its
-    actions stand beside theirs; `history` of a distillation: replays the first policy. Raises ValueError for others.
+    `policies`: one with linear maps, or some by name; `teacher`: its actions stand beside theirs; `history` of a
+    distillation: replays the first policy. SimpleGoal, MountainCarContinuous and Pendulum are played in the browser;
+    other tasks show stored episodes, over the two inputs `axes`, and cannot be changed. `guess`: a question that the
+    reader answers before results are shown. Raises ValueError for other policies and unknown inputs.
     """
-    return Explorer(policies if isinstance(policies, dict) else {"policy": policies}, teacher=teacher, history=history)
+    several = policies if isinstance(policies, dict) else {"policy": policies}
+    return Explorer(several, teacher=teacher, history=history, axes=axes, guess=guess)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...evaluation import start_states
 from ...history import History
 from ...policy import VoronoiPolicy
-from ...rollouts import Policy, rollout
+from ...rollouts import Policy, collect_episodes, rollout
 from ...tasks import PIT, RUNNING
 from ...tasks.base import Task
 
@@ -17,35 +18,91 @@ PLANES = {  # of each task that the script can play: the states that are drawn, 
 }
 N_STARTS = 400
 TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid along an axis; states at which its error is measured
+N_EPISODES, N_STEPS = 8, 250  # that are stored of a task that the script cannot play, and steps of each, at most
+EPISODE_SEED = 0
 N_MOMENTS = 80  # of a replay, in addition to those with a split or merge
 
 
 def scene_of(
-    policies: dict[str, VoronoiPolicy], task: Task, teacher: Policy | None = None, history: History | None = None
+    policies: dict[str, VoronoiPolicy],
+    task: Task,
+    teacher: Policy | None = None,
+    history: History | None = None,
+    axes: tuple[str, str] | None = None,
 ) -> dict:
     """The scene of some policies, of which `history` replays the first.
 
-    Keys: task (names and limits), plane (low, high, labels), starts (n, 2), lost (which outcomes are failures),
-    policies, and teacher: its actions on a grid, the largest error of reading them from there, and its mean return.
+    Keys: task (names and limits), plane (low, high, labels), policies; of a task that the script can play starts (n,
+    2), lost (which outcomes are failures) and teacher: its actions on a grid, the largest error of reading them from
+    there, and its mean return. Other tasks have stored episodes instead, drawn over two inputs, `axes`. Raises
+    ValueError for names that are no inputs.
     """
-    low, high, labels = PLANES[task.name]
-    starts = _starts(task)
-    scene = {
+    scene = _numbers_of_task(task) | {"policies": [_numbers(policy, name) for name, policy in policies.items()]}
+    if task.name in PLANES:
+        scene |= _played(task, teacher)
+    else:
+        scene |= _stored(policies, task, teacher, axes, scene["policies"])
+    if history is not None:
+        scene["policies"][0]["replay"] = _replay(history)
+    return scene
+
+
+def _numbers_of_task(task: Task) -> dict:
+    return {
         "task": {
             "name": task.name, "inputs": list(task.inputs), "outputs": list(task.outputs), "maxSteps": task.max_steps,
             "actionLow": task.action_low.tolist(), "actionHigh": task.action_high.tolist(),
         },
+    }  # fmt: skip
+
+
+def _played(task: Task, teacher: Policy | None) -> dict:
+    """What the script needs to play a task: plane, starts, failures, and a teacher's grid."""
+    (low, high, labels), starts = PLANES[task.name], _starts(task)
+    found = {
         "plane": {"low": low, "high": high, "labels": labels},
         "starts": starts.tolist(),
         "lost": [] if task.name == "Pendulum-v1" else [RUNNING, PIT],
-        "policies": [_numbers(policy, name) for name, policy in policies.items()],
-    }  # fmt: skip
+    }
     if teacher is not None:
         mean = float(rollout(teacher, task, starts).returns.mean())
-        scene["teacher"] = _teacher(teacher, task, np.array(low), np.array(high)) | {"mean": mean}
-    if history is not None:
-        scene["policies"][0]["replay"] = _replay(history)
-    return scene
+        found["teacher"] = _teacher(teacher, task, np.array(low), np.array(high)) | {"mean": mean}
+    return found
+
+
+def _stored(
+    policies: dict[str, VoronoiPolicy], task: Task, teacher: Policy | None, axes: tuple[str, str] | None, into: list
+) -> dict:
+    """Episodes of every policy, with the teacher's actions, added to `into`; returns the plane and the box of the
+    states."""
+    starts, seen = start_states(task, N_EPISODES, EPISODE_SEED), []
+    for policy, about in zip(policies.values(), into):
+        about["episodes"] = []
+        for episode in collect_episodes(policy, task, starts):
+            states = episode.states[:: 1 + (len(episode.states) - 1) // N_STEPS].round(4)
+            found = {"states": states.tolist()}
+            if teacher is not None:
+                found["teacher"] = np.round(teacher.predict(states)[0], 3).tolist()
+            about["episodes"].append(found)
+            seen.append(states)
+    seen = np.concatenate(seen)
+    low, high, chosen = seen.min(axis=0), seen.max(axis=0), _axes(task, seen, next(iter(policies.values())), axes)
+    room = 0.03 * np.maximum(high - low, 1e-3)
+    plane = {
+        "low": (low - room)[chosen].tolist(),
+        "high": (high + room)[chosen].tolist(),
+        "labels": [task.input_labels[i] for i in chosen],
+    }
+    return {"plane": plane, "stored": {"axes": chosen, "low": low.tolist(), "high": high.tolist()}}
+
+
+def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str, str] | None) -> list[int]:
+    """The two inputs to draw: those of these names, or where the states vary most in units of the look-up."""
+    if names is None:
+        return sorted(np.argsort(-(seen / policy.scale).std(axis=0), kind="stable")[:2].tolist())
+    if len(names) != 2 or not set(names) <= set(task.inputs):
+        raise ValueError(f"axes are {names!r}, expected two of the inputs {', '.join(task.inputs)}")
+    return [task.inputs.index(name) for name in names]
 
 
 def _starts(task: Task) -> np.ndarray:
