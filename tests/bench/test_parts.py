@@ -57,7 +57,7 @@ def test_a_trial_of_the_laboratory(task, record):
     for sub_policy in lab.settings["sub_policy"].options:
         begin = time.perf_counter()
         place = lab.trial({"sub_policy": sub_policy, "min_pol_distance": distance})
-        lab.show(place)
+        lab.scene(place)
         times[f"{len(lab.trials[place][1])} {sub_policy} cells"] = time.perf_counter() - begin
     longest = max(times, key=times.get)
     note = f"with {longest}; median of all classes {statistics.median(times.values()):.1f} s"

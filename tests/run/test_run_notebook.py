@@ -27,12 +27,11 @@ class Explorer:
 Explorer()"""
 
 EXPLORER = """\
-import numpy as np
-from vsp.show.page import Controls, Page
-class Small(Controls):
-    "Small."
-    def strip(self):
-        return [Page(np.zeros((2, 3, 3), np.uint8), "black", "on this page")]
+import ipywidgets
+from vsp.show import page
+class Small:
+    def _ipython_display_(self):
+        page.show(ipywidgets.IntSlider()._repr_mimebundle_(), "<figure>on this page</figure>", "Small.")
 Small()"""
 
 
@@ -95,8 +94,8 @@ def test_of_an_explorer_its_strip_is_left_once(tmp_path):
     assert run_notebook.run_notebook(notebook, tmp_path) == ["figures/executed/story.ipynb"]
     copy = tmp_path / "figures" / "executed" / "story.ipynb"
     (output,) = nbformat.read(copy, as_version=4).cells[1].outputs
-    assert output.data["text/html"].endswith("<figcaption>on this page</figcaption></figure></div>")
-    assert "widget" not in copy.read_text() and output.data["text/plain"] == "Small."
+    assert output.data["text/html"].endswith("<figure>on this page</figure></div>")
+    assert "widget-view" not in copy.read_text() and output.data["text/plain"] == "Small."
 
 
 def test_results_are_listed_beside_those_of_others(tmp_path):

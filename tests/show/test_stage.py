@@ -4,7 +4,6 @@ import io
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 from drawn import named
 from PIL import Image
@@ -19,7 +18,6 @@ from vsp.show.stage import (
     moment,
     png,
     policy_map,
-    trials,
 )
 from vsp.show.style import panels
 
@@ -158,12 +156,3 @@ def test_cells_over_iterations_with_every_pass_below(ax):
     assert (
         set(dotted.get_xdata()) == {3} and dot.get_xydata().tolist() == [[3, 4]] and ax.texts[-1].get_text() == "n = 3"
     )
-
-
-def test_the_present_trial_has_a_ring(ax):
-    frame = pd.DataFrame({"cells": [15, 30], "mean return": [16.0, 15.0]})
-    trials(ax, frame, 1, 16.5)
-    about = named(ax)
-    assert about["a trial"].get_offsets().tolist() == [[15, 16], [30, 15]]
-    assert about["this trial"].get_offsets().tolist() == [[30, 15]]
-    assert set(about["teacher"].get_ydata()) == {16.5} and ax.get_xlim()[0] == 0 and ax.get_xlim()[1] > 30

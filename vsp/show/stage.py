@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -19,7 +18,7 @@ from PIL import Image
 
 from .returns import over_iterations
 from .state_space import arrows, force_map, image, square
-from .style import BORDER, DISTILLED, TEACHER
+from .style import BORDER
 
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 
@@ -131,16 +130,4 @@ def moment(ax: Axes, n: int, cells: int) -> Axes:
     ax.axvline(n, color="black", lw=0.8, ls=":")
     ax.plot(n, cells, "o", color="black", ms=4.5, zorder=5)
     ax.annotate(f"n = {n}", (1, 1), (0, 6), xycoords="axes fraction", textcoords="offset points", ha="right")
-    return ax
-
-
-def trials(ax: Axes, frame: pd.DataFrame, this: int, teacher: float) -> Axes:
-    """Mean return over cells: a dot per row of `frame` (columns cells, mean return), a ring around row `this`, and a
-    line at the teacher's mean return."""
-    ax.axhline(teacher, color=TEACHER, zorder=1, label="teacher")
-    ax.scatter(frame["cells"], frame["mean return"], s=16, color=DISTILLED, zorder=3, label="a trial")
-    chosen = frame.iloc[this]
-    ax.scatter(chosen["cells"], chosen["mean return"], s=70, facecolor="none", edgecolor="black", lw=1.2, zorder=4,
-               label="this trial")  # fmt: skip
-    ax.set(xlabel="cells", ylabel="mean return", xlim=(0, 1.15 * max(10, frame["cells"].max())))
     return ax

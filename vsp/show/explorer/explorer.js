@@ -807,7 +807,13 @@ export function teacherAt(scene, point) {
 export default {
   render({ model, el }) {
     el.classList.add("vsp-controls") // hides the picture that stands there without a kernel: vsp/show/page.py
-    mount(el, JSON.parse(model.get("scene")))
+    let view = mount(el, JSON.parse(model.get("scene")))
+    model.on("change:scene", () => {
+      const { asked } = view // the reader's state stays chosen
+      view = mount(el, JSON.parse(model.get("scene")))
+      view.asked = asked
+      view.changed()
+    })
   },
 }
 
