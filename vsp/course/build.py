@@ -1,10 +1,11 @@
-"""Student copies, a hand-out of them, solution copies and a lecturer's guide, all from the sources of the lessons.
+"""Student copies, a hand-out of them, solution copies, slides and a lecturer's guide, all from the lessons' sources.
 
     python -m vsp.course.build --out .
 
 A source is a notebook with nbgrader's metadata: solution cells, whose answers stand between `### BEGIN SOLUTION` and
-`### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone. A student's copy has nbgrader's stub
-in place of each answer, as `nbgrader generate_assignment` would make it from the solution copy.
+`### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone, those tagged `slide` to the slides.
+A student's copy has nbgrader's stub in place of each answer, as `nbgrader generate_assignment` would make it from the
+solution copy.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ from ..run.locks import file_lock
 from ..run.notebook import NotebookNode, nbformat
 from ..run.sealed import read_sealed, write_sealed
 from .handout import write_handout
+from .slides import is_slide, slides
 
 SOURCES = ROOT / "notebooks" / "course"
-GUIDE = Path(__file__).with_name("guide.md")  # how the lecturer's guide begins
+HERE = Path(__file__).parent
+GUIDE = HERE / "guide.md"  # how the lecturer's guide begins
 MADE = ".made"  # checksums of the files written last
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
@@ -34,7 +37,7 @@ _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$
 
 
 def build(out: str | os.PathLike) -> list[Path]:
-    """Write copies, hand-out and guide to OUT/build/course; returns the files. The same sources, the same bytes.
+    """Write copies, hand-out, slides and guide to OUT/build/course; returns the files. Same sources, same bytes.
 
     A copy that somebody has written into is kept, under another name.
     """
@@ -42,6 +45,9 @@ def build(out: str | os.PathLike) -> list[Path]:
     students = {name: nbformat.writes(student(lesson)) + "\n" for name, lesson in lessons.items()}
     texts = {f"student/{name}": text for name, text in students.items()}
     texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
+    texts |= {f"slides/{Path(name).stem}.html": slides(lesson) for name, lesson in lessons.items()}
+    texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
+    texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
     texts["guide.md"] = guide(lessons)
     with file_lock(folder.parent / "locks" / "course", f"writes into {folder}"):
         _keep_edited(folder, texts)
@@ -87,7 +93,7 @@ def student(lesson: NotebookNode) -> NotebookNode:
 def solution(lesson: NotebookNode) -> NotebookNode:
     """A copy with answers, between their marks, and without the lecturer's cells: what nbgrader takes as its source."""
     made = copy.deepcopy(lesson)
-    made.cells = [cell for cell in made.cells if not for_lecturer(cell)]
+    made.cells = [cell for cell in made.cells if not for_lecturer(cell) and not is_slide(cell)]
     return made
 
 
@@ -130,7 +136,9 @@ def guide(lessons: dict[str, NotebookNode]) -> str:
 
 def _overview(name: str, lesson: NotebookNode) -> str:
     """Title, aims and exercises with their points."""
-    exercises = [re.search(r"^## (Exercise .*)", cell.source, re.MULTILINE) for cell in lesson.cells]
+    exercises = [
+        re.search(r"^## (Exercise .*)", cell.source, re.MULTILINE) for cell in lesson.cells if not is_slide(cell)
+    ]
     worth = [cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell)]
     rows = [f"| {found[1]} | {n} |" for found, n in zip(filter(None, exercises), worth, strict=True)]
     table = "\n".join(["| exercise | points |", "|---|---|", *rows, f"| all | {points(lesson)} |"])
@@ -141,6 +149,8 @@ def _notes(lesson: NotebookNode) -> str:
     """The lecturer's cells and the solutions of each section, under its heading."""
     lines, heading = [], ""
     for cell in lesson.cells:
+        if is_slide(cell):
+            continue
         found = re.findall(r"^#{1,2} (.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
         if found and not for_lecturer(cell):
             heading = f"{'##' if cell is lesson.cells[0] else '###'} {found[0]}\n"
@@ -160,8 +170,8 @@ def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", default=".", help="files go to OUT/build/course")
-    *files, guide, handout = build(parser.parse_args().out)
-    print(f"{len(files)} notebooks in {guide.parent}; begin with {guide}; for students: {handout}")
+    *_, guide, handout = build(parser.parse_args().out)
+    print(f"lessons, slides and project are in {guide.parent}; begin with {guide}; for students: {handout}")
 
 
 if __name__ == "__main__":

@@ -14,14 +14,14 @@ from ..run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
 UNUSED = ("cma", "papermill")  # dependencies of the package that the lessons do not need
-FILES = ("LICENSE", "vsp/**/*.py", "vsp/**/*.js", "data/paper/*", "data/teachers/*.*")
+FILES = ("LICENSE", "vsp/**/*.py", "vsp/show/**/*.js", "data/paper/*", "data/teachers/*.*")
 
 README = """# vsp: the course
 
 Set up once, with Python 3.11, 3.12 or 3.13 (Linux, macOS):
 
     python3 -m venv .venv
-    .venv/bin/python -m pip install -r requirements.txt
+    .venv/bin/python -m pip install --no-compile -r requirements.txt
 
 and then, each time:
 
@@ -29,14 +29,16 @@ and then, each time:
 
 On Windows, `py -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`.
 
-Begin with lesson_1_black_box.ipynb. Whatever you change stays in this folder.
+Begin with lesson_1_black_box.ipynb; the project comes after lesson 3 (project.md). The packages take 145 MB
+to download and 0.55 GB on the disk. Whatever you change stays in this folder.
 """
 
 
 def write_handout(path: Path, copies: dict[str, str]) -> None:
     """Write a zip file of the students' `copies` (file name: text) with the package, its data and the packages to
     install. The same sources, the same bytes."""
-    texts = {**copies, "README.md": README, "requirements.txt": requirements()}
+    project = Path(__file__).with_name("project.md").read_text("utf-8")
+    texts = {**copies, "README.md": README, "requirements.txt": requirements(), "project.md": project}
     files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
     contents = {name: text.encode() for name, text in texts.items()}
     contents |= {name: file.read_bytes() for name, file in files.items()}

@@ -1,0 +1,74 @@
+"""A sample solution of the project: MountainCar in two cells, beside one linear map and a tree.
+
+    .venv/bin/python notebooks/course/project_solution.py
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+import vsp
+from vsp import baselines, paper
+from vsp.rollouts import Policy
+from vsp.tasks import GOAL
+
+TASK = "MountainCarContinuous-v0"
+SEEDS, N_EPISODES, N_STARTS = range(5), 100, 1000
+CELLS = 2
+REPORTED = 9000  # the seed of the start states that decide nothing
+
+
+def made(teacher: Policy, seed: int) -> dict[str, Policy]:
+    """The three policies of a seed, from as many episodes of the teacher."""
+    episodes = vsp.collect_episodes(teacher, TASK, vsp.start_states(TASK, N_EPISODES, seed))
+    states, actions = (np.concatenate([getattr(e, name) for e in episodes]) for name in ("states", "actions"))
+    config = replace(vsp.preset(TASK, "faithful", n_cells=CELLS), n_episodes=N_EPISODES)
+    return {
+        f"{CELLS} cells": vsp.distill(teacher, TASK, config, seed=seed)[0],
+        "one linear map": baselines.linear_map(states, actions, TASK),
+        f"tree, {CELLS} leaves": baselines.Tree(states, actions, leaves=CELLS),
+    }
+
+
+def measured(policy: Policy, teacher: Policy) -> dict[str, float]:
+    """Mean return and share of failures from the reported starts, and R² where the teacher goes from them."""
+    starts = vsp.start_states(TASK, N_STARTS, REPORTED)
+    played, seen = vsp.rollout(policy, TASK, starts), vsp.visited_states(teacher, TASK, starts)
+    wanted = teacher.predict(seen)[0]
+    r2 = 1 - np.square(policy.predict(seen)[0] - wanted).mean() / wanted.var()
+    return {"mean": played.returns.mean(), "failing": np.mean(played.outcomes != GOAL), "r2": r2}
+
+
+def report(seeds: range = SEEDS) -> pd.DataFrame:
+    """One row per method: mean return with its 95 % interval over seeds, the most failures of a seed, the median R²."""
+    teacher = vsp.load_teacher(TASK)
+    rows = [{"method": name, **measured(one, teacher)} for seed in seeds for name, one in made(teacher, seed).items()]
+    rows.append({"method": "teacher", **measured(teacher, teacher)})
+    found = []
+    for name, own in pd.DataFrame(rows).groupby("method", sort=False):
+        low, high = paper.interval(own["mean"].to_numpy(), np.mean, vectorized=True)
+        about = {"policies": len(own), "mean": own["mean"].mean(), "low": low, "high": high}
+        found.append({"method": name, **about, "failing": own["failing"].max(), "r2": own["r2"].median()})
+    return pd.DataFrame(found)
+
+
+def main() -> None:
+    """Print the page."""
+    teacher, table = vsp.load_teacher(TASK), report()
+    best = table[table["method"] != "teacher"].sort_values("mean").iloc[-1]
+    policy = made(teacher, 0)[f"{CELLS} cells"]
+    state = np.array([-0.7, 0.02])
+    print(f"# {TASK}: who returns most?\n")
+    print(f"{best['method']} returns {best['mean']:.2f} on average, from {N_STARTS} starts.\n")
+    print(table.round(3).to_string(index=False))
+    print(f"\nThe policy of seed 0:\n\n{policy.to_text()}")
+    print(f"In {state.tolist()} it is in cell {policy.explain(state).cell}: {policy.explain(state).equations[0]};")
+    print(f"it pushes with {policy.predict(state)[0][0]:.2f}, the teacher with {teacher.predict(state)[0][0]:.2f}.")
+    print("\nThis cannot be concluded: whether another teacher would give the same order, for there is one.")
+
+
+if __name__ == "__main__":
+    main()
