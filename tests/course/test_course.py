@@ -25,7 +25,7 @@ from IPython.core.interactiveshell import InteractiveShell
 import vsp
 from vsp import baselines, distill
 from vsp.algorithms import split_regions, teacher_episodes
-from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages
+from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
 from vsp.course.lesson_1 import AT_MOST, CELLS, DRAWS, MARGIN
 from vsp.course.lesson_2 import _algorithm_1
 from vsp.run import atomic
@@ -196,9 +196,25 @@ def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
     assert not list(tmp_path.rglob("*.kept-*"))
     assert before == {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in before}
     copies = sorted(str(path.relative_to(tmp_path / "b" / "build" / "course")) for path in twice[1])
-    assert copies == sorted(
-        ["guide.md", "handout.zip", *(f"{kind}/{name}" for kind in ("student", "solution") for name in LESSONS)]
-    )
+    kinds = {"student": ".ipynb", "solution": ".ipynb", "slides": ".html"}
+    lessons = [f"{kind}/{name.split('.')[0]}{ending}" for kind, ending in kinds.items() for name in LESSONS]
+    project = ["project.md", "project_marking.md", "project_solution.py"]
+    assert copies == sorted(["guide.md", "handout.zip", *project, *lessons])
+
+
+def test_slides_are_in_no_copy_and_nothing_of_the_lecturers_in_the_hand_out(tmp_path):
+    for lesson in LESSONS.values():
+        for made in (build.student(lesson), build.solution(lesson)):
+            assert not any("slide" in cell.metadata.get("tags", []) for cell in made.cells)
+    handout.write_handout(tmp_path / "x.zip", {})
+    with zipfile.ZipFile(tmp_path / "x.zip") as archive:
+        names = {name.rpartition("/")[2] for name in archive.namelist()}
+    assert "project.md" in names and not names & {"project_marking.md", "project_solution.py", "guide.md", "reveal.js"}
+
+
+def test_a_lesson_without_slides_is_refused():
+    with pytest.raises(ValueError, match="no cell tagged 'slide'"):
+        slides.slides(build.student(LESSONS["lesson_1_black_box.ipynb"]))
 
 
 def test_the_guide_keeps_answers_apart_from_what_students_see():

@@ -144,9 +144,11 @@ def test_return_over_cells_by_hand(ax):
     assert ax.get_ylim()[0] > -40  # what is not drawn does not stretch the view
 
 
-@pytest.mark.parametrize("looks", [methods.IMITATIONS, methods.LIMITS], ids=["imitations", "limits"])
+@pytest.mark.parametrize(
+    "looks", [methods.IMITATIONS, methods.LIMITS, methods.ROBOTS], ids=["imitations", "limits", "robots"]
+)
 def test_every_method_has_a_look_and_a_name_of_its_own(looks):
-    known = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT
+    known = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT | method_tables.ROBOTS
     assert set(looks) <= set(known)
     assert len({(s["color"], s.get("ls"), s.get("marker")) for s in looks.values()}) == len(looks)
     assert len({s["label"] for s in looks.values()}) == len(looks)

@@ -12,6 +12,7 @@ from .explanation import contributions, whereabouts
 from .gait import footfall, gait_strip, save_gait
 from .methods import (
     LIMITS,
+    ROBOTS,
     fidelity_map,
     likeness_over_cells,
     over_cells,

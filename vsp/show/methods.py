@@ -27,6 +27,13 @@ LIMITS = {
 }
 
 
+# Policies of robots
+ROBOTS = {
+    "cells, trained further": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, trained further"},
+    "cells": {"color": DISTILLED, "ls": "--", "label": "our cells, imitation alone"},
+    "one map, random search": {"color": "black", "marker": "s", "label": "one linear map, random search"},
+}
+
 # Other methods by how their names begin: marker and label
 RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree"), "k-means": ("D", "k-means"),
                "small network": ("P", "small network"), "soft tree": ("v", "soft tree"),
