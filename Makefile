@@ -16,7 +16,7 @@ FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher
 TABLES_05_ledger := ledger left_out audit what_cells_buy readings_study teacher_study
 FIGURES_06_few_equations := $(addprefix beyond_,read explained map likeness)
 TABLES_06_few_equations := $(addprefix beyond_,leaders faithful)
-FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times limit_strides
+FIGURES_07_limits := limit_cells limit_dead_point limit_fit_times limit_robots limit_strides
 ANIMATIONS_07_limits := gait_halfcheetah
 TABLES_07_limits := $(addprefix limit_,references sizes starts losses robots gait fewest)
 FIGURES_08_proofs := proofs_basins proofs_mountaincar proofs_pendulum
@@ -195,7 +195,7 @@ faults: venv-test-train-dask ## breaks it in every way we know, into data/result
 beyond: begin venv-train ## our own method and others beside it, into data/results/: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 7 to 8 HOURS, resumable
+beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 11 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

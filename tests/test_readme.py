@@ -274,11 +274,17 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
         returns = f"{known['best']:.3f} | {known['teacher']:.3f} | {row['size']} | {row['mean']:.3f}"
         assert f"| {row['task']} | {returns} | {near} |" in block
     assert f"generations reach {starts['mean'][1]:.3f}" in block
-    mean, said = robots.set_index(["task", "method", "size"])["mean"], " ".join(block.split())
-    walker, cheetah, ours = mean["BipedalWalker"], mean["HalfCheetah"], "cells, trained further"
-    teacher = walker["robot's teacher", 0], cheetah["robot's teacher", 0]
-    share = 100 * cheetah[ours, 8] / teacher[1]
-    assert f"eight return {cheetah[ours, 8]:.0f}, which is {share:.0f} % of its teacher's return." in said
-    assert f"training returns {cheetah[ours, 1]:.0f}, and" in said
-    assert f"random search, {cheetah['one map, random search', 0]:.0f}." in said
-    assert f"cells return {walker[ours, 8]:.1f}, one cell {walker[ours, 1]:.1f}, its teacher {teacher[0]:.1f}." in said
+    robots, said = robots.set_index(["task", "method", "size"]), " ".join(block.split())
+    walker, cheetah, ours = robots.loc["BipedalWalker"], robots.loc["HalfCheetah"], "cells, trained further"
+    one, map_, teacher = cheetah["mean"][ours, 1], "one map, random search", "robot's teacher"
+    eight, sixteen = (cheetah.loc[(ours, k)] for k in (8, 16))
+    assert (
+        f"training returns {one:.0f}, eight return {eight['mean']:.0f}, which is {100 * eight['share']:.0f} %" in said
+    )
+    assert f"and sixteen {sixteen['mean']:.0f} ({100 * sixteen['share']:.0f} %; one seed)" in said
+    assert f"random search, returns {cheetah['mean'][map_, 0]:.0f}." in said
+    assert f"teacher returns {walker['mean'][teacher, 0]:.1f}. Eight" in said
+    assert f"return {walker['mean'][ours, 8]:.1f}, at least {walker['low'][ours, 8]:.0f} with every seed" in said
+    search = walker.loc[(map_, 0)]
+    assert f"returns {search['high']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
+    assert f"R² falls to {walker['r2'][ours, 8]:.2f} and {eight['r2']:.2f}." in said

@@ -226,10 +226,11 @@ LONG_TABLES = {
     ),
     "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
 }  # fmt: skip
-# Few seeds so far, and no trees. One cell trained further is the control: it has a teacher, as eight have
+# No trees so far, and of most sizes one seed. One cell trained further is the control: it has a teacher, as eight have
 ROBOT_TABLES = {
     "robots": Table(
         {name: method for name, method in ROBOTS.items() if "tree" not in name},
-        seeds=range(1), fewer=range(1), sizes=(*OWN, 1, 8), by_task={"HalfCheetah-v5": {"seeds": range(3)}},
+        seeds=range(3), fewer=range(3), sizes=(*OWN, 1, 8),
+        by_task={"HalfCheetah-v5": {"fewer": range(1), "sizes": (*OWN, 1, 2, 4, 8, 16)}},
     ),
 }  # fmt: skip
