@@ -1,6 +1,5 @@
 """The directive `explorer`: the companion's policies for one task, to be replayed, asked and changed."""
 
-import json
 import shutil
 
 import numpy as np
@@ -13,10 +12,11 @@ from vsp.baselines import linear_map
 from vsp.beyond import comparison
 from vsp.paper.printed import TASKS, published_policy
 from vsp.paper.results import read_results
-from vsp.show.explorer import SCRIPT
+from vsp.show.explorer import SCRIPT, Explorer
+from vsp.show.explorer.scene import to_json
 
 
-def of_task(task: str, guess: str | None) -> vsp.show.explorer.Explorer:
+def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
     """The paper's policy, its method's best rerun with the run, ours, and one linear map: those that the task has."""
     teacher, policies, history = vsp.load_teacher(task), {}, None
     if task in TASKS:
@@ -29,23 +29,33 @@ def of_task(task: str, guess: str | None) -> vsp.show.explorer.Explorer:
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
     states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
     policies["one linear map"] = linear_map(states, actions, task)
-    return vsp.explore(policies, teacher=teacher, history=history, guess=guess)
+    return vsp.explore(policies, teacher=teacher, history=history, axes=axes)
+
+
+def challenge(task: str, guess: str) -> Explorer:
+    """The paper's policy, about which `guess` asks, and three cells for the reader, which all go to the origin."""
+    maps = np.zeros((3, 3, 2))
+    maps[:, 2] = -1.0
+    own = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.4], [0.4, 0.75]], maps, task=task)
+    policies = {"the paper's, as published": published_policy(task), "three cells, for you to change": own}
+    return vsp.explore(policies, teacher=vsp.load_teacher(task), guess=guess)
 
 
 class Shown(SphinxDirective):
     """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view.
 
-    The option `guess` is a question that the reader answers first.
+    Option `axes`: two inputs, for a task with stored episodes. Option `guess`: a question about the paper's policy for
+    SimpleGoal, which the reader answers first and then has three cells to do better.
     """
 
     required_arguments = 1
-    option_spec = {"guess": directives.unchanged_required}
+    option_spec = {"guess": directives.unchanged_required, "axes": directives.unchanged_required}
 
     def run(self):
-        guess, top = self.options.get("guess"), "../" * self.env.docname.count("/")
-        explorer = of_task(self.arguments[0], guess)
-        name = f"explorer_{self.arguments[0]}{'_guess' * (guess is not None)}.json"
-        self.env.app.explorers[name] = json.dumps(explorer.scene, separators=(",", ":"), allow_nan=False)
+        (task,), guess, axes = self.arguments, self.options.get("guess"), self.options.get("axes")
+        explorer = challenge(task, guess) if guess else of_task(task, tuple(axes.split()) if axes else None)
+        top, name = "../" * self.env.docname.count("/"), f"explorer_{task}{'_guess' * bool(guess)}.json"
+        self.env.app.explorers[name] = to_json(explorer.scene)
         return [nodes.raw("", explorer.element(source=f"{top}_static/{name}"), format="html")]
 
 

@@ -3,11 +3,13 @@ import re
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant
 
 import vsp
-from vsp.show.explorer import SCRIPT
-from vsp.show.explorer.scene import scene_of
+from vsp.paper.printed import published_policy
+from vsp.show.explorer import SCRIPT, scene
+from vsp.show.explorer.scene import scene_of, starts_of, to_json
+from vsp.tasks.base import Task
 
 TWO = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.75]], -np.ones((2, 3, 2)), task=SIMPLEGOAL)
 
@@ -82,28 +84,101 @@ LANDER = vsp.VoronoiPolicy(
 
 def test_of_a_task_that_the_script_cannot_play_episodes_are_stored():
     teacher = vsp.load_teacher(LANDER.task.name)
-    scene = scene_of({"a": LANDER, "b": LANDER}, LANDER.task, teacher)
-    assert "starts" not in scene and len(json.dumps(scene)) < 500_000
-    for about in scene["policies"]:
-        assert len(about["episodes"]) == 8
-        for episode in about["episodes"]:
+    found = scene_of({"a": LANDER, "b": LANDER}, LANDER.task, teacher)
+    played = vsp.collect_episodes(LANDER, LANDER.task, vsp.start_states(LANDER.task, 8, 0))
+    assert "starts" not in found and len(to_json(found)) < 500_000
+    for about in found["policies"]:
+        for episode, whole in zip(about["episodes"], played, strict=True):
             states = np.array(episode["states"])
-            assert states.shape[1] == 8 and 1 <= len(states) <= 251
-            assert np.allclose(episode["teacher"], teacher.predict(states)[0], atol=1e-3)
-    i, j = scene["stored"]["axes"]
-    assert scene["plane"]["labels"] == [LANDER.task.input_labels[i], LANDER.task.input_labels[j]]
-    low, high = np.array(scene["stored"]["low"]), np.array(scene["stored"]["high"])
-    assert all(((states := np.array(e["states"])) >= low).all() and (states <= high).all() for e in about["episodes"])
+            assert 1 <= len(states) <= 251 and episode["steps"] == len(whole.states)
+            assert np.allclose(states, whole.states[:: episode["every"]], atol=1e-4 * np.ptp(whole.states))
+            assert np.allclose(episode["teacher"], teacher.predict(states)[0], atol=1e-4)
+    i, j = found["stored"]["axes"]
+    assert found["plane"]["labels"] == [LANDER.task.input_labels[i], LANDER.task.input_labels[j]]
+    assert not {i, j} & {6, 7}  # contacts of the legs are 0 or 1
+    low, high = np.array(found["stored"]["low"]), np.array(found["stored"]["high"])
+    for episode in about["episodes"]:
+        assert (np.array(episode["states"]) >= low - 1e-3).all() and (np.array(episode["states"]) <= high + 1e-3).all()
+
+
+def falling(d, size=1.0):
+    """A task of d inputs that shrink, each of another size, down from `size`."""
+    box = np.full(d, 10.0 * size)
+    return Task(
+        "Falling", tuple(f"s{i}" for i in range(d)), ("a",), tuple(f"s{i}" for i in range(d)), -box, box,
+        -np.ones(1), np.ones(1), 60,
+        start=lambda rng, n: size * rng.uniform(1, 2, size=(n, d)) / np.arange(1, d + 1),
+        step=lambda states, actions: (0.95 * states, np.zeros(len(states)), np.zeros(len(states), int)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("d", "size"), [(1, 1.0), (3, 1e-7), (70, 1e5)])
+def test_every_number_of_inputs_and_every_size_is_drawn(d, size):
+    """Rounding leaves each state in its cell, or nearly."""
+    task = falling(d, size)
+    policy = vsp.VoronoiPolicy(
+        size * np.linspace(0, 1, 3)[:, None] * np.ones(d), np.zeros((3, d + 1, 1)), task=task, scale=size * np.ones(d)
+    )
+    found = vsp.explore(policy).scene
+    states = np.concatenate([one["states"] for one in found["policies"][0]["episodes"]])
+    whole = vsp.visited_states(policy, task, vsp.start_states(task, 8, 0))
+    assert np.allclose(states, whole, rtol=0, atol=1e-4 * np.ptp(whole, axis=0))
+    assert (policy.cells(states) == policy.cells(whole)).mean() > 0.99
+    assert all(low < high for low, high in zip(found["plane"]["low"], found["plane"]["high"]))
+
+
+def test_where_much_is_stored_steps_and_moments_are_left_out(monkeypatch, run):
+    teacher = vsp.load_teacher(LANDER.task.name)
+    whole = scene_of({"a": LANDER}, LANDER.task, teacher)
+    monkeypatch.setattr(scene, "MOST", 40_000)
+    less = scene_of({"a": LANDER}, LANDER.task, teacher)
+    assert len(to_json(less)) < 40_000 < len(to_json(whole))
+    for short, full in zip(less["policies"][0]["episodes"], whole["policies"][0]["episodes"]):
+        assert short["every"] > full["every"] and short["steps"] == full["steps"]
+        assert short["states"][0] == full["states"][0] and len(short["states"]) == len(short["teacher"])
+    moments = scene._replay(run[2])
+    for most in (len(to_json(moments)), len(to_json(moments)) // 2, 3000):
+        thinned = scene._thinned(moments, most)
+        assert len(to_json(thinned)) <= most and thinned[0] == moments[0] and thinned[-1] == moments[-1]
 
 
 def test_the_drawn_inputs_can_be_named():
     assert scene_of({"a": LANDER}, LANDER.task, axes=("y", "x"))["stored"]["axes"] == [1, 0]
-    with pytest.raises(ValueError, match="axes are .'x', 'z'., expected two of the inputs x, y, vx"):
-        vsp.explore(LANDER, axes=("x", "z"))
+    for wrong in (("x", "z"), ("x", "x"), ("x",), (), "xy", 3, (["x"], "y")):
+        with pytest.raises(ValueError, match=f"axes are {re.escape(repr(wrong))}, expected two of the inputs x, y, vx"):
+            vsp.explore(LANDER, axes=wrong)
+    with pytest.raises(ValueError, match="axes are .'x', 'y'., expected None: the states of SimpleGoal-v0 are drawn"):
+        vsp.explore(TWO, axes=("x", "y"))
 
 
 def test_a_question_comes_along():
     assert vsp.explore(TWO, guess="How many?").scene["guess"] == "How many?" and "guess" not in vsp.explore(TWO).scene
+    for policy, wrong in ((TWO, 5), (TWO, ""), (LANDER, "How many?")):
+        with pytest.raises(
+            ValueError, match=re.escape(f"guess is {wrong!r}, expected a question about one of SimpleGoal-v0, ")
+        ):
+            vsp.explore(policy, guess=wrong)
+
+
+def test_three_cells_can_lose_fewer_starts_than_the_papers_thirteen():
+    """docs/explore.md says so."""
+    maps = np.zeros((3, 3, 2))
+    maps[:, 2] = [[-0.2, -0.2], [-0.2, -0.5], [-1, -0.2]]
+    three = vsp.VoronoiPolicy([[0.3, 0.6], [0.8, 0.4], [0.5, 0.7]], maps, task=SIMPLEGOAL)
+    starts = starts_of(three.task)
+    lost = [(vsp.rollout(one, SIMPLEGOAL, starts).outcomes != 1).sum() for one in (three, published_policy(SIMPLEGOAL))]
+    assert lost == [16, 44]
+
+
+def test_other_histories_and_teachers_get_one_clear_error(run):
+    _, policy, history = run
+    car = vsp.VoronoiPolicy([[0.0, 0.0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR)
+    with pytest.raises(ValueError, match="history is a DataFrame, expected the History"):
+        vsp.explore(policy, history=history.to_frame())
+    with pytest.raises(ValueError, match="history is of a run on SimpleGoal-v0, expected one on MountainCar"):
+        vsp.explore(car, history=history)
+    with pytest.raises(ValueError, match="the teacher's actions have shape"):
+        vsp.explore(LANDER, teacher=Constant(0.0))
 
 
 def test_other_policies_get_one_clear_error():

@@ -53,9 +53,9 @@ def test_a_trial_is_a_distillation_and_its_evaluation(lab):
         same, _ = distill(CurvedTeacher(), SIMPLEGOAL, config, seed=3)
         assert np.array_equal(policy.codewords, same.codewords)
         assert np.array_equal(policy.coefficients, same.coefficients)
-        result = vsp.evaluate(same, SIMPLEGOAL, 300, seed=1)
-        assert row["cells"] == len(same) and row["mean return"] == result["return"].mean()
-        assert row["failures"] == (result["outcome"] != "goal").sum()
+        result = vsp.rollout(same, SIMPLEGOAL, lab.scene(0)["starts"])  # those that the explorer plays
+        assert row["cells"] == len(same) and row["mean return"] == result.returns.mean()
+        assert row["failures"] == (result.outcomes != 1).sum()
 
 
 def test_a_setting_makes_a_trial_and_the_explorer_draws_it(lab):
@@ -88,14 +88,14 @@ def test_constants_are_drawn_as_maps_without_weights(lab):
 
 
 def test_the_words_tell_the_distilled_policy_from_the_teacher(lab):
-    teacher = vsp.evaluate(CurvedTeacher(), SIMPLEGOAL, 300, seed=1)
+    teacher = vsp.rollout(CurvedTeacher(), SIMPLEGOAL, lab.scene(0)["starts"])
     for place in (0, 1):
         _, policy, result = lab.trials[place]
         cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
         assert lab.words(place) == (
-            f"Trial {place + 1}: {cells}, mean return {result['mean']:.2f}; {result['failures'] or 'none'} of 300 "
-            f"starts fail to reach the goal. The teacher: mean return {teacher['return'].mean():.2f}, "
-            f"{(teacher['outcome'] != 'goal').sum() or 'no'} failures."
+            f"Trial {place + 1}: {cells}, mean return {result['mean']:.2f}; {result['failures'] or 'none'} of 400 "
+            f"starts fail to reach the goal. The teacher: mean return {teacher.returns.mean():.2f}, "
+            f"{(teacher.outcomes != 1).sum() or 'no'} failures."
         )
 
 

@@ -341,8 +341,12 @@ def test_results_are_hidden_until_the_reader_has_guessed(browser, tmp_path):
     visit.page.wait_for_timeout(400)
     assert "How many are lost?" in root.inner_text() and "Mean return" not in root.inner_text()
     root.get_by_label("your guess").fill("7")
-    root.get_by_role("button", name="show").click()
+    root.get_by_role("button", name="guess", exact=True).click()
     visit.page.wait_for_timeout(400)
     text = root.inner_text()
-    assert "Mean return" in text and "Your guess was 7." in text and "How many" not in text
+    assert (
+        "Mean return from 400 starts" in text
+        and "Your guess: 7." in text
+        and root.get_by_label("your guess").count() == 0
+    )
     visit.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import html
-import json
 import math
 
 import ipywidgets as widgets
@@ -13,17 +12,17 @@ import pandas as pd
 
 from ..algorithms import distill
 from ..config import Config, paper_preset
-from ..evaluation import evaluate
 from ..policy import VoronoiPolicy
-from ..rollouts import Policy
+from ..rollouts import Policy, rollout
+from ..tasks import GOAL
 from ..tasks.base import Task
 from ..tasks.registry import get_task
 from . import page
 from .animation import MAPS, check_plays
 from .explorer import Explorer, scene_of
+from .explorer.scene import N_STARTS, starts_of, to_json
 from .explorer.view import View
 
-N_STARTS, EVALUATION_SEED = 300, 1  # shared start states for the evaluation of every trial, and their seed
 # Range of each slider, as multiples of the initial setting. Half the distance makes three to four times the cells,
 # which limits the time of a trial.
 REACH = {"max_pol_loss": (1e-2, 1e4), "min_pol_distance": (0.5, 3.0), "min_param_distance": (0.2, 4.0)}
@@ -129,7 +128,7 @@ class Laboratory:
     def _put(self, place: int) -> None:
         """Show a trial."""
         table = self._newest(place).to_html(float_format="{:.4g}".format, border=0, index=False)
-        scene = json.dumps(self.scene(place))
+        scene = to_json(self.scene(place))
         self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{table}</div>'
         self.explorer.scene, self._shown = scene, place
 
@@ -195,9 +194,9 @@ class Remembered:
 
 
 def _judge(policy: Policy, task: Task) -> dict[str, float]:
-    """The mean return, and how many of the shared starts do not end in the goal."""
-    result = evaluate(policy, task, N_STARTS, seed=EVALUATION_SEED)
-    return {"mean": result["return"].mean(), "failures": int((result["outcome"] != "goal").sum())}
+    """The mean return, and how many episodes do not end in the goal, from the starts that the explorer plays."""
+    result = rollout(policy, task, starts_of(task))
+    return {"mean": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
 
 
 def _rounded(value: object) -> object:

@@ -3,7 +3,7 @@
 // scene, which vsp/show/explorer/scene.py describes.
 
 const PALETTE = ["#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#56b4e9", "#949494", "#ece133"]
-const [GOAL, FAILED, INK, PAPER] = ["#029e73", "#d55e00", "#222222", "#ffffff"]
+const [GOAL, FAILED, HIDDEN, INK, PAPER] = ["#029e73", "#d55e00", "#777777", "#222222", "#ffffff"]
 const [COARSE, FINE] = [100, 240] // points of the map along an axis: while something moves, and afterwards
 const ARROWS = 14
 
@@ -15,14 +15,16 @@ const clip = (value, low, high) => Math.min(Math.max(value, low), high)
 export function ready(policy) {
   const { codewords, scale } = policy
   policy.scaled = Float64Array.from(codewords.flatMap(codeword => codeword.map((value, i) => value / scale[i])))
+  policy.place = new Float64Array(scale.length)
+  policy.far = new Float64Array(codewords.length)
   return policy
 }
 
-/** Into `far`: how far an observation is from each codeword, as the look-up measures (in squares, where it is Euclidean).
- * Returns how many there are. */
-function distances({ scaled, scale, metric }, seen) {
+/** How far an observation is from each codeword, as the look-up measures (in squares, where it is Euclidean): valid until
+ * the next call. */
+function distances({ scaled, scale, metric, place, far }, seen) {
   const d = scale.length,
-    k = scaled.length / d
+    k = far.length
   for (let i = 0; i < d; i++) place[i] = seen[i] / scale[i]
   for (let j = 0, at = 0; j < k; j++) {
     let sum = 0
@@ -34,16 +36,14 @@ function distances({ scaled, scale, metric }, seen) {
     }
     far[j] = sum
   }
-  return k
+  return far
 }
-const place = new Float64Array(64),
-  far = new Float64Array(4096)
 
 /** The nearest codeword; of equally near ones the first. */
 export function cellOf(policy, seen) {
-  const k = distances(policy, seen)
+  const far = distances(policy, seen)
   let best = 0
-  for (let j = 1; j < k; j++) if (far[j] < far[best]) best = j
+  for (let j = 1; j < far.length; j++) if (far[j] < far[best]) best = j
   return best
 }
 
@@ -69,7 +69,7 @@ export function act({ task }, policy, seen) {
 
 /** By how little the nearest codeword wins: zero on a border. */
 export function margin(policy, seen) {
-  const [first, second] = far.slice(0, distances(policy, seen)).sort()
+  const [first, second] = distances(policy, seen).slice().sort()
   return second === undefined ? Infinity : second - first
 }
 
@@ -288,7 +288,7 @@ function draw(view) {
 }
 
 function drawAll(view) {
-  const { picture, scene, policy, asked } = view,
+  const { picture, scene, policy } = view,
     { ctx } = picture
   picture.fit()
   ctx.fillStyle = PAPER
@@ -306,7 +306,7 @@ function drawAll(view) {
     if (scene.task.outputs.length === 2) drawArrows(view)
     scene.starts.forEach((start, i) => {
       const lost = view.guessed && view.ends[i]
-      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : GOAL)
+      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : view.guessed ? GOAL : HIDDEN)
     })
   }
   picture.line(view.path.map(view.place), PAPER, 4)
@@ -315,18 +315,33 @@ function drawAll(view) {
   policy.codewords.forEach((codeword, i) =>
     picture.dot(view.placeSeen(codeword), 5, i === view.cell ? INK : PAPER, INK),
   )
-  const chosen = view.stored ? view.place(view.seen) : asked
-  picture.dot(chosen, 7, null, FAILED)
-  picture.dot(chosen, 2, FAILED)
+  drawChosen(view)
   ctx.restore()
   picture.axes()
 }
 
-/** The states of all stored episodes, in the colours of their cells. */
+/** The chosen state: a ring, over coloured dots with a white rim. */
+function drawChosen({ picture, stored, asked, seen, place }) {
+  const point = stored ? place(seen) : asked
+  if (stored) picture.dot(point, 8, PAPER, INK)
+  picture.dot(point, stored ? 5 : 7, null, FAILED)
+  picture.dot(point, 2, FAILED)
+}
+
+/** The states of all stored episodes, in the colours of their cells: one path a colour. */
 function drawStored(view) {
-  for (const { states } of view.episodes)
-    for (const state of states)
-      view.picture.dot(view.place(state), 2, PALETTE[cellOf(view.policy, state) % PALETTE.length])
+  const { picture, cells } = view,
+    paths = PALETTE.map(() => new Path2D())
+  view.episodes.forEach(({ states }, episode) =>
+    states.forEach((state, step) => {
+      const [x, y] = picture.at(view.place(state))
+      paths[cells[episode][step] % PALETTE.length].rect(x - 1.7, y - 1.7, 3.4, 3.4)
+    }),
+  )
+  paths.forEach((path, i) => {
+    picture.ctx.fillStyle = PALETTE[i]
+    picture.ctx.fill(path)
+  })
 }
 
 function drawArrows(view) {
@@ -363,7 +378,9 @@ const STYLE = `
 .vsp-explorer canvas:focus-visible { outline: 3px solid #0173b2 }
 .vsp-explorer .vsp-panel { flex: 1 1 260px; min-width: 0 }
 .vsp-explorer .vsp-row { display: flex; flex-wrap: wrap; gap: 0.3rem 0.6rem; align-items: center; margin: 0 0 0.6rem }
-.vsp-explorer table { border-collapse: collapse; margin: 0.3rem 0; display: block; overflow: auto; max-height: 24rem }
+.vsp-explorer table { border-collapse: collapse; margin: 0.3rem 0; display: block; overflow-x: auto }
+.vsp-explorer .vsp-scroll { overflow: auto; max-height: 15rem }
+.vsp-explorer .vsp-scroll table { overflow: visible } .vsp-explorer .vsp-scroll th { white-space: nowrap }
 .vsp-explorer :is(td, th) { padding: 0.1rem 0.5rem; text-align: right; font-weight: normal }
 .vsp-explorer legend { font-size: inherit }
 .vsp-explorer [hidden] { display: none }
@@ -384,11 +401,11 @@ function element(tag, attributes = {}, ...children) {
   return made
 }
 
-/** A table: names of the columns, then rows that begin with their name. A long one scrolls, also by the keyboard. */
+/** A table: names of the columns, then rows that begin with their name. */
 const table = (head, rows) =>
   element(
     "table",
-    rows.length > 12 ? { tabindex: 0 } : {},
+    {},
     element("tr", {}, ...head.map(name => element(name ? "th" : "td", name ? { scope: "col" } : {}, name))),
     ...rows.map(([name, ...values]) =>
       element("tr", {}, element("th", { scope: "row" }, name), ...values.map(value => element("td", {}, value))),
@@ -451,7 +468,7 @@ class Player {
 }
 
 const UNCHANGED = [
-  "Dots are states of stored episodes, in the colours of their cells; circles are codewords.",
+  "Dots are states of stored episodes, in the colours of their cells. Circles are codewords; some lie outside the picture.",
   "Click a state, or move through its episode.",
   "Nothing can be changed here: the browser cannot play this task, only SimpleGoal, MountainCar and Pendulum.",
 ].join(" ")
@@ -469,7 +486,8 @@ class Explorer {
     Object.assign(this, { stored: scene.stored, path: null, ends: [], frames: 0, guessed: !scene.guess })
     this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
     this.angular = scene.task.name === "Pendulum-v1"
-    this.answer = element("div")
+    this.many = scene.task.inputs.length > 8 || scene.task.outputs.length > 3
+    this.answer = this.answers()
     this.result = element("p", { "aria-live": "polite" })
     this.form = element("div")
     this.names = element(
@@ -524,58 +542,96 @@ class Explorer {
       { cell, raw: given, action } = act(this.scene, this.policy, seen),
       rows = this.policy.coefficients[cell]
     this.cell = cell
-    const adds = inputs.map((name, i) => [`${name} = ${digits(seen[i])} adds`, rows[i].map(w => digits(w * seen[i]))])
     const teacher = this.teachers()
-    const written = outputs.map((name, k) => element("p", {}, element("code", {}, equation(name, inputs, rows, k))))
-    const lines = [
-      ...adds,
-      ["the bias adds", rows[inputs.length].map(digits)],
-      ["sum", given.map(digits)],
-      ["action, within the limits", action.map(digits)],
-      ...(teacher ? [["the teacher's action", teacher.map(digits)]] : []),
+    const results = [
+      ["sum", ...given.map(digits)],
+      [this.many ? "action" : "action, within the limits", ...action.map(digits)],
+      ...(teacher ? [[this.many ? "teacher" : "the teacher's action", ...teacher.map(digits)]] : []),
     ]
-    this.answer.replaceChildren(
-      element("p", {}, element("b", {}, `Cell ${cell + 1} of ${this.policy.codewords.length}. `), this.border()),
-      ...(inputs.length > 8 ? [element("details", {}, element("summary", {}, "equations"), ...written)] : written),
-      table(
-        ["", ...outputs],
-        lines.map(([name, values]) => [name, ...values]),
-      ),
+    this.where.replaceChildren(element("b", {}, `Cell ${cell + 1} of ${this.policy.codewords.length}. `), this.border())
+    this.written.replaceChildren(
+      ...outputs.map((name, k) => element("p", {}, element("code", {}, equation(name, inputs, rows, k)))),
     )
+    const adds = this.adds(seen, rows)
+    if (this.many) this.results.replaceChildren(table(["", ...outputs], results))
+    this.added.replaceChildren(table(["", ...outputs], this.many ? adds : [...adds, ...results]))
     const keys = this.stored ? "Left and right go through the episode." : "Arrow keys move it."
     this.canvas.setAttribute("aria-label", `Map of the policy. The chosen state is in cell ${cell + 1}. ${keys}`)
+  }
+  /** Rows of what each input and the bias add; of many inputs those first that add most. */
+  adds(seen, rows) {
+    const { inputs } = this.scene.task
+    const found = [...inputs, ""].map((name, i) => {
+      const values = rows[i].map(weight => (name ? weight * seen[i] : weight))
+      return {
+        values,
+        size: Math.max(...values.map(Math.abs)),
+        name: name ? `${name} = ${digits(seen[i])}` : "the bias",
+      }
+    })
+    if (this.many) found.sort((one, other) => other.size - one.size)
+    return found.map(({ name, values }) => [this.many ? name : `${name} adds`, ...values.map(digits)])
+  }
+  /** Where that is written. What stays, such as a box that scrolls, stays as the reader left it. */
+  answers() {
+    const box = name =>
+      element("div", this.many ? { class: "vsp-scroll", tabindex: 0, role: "region", "aria-label": name } : {})
+    Object.assign(this, { where: element("p"), written: element("div") })
+    Object.assign(this, { results: box("sum and actions"), added: box("what each input adds") })
+    if (!this.many) return element("div", {}, this.where, this.written, this.added)
+    const folded = element("details", {}, element("summary", {}, "equations"), this.written)
+    const first = element("p", { class: "vsp-note" }, "What each input adds, the most first:")
+    return element("div", {}, this.where, folded, this.results, first, this.added)
   }
   teachers() {
     if (this.stored) return this.episodes[this.episode].teacher?.[this.steps.at]
     return this.scene.teacher && teacherAt(this.scene, this.asked)
   }
+  /** In words: the least change of one input (of a coordinate of the plane) that leads to another cell. */
   border() {
-    const plane = this.stored ? { ...this.stored, labels: this.scene.task.inputs } : this.scene.plane
-    const point = this.stored ? this.seen : this.asked
-    return border(point, this.cell, plane, changed => cellOf(this.policy, this.see(changed)))
+    const { stored, scene } = this,
+      labels = stored ? scene.task.inputs : scene.plane.labels
+    const cellAt = point => cellOf(this.policy, this.see(point))
+    const found = leastChange(stored ? this.seen : this.asked, this.cell, stored ?? scene.plane, cellAt)
+    if (found.axis === undefined) return "No change of one input leads to another cell."
+    const gap = Math.abs(found.gap) < 0.005 ? minus(found.gap.toPrecision(2)) : digits(found.gap)
+    const share = stored ? ` (${(100 * found.share).toPrecision(2)} % of its range)` : ""
+    return `A change of ${gap} in ${labels[found.axis]}${share} leads to cell ${found.to + 1}.`
   }
-  judge() {
+  /** Plays the starts, and says how they end. */
+  judge(policy = this.policy) {
     const { scene } = this
-    const found = scene.starts.map(start => rollout(scene, this.policy, start))
+    const found = scene.starts.map(start => rollout(scene, policy, start))
     this.ends = found.map(one => scene.lost.includes(one.outcome))
     this.mean = found.reduce((sum, one) => sum + one.total, 0) / found.length
     this.failures = this.ends.filter(Boolean).length
     const fails = scene.lost.length ? ` ${this.failures} of ${found.length} fail.` : ""
     const teacher = scene.teacher ? ` The teacher: ${scene.teacher.mean.toFixed(2)}.` : ""
-    const guess = this.guess === undefined ? "" : ` Your guess was ${this.guess}.`
-    const text = `Mean return from ${found.length} starts: ${this.mean.toFixed(2)}.${fails}${teacher}${guess}`
-    this.result.textContent = this.guessed ? minus(text) : ""
+    const text = minus(`Mean return from ${found.length} starts: ${this.mean.toFixed(2)}.${fails}`)
+    this.result.textContent = this.guessed ? text + minus(teacher) : ""
+    return text
   }
-  /** Results stay hidden until the reader has guessed. */
+  /** The question. Results stay hidden until the reader has guessed, or does not want to; then both stand there. */
   question() {
-    const input = element("input", { type: "number", "aria-label": "your guess" })
-    const show = button("show", () => {
+    const { guess, policies } = this.scene
+    const row = element("div", { class: "vsp-row" })
+    const show = guessed => () => {
+      if (guessed && !Number.isFinite(input.valueAsNumber)) return input.focus()
+      const first = ready(copied(policies[0])),
+        answer = this.judge(first) // of the policy as it is given, whatever the reader chose or changed meanwhile
+      const own = guessed ? ` Your guess: ${input.valueAsNumber}.` : ""
       this.guessed = true
-      this.guess = Number.isFinite(input.valueAsNumber) ? input.valueAsNumber : undefined
-      row.remove()
-      this.changed({ policy: true })
+      const said = element("p", { tabindex: -1 }, `${guess}${own} `, element("b", {}, `${first.name}: ${answer}`))
+      row.replaceWith(said)
+      said.focus()
+      this.changed({ policy: true, whole: false })
+    }
+    const input = element("input", {
+      type: "number",
+      "aria-label": "your guess",
+      keydown: event => event.key === "Enter" && show(true)(),
     })
-    const row = element("div", { class: "vsp-row" }, element("span", {}, this.scene.guess), input, show)
+    row.append(element("span", {}, guess), input, button("guess", show(true)), button("show", show(false)))
     return row
   }
   note() {
@@ -586,7 +642,7 @@ class Explorer {
         ? `Purple: ${task.outputs[0]} below 0; brown: above 0.`
         : "An arrow is the action there.",
       `Circles are codewords${this.angular ? "" : ": drag one"}. Click or drag elsewhere to choose a state; its episode is black.`,
-      lost.length ? "Orange starts fail." : "Small dots are starts.",
+      lost.length ? "Small dots are starts; orange ones fail." : "Small dots are starts.",
       teacher
         ? `The teacher's action is read from a grid: in nine of ten states off by at most ${teacher.usual.toFixed(3)}, in all by ${teacher.error.toFixed(2)}.`
         : "",
@@ -634,7 +690,8 @@ class Explorer {
     if (renewed) {
       ready(this.policy)
       this.mapped = null
-      if (!this.stored) this.judge()
+      if (this.stored) this.cells = this.episodes.map(({ states }) => states.map(state => cellOf(this.policy, state)))
+      else this.judge()
     }
     this.ask()
     this.path = this.stored ? this.recent() : rollout(this.scene, this.policy, this.asked, true).states
@@ -691,7 +748,8 @@ class Explorer {
   }
   stepTo(i) {
     this.changed({ whole: false })
-    return `episode ${this.episode + 1} of ${this.episodes.length}, step ${i + 1} of ${this.steps.last + 1}`
+    const { every, steps } = this.episodes[this.episode]
+    return `episode ${this.episode + 1} of ${this.episodes.length}, step ${i * every + 1} of ${steps}`
   }
 
   // -- Pointer and keys
@@ -760,30 +818,34 @@ function equation(name, inputs, rows, k) {
 }
 
 /** The least change of one coordinate of `point`, as a share of its range, that leads from `cell` to another. */
-function border(point, cell, { low, high, labels }, cellAt) {
-  let least = null
-  for (const axis of point.keys())
+function leastChange(point, cell, { low, high }, cellAt) {
+  const changed = [...point]
+  let least = { share: 1 }
+  for (const axis of point.keys()) {
     for (const end of [low[axis], high[axis]]) {
-      if (end === point[axis]) continue
-      const at = value => cellAt(point.map((v, i) => (i === axis ? value : v)))
-      let [inside, outside] = [point[axis], null]
+      const range = high[axis] - low[axis],
+        reach = clip(end - point[axis], -least.share * range, least.share * range)
+      if (!reach) continue
+      const at = gap => {
+        changed[axis] = point[axis] + gap
+        return cellAt(changed)
+      }
+      let [inside, outside] = [0, null]
       for (let i = 1; i <= 200 && outside === null; i++) {
-        const value = point[axis] + (i / 200) * (end - point[axis])
-        if (at(value) === cell) inside = value
-        else outside = value
+        const gap = (i / 200) * reach
+        if (at(gap) === cell) inside = gap
+        else outside = gap
       }
       if (outside === null) continue
       for (let i = 0; i < 30; i++) {
         const half = (inside + outside) / 2
         at(half) === cell ? (inside = half) : (outside = half)
       }
-      const gap = outside - point[axis],
-        share = Math.abs(gap) / (high[axis] - low[axis])
-      if (!least || share < least.share) least = { share, gap, axis, to: at(outside) }
+      least = { share: Math.abs(outside) / range, gap: outside, axis, to: at(outside) }
     }
-  if (!least) return "No border lies straight ahead."
-  const gap = Math.abs(least.gap) < 0.005 ? minus(least.gap.toPrecision(2)) : digits(least.gap)
-  return `A change of ${gap} in ${labels[least.axis]} leads to cell ${least.to + 1}.`
+    changed[axis] = point[axis]
+  }
+  return least
 }
 
 /** The teacher's action at a point of the plane, between the points of its grid. (linear) */
@@ -812,7 +874,7 @@ export default {
       const { asked } = view // the reader's state stays chosen
       view = mount(el, JSON.parse(model.get("scene")))
       view.asked = asked
-      view.changed()
+      view.redo() // at once: the page keeps its height, and so the place it is scrolled to
     })
   },
 }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import io
-import json
 import os
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from ...policy import VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
-from .scene import scene_of
+from .scene import PLANES, scene_of, to_json
 
 SCRIPT = Path(__file__).with_name("explorer.js")
 _PAGE = """<!doctype html>
@@ -42,7 +41,7 @@ class Explorer:
 
     `policies`: names and policies with linear maps, all of one task; `history` replays the first of them. The script
     plays SimpleGoal, MountainCarContinuous and Pendulum itself; of other tasks it shows stored episodes, over the two
-    inputs `axes`. Raises ValueError for other policies and for unknown inputs.
+    inputs `axes`. Raises ValueError for other policies, unknown inputs, and a history that is none of the first policy.
     """
 
     def __init__(
@@ -57,6 +56,9 @@ class Explorer:
         if len(tasks) != 1:
             raise ValueError(f"the policies play {sorted(tasks) or 'nothing'}, expected one task")
         self.policies, (self.task,) = policies, tasks.values()
+        _check_history(history, self.task.name)
+        if guess is not None and not (isinstance(guess, str) and guess and self.task.name in PLANES):
+            raise ValueError(f"guess is {guess!r}, expected a question about one of {', '.join(PLANES)}, or None")
         self.scene = scene_of(policies, self.task, teacher, history, axes)
         if guess is not None:
             self.scene["guess"] = guess
@@ -73,18 +75,20 @@ class Explorer:
         picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{said}</figure>"
         if source is not None:
             return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
-        scene = json.dumps(self.scene, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+        scene = to_json(self.scene).replace("</", "<\\/")
         return f'<div class="vsp-explorer">{picture}<script type="application/json">{scene}</script></div>'
 
     def _ipython_display_(self) -> None:
         from .view import View  # with anywidget, which takes a while to import
 
-        page.show(View(scene=json.dumps(self.scene))._repr_mimebundle_()[0], self.element(), self._alt())
+        page.show(View(scene=to_json(self.scene))._repr_mimebundle_()[0], self.element(), self._alt())
 
     def _alt(self) -> str:
         name, policy = next(iter(self.policies.items()))
-        plane = " and ".join(self.scene["plane"]["labels"])
-        return f"The map of one policy ({name}, {len(policy)} cells) over {plane}: cells and actions."
+        plane, cells = " and ".join(self.scene["plane"]["labels"]), f"{len(policy)} cell{'s' * (len(policy) > 1)}"
+        if "stored" in self.scene:
+            return f"States that one policy ({name}, {cells}) visits, over {plane}, in the colours of their cells."
+        return f"The map of one policy ({name}, {cells}) over {plane}: cells and actions."
 
     def _still(self) -> bytes:
         """The first policy, as a PNG: its map, or the states of its stored episodes in the colours of their cells."""
@@ -115,6 +119,17 @@ class Explorer:
             state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
 
 
+def _check_history(history: History | None, task: str) -> None:
+    """Raise ValueError unless it is the history of a run on the task, or None."""
+    if history is None:
+        return
+    if not isinstance(history, History):
+        kind = type(history).__name__
+        raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
+    if (found := history.policy_at(0).task.name) != task:
+        raise ValueError(f"history is of a run on {found}, expected one on {task}")
+
+
 def explore(
     policies: VoronoiPolicy | dict[str, VoronoiPolicy],
     *,
@@ -127,8 +142,9 @@ def explore(
 
     `policies`: one with linear maps, or some by name; `teacher`: its actions stand beside theirs; `history` of a
     distillation: replays the first policy. SimpleGoal, MountainCarContinuous and Pendulum are played in the browser;
-    other tasks show stored episodes, over the two inputs `axes`, and cannot be changed. `guess`: a question that the
-    reader answers before results are shown. Raises ValueError for other policies and unknown inputs.
+    other tasks show stored episodes, over the two inputs `axes`, and cannot be changed. `guess`: a question about the
+    first policy, which the reader answers before returns and failures are shown. Raises ValueError for other policies,
+    unknown inputs, a history of another method or task, and a guess where the browser cannot play.
     """
     several = policies if isinstance(policies, dict) else {"policy": policies}
     return Explorer(several, teacher=teacher, history=history, axes=axes, guess=guess)

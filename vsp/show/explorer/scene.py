@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from itertools import count
+
 import numpy as np
 
+from ...checks import check_array
 from ...evaluation import start_states
 from ...history import History
 from ...policy import VoronoiPolicy
@@ -20,6 +24,8 @@ N_STARTS = 400
 TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid along an axis; states at which its error is measured
 N_EPISODES, N_STEPS = 8, 250  # that are stored of a task that the script cannot play, and steps of each, at most
 EPISODE_SEED = 0
+DIGITS = 4  # of what is stored, in the range of each variable
+MOST = 490_000  # bytes of a scene with stored episodes
 N_MOMENTS = 80  # of a replay, in addition to those with a split or merge
 
 
@@ -34,17 +40,25 @@ def scene_of(
 
     Keys: task (names and limits), plane (low, high, labels), policies; of a task that the script can play starts (n,
     2), lost (which outcomes are failures) and teacher: its actions on a grid, the largest error of reading them from
-    there, and its mean return. Other tasks have stored episodes instead, drawn over two inputs, `axes`. Raises
-    ValueError for names that are no inputs.
+    there, and its mean return. Other tasks have stored episodes instead, drawn over two inputs, `axes`; these scenes
+    stay below `MOST` bytes, with fewer moments and steps where needed. Raises ValueError for names that are no inputs,
+    for a teacher whose actions do not fit, and as `collect_episodes` does.
     """
     scene = _numbers_of_task(task) | {"policies": [_numbers(policy, name) for name, policy in policies.items()]}
-    if task.name in PLANES:
-        scene |= _played(task, teacher)
-    else:
-        scene |= _stored(policies, task, teacher, axes, scene["policies"])
     if history is not None:
         scene["policies"][0]["replay"] = _replay(history)
-    return scene
+    if task.name in PLANES:
+        if axes is not None:
+            raise ValueError(f"axes are {axes!r}, expected None: the states of {task.name} are drawn as a whole")
+        return scene | _played(task, teacher)
+    if history is not None:
+        scene["policies"][0]["replay"] = _thinned(scene["policies"][0]["replay"], MOST // 2)
+    return scene | _stored(policies, task, teacher, axes, scene["policies"])
+
+
+def to_json(scene: object) -> str:
+    """A scene, or a part of one, as the script reads it."""
+    return json.dumps(scene, separators=(",", ":"), allow_nan=False)
 
 
 def _numbers_of_task(task: Task) -> dict:
@@ -58,7 +72,7 @@ def _numbers_of_task(task: Task) -> dict:
 
 def _played(task: Task, teacher: Policy | None) -> dict:
     """What the script needs to play a task: plane, starts, failures, and a teacher's grid."""
-    (low, high, labels), starts = PLANES[task.name], _starts(task)
+    (low, high, labels), starts = PLANES[task.name], starts_of(task)
     found = {
         "plane": {"low": low, "high": high, "labels": labels},
         "starts": starts.tolist(),
@@ -75,19 +89,18 @@ def _stored(
 ) -> dict:
     """Episodes of every policy, with the teacher's actions, added to `into`; returns the plane and the box of the
     states."""
-    starts, seen = start_states(task, N_EPISODES, EPISODE_SEED), []
-    for policy, about in zip(policies.values(), into):
-        about["episodes"] = []
-        for episode in collect_episodes(policy, task, starts):
-            states = episode.states[:: 1 + (len(episode.states) - 1) // N_STEPS].round(4)
-            found = {"states": states.tolist()}
-            if teacher is not None:
-                found["teacher"] = np.round(teacher.predict(states)[0], 3).tolist()
-            about["episodes"].append(found)
-            seen.append(states)
-    seen = np.concatenate(seen)
-    low, high, chosen = seen.min(axis=0), seen.max(axis=0), _axes(task, seen, next(iter(policies.values())), axes)
-    room = 0.03 * np.maximum(high - low, 1e-3)
+    first, starts = next(iter(policies.values())), start_states(task, N_EPISODES, EPISODE_SEED)
+    _check_axes(task, axes)  # before the episodes are played
+    played = [[one.states for one in collect_episodes(policy, task, starts)] for policy in policies.values()]
+    seen = np.concatenate([states for episodes in played for states in episodes])
+    low, high, chosen = seen.min(axis=0), seen.max(axis=0), _axes(task, seen, first, axes)
+    decimals = _decimals(seen)
+    for most in (N_STEPS // n for n in count(1)):
+        for episodes, about in zip(played, into):
+            about["episodes"] = [_episode(states, decimals, teacher, task, max(most, 1)) for states in episodes]
+        if len(to_json(into).encode()) < MOST - 10_000 or most <= 1:  # plane and names need little
+            break
+    room = 0.03 * np.maximum(high - low, 1e-3 * np.maximum(1.0, np.abs(high)))
     plane = {
         "low": (low - room)[chosen].tolist(),
         "high": (high + room)[chosen].tolist(),
@@ -96,16 +109,60 @@ def _stored(
     return {"plane": plane, "stored": {"axes": chosen, "low": low.tolist(), "high": high.tolist()}}
 
 
-def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str, str] | None) -> list[int]:
-    """The two inputs to draw: those of these names, or where the states vary most in units of the look-up."""
-    if names is None:
-        return sorted(np.argsort(-(seen / policy.scale).std(axis=0), kind="stable")[:2].tolist())
-    if len(names) != 2 or not set(names) <= set(task.inputs):
+def _episode(states: np.ndarray, decimals: list[int], teacher: Policy | None, task: Task, most: int) -> dict:
+    """At most `most` states of an episode, one `every` so many of its `steps`, and the teacher's actions there."""
+    every = 1 + (len(states) - 1) // most
+    kept = _rounded(states[::every], decimals)
+    found = {"states": kept.tolist(), "every": every, "steps": len(states)}
+    if teacher is None:
+        return found
+    actions = check_array("the teacher's actions", teacher.predict(kept)[0], (len(kept), len(task.outputs)))
+    return found | {"teacher": _rounded(actions, _decimals(np.stack([task.action_low, task.action_high]))).tolist()}
+
+
+def _decimals(values: np.ndarray) -> list[int]:
+    """For each column, the decimals with which its range has `DIGITS` digits or one more."""
+    size = np.maximum(np.ptp(values, axis=0), 1e-6 * np.abs(values).max(axis=0))
+    return [DIGITS - int(np.floor(np.log10(one))) if one else 0 for one in size.tolist()]
+
+
+def _rounded(values: np.ndarray, decimals: list[int]) -> np.ndarray:
+    return np.column_stack([column.round(n) for column, n in zip(values.T, decimals)])
+
+
+def _check_axes(task: Task, names: tuple[str, str] | None) -> None:
+    """Raise ValueError unless these are two inputs, or None."""
+    given = [] if names is None or isinstance(names, str) else list(names) if np.iterable(names) else []
+    if names is not None and (len(given) != 2 or given[0] == given[1] or not all(one in task.inputs for one in given)):
         raise ValueError(f"axes are {names!r}, expected two of the inputs {', '.join(task.inputs)}")
-    return [task.inputs.index(name) for name in names]
 
 
-def _starts(task: Task) -> np.ndarray:
+def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str, str] | None) -> list[int]:
+    """The two inputs to draw: those of these names, or where the states vary most in units of the look-up; inputs with
+    two values, such as contacts, only where there are no others. (a single input twice)"""
+    if names is not None:
+        return [task.inputs.index(name) for name in names]
+    spread = (seen / policy.scale).std(axis=0)
+    binary = np.array([len(np.unique(column)) <= 2 for column in seen.T])
+    order = np.lexsort((-spread, binary))
+    return sorted(order[:2].tolist()) if len(order) > 1 else [0, 0]
+
+
+def _thinned(moments: list[dict], most: int) -> list[dict]:
+    """As many moments of a replay as fit into `most` bytes, evenly, with the first and the last; rather those with a
+    split or merge."""
+    changes = [i for i, one in enumerate(moments) if one["change"] or i in (0, len(moments) - 1)]
+    for places in ([*range(len(moments))], changes):
+        if len(to_json([moments[i] for i in places])) <= most:
+            return [moments[i] for i in places]
+    for every in count(2):
+        places = [*changes[:-1][::every], changes[-1]]
+        if len(to_json(found := [moments[i] for i in places])) <= most or every > len(changes):
+            return found
+    raise AssertionError
+
+
+def starts_of(task: Task) -> np.ndarray:
     """Starts in a regular grid over those of the task. (n, 2)"""
     drawn = task.start(np.random.default_rng(0), 10_000)
     low, high = drawn.min(axis=0), drawn.max(axis=0)
