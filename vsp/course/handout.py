@@ -27,8 +27,8 @@ and then, each time:
 
     .venv/bin/jupyter lab
 
-On Windows, `py -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`. Linux is tested. For macOS and Windows all
-packages come as wheels, but nobody has tried them there.
+On Windows, `py -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`. Linux is tested. For macOS and Windows
+all packages come as wheels, but nobody has tried them there.
 
 Begin with lesson_1_black_box.ipynb; the project comes after lesson 3 (project.md). The packages take 145 MB
 to download and 0.55 GB on the disk. Whatever you change stays in this folder.
