@@ -277,6 +277,15 @@ def test_the_place_of_the_keyboard_is_seen_at_every_stop(browser, address, name,
     assert unseen == [] and stops > 30
 
 
+def test_the_explorer_that_loads_keeps_the_place_of_the_keyboard(browser, address):
+    one = Visit(browser, address, "notebooks/02_distillation.html", viewport=DESK)
+    scene = one.page.locator(".vsp-explorer[data-scene]").last
+    scene.locator("a, img").first.evaluate("part => { part.tabIndex = 0; part.focus() }")
+    scene.locator("canvas").wait_for()
+    assert scene.locator("canvas").evaluate("canvas => canvas == document.activeElement")
+    one.close()
+
+
 def test_the_skip_link_leads_past_the_buttons(start):
     for key in ("Tab", "Enter", "Tab"):
         start.keyboard.press(key)

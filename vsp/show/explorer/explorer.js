@@ -509,7 +509,9 @@ class Explorer {
     const said = [this.stored ? this.steps.row : "", this.guessed ? "" : this.question(), this.result, this.answer]
     const panel = element("div", { class: "vsp-panel" }, ...rows, ...said, this.form, this.note())
     root.classList.add("vsp-explorer")
+    const held = root.contains(document.activeElement) // the picture that stood there has the keyboard's focus
     root.replaceChildren(element("style", {}, STYLE), this.canvas, panel)
+    if (held) this.canvas.focus()
     this.listen()
     new ResizeObserver(() => this.path && draw(this)).observe(this.canvas)
     this.choose(0)
