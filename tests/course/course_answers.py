@@ -350,7 +350,7 @@ wrongs(
     ("the mean begins anew", "previous, losses = i, []", "previous = i"),
     ("a codeword that came a moment ago", LOCATE, "", "for state, action in zip(", FOR_ALL_CELLS),
     ("no state far from its codeword", "partition.far(i, state)", "state.tolist() not in partition.codewords.tolist()"),
-    ("a copy without any error", "np.mean(losses) > config.max_pol_loss and ", ""),
+    ("a policy without any error", "np.mean(losses) > config.max_pol_loss and ", ""),
     ("go on after a split", "losses = []\n    return", "break\n    return"),
     ("all buffers empty", "affected[i] = True", "affected[:-1] = True"),
     ("full buffers beside a new cell", "partition.reset(affected)", "pass"),
@@ -761,7 +761,7 @@ BOTH, LABELS = (
 )
 wrongs(
     "3.6",
-    ("the copy's own actions", "teacher.predict", "policy.predict"),
+    ("the policy's own actions", "teacher.predict", "policy.predict"),
     ("the states that the teacher goes through", "collect_episodes(policy", "collect_episodes(teacher"),
     ("the old states gone", BOTH, "visited, labels"),
     ("in different orders", "[actions, labels]", "[labels, actions]"),
@@ -802,7 +802,7 @@ def data():
 
 
 wrong("3.7", "is not written yet")(lambda: None)
-wrong("3.7", "expected more than the best copy")(lambda: baselines.linear_map(*data(), "SimpleGoal-v0"))
+wrong("3.7", "expected more than the best policy")(lambda: baselines.linear_map(*data(), "SimpleGoal-v0"))
 wrong("3.7", "a vsp.VoronoiPolicy")(lambda: vsp.load_teacher("SimpleGoal-v0"))
 wrong("3.7", "the class VoronoiPolicy itself")(lambda: vsp.VoronoiPolicy)
 wrong("3.7", "the policy alone")(lambda: (baselines.rule_of_thumb("SimpleGoal-v0")[1], None))

@@ -314,7 +314,7 @@ def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, cap
 def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     teacher = vsp.load_teacher(SIMPLEGOAL)
-    fig, _ = drawing.copy_and_error(baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher)
+    fig, _ = drawing.actions_and_error(baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher)
     picture = drawing.picture(fig, "a policy")
     assert 'alt="a policy"' in picture._repr_html_() and picture.png[:4] == b"\x89PNG" and not list(tmp_path.iterdir())
 
@@ -323,7 +323,7 @@ def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
 def test_two_squares_side_by_side_are_of_one_size(on_the_way):
     _, teacher, states, _ = examples()
     policy = baselines.rule_of_thumb(SIMPLEGOAL)[1]
-    fig, axes = drawing.copy_and_error(policy, teacher, states if on_the_way else None)
+    fig, axes = drawing.actions_and_error(policy, teacher, states if on_the_way else None)
     fig.canvas.draw()
     one, other = (ax.get_window_extent() for ax in axes)
     drawing.plt.close(fig)
@@ -419,15 +419,15 @@ def test_an_answer_cannot_replace_what_the_check_measures_by(monkeypatch):
     assert "expected at most 85%" in _refused("1.7", patches)
 
 
-def test_the_copies_to_beat_are_those_of_the_lesson(monkeypatch):
+def test_the_policies_to_beat_are_those_of_the_lesson(monkeypatch):
     keep_runs(monkeypatch)
     source = next(c.source for c in LESSONS["lesson_3_does_it_work.ipynb"].cells if c.id == "distil")
     assert f"for seed in range({len(lesson_3.SEEDS)})" in source and lesson_3.SEEDS.start == 0
     _, teacher, *_ = examples()
-    copies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in lesson_3.SEEDS]
+    policies = [once(teacher, SIMPLEGOAL, seed=seed)[0] for seed in lesson_3.SEEDS]
     starts = vsp.start_states(SIMPLEGOAL, 2000, seed=lesson_3.FRESH)
-    best = max(vsp.rollout(copy, SIMPLEGOAL, starts).returns.mean() for copy in copies)
-    assert lesson_3._best_copy() == best
+    best = max(vsp.rollout(policy, SIMPLEGOAL, starts).returns.mean() for policy in policies)
+    assert lesson_3._best_policy() == best
 
 
 def test_a_loop_without_end_is_stopped_and_told():
@@ -470,7 +470,7 @@ def test_where_signals_do_not_work_there_is_no_time_limit(place, monkeypatch):
 
 def test_the_first_prediction_is_kept(monkeypatch, capsys):
     keep_runs(monkeypatch)
-    monkeypatch.setattr(lesson_2, "_FIRST", {})
+    monkeypatch.setattr(feedback, "_FIRST", {})
     right, rest = course_answers.PREDICTION, arguments("2.6")
     assert lesson_2.predicted(right | {"exact maps": None}, *rest) is None
     assert "'exact maps' is not answered yet" in capsys.readouterr().out
@@ -480,6 +480,16 @@ def test_the_first_prediction_is_kept(monkeypatch, capsys):
     assert words.startswith("✓ 2.6") and "first prediction was wrong about ['a higher loss']" in words
     table = lesson_2.predicted(right, *rest)
     assert table.loc["a higher loss", "you said first"] == "fewer cells"
+
+
+def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch):
+    monkeypatch.setattr(feedback, "_FIRST", {})
+    quiz = feedback.Exercise("0.1", "quiz")
+    questions = {name: feedback.Question(("yes", "no"), "yes", 1) for name in "abc"}
+    with pytest.raises(feedback.NotYet, match="question 'b': not 'no'"):
+        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions)
+    assert quiz.ask(dict.fromkeys("abc", "yes"), questions) == " Of your first answers 1 of 3 were right."
+    assert feedback.Exercise("0.2", "quiz").ask(dict.fromkeys("abc", "yes"), questions) == ""
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):

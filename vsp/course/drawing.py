@@ -41,7 +41,7 @@ def walls(ax: Axes) -> Axes:
     return ax
 
 
-def copy_and_error(
+def actions_and_error(
     policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None
 ) -> tuple[Figure, np.ndarray]:
     """The arrows of a policy on SimpleGoal beside its squared error, both with cells and codewords.
@@ -59,7 +59,7 @@ def copy_and_error(
     for ax in axes:
         show.cells(walls(ax), x, y, policy.cells(grid))
         show.codewords(ax, policy.codewords, numbers=True)
-    show.letter(axes, ["the copy", "its error" if states is None else "its error where the teacher goes"])
+    show.letter(axes, ["the policy", "its error" if states is None else "its error where the teacher goes"])
     return fig, axes
 
 

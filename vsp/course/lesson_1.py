@@ -52,8 +52,8 @@ def reading(answers: object, teacher: Policy) -> None:
         "at the limit": Question(SHARES, share, 2),
         "sudden turn": Question(PLACES, _sharpest(states, actions), 3),
     }
-    READING.ask(answers, questions)
-    READING.passed("you read the arrows as the network means them.")
+    first = READING.ask(answers, questions)
+    READING.passed(f"you read the arrows as the network means them.{first}")
 
 
 def _way(teacher: Policy, state: list[float]) -> str:

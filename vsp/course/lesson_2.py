@@ -34,7 +34,6 @@ PREDICTION = Exercise("2.6", "prediction", seconds=180)
 MOMENTS = ("before iteration 500", "between 500 and 2000", "after 2000")
 CAUSES = ("a split", "a merge", "a reset of the buffers", "a change of the teacher")
 TREND = ("more cells", "as many", "fewer cells")
-_FIRST: dict[str, str] = {}  # the first prediction of exercise 2.6
 SAME = 0.12  # a change of the mean number of cells by less than this share counts as none
 CHANGES = {
     "a lower distance": {"min_pol_distance": 0.15},
@@ -70,8 +69,8 @@ def reading(answers: object, history: History, config: Config) -> None:
         "fewer cells by": Question(CAUSES, "fb8f27a3b939a5dc", 2, fewer | same_teacher),
         "loss jumps by": Question(CAUSES, "71c02946198a22ee", 3, jumps | same_teacher),
     }
-    READING.ask(answers, questions)
-    READING.passed("the plot has told you what the algorithm does when.")
+    first = READING.ask(answers, questions)
+    READING.passed(f"the plot has told you what the algorithm does when.{first}")
 
 
 @RUNNING_MEAN.checks
@@ -291,9 +290,7 @@ def _disagree(means: pd.Series, given: dict) -> list[str]:
 def _first(given: object) -> dict[str, str]:
     """The first complete prediction since the kernel started. Raises NotYet if there is none."""
     PREDICTION.answers(given, dict.fromkeys(CHANGES, TREND))
-    if not _FIRST:
-        _FIRST.update({name: given[name] for name in CHANGES})
-    return _FIRST
+    return PREDICTION.first(given)
 
 
 def predicted(given: object, teacher: Policy, task: Task, config: Config) -> pd.DataFrame | None:

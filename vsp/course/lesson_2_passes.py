@@ -107,7 +107,7 @@ class SplitCase(NamedTuple):
 SPLITS = (
     SplitCase([0.1], [1], [0.12, 0.15, 0.2, 0.25], [0, 0, 0, 0], [],
               "a bad map but no state far from its codeword: both conditions must hold", 1),
-    SplitCase([0.1], [0], [0.4, 0.5, 0.6], [0, 0, 0], [], "a copy without any error", 1),
+    SplitCase([0.1], [0], [0.4, 0.5, 0.6], [0, 0, 0], [], "a policy without any error", 1),
     SplitCase([0.1], [1], [0.15, 0.25, 0.4], [0, 0, 0], [0.4], "mean loss 1 and one state that is far enough", 1),
     SplitCase([0.1], [0], [0.4, 0.45, 0.5], [0.4, 0.4, 0.4], [],
               "many small losses in one cell: their mean counts, not their sum", 2),

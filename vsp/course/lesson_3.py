@@ -25,7 +25,7 @@ from .feedback import ActionsAlone, Exercise, Mistake, Question, works
 TASK = "SimpleGoal-v0"
 FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
 FRESH = 2_000_003  # seed of the start states that a challenger is judged on
-SEEDS = range(8)  # of the lesson's copies
+SEEDS = range(8)  # of the lesson's policies
 NEAR = 0.1  # how far the width of an interval may be from what it comes to in large samples, relatively
 
 READING = Exercise("3.1", "reading")
@@ -36,7 +36,7 @@ REFIT = Exercise("3.5", "refit", ("vsp.baselines.simple.refit",))
 DAGGER = Exercise("3.6", "dagger_round")
 CHALLENGE = Exercise("3.7", "challenger", seconds=180)
 
-WHO = ("the teacher", "the copies")
+WHO = ("the teacher", "the policies")
 INSIDE = ("a quarter", "half", "three quarters", "nearly all")
 WHERE = ("inside the box", "in the lower whisker", "nowhere")
 SEES = ("the median", "the height of the box", "the mean")
@@ -63,8 +63,8 @@ def reading(answers: object, ours: np.ndarray, theirs: np.ndarray) -> None:
         "pit episodes": Question(WHERE, place, 2, places),
         "sees the pit": Question(SEES, SEES[int(np.argmax(change))], 3),
     }
-    READING.ask(answers, questions)
-    READING.passed("a plot may hide just what went wrong.")
+    first = READING.ask(answers, questions)
+    READING.passed(f"a plot may hide just what went wrong.{first}")
 
 
 @PAIRED_GAP.checks
@@ -296,7 +296,7 @@ def dagger_round(function: Callable) -> None:
         found = "the pair that `predict` returns, used as the actions"
         DAGGER.refuse_if(pair, found, "its first part, `predict(states)[0]`", 2)
         _labels(function, *case)
-    DAGGER.passed("the copy went there, the teacher said what is right there, and nothing was forgotten.")
+    DAGGER.passed("the policy went there, the teacher said what is right there, and nothing was forgotten.")
 
 
 def _labels(
@@ -317,25 +317,25 @@ def _labels(
         raise DAGGER.wrong("states and actions in different orders", "the same order for both", 3)
     if right < 1:
         number = round((1 - right) * len(states))
-        found = "the copy's own actions" if copied > 0.5 else f"other actions in {number} of {len(states)} states"
+        found = "the policy's own actions" if copied > 0.5 else f"other actions in {number} of {len(states)} states"
         raise DAGGER.wrong(found, "the teacher's action for every state", 2)
 
 
 def _gathered(states: np.ndarray, old: np.ndarray, ours: np.ndarray, theirs: np.ndarray, n_episodes: int) -> None:
-    """Whether `states` are the `old` ones and `ours`, those on the copy's way; `theirs` are on the teacher's."""
-    n, driver = len(old), ("the states that the teacher goes through", "those that the copy goes through", 1)
+    """Whether `states` are the `old` ones and `ours`, those on the policy's way; `theirs` are on the teacher's."""
+    n, driver = len(old), ("the states that the teacher goes through", "those that the policy goes through", 1)
     sizes = {
         len(ours): ("the old states gone", "them kept, with the new ones behind or before them", 3),
         len(theirs): driver,
         n + len(theirs): driver,
-        n: ("no new states", "those that the copy goes through", 1),
+        n: ("no new states", "those that the policy goes through", 1),
         n + n_episodes: ("one new state per episode", "every state on the way", 1),
     }
     if states.shape != (n + len(ours), 2):
         otherwise = f"states of shape {states.shape}", "old and new states, a row each", 1
         raise DAGGER.wrong(*sizes.get(len(states), otherwise))
     if not np.allclose(_sorted(states), _sorted(np.concatenate([old, ours])), atol=1e-6):
-        raise DAGGER.wrong("other states", "the old ones and those that the copy goes through", 1)
+        raise DAGGER.wrong("other states", "the old ones and those that the policy goes through", 1)
 
 
 def corrected(
@@ -352,16 +352,16 @@ def _sorted(rows: np.ndarray) -> np.ndarray:
 
 
 @functools.cache
-def _best_copy() -> float:
-    """The highest mean return of the lesson's copies, from fresh starts."""
+def _best_policy() -> float:
+    """The highest mean return of the lesson's policies, from fresh starts."""
     task, teacher = get_task(TASK), load_teacher(TASK)
-    copies = [distill(teacher, task, paper_preset(TASK), seed=seed)[0] for seed in SEEDS]
-    return max(rollout(copy, task, start_states(task, 2000, FRESH)).returns.mean() for copy in copies)
+    policies = [distill(teacher, task, paper_preset(TASK), seed=seed)[0] for seed in SEEDS]
+    return max(rollout(policy, task, start_states(task, 2000, FRESH)).returns.mean() for policy in policies)
 
 
 @CHALLENGE.checks
 def challenger(policy: VoronoiPolicy) -> None:
-    """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of the lesson's copies, from fresh
+    """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of the lesson's policies, from fresh
     starts. Made anew from its numbers, so that no method of the student's own plays."""
     if policy is None:
         raise CHALLENGE.unsolved()
@@ -378,9 +378,9 @@ def challenger(policy: VoronoiPolicy) -> None:
     task = get_task(TASK)
     starts = start_states(task, 2000, FRESH)
     own, teacher = (rollout(p, task, starts) for p in (made, load_teacher(TASK)))
-    best, mean = _best_copy(), own.returns.mean()
+    best, mean = _best_policy(), own.returns.mean()
     failing = f"{(own.outcomes != GOAL).mean():.1%} of the episodes fail"
     found = f"codewords and coefficients that return {mean:.3f} from fresh starts ({failing})"
-    CHALLENGE.refuse_if(mean <= best, found, f"more than the best copy's {best:.3f}", 2)
-    others = f"the best copy {best:.2f}, the teacher {teacher.returns.mean():.2f}"
+    CHALLENGE.refuse_if(mean <= best, found, f"more than the best policy's {best:.3f}", 2)
+    others = f"the best of the eight {best:.2f}, the teacher {teacher.returns.mean():.2f}"
     CHALLENGE.passed(f"{len(made)} cells return {mean:.2f}, {others}; {failing}.")
