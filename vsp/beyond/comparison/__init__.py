@@ -10,7 +10,7 @@ from .regret import best_mean, with_regret
 
 
 def stale_results() -> list[str]:
-    """Which committed results were made with other settings, teachers or versions than today's, in words."""
-    from .stale import stale  # here, for `python -m` runs a module that nobody has imported
+    """List the committed results made with other settings, teachers or versions than today's, one message each."""
+    from .stale import stale  # imported here: `python -m` warns if the module it runs is already imported
 
     return stale()

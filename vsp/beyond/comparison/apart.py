@@ -1,9 +1,10 @@
-"""The fit and the borders apart: what our cells owe to their fit, and what to the Voronoi diagram.
+"""Separate the effect of the fit from that of the borders: what our cells owe to each.
 
-Our cells differ from a tree with linear leaves in their borders, and in their fit: all their numbers together, where a
-tree is grown greedily. Here are the combinations that are neither: a tree whose numbers are fitted together, and cells
-that are grown greedily; beside them our cells, fitted with the same effort. `ObliqueLinearTree` is the fourth. Each is
-a function of a budget, a size and a seed, and is fitted to the teacher's own episodes, without corrections.
+Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
+fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
+are fitted together, and cells that are grown greedily. It also has our cells, fitted with the same effort.
+`ObliqueLinearTree` is the fourth combination. Each method is a function of a budget, a size and a seed, and is fitted
+to the teacher's own episodes, without corrections.
 """
 
 from __future__ import annotations
@@ -23,25 +24,25 @@ from ..refinement.units import Cells, Frame, LabelledStates, joined
 from .methods import Budget, alone
 from .tuning import TreeNumbers, Tunable, in_units
 
-N_BEGINNINGS = 64  # at random: so many divided by the size, at least 8, for descents of few numbers are quick
-N_GREEDY = 4  # greedy trees that descents begin from besides
-HOT = ((range(0, 2), 12), (range(2, 6), 4))  # stages, and how many descents of random trees go on
-WARM = ((range(6, 12), 3), (range(12, search.N_STAGES), 1))  # the same, of these and of the greedy trees
-CERTAIN = 40.0  # logits beyond have shares of 0 and 1 in float64
+N_BEGINNINGS = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
+N_GREEDY = 4  # additional descents, which start from greedy trees
+HOT = ((range(0, 2), 12), (range(2, 6), 4))  # stages, and how many descents from random trees are kept after them
+WARM = ((range(6, 12), 3), (range(12, search.N_STAGES), 1))  # the same, for these and the greedy trees together
+CERTAIN = 40.0  # larger logits give shares of exactly 0 and 1 in float64
 
 
 def tree_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """Our fit with a tree's borders: an oblique tree with linear leaves, all its numbers fitted together."""
+    """Combine our fit with a tree's borders: an oblique tree with linear leaves, all its numbers fitted together."""
     return alone(budget, size, seed, fit=global_tree)
 
 
 def cells_by_greedy_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """A tree's fit with our borders: Voronoi cells that are split one after the other, as a tree is grown."""
+    """Combine a tree's fit with our borders: Voronoi cells that are split one after the other, as a tree is grown."""
     return alone(budget, size, seed, fit=greedy_cells)
 
 
 def cells_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """Our fit with our borders, from as many beginnings as `tree_by_global_fit` and on the same states."""
+    """Combine our fit with our borders: as many random starts as `tree_by_global_fit`, and the same states."""
     return alone(budget, size, seed, fit=global_cells)
 
 
@@ -50,7 +51,7 @@ def cells_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
 
 @threadpool_limits.wrap(limits=1)
 def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
-    """The cells with the least error on states (n, d) and actions (n, m) that `search.least_error` finds."""
+    """Return the cells with the least error on states (n, d) and actions (n, m) that `search.least_error` finds."""
     frame = Frame.of(task, states)
     seen = LabelledStates(frame.inputs(states), frame.outputs(actions))
     return frame.policy(search.least_error(seen, size, beginnings(size), np.random.default_rng(seed)))
@@ -58,11 +59,11 @@ def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
 
 @threadpool_limits.wrap(limits=1)
 def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> Tunable:
-    """The oblique tree with the least error on states (n, d) and actions (n, m), searched as by `search.least_error`.
+    """Return the oblique tree with the least error on states (n, d) and actions (n, m).
 
-    Descents from trees split at random begin hot; greedy trees are good already and join them on the way. All keep
-    their structure, and fit directions, thresholds and maps together. A greedy tree is returned where no descent is
-    better.
+    The search is that of `search.least_error`. Descents from randomly split trees start at a high temperature. Greedy
+    trees are good already and join at a lower one. Descents keep the structure of a tree, and fit its directions,
+    thresholds and maps together. If no descent is better, the best greedy tree is returned.
     """
     rng, frame = np.random.default_rng(seed), Frame.of(task, states)
     some = search.spread(states / frame.scale, search.FEW, rng)
@@ -88,15 +89,15 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
 
 
 def beginnings(size: int) -> int:
-    """How many descents begin at random, of a policy with `size` cells or leaves."""
+    """Return how many descents start at random, for a policy with `size` cells or leaves."""
     return max(8, N_BEGINNINGS // size)
 
 
 class RandomTree(ObliqueLinearTree):
-    """An oblique tree that is split at random: between two states of a leaf, often of one with many states."""
+    """An oblique tree with random splits: each lies between two states of a leaf, more often of a leaf with many."""
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
-        """The border between two of the `inputs` (n, d), with a gain drawn at random."""
+        """Return the border halfway between two random `inputs` (n, d), with a random gain."""
         left, right = inputs[self._rng.integers(len(inputs), size=2)]
         direction = (right - left) / (np.linalg.norm(right - left) or 1.0)
         gain = self._rng.random() * len(inputs) * (left != right).any()
@@ -104,16 +105,19 @@ class RandomTree(ObliqueLinearTree):
 
 
 def action_error(policy: Policy, frame: Frame, states: np.ndarray, actions: np.ndarray) -> float:
-    """Mean squared error of the policy's actions in states (n, d), in half action ranges; `actions` (n, m)."""
+    """Return the mean squared difference of the policy's actions in states (n, d) from `actions` (n, m).
+
+    Actions are in units of half their range.
+    """
     return float(np.square(frame.outputs(policy.predict(states)[0]) - frame.outputs(actions)).mean())
 
 
 def descend(
     tree: Tunable, states: np.ndarray, actions: np.ndarray, stages: range, *, n_iterations: int = search.N_ITERATIONS
 ) -> Tunable:
-    """`tree` after L-BFGS on the expected loss, stage by stage, as `search.descend` does with cells.
+    """Fit `tree` by L-BFGS on the expected loss, stage by stage, as `search.descend` fits cells.
 
-    The temperature is in units of half a cell's width: then a border is as soft as one between two codewords.
+    The temperature is in units of half a cell's width. This makes a border as soft as one between two codewords.
     """
     seen = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
     numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(seen, len(tree)))
@@ -140,21 +144,22 @@ def _cooler(seen: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_
 
 
 def shares(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
-    """How much of each of `states` (n, d) belongs to each leaf: in the cold, all of it to its own. (leaves, n)
+    """Return the share of each of `states` (n, d) that belongs to each leaf: (leaves, n).
 
-    The product of the shares that turn towards the leaf at the nodes on its way: each the sigmoid of how far the state
-    lies beyond the threshold, in units of the temperature.
+    As the temperature goes to 0, a state belongs wholly to its own leaf. A share is a product over the nodes on the
+    path to the leaf. Each factor is a sigmoid of the state's distance beyond the threshold, in units of the
+    temperature.
     """
     return np.exp(_ways(tree) @ _turns(tree, states, temperature))
 
 
 def _ways(tree: TreeNumbers) -> np.ndarray:
-    """Which turns lead to each leaf: first those to the left, then those to the right. (leaves, 2 nodes)"""
+    """Return which turns lead to each leaf, first the left turns, then the right turns: (leaves, 2 nodes)."""
     return np.hstack([tree.sides < 0, tree.sides > 0]).astype(np.float64)
 
 
 def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
-    """Logarithms of the shares that turn left, then of those that turn right, at each node. (2 nodes, n)"""
+    """Return the log shares that turn left at each node, then those that turn right: (2 nodes, n)."""
     logits = np.clip((tree.directions @ states.T - tree.thresholds[:, None]) / temperature, -CERTAIN, CERTAIN)
     rest = np.log1p(np.exp(-np.abs(logits)))
     return np.vstack([-np.maximum(logits, 0.0) - rest, np.minimum(logits, 0.0) - rest])
@@ -163,9 +168,9 @@ def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndar
 def expected_loss(
     tree: TreeNumbers, seen: LabelledStates, *, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
-    """Mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
+    """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
 
-    As `anneal.expected_loss` of cells; the gradient is with respect to `tree.vector`.
+    This is `anneal.expected_loss` for trees. The gradient is with respect to `tree.vector`.
     """
     (n, m), (k, rows, _), states = seen.actions.shape, tree.maps.shape, seen.inputs[:, :-1]
     raw = Cells(np.zeros((k, 0)), tree.maps).outputs(seen.inputs)
@@ -190,16 +195,16 @@ def expected_loss(
 
 @threadpool_limits.wrap(limits=1)
 def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
-    """Voronoi cells grown as `ObliqueLinearTree` grows leaves, for states (n, d) and actions (n, m).
+    """Grow Voronoi cells as `ObliqueLinearTree` grows leaves, for states (n, d) and actions (n, m).
 
-    The cell whose best oblique split lowers the squared error most gets two codewords instead of its own, one on each
-    side of the hyperplane, from the best of `pairs`. Then all states go to their nearest codewords, and all maps are
-    fitted again by least squares. Nothing is moved later. Distances are Euclidean, of standardised states. There are
-    fewer cells where no split gains anything.
+    The cell whose best oblique split lowers the squared error most is split. Its codeword is replaced by the best of
+    `pairs`: two codewords, one on each side of the hyperplane. Then all states are assigned to their nearest codewords,
+    and all maps are refitted by least squares. Codewords never move later. Distances are Euclidean, between
+    standardised states. There are fewer than `size` cells if no further split lowers the error.
     """
     frame, d, m = Frame.of(task, states), states.shape[1], actions.shape[1]
     points, least = frame.inputs(states)[:, :-1], 1e-9 * np.square(actions).sum()
-    tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # for its search for a split
+    tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # used only to search for splits
 
     def fitted(codewords: np.ndarray) -> VoronoiPolicy:
         cells = Cells(codewords, np.zeros((len(codewords), d + 1, m)))
@@ -222,10 +227,10 @@ def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
 
 
 def pairs(codeword: np.ndarray, points: np.ndarray, split: Split) -> list[np.ndarray]:
-    """Pairs of codewords (2, d) that may stand for one, left and right of the hyperplane of `split`.
+    """Return pairs of codewords (2, d) that may replace `codeword`, left and right of the hyperplane of `split`.
 
-    The means of the `points` (n, d) on either side; the codeword with its mirror image across the hyperplane, and
-    either mean with its own: then the border between the two is the hyperplane.
+    The first pair is the means of the `points` (n, d) on either side. The others are the codeword, or either mean, with
+    its mirror image across the hyperplane: their border is the hyperplane itself.
     """
     right = split.right(points)
     means = np.array([points[~right].mean(axis=0), points[right].mean(axis=0)])

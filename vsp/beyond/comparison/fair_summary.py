@@ -1,6 +1,6 @@
-"""Who leads at equal tuning: every method with as many cells or leaves, as it imitates and as it is tuned.
+"""Compare methods at equal tuning: each with the same number of cells or leaves, before and after tuning.
 
-Also what each of them costs: episodes of every kind, and seconds.
+Also count what each method costs: episodes of every kind, and seconds.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .method_tables import LONG, UNTUNED
 from .methods import numbers_of
 
 OURS = "our cells"
-# By the name in tables: the imitation, and the same tuned
+# By the name in tables: the method that imitates, and the same method tuned
 PAIRS = {
     OURS: ("refined, not tuned", "refined"),
     "axis tree, constants": ("CART, DAgger", "CART, DAgger, tuned"),
@@ -38,29 +38,37 @@ PAIRS = {
     "small network": ("small network, DAgger", "small network, DAgger, tuned"),
     "one linear map": ("one linear map", "one linear map, tuned"),
 }  # fmt: skip
-# Of `method_tables`: all methods, from the shipped teacher
+# Tables of `method_tables` that together hold all methods, distilled from the shipped teacher
 TABLES = ("beyond", "tuned", "apart", "faithful", "demanded")
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 
 
 def all_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The committed rows of `task` of all methods, from the shipped teacher, `with_r2`; each method, size and seed
-    once, as its last table has it."""
+    """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`.
+
+    Each method, size and seed occurs once: the last of `TABLES` that has it counts.
+    """
     tables = [table for table in TABLES if table in tables_of(task)]
     frame = pd.concat([read_rows(task, folder, table=table) for table in tables])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
 def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
-    """`frame` with a column r2: 1 minus the squared action error over that of the best constant, both in the teacher's
-    states of `measure`, which no fit has seen. (`likeness` has R² on more states.)"""
+    """Add a column r2 to `frame`: 1 minus the squared action error divided by that of the best constant action.
+
+    Both errors are measured in the teacher's states of `measure`, which no fit has seen. `likeness` gives R² on more
+    states.
+    """
     r2 = 1.0 - np.square(frame["error_teacher"] / constant_error(load_teacher(task)))
     return frame.assign(r2=r2)
 
 
 def constant_error(teacher: Teacher) -> float:
-    """Root mean square action error of the best constant in the states of `measure`, in units of half the range."""
+    """Return the root mean square action error of the best constant action in the states of `measure`.
+
+    Errors are in units of half the action range.
+    """
     task = teacher.task
     states = visited_states(teacher, task, start_states(task, N_ERROR // SLOW.get(task.name, 1), ERROR_SEED))
     half = 0.5 * (task.action_high - task.action_low)
@@ -68,10 +76,11 @@ def constant_error(teacher: Teacher) -> float:
 
 
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
-    """One row per size and method of `PAIRS`, the best tuned mean return of a size first; only sizes with rivals.
+    """Return one row per size and method of `PAIRS`, within a size the best tuned mean return first.
 
     `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
-    low, high (its 95 % interval) and r2 of what is tuned, and "untuned mean" and so on. Of size 1 is one linear map.
+    low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
+    method of size 1 is one linear map. Sizes without rivals are left out.
     """
     table, found = method_summary(frame).set_index(["method", "size"]), []
     r2 = frame.groupby(["method", "size"])["r2"].median()
@@ -91,10 +100,10 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
-    """Our cells beside the best other method at every size of an `equal_budget`, one row per size beyond 1.
+    """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1.
 
-    Columns: size; mean, low, high and policies of ours; rival, its name, "rival mean" and so on; ahead: "ours" or
-    "theirs" where the intervals do not overlap, else "level".
+    Columns: size; mean, low, high and policies of our cells; rival (the name of the best other method), "rival mean"
+    and so on; ahead: "ours" or "theirs" if the intervals do not overlap, else "level".
     """
     found = []
     for size, rows in table[table["size"] > 1].groupby("size"):
@@ -106,15 +115,15 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def possible(frame: pd.DataFrame) -> pd.DataFrame:
-    """Where each method stands on the map of return over fidelity, one row per method and size: medians over seeds."""
+    """Return the medians over seeds for the plot of return against fidelity, one row per method and size."""
     return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "cells", "parameters"]].median().reset_index()
 
 
 def tail(frame: pd.DataFrame) -> pd.DataFrame:
-    """The worst returns beside the mean, one row per method and size of `all_rows` where they were measured.
+    """Return the worst returns beside the mean, one row per method and size of `all_rows` that has them.
 
-    Columns: method, size, policies; mean, worst (mean of the worst `measure.TAIL` of the episodes) and failing: means
-    over the seeds; worst_least, the lowest of a seed.
+    Columns: method, size, policies; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and
+    failing, each as a mean over the seeds; worst_least (the lowest `worst` of any seed).
     """
     by_kind = frame[frame["worst"].notna()].groupby(["method", "size"])
     table = by_kind[["mean", "worst", "failing"]].mean()
@@ -125,8 +134,10 @@ def tail(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Fit and geometry apart, and newer methods, one row per method: the median r2 at every size, and the median mean
-    return. Columns: method, "r2 2" and so on, "mean 2" and so on."""
+    """Return the table "apart", which separates fit from geometry and adds newer methods, one row per method.
+
+    Columns: method; "r2 2" and so on (the median r2 at that size); "mean 2" and so on (the median mean return).
+    """
     rows = with_r2(read_rows(task, folder, table="apart"), task)
     table = rows.groupby(["method", "size"], sort=False)[["r2", "mean"]].median().unstack("size")
     table.columns = [f"{what} {size}" for what, size in table.columns]
@@ -134,11 +145,12 @@ def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.D
 
 
 def budgets(task: str) -> pd.DataFrame:
-    """Episodes of every kind that a policy of the preset's size takes, one row per method; seconds on one core.
+    """Count the episodes of every kind that a policy of the preset's size needs, and its seconds on one core.
 
-    Columns: method, size, teacher (episodes that it plays), correction (of the policy, labelled by the teacher), tuning
-    and validation (of candidates), seconds (median over the seeds), steps (of the teacher's training, in its row, the
-    first). Faithful policies are tuned only where they return too little: theirs are the most that may be.
+    One row per method. Columns: method, size; numbers of episodes: teacher (played by the teacher), correction (played
+    by the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the
+    seeds); steps (of the teacher's training, only in its row, the first). Faithful policies are tuned only if they
+    return too little, so their tuning episodes are an upper bound.
     """
     config, close = tuned_preset(task), faithful_preset(task)
     seconds = _seconds(task)
@@ -155,16 +167,18 @@ def budgets(task: str) -> pd.DataFrame:
 
 
 def _seconds(task: str) -> pd.Series:
-    """Median seconds by method and size, from all committed tables of times."""
+    """Return the median seconds by method and size, from all committed tables of times."""
     long = "_long" * (task in LONG)
     frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("beyond", "tuned", "faithful")])
     return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
 
 
 def episodes(name: str, config: Refinement, task: str, *, tuned: bool) -> dict[str, int]:
-    """Episodes that a method of `PAIRS` plays by `config`, as it imitates or tuned: teacher, correction, tuning and
-    validation."""
-    if name == OURS:  # `refine` begins with one linear map
+    """Count the episodes of a method of `PAIRS` with the settings `config`, with or without tuning.
+
+    Keys: teacher, correction, tuning, validation.
+    """
+    if name == OURS:  # the first candidate of `refine` is one linear map
         rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
     else:
         settings = UNTUNED[PAIRS[name][0]].settings
@@ -189,12 +203,12 @@ def _of_faithful(config: Faithful, task: str) -> dict[str, int]:
 
 
 def _tuning(config: Refinement | Faithful, numbers: int) -> int:
-    """Episodes of the generations: as many candidates as CMA-ES has for so many numbers."""
+    """Count the episodes of all generations. CMA-ES chooses the number of candidates by that of the tuned `numbers`."""
     return config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
 
 
 def _tuned_numbers(name: str, k: int, task: str) -> int:
-    """How many numbers are tuned of a method of `PAIRS` with k cells or leaves."""
+    """Return how many numbers are tuned in a method of `PAIRS` with k cells or leaves."""
     found = get_task(task)
     d, m = len(found.low), len(found.action_low)
     maps, units = k * (d + 1) * m, units_for(numbers_of(k, found), found)

@@ -1,4 +1,4 @@
-"""Whether policies act like their teacher, return what it returns, and come out the same from any seed."""
+"""Summarise whether policies act like their teacher, match its return, and are the same for every seed."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ LEAST_R2 = {
     "Pendulum-v1": 0.95,
     "LunarLanderContinuous-v3": 0.9,
 }
-SAME_CELLS = 0.9  # adjusted Rand index, at the median of the pairs
+SAME_CELLS = 0.9  # least median adjusted Rand index over pairs of seeds for cells to count as the same
 
 
 def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The faithful policies of a task, one row per number of cells that was asked for.
+    """Summarise the faithful policies of a task, one row per requested number of cells.
 
-    Columns: size; policies (how many) and cells (median); r2, the median, r2_least, the lowest, and r2_worst, the
-    median of the worst action coordinate; off, the share of states where an action is off by more than a tenth of its
-    range; mean and failing (medians); like, good and both, the shares of the policies whose R² is at least `LEAST_R2`,
-    that are as good as their teacher (`AS_GOOD`), and that are both; low and high, the 95 % interval of the latter; of
-    all pairs of seeds, index and index_least, the median and the lowest adjusted Rand index of their cells, and ratio,
-    the median ratio of the difference of their actions to that to the teacher; one_cell, how many policies have one
-    cell, which leaves them out of the index.
+    Columns: size; policies (how many); cells (median); r2 (median), r2_least (lowest) and r2_worst (median R² of the
+    worst action coordinate); off (share of states where an action is off by more than a tenth of its range); mean and
+    failing (medians); like, good and both (share of the policies whose R² is at least `LEAST_R2`, share that match
+    their teacher by `AS_GOOD`, and share that do both); low and high (95 % interval of both).
+
+    Over all pairs of seeds: index and index_least (median and lowest adjusted Rand index of their cells) and ratio
+    (median of the difference between their actions, divided by their difference from the teacher's). one_cell is the
+    number of policies with one cell; the index leaves them out.
     """
     rows, pairs = read_rows(task, folder, table="faithful"), read_results(f"same_{task}", folder)
     every = read_rows(task, folder)
@@ -49,7 +50,7 @@ def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame
 
 
 def share_interval(found: int, n: int) -> tuple[float, float]:
-    """The 95 % interval of a share, of which `found` of n were seen (Clopper & Pearson 1934)."""
+    """Return the 95 % interval of a share when `found` of `n` were observed (Clopper & Pearson 1934)."""
     from scipy.stats import binomtest
 
     interval = binomtest(found, n).proportion_ci(method="exact")
@@ -57,8 +58,10 @@ def share_interval(found: int, n: int) -> tuple[float, float]:
 
 
 def largest_alike(table: pd.DataFrame) -> int | None:
-    """The largest size up to which the median pair of seeds has the same cells, of a table of `likeness`; None if there
-    is none."""
+    """Return the largest size up to which the median pair of seeds has the same cells, or None.
+
+    `table` is that of `likeness`. Cells count as the same if their index is at least `SAME_CELLS`.
+    """
     found = None
     for size, index in table.loc[table["index"].notna(), ["size", "index"]].to_numpy():
         if index < SAME_CELLS:
@@ -68,12 +71,12 @@ def largest_alike(table: pd.DataFrame) -> int | None:
 
 
 def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """What the methods make of every teacher of a task, one row per teacher and method, then one over all teachers.
+    """Compare the methods across all teachers of a task: for each method a row per teacher, then one over all teachers.
 
-    Columns: teacher (0: the shipped one; "all"), own (its mean return), method, size, policies, gap (mean return minus
-    the teacher's, the mean over seeds), low and high (its 95 % interval, over all teachers by `over_groups`), r2
-    (median; NaN where it was not measured), good (share as good as their teacher), good_low and good_high (its interval
-    for one teacher by `share_interval`).
+    Columns: teacher (0: the shipped one; "all"), own (the teacher's mean return), method, size, policies, gap (mean
+    return minus the teacher's, the mean over seeds), low and high (95 % interval of the gap by `over_groups`), r2
+    (median; NaN where it was not measured), good (share of the policies that match their teacher), good_low and
+    good_high (interval of this share for one teacher, by `share_interval`).
     """
     others = read_rows(task, folder, table="teachers")
     asked = others[["method", "size"]].drop_duplicates()
@@ -97,7 +100,7 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
 
 
 def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
-    """The rows of some teachers in short; every teacher counts alike."""
+    """Summarise the rows of some teachers, each group with equal weight."""
     low, high = over_groups([rows["gap"].to_numpy() for rows in groups])
     r2 = pd.concat(groups)["r2"]
     return {
@@ -110,8 +113,11 @@ def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
 
 
 def over_groups(groups: list[np.ndarray]) -> tuple[float, float]:
-    """Percentile bootstrap interval (95 %) of the mean of the groups' means: resamples groups, such as teachers, and
-    the values within each, such as policies. Of few groups it is a lower bound on what another one may bring."""
+    """Return the percentile bootstrap interval (95 %) of the mean of the groups' means.
+
+    Resamples the groups, such as teachers, and the values within each, such as policies. With few groups the interval
+    understates how much another group may differ.
+    """
     rng, n = np.random.default_rng(0), len(groups)
     means = [group[rng.integers(len(group), size=(2000, n, len(group)))].mean(axis=2) for group in groups]
     drawn = rng.integers(n, size=(2000, n))

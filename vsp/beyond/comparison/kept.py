@@ -1,5 +1,8 @@
-"""Policies that are kept beside the committed rows, each with what made it: one of every task that acts like its
-teacher, one at the limit, one of each robot, and of LunarLander a simplified one."""
+"""Write the policies that are committed beside the rows, each with its provenance.
+
+Each task has one policy that acts like its teacher and one at the limit. Each robot has one policy, and LunarLander
+also has a simplified one.
+"""
 
 from __future__ import annotations
 
@@ -18,28 +21,31 @@ from ..refinement.units import METRIC
 from .method_rows import Job, jobs_of, preset
 
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
-SIMPLIFY_VERSION = 1  # raise it when `simplify` gives another policy
+SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
 
 
-# Tables of whose rows a policy is kept, and the method that made it
+# Tables from which one policy is kept, and the method that made it
 KEPT = {"faithful": "faithful", "limit": "at the limit", "robots": "cells, trained further"}
 
 
 def keep(folder: str | os.PathLike, task: str, table: str, path: str | os.PathLike) -> None:
-    """Write the policy of `kept_job` to `path`, with its provenance; listed. `folder` is that of the rows."""
+    """Write the policy of `kept_job` to `path` with its provenance, and add it to the manifest.
+
+    `folder` holds the rows.
+    """
     job = kept_job(task, table)
     arrays, _ = load_made(job.path(folder), "Row", job.about())
     _keep(VoronoiPolicy(**arrays, task=task, metric=METRIC), path, job.provenance)
 
 
 def kept_job(task: str, table: str) -> Job:
-    """The row whose policy is kept: of the preset's size, and of the first seed."""
+    """Return the row whose policy is kept: the one with the preset's size and the first seed."""
     jobs = [job for job in jobs_of(task, table) if job.method == KEPT[table]]
     return next(job for job in jobs if (job.size, job.seed) == (preset(task, job.how.preset).n_cells, 0))
 
 
 def simplest(task: str) -> VoronoiPolicy:
-    """The simplest policy that loses at most `LOSS` of what the teacher returns; made anew, in about ten minutes."""
+    """Make the simplest policy that loses at most `LOSS` of the teacher's mean return. Takes about ten minutes."""
     teacher, config = load_teacher(task), preset(task, "tuned")
     starts = start_states(get_task(task), config.n_validation, 0)
     own = rollout(teacher, get_task(task), starts).returns.mean()
@@ -47,7 +53,7 @@ def simplest(task: str) -> VoronoiPolicy:
 
 
 def keep_simplest(task: str, path: str | os.PathLike) -> None:
-    """Make `simplest`, and write it to `path` with its provenance; listed."""
+    """Make the policy of `simplest`, write it to `path` with its provenance, and add it to the manifest."""
     _keep(simplest(task), path, simplest_provenance(task))
 
 
@@ -59,6 +65,6 @@ def _keep(policy: VoronoiPolicy, path: str | os.PathLike, made_with: dict) -> No
 
 
 def simplest_provenance(task: str) -> dict[str, str | int]:
-    """What decides the policy of `simplest`; its seed is 0."""
+    """Return the provenance of the policy of `simplest`: what determines it besides the seed, which is 0."""
     settings = {"task": task, "loss": LOSS, **asdict(preset(task, "tuned"))}
     return provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)

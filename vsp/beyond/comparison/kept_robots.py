@@ -1,4 +1,4 @@
-"""What is shown of the kept policy of a robot: its gait, step by step, and how few of its numbers it needs."""
+"""Make two tables for the kept policy of a robot: its gait, step by step, and how few of its numbers it needs."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from ..robots import fewest_numbers, record_gait
 from .kept import kept_job
 from .measure import N_REPORTED, REPORT_SEED
 
-VERSION = 1  # raise it when the same policy gets another table
+VERSION = 1  # raise it when the same policy gives a different table
 GAIT = {"start": 0.0, "n_steps": 200}
 FEWEST = {"keep": 0.95, "n_episodes": 20, "seed": 0}
 
 
 def gait(policy: VoronoiPolicy) -> pd.DataFrame:
-    """`record_gait` of one episode, and the provenance."""
+    """Return the table of `record_gait` for one episode, with the provenance."""
     task = policy.task.name
     return record_gait(policy, task, **GAIT).assign(**provenance_of("gait", task))
 
 
 def fewest(policy: VoronoiPolicy) -> pd.DataFrame:
-    """The candidates of `fewest_numbers`, then two rows from the report starts: stages "all numbers" and "fewest"."""
+    """Return the candidates of `fewest_numbers`, then two rows measured from the report starts.
+
+    These two have the stages "all numbers" and "fewest".
+    """
     task = policy.task
     small, rows = fewest_numbers(policy, **FEWEST)
     starts = start_states(task, N_REPORTED // SLOW.get(task.name, 1), REPORT_SEED)
@@ -40,7 +43,7 @@ def fewest(policy: VoronoiPolicy) -> pd.DataFrame:
 
 
 def provenance_of(name: str, task: str) -> dict[str, str | int]:
-    """The provenance of the table `name`, which depends on that of the policy."""
+    """Return the provenance of the table `name`, which includes that of the policy."""
     made_with = kept_job(task, "robots").provenance
     settings = {"policy": made_with, "table": name, **(GAIT if name == "gait" else FEWEST)}
     return {**made_with, **provenance(settings, made_with["teacher"], VERSION)}

@@ -1,4 +1,7 @@
-"""What came out at the limit, and of robots: returns over cells, beside the best possible one or the teacher's."""
+"""Summarise the policies at the limit and those of robots: returns by number of cells.
+
+Returns are compared with the best possible return, or with the teacher's.
+"""
 
 from __future__ import annotations
 
@@ -14,22 +17,22 @@ from .method_summary import method_summary, read_rows
 from .method_tables import LIMIT, STARTS
 from .regret import best_mean
 
-# Mean return from which on a policy is said to be at the limit; SimpleGoal's: so much below the best
+# Least mean return of a policy at the limit; for SimpleGoal, its largest distance below the best mean return
 NEAR = {"MountainCarContinuous-v0": 99.2, "Pendulum-v1": -141.0, "LunarLanderContinuous-v3": 290.0}
 GAP = {"SimpleGoal-v0": 0.015}
 
 
 def near(task: str, folder: str | os.PathLike | None = None) -> float:
-    """The mean return from which on a policy of `task` is at the limit."""
+    """Return the least mean return with which a policy of `task` counts as at the limit."""
     return NEAR[task] if task in NEAR else best_mean(task, folder) - GAP[task]
 
 
 def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The policies at the limit, one row per number of cells.
+    """Summarise the policies at the limit, one row per number of cells.
 
-    Columns: size, policies; mean, low and high (its 95 % interval), least (of a seed), regret of the mean (NaN where
-    the best return is not known), failing (the most); near, the share of the policies that are at the limit, near_low
-    and near_high, its 95 % interval.
+    Columns: size, policies; mean, low and high (its 95 % interval), least (lowest mean return of a seed), regret (of
+    the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the policies that are
+    at the limit), near_low and near_high (its 95 % interval).
     """
     rows = read_rows(task, folder, table="limit")
     found, bar = method_summary(rows).sort_values("size"), near(task, folder)
@@ -45,9 +48,10 @@ def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Data
 
 
 def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Whether the start or the length of the search decides, one row per search, "at the limit" last.
+    """Compare searches by their start and their length, one row per search, "at the limit" last.
 
-    Columns: method, policies, mean, low, high (its 95 % interval), least (of a seed) and failing (the most).
+    Columns: method, policies, mean, low, high (its 95 % interval), least (lowest mean return of a seed) and failing
+    (highest of a seed).
     """
     size, order = limit_preset(task).n_cells, ["refined", *reversed(STARTS), *LIMIT]
     rows = pd.concat([read_rows(task, folder, table=table) for table in ("beyond", "starts", "limit")])
@@ -58,10 +62,11 @@ def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
 
 
 def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The best returns that are computed, one row per task, beside what the teacher returns.
+    """Return the computed best returns beside the teacher's, one row per task.
 
-    Columns: task; best, worst (of an episode), failing and longest, of the best policy; error, the difference of its
-    mean return on two grids (NaN where it is exact); teacher, its mean return; regret, the teacher's.
+    Columns: task; best (mean return of the best policy); error (difference of this mean between two grids; NaN where it
+    is exact); found, worst (lowest return of an episode), failing and longest, of the best policy as in `optimum`;
+    teacher (its mean return); regret (of the teacher).
     """
     found = []
     for task, rows in read_results("optimum", folder).groupby("task", sort=False):
@@ -75,10 +80,10 @@ def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:
 
 
 def walking(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """The policies of a robot, one row per method and size, the teacher first.
+    """Summarise the policies of a robot, one row per method and size, the teacher first.
 
-    Columns: method, size, policies, mean, low, high (its 95 % interval), failing, share (of the teacher's mean
-    return), r2 (the median) and parameters.
+    Columns: method, size, policies, mean, low, high (its 95 % interval), failing, share (mean divided by the teacher's
+    mean return), r2 (the median) and parameters.
     """
     rows = read_rows(task, folder, table="robots")
     teacher = rows.loc[rows["method"] == "robot's teacher", "mean"].iloc[0]

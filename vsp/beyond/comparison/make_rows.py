@@ -1,4 +1,4 @@
-"""`make beyond` and `make beyond-long`: the rows of the comparison of methods, and how long methods take."""
+"""Run `make beyond` and `make beyond-long`: make the rows of the comparison of methods, and time the methods."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from .regret import optimum
 
 
 def main() -> None:
-    """Make the rows that are missing, and write data/results/<table>_<task>.csv and what is kept beside it: a policy,
-    same_<task>.csv beside the faithful table. Times go to <table>_seconds.csv (_long: of the tasks that take hours).
+    """Make the missing rows, and write them to data/results/<table>_<task>.csv. Some tables also keep one policy, and
+    the faithful table also has same_<task>.csv. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the
+    tasks that take hours.
 
-    Beside them: optimum.csv; or, of the tasks that take hours, beyond_<task>.policy, and of robots
-    gait_<task>.csv and fewest_<task>.csv.
+    Also write optimum.csv; or, for the tasks that take hours, beyond_<task>.policy, and for robots gait_<task>.csv and
+    fewest_<task>.csv.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
@@ -50,7 +51,7 @@ def main() -> None:
 
 
 def _beside(long: bool, tables: set[str], out: Path) -> None:
-    """What is made from the rows, or beside them."""
+    """Write the files that are made from the rows, or in addition to them."""
     results = out / "data" / "results"
     if "robots" in tables:
         for task in WALKERS:

@@ -1,6 +1,6 @@
-"""What is reported of a policy beyond the paper: returns, failures, distance from its teacher, and cost.
+"""Measure what is reported of a policy beyond the paper: returns, failures, distance from its teacher, and cost.
 
-No method saw the start states: nothing was fitted to them or chosen by them.
+No method has seen these start states: nothing is fitted to them or selected with them.
 """
 
 from __future__ import annotations
@@ -16,28 +16,31 @@ from ...rollouts import Policy, rollout, visited_states
 from ...tasks.base import GOAL, Task
 from ...tasks.registry import SLOW
 
-VERSION = 1  # raise it when the same policy gets other numbers
-REPORT_SEED, ERROR_SEED = 21, 22  # of the start states: for returns, and for action errors
+VERSION = 1  # raise it when the same policy gives different numbers
+REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and for action errors
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
-TAIL = 0.01  # share of the episodes: the worst ones
+TAIL = 0.01  # share of the episodes that count as the worst
 
 
 def settings(*, tail: bool = False) -> dict:
-    """What decides the numbers of a policy, as JSON-able values."""
+    """Return the settings that determine the numbers of a policy, as JSON-able values."""
     about = {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
     return about | ({"tail": TAIL} if tail else {})
 
 
 def common() -> dict:
-    """What decides the numbers of `fidelity` beside, as JSON-able values."""
+    """Return the additional settings that determine the numbers of `fidelity`, as JSON-able values."""
     return {"states": N_COMMON}
 
 
 def measure(policy: Policy, teacher: Policy, task: Task, *, tail: bool = False) -> dict[str, float]:
-    """Mean return, share of episodes without the goal, action errors on the states of the teacher and on its own,
-    cells or leaves (0: none), parameters, operations per decision; with `tail`, the mean return of the worst episodes.
-    Tasks in `SLOW` are played fewer times."""
+    """Measure a policy: returns, action errors, size and cost.
+
+    Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
+    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
+    `tail`, worst (mean return of the worst episodes). Tasks in `SLOW` are played fewer times.
+    """
     fewer = SLOW.get(task.name, 1)
     result = rollout(policy, task, start_states(task, N_REPORTED // fewer, REPORT_SEED))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
@@ -55,12 +58,15 @@ def measure(policy: Policy, teacher: Policy, task: Task, *, tail: bool = False) 
 
 
 def worst(returns: np.ndarray) -> float:
-    """The mean of the worst `TAIL` of the returns, of one at least: the conditional value at risk."""
+    """Return the mean of the worst `TAIL` of the returns, at least of one: the conditional value at risk."""
     return float(np.sort(returns)[: max(1, round(TAIL * len(returns)))].mean())
 
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
-    """Root mean square difference of the actions in the states that `by` visits, in units of half the action range."""
+    """Return the root mean square difference between the actions of `policy` and `teacher` in the states `by` visits.
+
+    It is in units of half the action range.
+    """
     states = visited_states(by, task, starts)
     half = 0.5 * (task.action_high - task.action_low)
     gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
@@ -68,34 +74,37 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
 
 
 def fidelity(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
-    """R² of the actions, all coordinates pooled, and of the worst coordinate, on `common_states`; the share of them
-    where an action is off by more than a tenth of its range."""
+    """Measure how closely the policy's actions match the teacher's on `common_states`.
+
+    Keys: r2 (R² of the actions, all coordinates pooled), r2_worst (R² of the worst coordinate), off (share of the
+    states where an action is off by more than a tenth of its range).
+    """
     states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
     wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
     errors = np.square(policy.predict(states)[0] / half - wanted)
     spread = np.square(wanted - wanted.mean(axis=0))
-    varies = spread.any(axis=0)  # R² is not defined of a coordinate that is constant
+    varies = spread.any(axis=0)  # R² is not defined for a constant coordinate
     worst = (errors.mean(axis=0)[varies] / spread.mean(axis=0)[varies]).max()
     off = float((errors > 0.2**2).any(axis=1).mean())
     return {"r2": float(1 - errors.sum() / spread.sum()), "r2_worst": float(1 - worst), "off": off}
 
 
 def common_states(teacher: Policy, task: Task) -> np.ndarray:
-    """10,000 states of the teacher's own episodes from starts that no fit, choice or tuning has seen."""
+    """Return 10,000 states of the teacher's own episodes, from starts that no fit, selection or tuning has seen."""
     episodes = N_REPORTED // SLOW.get(task.name, 1)
     states = visited_states(teacher, task, start_states(task, episodes, ERROR_SEED))
     return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
 
 
 def cost(policy: Policy) -> tuple[int, float]:
-    """Parameters of a policy, and arithmetic operations and comparisons per decision, the mean over decisions."""
+    """Return a policy's parameters, and the mean number of arithmetic operations and comparisons per decision."""
     if isinstance(policy, VoronoiPolicy):
         policy.check_linear()
         k, rows, m = policy.coefficients.shape
-        units = (rows - 1) * bool((policy.scale != 1).any())  # that states are divided by
+        units = (rows - 1) * bool((policy.scale != 1).any())  # states are divided by these numbers
         look_up = (k > 1) * (units + k * 3 * (rows - 1) + k - 1)
         return policy.coefficients.size + (k > 1) * (policy.codewords.size + units), look_up + 2 * (rows - 1) * m
-    if isinstance(policy, tdavq.DiscretePolicy):  # the values are no part of what acts
+    if isinstance(policy, tdavq.DiscretePolicy):  # its values do not count: they do not affect the actions
         (k, d), m = policy.codewords.shape, policy.actions.shape[1]
         return k * (d + m), float((k > 1) * (k * 3 * d + k - 1))
     if isinstance(policy, Tree | LinearTree):
@@ -110,7 +119,7 @@ def cost(policy: Policy) -> tuple[int, float]:
 
 
 def _tree_cost(policy: Tree | LinearTree) -> tuple[int, float]:
-    """A split along an axis is two numbers and a comparison, an oblique one d + 1 numbers and 2 d operations."""
+    """Count the cost of a tree: an axis split is two numbers and one comparison, an oblique one d + 1 and 2 d."""
     leaves = len(policy)
     if isinstance(policy, Tree):
         tree, ends = policy.model.tree_, policy.model.tree_.children_left < 0

@@ -1,7 +1,8 @@
-"""The comparison beyond the paper: every method at every size, from the same teachers, budgets and starts, on disk.
+"""Make the rows of the comparison beyond the paper: every method at every size, with the same teachers, budgets and
+starts.
 
-`make beyond` makes the rows that are missing; data/results/beyond_<task>.csv holds what came out, one row per method,
-size and seed. How long a distillation took differs from run to run and has a file of its own, beyond_seconds.csv.
+`make beyond` makes the missing rows. data/results/beyond_<task>.csv holds the results, one row per method, size and
+seed. Distillation times differ from run to run, so they are in a separate file, beyond_seconds.csv.
 """
 
 from __future__ import annotations
@@ -50,25 +51,25 @@ from .sameness import sameness
 
 @dataclass(frozen=True)
 class Job:
-    """One row to come: a method at a size, with a seed. Size 0: the method's own."""
+    """One row to make: a method at a size, with a seed. Size 0: the method finds its own size."""
 
     task: str
     method: str
     size: int
     seed: int
-    agent: int = 0  # the shipped teacher, or one of `AGENTS`
+    agent: int = 0  # which teacher: 0 is the shipped one, others are in `AGENTS`
     tail: bool = False  # whether the worst returns are measured too
 
     @property
     def how(self) -> Method:
-        """The method, or `refined` with a part taken away."""
+        """The method, or `refined` with one part removed."""
         if self.method in (known := METHODS | RIVALS | LIKE | APART | DEMANDED | LIMIT | STARTS | ROBOTS):
             return known[self.method]
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
     @property
     def provenance(self) -> dict[str, str | int]:
-        """What names the row beside its seed: settings (an id), teacher, version."""
+        """What identifies the row besides its seed: settings (an id), teacher, version."""
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
@@ -76,17 +77,17 @@ class Job:
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
-        """Its file."""
+        """Return the path of the row's file in `folder`."""
         return provenance_folder(folder, self.task, self.provenance) / f"{self.seed:04d}.row"
 
     def about(self) -> dict:
-        """What its file names."""
+        """Return what the row's file says about the row."""
         named = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
-        return {**named, **self.provenance}  # which name the agent by its checksum, and the tail in the settings
+        return {**named, **self.provenance}  # provenance has the teacher's checksum; its settings include the tail
 
 
 def preset(task: str, kind: str) -> Refinement | Faithful | Config | Walking:
-    """The settings that a method of this kind has for `task`."""
+    """Return the preset of this kind for `task`."""
     kinds = {
         "tuned": tuned_preset, "paper": paper_preset, "faithful": faithful_preset, "limit": limit.limit_preset,
         "walking": walking_preset,
@@ -96,12 +97,12 @@ def preset(task: str, kind: str) -> Refinement | Faithful | Config | Walking:
 
 @cache
 def _teacher(task: str, agent: int) -> Teacher:
-    """The shipped teacher of a task, or one of its further ones, by number."""
+    """Return the shipped teacher of a task (0), or one of its further teachers, by number."""
     return load_teacher(list(further_teachers(task).values())[agent - 1] if agent else task)
 
 
 def jobs_of(task: str, table: str = "beyond") -> list[Job]:
-    """All rows of a task in a table, a key of `TABLES`."""
+    """List all rows of a task in `table`, a key of `TABLES`."""
     about, found = tables_of(task)[table], []
     for name, method in about.methods.items():
         if method.tasks is None or task in method.tasks:
@@ -127,13 +128,13 @@ def _seeds(task: str, method: Method, about: Table, size: int) -> range:
 
 
 def tables_of(task: str) -> dict[str, Table]:
-    """The tables that a task has rows in."""
+    """Return the tables in which a task has rows."""
     tables = ROBOT_TABLES if task in WALKERS else LONG_TABLES if task in LONG else TABLES
     return {name: table.of(task) for name, table in tables.items() if table.has(task)}
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
-    """Distil and measure: what the file of the row holds, no arrays and about."""
+    """Distil and measure one policy. Returns the content of the row's file: arrays (none if not Voronoi cells), about."""
     teacher = _teacher(job.task, job.agent)
     budget = Budget(teacher, get_task(job.task), preset(job.task, job.how.preset))
     began = time.perf_counter()
@@ -148,13 +149,13 @@ def make_row(job: Job) -> tuple[dict, dict]:
 
 
 def make_all(folder: str | os.PathLike, todo: list[Job], *, jobs: int | str = 1) -> None:
-    """Make the rows of `todo` that are missing in `folder`, the first seeds first; `jobs` as in `workers`."""
+    """Make the rows of `todo` that are missing in `folder`, lower seeds first; `jobs` as in `workers`."""
     todo = sorted(todo, key=lambda job: job.seed)
     make_missing(make_row, {job.path(folder): (job,) for job in todo}, "beyond", jobs=jobs, unit="rows")
 
 
 def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """What came out, one row per job, and how long each took. Raises `atomic.DamagedFile`."""
+    """Return the results, one row per job, and the time each took. Raises `atomic.DamagedFile`."""
     found, took = [], []
     for job in wanted:
         _, about = load_made(job.path(folder), "Row", job.about())
@@ -165,7 +166,7 @@ def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd
 
 
 def pairs(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
-    """How alike the policies of different seeds are, one row per size and pair, for rows whose files keep policies."""
+    """Compare the policies of different seeds, one row per size and pair. The files of `wanted` must hold policies."""
     found, by_kind = [], {}
     for job in wanted:
         arrays, _ = load_made(job.path(folder), "Row", job.about())

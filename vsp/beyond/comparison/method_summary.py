@@ -1,6 +1,6 @@
-"""What came out of the comparison beyond the paper, from the committed rows: summaries, rivals, and who is as good.
+"""Summarise the comparison beyond the paper from its committed rows: means, rivals, and which policies match.
 
-`method_tables` says what the methods are, `method_rows` makes the rows.
+A policy matches its teacher as `AS_GOOD` defines. `method_tables` defines the methods, `method_rows` makes the rows.
 """
 
 from __future__ import annotations
@@ -20,17 +20,19 @@ INTERVAL = ("mean", "low", "high")
 
 
 def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "beyond") -> pd.DataFrame:
-    """The committed rows of `task` in a table of `method_tables`, or those in another folder; `failing` is NaN where
-    nothing can reach a goal."""
+    """Read the rows of `task` in a table of `method_tables`, by default the committed ones, or those in `folder`.
+
+    `failing` is NaN for a task where no policy can reach a goal.
+    """
     frame = read_results(f"{table}_{task}", folder)
     return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame
 
 
 def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """One row per method and size of `frame`, rows as `read_rows` has them, the best mean return of a size first.
+    """Summarise rows of `read_rows`: one row per method and size, within a size the best mean return first.
 
-    Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median,
-    failing, error_teacher, error_own, cells, parameters, operations: means over the seeds.
+    Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median; and
+    failing, error_teacher, error_own, cells, parameters, operations (means over the seeds).
     """
     found = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):
@@ -43,11 +45,11 @@ def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def rivals(table: pd.DataFrame) -> pd.DataFrame:
-    """`refined` in a `method_summary` beside the best of the other methods at every size, one row per size.
+    """Compare `refined` with the best other method in a `method_summary`, one row per size.
 
-    Columns: size, mean, low, high, rival (its name), rival mean, rival low, rival high, ahead: "ours" or "theirs" where
-    the two intervals do not overlap, else "level"; untuned: the mean of `refined` without tuning, and untuned ahead
-    likewise.
+    Columns: size, mean, low, high, rival (the name of the best other method), rival mean, rival low, rival high, ahead
+    ("ours" or "theirs" if the two intervals do not overlap, else "level"), untuned (the mean of `refined` without
+    tuning), and untuned ahead (like ahead, for the untuned policies).
     """
     found = []
     for size, rows in table[table["size"] > 0].groupby("size"):
@@ -62,15 +64,15 @@ def rivals(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def ahead(own: dict | pd.Series, other: pd.Series) -> str:
-    """Who is ahead: "ours" or "theirs" where the intervals low to high do not overlap, else "level"."""
+    """Return which is ahead: "ours" or "theirs" if the intervals from low to high do not overlap, else "level"."""
     return "ours" if own["low"] > other["high"] else "theirs" if other["low"] > own["high"] else "level"
 
 
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
-    """`refined`, whole and with one part removed, at the size of the preset, as `method_summary` has it.
+    """Summarise `refined`, complete and with one part removed, at the size of the preset.
 
-    The column `part` names what was removed, in the words and the order of `PARTS`. Raises ValueError
-    for a task without such rows, one of `LONG`.
+    Columns are those of `method_summary`, and `part`: what was removed, in the words and the order of `PARTS`. Raises
+    ValueError for a task without such rows (those of `LONG`).
     """
     names = {f"refined, {part}": part for part in ABLATION} | {"refined": "all of it"}
     ablated = frame["method"].isin(names) & ~frame["method"].isin(METHODS)
@@ -81,7 +83,7 @@ def ablation(frame: pd.DataFrame) -> pd.DataFrame:
     return table.loc[[part for part in PARTS if part in table.index]].rename(index=PARTS).reset_index()
 
 
-PARTS = {  # of an ablation, in words
+PARTS = {  # the parts of the ablation, by key of `ABLATION`, as readers see them
     "all of it": "all parts",
     "cold from the start": "no annealing",
     "one beginning": "one restart",
@@ -95,9 +97,10 @@ PARTS = {  # of an ablation, in words
 
 
 def seeds_as_good(task: str, frame: pd.DataFrame, method: str = "refined") -> pd.DataFrame:
-    """How many seeds of a method match their teacher, as `AS_GOOD` defines it, one row per size.
+    """Return the share of a method's seeds that match the teacher, as `AS_GOOD` defines it, one row per size.
 
-    Columns: size, policies, reached (share of them), gap (median, to the teacher's mean return), failing (the most).
+    Columns: size, policies, reached (the share), gap (median of the mean return minus the teacher's), failing (highest
+    of a seed).
     """
     teacher = frame[frame["method"] == "teacher"].iloc[0]
     rows = frame[frame["method"] == method].assign(good=lambda own: AS_GOOD[task](own, teacher))
@@ -107,12 +110,12 @@ def seeds_as_good(task: str, frame: pd.DataFrame, method: str = "refined") -> pd
 
 
 def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """What came out in short: `refined` at the size of the preset, one row per task.
+    """Summarise `refined` at the size of the preset, one row per task.
 
-    `frames` are as `read_rows` has them, by task, and `summaries` theirs.
+    `frames` holds the rows of `read_rows` by task, and `summaries` their `method_summary` by task.
 
-    Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing, as in `seeds_as_good`, rival
-    (the best of the other methods with as many cells or leaves), rival mean, and rival reached.
+    Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing (as in `seeds_as_good`), rival
+    (the best other method with as many cells or leaves), rival mean, and rival reached.
     """
     columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
     found = []
@@ -125,9 +128,9 @@ def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]
     return pd.DataFrame(found)
 
 
-# When a policy is as good as its teacher. SimpleGoal: the mean return within 0.03 and the failures within 0.1 points.
-# MountainCar: no failure, and a higher return. Pendulum, where nothing can fail: within one part in a hundred.
-# LunarLander: within two.
+# When a policy matches its teacher. SimpleGoal: the mean return is at most 0.03 lower, and the failures at most 0.1
+# percentage points more. MountainCar: no failure, and a higher mean return. Pendulum, where nothing can fail: the mean
+# return is at most 1 % lower. LunarLander: at most 2 % lower.
 AS_GOOD = {
     "SimpleGoal-v0": lambda own, teacher: (
         (own["mean"] >= teacher["mean"] - 0.03) & (own["failing"] <= teacher["failing"] + 0.001)
