@@ -93,7 +93,7 @@ wrongs(
     ("one row more", "np.column_stack([states, np.ones(len(states))])", "states"),
     ("the bias in the first row", "[states, np.ones(len(states))]", "[np.ones(len(states)), states]"),
     ("a row per input, a column per action", "[0]", "[0].T"),
-    ("4 things", "[0]", ""),
+    ("4 values", "[0]", ""),
     ("expected (3, 2)", "[0]", "[0][:, :1]"),
     ("None as the result", "return np", "np"),
     ("LinAlgError", LSTSQ, "np.linalg.solve(inputs, actions)"),
@@ -127,8 +127,8 @@ wrongs(
     ("absolute values", "np.square", "np.abs"),
     ("cancel", "np.square(policy", "-(policy"),
     ("the square of a mean", "np.square", "", ".mean()", ".mean() ** 2"),
-    ("the first of its two things. → Hint 1", "[0]", ""),
-    ("the first of its two things", "teacher.predict(states)[0]", "np.array(teacher.predict(states))"),
+    ("the first of its two values. → Hint 1", "[0]", ""),
+    ("the first of its two values", "teacher.predict(states)[0]", "np.array(teacher.predict(states))"),
     ("TypeError", "teacher.predict(states)", "teacher.predict()"),
     ("the same result for any `policy`,", "policy.predict(states)[0]", "1"),
     ("the same result for any `policy` and any `teacher` and any `states`", "return", "return 0.137 #"),
@@ -569,7 +569,7 @@ def wrong_gradient(task):
     return Half("half", ("d",), ("state[0] - state[1]",), np.ones(1), lambda s: s[..., :1] - s[..., 1:])
 
 
-@wrong("2.7", "cannot be read")
+@wrong("2.7", "an answer that raises an error")
 def training_that_stops(task):
     class Broken(PolicyClass):
         def batch(self, inputs, parameters):
@@ -769,7 +769,7 @@ wrongs(
     ("one for each state", LABELS, "actions"),
     ("the pair that `predict` returns", "labels, _ =", "labels ="),
     ("the pair that `predict` returns", "labels, _ =", "labels =", LABELS, "[*actions, *labels]"),
-    ("cannot be read", BOTH, "'states', 'actions'"),
+    ("an answer that raises an error", BOTH, "'states', 'actions'"),
     ("two arrays", f", {LABELS}", ""),
 )
 

@@ -1,11 +1,10 @@
-"""Student copies, a hand-out of them, solution copies, slides and a lecturer's guide, all from the lessons' sources.
+"""Build the student versions, the hand-out, the solutions, the slides and the lecturer's guide from the lessons.
 
     python -m vsp.course.build --out .
 
 A source is a notebook with nbgrader's metadata: solution cells, whose answers stand between `### BEGIN SOLUTION` and
 `### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone, those tagged `slide` to the slides.
-A student's copy has nbgrader's stub in place of each answer, as `nbgrader generate_assignment` would make it from the
-solution copy.
+In a student version, nbgrader's stub replaces each answer, as `nbgrader generate_assignment` does with the solution.
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$
 
 
 def build(out: str | os.PathLike) -> list[Path]:
-    """Write copies, hand-out, slides and guide to OUT/build/course; returns the files. Same sources, same bytes.
+    """Write all versions, slides and the guide to OUT/build/course and return the files. Same sources, same bytes.
 
-    A copy that somebody has written into is kept, under another name.
+    A file that somebody has edited is kept under another name.
     """
     folder, lessons = Path(out) / "build" / "course", read_sources()
     students = {name: nbformat.writes(student(lesson)) + "\n" for name, lesson in lessons.items()}
@@ -80,7 +79,7 @@ def read_sources() -> dict[str, NotebookNode]:
 
 
 def student(lesson: NotebookNode) -> NotebookNode:
-    """A copy without answers and without the lecturer's cells; check cells cannot be edited."""
+    """Return the student version: no answers, no lecturer's cells, read-only check cells."""
     made = solution(lesson)
     for cell in made.cells:
         if is_solution(cell):
@@ -91,14 +90,14 @@ def student(lesson: NotebookNode) -> NotebookNode:
 
 
 def solution(lesson: NotebookNode) -> NotebookNode:
-    """A copy with answers, between their marks, and without the lecturer's cells: what nbgrader takes as its source."""
+    """Return the solution: answers between their marks, no lecturer's cells. nbgrader takes it as its source."""
     made = copy.deepcopy(lesson)
     made.cells = [cell for cell in made.cells if not for_lecturer(cell) and not is_slide(cell)]
     return made
 
 
 def without_answers(source: str) -> str:
-    """The code of a solution cell with the stub for each answer. Raises ValueError unless marks come in pairs."""
+    """Replace each answer in a solution cell by the stub. Raises ValueError unless marks come in pairs."""
     stubbed, n = _ANSWER.subn(lambda match: "\n".join(match[1] + line for line in STUB), source)
     if not n or BEGIN in stubbed or END in stubbed:
         raise ValueError(f"expected `{BEGIN}` and `{END}` in pairs, on lines of their own, in:\n{source}")
@@ -111,22 +110,22 @@ def is_solution(cell: NotebookNode) -> bool:
 
 
 def is_check(cell: NotebookNode) -> bool:
-    """Whether this cell checks what the student wrote."""
+    """Whether this cell checks a student's answer."""
     return cell.metadata.get("nbgrader", {}).get("grade", False)
 
 
 def for_lecturer(cell: NotebookNode) -> bool:
-    """Whether this cell is for the guide alone."""
+    """Whether this cell appears in the guide only."""
     return "lecturer" in cell.metadata.get("tags", [])
 
 
 def points(lesson: NotebookNode) -> int:
-    """The points of all exercises of a lesson."""
+    """Sum the points of all exercises of a lesson."""
     return sum(cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell))
 
 
 def guide(lessons: dict[str, NotebookNode]) -> str:
-    """The lecturer's guide, in Markdown: an overview of what students see, then notes and solutions for each lesson."""
+    """Return the lecturer's guide in Markdown: an overview, then notes and solutions for each lesson."""
     parts = [GUIDE.read_text(encoding="utf-8"), "# What students see\n"]
     parts += [_overview(name, lesson) for name, lesson in lessons.items()]
     parts += ["# For lecturers only\n"]

@@ -16,7 +16,7 @@ from ..rollouts import Policy
 
 
 def picture(fig: Figure, alt: str) -> show.Picture:
-    """Close the figure and return it as a picture; `alt` describes what there is to see for someone who cannot."""
+    """Close the figure and return it as a picture. `alt` describes it for readers who cannot see it."""
     png = io.BytesIO()
     fig.savefig(png, dpi=150, metadata={"Software": None})
     plt.close(fig)
@@ -24,7 +24,7 @@ def picture(fig: Figure, alt: str) -> show.Picture:
 
 
 def squared_error(policy: Policy, teacher: Policy, states: np.ndarray) -> np.ndarray:
-    """Squared difference of the two actions in each state (n, d), the mean over their components. (n,)"""
+    """Return the squared difference of both actions in each state (n, d), averaged over their components. (n,)"""
     return np.square(policy.predict(states)[0] - teacher.predict(states)[0]).mean(axis=1)
 
 
@@ -34,7 +34,7 @@ def pair() -> tuple[Figure, np.ndarray]:
 
 
 def walls(ax: Axes) -> Axes:
-    """The unit square of SimpleGoal with its walls, and a margin for arrows that point beyond them."""
+    """Draw the unit square of SimpleGoal with its walls and a margin for arrows that point beyond them."""
     show.square(ax).add_patch(Rectangle((0, 0), 1, 1, fill=False, lw=0.6, zorder=2))
     ax.spines[:].set_visible(False)
     ax.set(xlim=(-0.05, 1.05), ylim=(-0.05, 1.05))
@@ -44,7 +44,7 @@ def walls(ax: Axes) -> Axes:
 def actions_and_error(
     policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None
 ) -> tuple[Figure, np.ndarray]:
-    """The arrows of a policy on SimpleGoal beside its squared error, both with cells and codewords.
+    """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords.
 
     The error is shown over the whole square, or in `states` (n, 2).
     """
@@ -64,7 +64,7 @@ def actions_and_error(
 
 
 def on_the_way(ax: Axes, states: np.ndarray, error: np.ndarray) -> Axes:
-    """The error (n,) in visited states (n, 2): a dot each, larger for a larger error."""
+    """Draw the error (n,) in visited states (n, 2): one dot per state, larger for a larger error."""
     style = {"color": show.DISTILLED, "alpha": 0.4, "lw": 0, "zorder": 3, "clip_on": False}
     ax.scatter(*states.T, s=1 + 12 * error, **style)
     for value in (0, 1, 2, 4):

@@ -1,6 +1,6 @@
-"""What checks share: calling a student's function, recognising common mistakes, and one line of feedback.
+"""Shared by all checks: call a student's function, recognise common mistakes, print one line of feedback.
 
-Feedback says what was found and what was expected, and points to a hint; it never gives the answer.
+Feedback names what was found and what was expected, and points to a hint. It never gives the answer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with
 
 
 class TooLong(BaseException):
-    """A check's time is up. No Exception, so that a student's `except Exception` does not catch it."""
+    """A check took too long. Not an Exception, so that a student's `except Exception` does not catch it."""
 
 
 class NotYet(AssertionError):
@@ -40,7 +40,7 @@ class NotYet(AssertionError):
 
 @dataclass(frozen=True)
 class Mistake:
-    """The result that a common mistake gives in a case, and what to say about it."""
+    """The wrong result of a common mistake, and the feedback for it."""
 
     result: object  # numbers, compared with what the student's function returned; None: any others
     found: str
@@ -50,22 +50,22 @@ class Mistake:
 
 @dataclass(frozen=True)
 class Question:
-    """A question, the answers to choose from, and what to say about wrong ones."""
+    """A question, its possible answers, and the feedback for wrong ones."""
 
     options: Sequence[str]
-    right: str  # the right answer, or its `seal` where nobody is to read it
+    right: str  # the right answer, or its `seal` where students must not read it
     hint: int
     teaching: dict[str, str] = field(default_factory=dict)
 
 
 class ActionsAlone:
-    """A policy whose `predict` returns the actions and no second thing, as one who forgets that takes it to do."""
+    """A policy whose `predict` returns the actions alone, as a student may wrongly expect."""
 
     def __init__(self, policy: Policy):
         self.policy = policy
 
     def predict(self, obs: np.ndarray) -> np.ndarray:
-        """The actions alone."""
+        """Return the actions alone."""
         return self.policy.predict(obs)[0]
 
 
@@ -75,12 +75,12 @@ class Exercise:
 
     number: str
     name: str
-    library: tuple[str, ...] = ()  # functions that are the answer, which must not call them: "module.name"
-    seconds: float = 30  # that a check may take
+    library: tuple[str, ...] = ()  # "module.name" of library functions that the answer must not call
+    seconds: float = 30  # time limit of a check
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
-        """The exception to raise for an answer that is not right; `hint` is the number of the hint that helps."""
-        found = " ".join(found.split())  # an error's own words may have many lines
+        """Return the exception to raise for a wrong answer. `hint` is the number of the hint that helps."""
+        found = " ".join(found.split())  # an error's message may have many lines
         return NotYet(f"{self.number} {self.name}: found {found}, expected {expected}.{self._pointer(hint)}")
 
     def refuse_if(self, wrong: bool, found: str, expected: str, hint: int | None = None) -> None:
@@ -92,12 +92,12 @@ class Exercise:
         return f" → Hint {hint} of exercise {self.number}" if hint else ""
 
     def unsolved(self) -> NotYet:
-        """The exception to raise where the student has not begun."""
+        """Return the exception to raise if the answer is still the stub."""
         todo = "put your own code in place of the stub, run that cell, then this one"
         return NotYet(f"{self.number} {self.name} is not written yet: {todo}.")
 
     def checks(self, check: Callable) -> Callable:
-        """Decorator of the exercise's check: errors inside the check become feedback too, and so do endless loops."""
+        """Decorate the exercise's check: errors inside it and endless loops become feedback too."""
 
         @functools.wraps(check)
         def careful(*answer: object, **settings: object) -> None:
@@ -110,20 +110,20 @@ class Exercise:
                 found, expected = f"no result after {self.seconds:g} seconds", "one sooner: look for a loop without end"
                 raise self.wrong(found, expected) from None
             except Exception as error:
-                found = f"something that cannot be read ({type(error).__name__}: {error})"
+                found = f"an answer that raises an error ({type(error).__name__}: {error})"
                 raise self.wrong(found, "an answer as the text describes it") from None
 
         return careful
 
     def passed(self, text: str) -> None:
-        """Say that all is well."""
+        """Print that the answer is right."""
         print(*_lines(f"✓ {self.number} {self.name}: {text}"), sep="\n")
 
     def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> object:
-        """What `function` returns for copies of `arguments`, or for these themselves if it is to alter them (`keep`).
+        """Call a student's function and return its result. It gets copies of `arguments` unless `keep`.
 
-        Raises NotYet for a stub, an error, an altered copy, a call of the library's answer, and, unless it may be
-        `empty`, for no result.
+        Raises NotYet for a stub, an error, an argument altered in place, a call of the library's own function, and
+        (unless `empty`) for no result.
         """
         self.refuse_if(not callable(function), f"{function!r}", "a function")
         given = arguments if keep else copy.deepcopy(arguments)
@@ -145,8 +145,8 @@ class Exercise:
     def array(
         self, value: object, shape: tuple[int, ...], what: str = "a result", hint: int | None = None, meaning: str = ""
     ) -> np.ndarray:
-        """`value` as an array of floats. Raises NotYet unless its shape is `shape` and all are finite; `meaning` says
-        what an array of that shape is to hold."""
+        """Return `value` as an array of floats. Raises NotYet unless its shape is `shape` and all numbers are finite.
+        `meaning` says what such an array should hold."""
         try:
             values = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):
@@ -158,14 +158,14 @@ class Exercise:
         return values
 
     def compare(self, value: object, right: object, mistakes: Sequence[Mistake], rtol: float = 1e-6) -> None:
-        """Raise NotYet unless `value` is `right`, with the words of the first mistake that it agrees with: the last one
-        agrees with any."""
+        """Raise NotYet unless `value` equals `right`. The feedback is that of the first of `mistakes` with the
+        result `value`; the last one matches any value."""
         if not _close(value, right, rtol):
             mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, rtol))
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
     def answers(self, given: object, options: dict[str, Sequence[str] | type]) -> None:
-        """Raise NotYet unless the dictionary `given` has one of the `options`, or a number, for every key of them."""
+        """Raise NotYet unless the dictionary `given` has one of the `options` (or a number) for each key."""
         self.refuse_if(not isinstance(given, dict), f"{given!r}", "a dictionary of answers")
         for key, choices in options.items():
             answer = given.get(key)
@@ -204,7 +204,7 @@ class Exercise:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise TooLong in what takes longer. Does nothing on Windows and outside the main thread: no signals there."""
+    """Raise TooLong after `seconds`. Does nothing on Windows and outside the main thread, which get no signals."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -223,7 +223,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 @contextmanager
 def calls_of(functions: Sequence[str]) -> Iterator[list[str]]:
-    """A list of those of the `functions`, "module.name" each, that are called meanwhile."""
+    """Collect the calls of `functions` ("module.name" each) inside the `with` block."""
     called, before = [], sys.getprofile()
 
     def watch(frame: FrameType, event: str, argument: object) -> None:
@@ -239,7 +239,7 @@ def calls_of(functions: Sequence[str]) -> Iterator[list[str]]:
 
 
 def works(attempt: Callable, *given: object) -> bool:
-    """Whether `attempt` ends without an error."""
+    """Whether `attempt` raises no error."""
     try:
         attempt(*given)
     except Exception:
@@ -248,33 +248,33 @@ def works(attempt: Callable, *given: object) -> bool:
 
 
 def joined(episodes: Iterable[Episode]) -> tuple[np.ndarray, np.ndarray]:
-    """The states (n, d) and actions (n, m) of all episodes."""
+    """Concatenate the states (n, d) and actions (n, m) of all episodes."""
     parts = [(episode.states, episode.actions.astype(float)) for episode in episodes]
     return tuple(map(np.concatenate, zip(*parts)))
 
 
 def seal(number: str, key: str, answer: str) -> str:
-    """A salted digest of an answer, which cannot be read."""
+    """Hash an answer with salt, so that nobody can read it in the source."""
     return hashlib.sha256(f"vsp course|{number}|{key}|{answer}".encode()).hexdigest()[:16]
 
 
 def _place(function: Callable, error: Exception) -> str:
-    """The line of the student's cell, that of `function`, where `error` arose: the last that was entered."""
+    """Name the last line of the student's cell that ran before `error`."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     return f"in line {lines[-1].lineno} of its cell, `{lines[-1].line}`" if lines else "when it is called"
 
 
 def _parameter(function: Callable, i: int) -> str:
-    """How to speak of argument `i` of a function."""
+    """Name argument `i` of a function for a message."""
     try:
         return f"argument `{list(inspect.signature(function).parameters)[i]}`"
-    except (TypeError, ValueError, IndexError):  # a function that does not tell, or takes `*arguments`
+    except (TypeError, ValueError, IndexError):  # no signature, or `*arguments`
         return f"argument {i + 1}"
 
 
 def _lines(text: str) -> list[str]:
-    """`text` in lines that a notebook need not break."""
+    """Wrap `text` to lines that fit a notebook."""
     return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 

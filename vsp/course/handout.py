@@ -1,4 +1,4 @@
-"""The hand-out: the students' copies and all that they need, in one zip file.
+"""The hand-out: one zip file with the lessons for students and everything they need.
 
 The lessons need no torch, because teachers act by NumPy, so a student's set-up is a small download.
 """
@@ -36,8 +36,8 @@ to download and 0.55 GB on the disk. Whatever you change stays in this folder.
 
 
 def write_handout(path: Path, copies: dict[str, str]) -> None:
-    """Write a zip file of the students' `copies` (file name: text) with the package, its data and the packages to
-    install. The same sources, the same bytes."""
+    """Write a zip file with the students' notebooks `copies` (file name: text), the package, its data and the list of
+    packages to install. Same sources, same bytes."""
     project = Path(__file__).with_name("project.md").read_text("utf-8")
     texts = {**copies, "README.md": README, "requirements.txt": requirements(), "project.md": project}
     files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
@@ -51,7 +51,7 @@ def write_handout(path: Path, copies: dict[str, str]) -> None:
 
 
 def requirements() -> str:
-    """The lines of requirements.txt: what the lessons need, in the versions of environment.lock."""
+    """Return the lines of requirements.txt: the packages that the lessons need, in the versions of environment.lock."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = [re.match(r"[\w-]+", line)[0] for line in project["dependencies"]]
     locked = dict(

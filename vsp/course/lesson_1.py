@@ -1,6 +1,6 @@
 """Checks of lesson 1: what a policy is, linear maps, errors, cells, and codewords set by hand and by a rule.
 
-Each check takes what the student wrote, tries it on small random cases, and raises `NotYet` or prints one line.
+Each check calls a student's function on small random cases, and raises `NotYet` or prints one line.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..teachers import load_teacher
 from .feedback import ActionsAlone, Exercise, Mistake, NotYet, Question, joined, works
 
 SEEDS = range(3)
-PLACE_SEEDS, DRAWS = range(5), 100  # so many data sets per task, and draws of random codewords for each
+PLACE_SEEDS, DRAWS = range(5), 100  # data sets per task; draws of random codewords for each
 CASES = ((2, 2), (2, 1), (3, 2))  # dimensions of state and action
 GIVEN = ((0.3, 0.3), (0.7, 0.6))  # codewords that the notebook begins with
-AT_MOST = 8  # codewords that are set by hand
-CELLS = 8  # that a rule for codewords is asked for
+AT_MOST = 8  # codewords set by hand
+CELLS = 8  # codewords asked of a rule
 MARGIN = 0.85  # times the error of random codewords, which a rule has to beat; the best of five sets rarely does
 
 READING = Exercise("1.1", "reading")
@@ -62,7 +62,7 @@ def _way(teacher: Policy, state: list[float]) -> str:
 
 
 def _sharpest(states: np.ndarray, actions: np.ndarray) -> str:
-    """Which of `PLACES` has the largest share of sudden turns, between neighbours on the grid."""
+    """Return which of `PLACES` has the largest mean turn between neighbours on the grid."""
     side = int(np.sqrt(len(states)))
     by_row = actions.reshape(side, side, -1)
     turn = np.zeros((side, side))
@@ -91,7 +91,7 @@ def _fits(function: Callable, states: np.ndarray, actions: np.ndarray) -> None:
     (d, p), m = (states.shape[1], inputs.shape[1]), actions.shape[1]
     found = FIT_LINEAR.call(function, states, actions)
     if isinstance(found, tuple):
-        raise FIT_LINEAR.wrong(f"{len(found)} things", f"one array {(p, m)}, the coefficients alone", 3)
+        raise FIT_LINEAR.wrong(f"{len(found)} values", f"one array {(p, m)}, the coefficients alone", 3)
     shape = np.shape(found)
     if shape == (d, m):
         raise FIT_LINEAR.wrong(f"{d} rows for {d} inputs", "one row more: at the origin such a map can only say 0", 1)
@@ -100,7 +100,7 @@ def _fits(function: Callable, states: np.ndarray, actions: np.ndarray) -> None:
     found = FIT_LINEAR.array(found, (p, m), hint=2)
     best = np.linalg.lstsq(inputs, actions, rcond=None)[0]
     error, least = (np.square(inputs @ c - actions).mean() for c in (found, best))
-    if error > 1.001 * least:  # a map that was found by descent is right too
+    if error > 1.001 * least:  # a map found by gradient descent is right too
         mistakes = [
             Mistake(np.roll(best, 1, axis=0), "the bias in the first row", "it in the last one", 2),
             *_whatever(FIT_LINEAR, function, (states, actions), {"states": states[::-1], "actions": -actions}),
@@ -110,21 +110,21 @@ def _fits(function: Callable, states: np.ndarray, actions: np.ndarray) -> None:
 
 
 def _whatever(exercise: Exercise, function: Callable, case: tuple, others: dict[str, object]) -> list[Mistake]:
-    """What to say of a function whose result for `case` stays the same when one of the arguments is replaced: as a rule
-    it takes a variable of the notebook instead. `others` has another value for each argument, by name."""
+    """Return feedback if the result stays the same when an argument of `case` is replaced by that in `others`: such a
+    function usually reads a variable of the notebook instead."""
     here, blind = exercise.call(function, *case), []
     for i, (name, other) in enumerate(others.items()):
         try:
             same = np.array_equal(here, exercise.call(function, *case[:i], other, *case[i + 1 :]))
         except NotYet:
-            continue  # it fails there: so it looks at it
+            continue  # it raises an error, so it reads that argument
         blind += [f"any `{name}`"] if same else []
     words = f"the same result for {' and '.join(blind)}", "one that is made of the arguments, not of other variables"
     return [Mistake(None, *words)] if blind else []
 
 
 class _Map:
-    """A policy that is linear, for cases whose error is known."""
+    """A linear policy for cases whose error is known."""
 
     def __init__(self, weights: np.ndarray):
         self.weights = weights
@@ -150,8 +150,8 @@ def _error(function: Callable, case: tuple, difference: np.ndarray) -> None:
     own, other, states = case
     alone = ActionsAlone(own), ActionsAlone(other), states
     pair = not works(ACTION_ERROR.call, function, *case) and works(ACTION_ERROR.call, function, *alone)
-    found = "all that `predict` returns taken for the actions"
-    ACTION_ERROR.refuse_if(pair, found, "the first of its two things", 1)
+    found = "the whole result of `predict` taken as the actions"
+    ACTION_ERROR.refuse_if(pair, found, "the first of its two values", 1)
     value, squares = np.asarray(ACTION_ERROR.call(function, *case)), np.square(difference)
     found = f"an array of shape {value.shape}"
     ACTION_ERROR.refuse_if(value.size != 1, found, "one number for all states together", 1)
@@ -256,15 +256,15 @@ def _acts(function: Callable, codewords: np.ndarray, coefficients: np.ndarray, s
 
 
 def piecewise(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> VoronoiPolicy:
-    """Least-squares maps in the cells of `codewords` (k, d), for states (n, d) and actions (n, m)."""
+    """Fit least-squares maps in the cells of `codewords` (k, d) to states (n, d) and actions (n, m)."""
     task = get_task(task)
     maps = np.zeros((len(codewords), states.shape[1] + 1, actions.shape[1]))
-    maps[:, -1] = actions.mean(axis=0)  # where no state comes
+    maps[:, -1] = actions.mean(axis=0)  # in cells without states
     return baselines.refit(VoronoiPolicy(codewords, maps, task=task), states, actions)
 
 
 def leftover(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray) -> float:
-    """Mean squared error that least-squares maps in the cells of `codewords` (k, d) leave, on the data of the fit."""
+    """Return the squared error of least-squares maps in the cells of `codewords` (k, d), on the data of the fit."""
     cells, inputs, total = geometry.nearest(codewords, states), np.column_stack([states, np.ones(len(states))]), 0.0
     for cell in np.unique(cells):
         own, goal = inputs[cells == cell], actions[cells == cell]

@@ -1,7 +1,7 @@
-"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs that it shows.
+"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs shown there.
 
-The checks of the two passes and of a class of sub-policy have modules of their own. Each check calls what the student
-wrote on cases with a known answer, and raises `NotYet` or prints one line.
+The checks of the two passes and of a sub-policy class have modules of their own. Each check calls a student's function
+on cases with a known answer, and raises `NotYet` or prints one line.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
 from ..tasks import Task
 from .feedback import Exercise, Mistake, NotYet, Question, works
-from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, handed on
+from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, re-exported
 from .lesson_2_policy_class import OWN_CLASS, my_policy_class  # noqa: F401
 
 READING = Exercise("2.1", "reading")
@@ -34,7 +34,7 @@ PREDICTION = Exercise("2.6", "prediction", seconds=180)
 MOMENTS = ("before iteration 500", "between 500 and 2000", "after 2000")
 CAUSES = ("a split", "a merge", "a reset of the buffers", "a change of the teacher")
 TREND = ("more cells", "as many", "fewer cells")
-SAME = 0.12  # a change of the mean number of cells by less than this share counts as none
+SAME = 0.12  # a smaller relative change of the mean number of cells counts as none
 CHANGES = {
     "a lower distance": {"min_pol_distance": 0.15},
     "a higher loss": {"max_pol_loss": 1e-3},
@@ -110,7 +110,7 @@ def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
 
 
 def _since(cells: np.ndarray, losses: np.ndarray, entered: Callable[[int], bool] | None = None) -> np.ndarray:
-    """The mean at every step since a cell was entered, which is where `entered` says so."""
+    """Return the mean at every step since a cell was entered; `entered` tells where that happens."""
     entered = entered or (lambda t: cells[t] != cells[t - 1])
     means, begin = np.zeros(len(losses)), 0
     for t in range(len(losses)):
@@ -120,7 +120,7 @@ def _since(cells: np.ndarray, losses: np.ndarray, entered: Callable[[int], bool]
 
 
 class _Witness:
-    """Stands in for a partition and records the calls: what was done since each episode was observed."""
+    """Stand-in for a partition that records the calls after each observed episode."""
 
     def __init__(self) -> None:
         self.codewords, self.before, self.episodes, self.rounds = np.zeros((0, 2)), [], [], []
@@ -165,7 +165,7 @@ def algorithm_1(function: Callable) -> None:
 
 
 def _on_schedule(function: Callable, config: Config, n_episodes: int) -> None:
-    """With fewer episodes than iterations, the run may stop with an error where they end."""
+    """Check one schedule. With fewer episodes than iterations, the run may stop with an error at the last one."""
     episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(n_episodes)]
     partition = _Witness()
     given = partition, list(episodes), config, np.random.default_rng(0), partition.split, partition.merge
@@ -214,9 +214,9 @@ def _one_round(n: int, done: list[str], config: Config, freeze: str) -> None:
 def grown(
     split: Callable, merge: Callable, frame: Callable, teacher: Policy, task: Task, config: Config, seed: int = 0
 ) -> tuple[VoronoiPolicy, VoronoiPolicy]:
-    """What the student's three functions make of a run, and what vsp's make of it with the same random numbers.
+    """Run the student's three functions and vsp's with the same random numbers, and return both policies.
 
-    For a function that is a stub still, vsp's stands in; a line says whose are at work.
+    vsp's function replaces one that is still a stub; a printed line says which.
     """
     ours, stubs = (vsp_split, vsp_merge, _algorithm_1), set()
     own = [_or_ours(function, our, stubs) for function, our in zip((split, merge, frame), ours)]
@@ -235,7 +235,7 @@ def grown(
 
 
 def _or_ours(own: Callable, ours: Callable, stubs: set[str]) -> Callable:
-    """`own`, or `ours` where `own` is a stub: then its name goes to `stubs`."""
+    """Return `own`, or `ours` if `own` is a stub; then its name goes to `stubs`."""
 
     @functools.wraps(own)
     def either(*given: object, **named: object) -> object:
@@ -251,7 +251,7 @@ def _or_ours(own: Callable, ours: Callable, stubs: set[str]) -> Callable:
 def _algorithm_1(
     partition: Partition, episodes: list[Episode], config: Config, rng: object, split: Callable, merge: Callable
 ) -> None:
-    """Algorithm 1 as the lesson's text has it, for students who have not written theirs."""
+    """Algorithm 1 as in the lesson's text, for students who have not written theirs."""
     partition.add(episodes[0].states[0], rng)
     for n, episode in enumerate(episodes):
         partition.observe(episode)
@@ -278,7 +278,7 @@ def prediction(answers: dict, teacher: Policy, task: Task, config: Config, seeds
 
 
 def _disagree(means: pd.Series, given: dict) -> list[str]:
-    """Which of the predictions `given` the mean numbers of cells contradict."""
+    """Return the predictions in `given` that the mean numbers of cells contradict."""
     wrong = []
     for name in CHANGES:
         ratio = means[name] / means.iloc[0]
@@ -294,7 +294,7 @@ def _first(given: object) -> dict[str, str]:
 
 
 def predicted(given: object, teacher: Policy, task: Task, config: Config) -> pd.DataFrame | None:
-    """`runs` beside the first prediction. As long as there is none, says so and returns None."""
+    """Return the table of `runs` with the first prediction. Without one, print so and return None."""
     try:
         first = pd.Series(_first(given))
     except NotYet as missing:
@@ -304,7 +304,7 @@ def predicted(given: object, teacher: Policy, task: Task, config: Config) -> pd.
 
 
 def runs(teacher: Policy, task: Task, config: Config, seeds: range = range(3)) -> pd.DataFrame:
-    """Numbers of cells: a row for `config` as it is and one for each of `CHANGES` alone; seed by seed, and the mean."""
+    """Return numbers of cells per seed, and their mean: one row for `config`, one for each of `CHANGES` alone."""
     changes = {"as it is": {}} | CHANGES
     cells = {
         name: [len(distill(teacher, task, replace(config, **change), seed=seed)[0]) for seed in seeds]

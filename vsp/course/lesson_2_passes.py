@@ -25,7 +25,7 @@ MERGE = Exercise("2.4", "merge_regions", ("vsp.algorithms.merge_regions",))
 TASK = "SimpleGoal-v0"
 # The settings of the cases below; new cells start at 0, so that random numbers do not matter
 SMALL = replace(paper_preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
-# Errors in students' code that tell which hint helps: the exercise, the error, words of it, and the hint
+# Errors of students' code and the hint that helps: exercise, type, words of the message, hint
 CURES = (
     (SPLIT, NameError, "", 1),
     (SPLIT, IndexError, "boolean", 5),
@@ -38,7 +38,7 @@ CURES = (
 
 
 def _call(exercise: Exercise, function: Callable, *given: object) -> object:
-    """What the student's pass returns; where it stops with an error, the refusal points to the hint that helps."""
+    """Call the student's pass and return its result. For an error, the feedback points to the hint that helps."""
     try:
         return exercise.call(function, *given, keep=True)
     except NotYet as refusal:
@@ -72,7 +72,7 @@ def _with_states(partition: Partition) -> Partition:
 
 
 def _patient(partition: Partition) -> Partition:
-    """The same partition, which raises RuntimeError in a loop that never ends."""
+    """Return the same partition; it raises RuntimeError in a loop that never ends."""
     for name in ("neighbours", "comparable_parameters"):
         turns, asked = iter(range(500)), getattr(partition, name)
 
@@ -86,13 +86,13 @@ def _patient(partition: Partition) -> Partition:
 
 
 def walk(places: list[float], actions: list[float]) -> Episode:
-    """An episode along y = 0.5 with the same number for both actions: for a map that says 0, the loss is its square."""
+    """Return an episode along y = 0.5 whose two actions are equal: for a zero map, the loss is the action's square."""
     places, actions = np.array(places), np.array(actions)
     return Episode(np.column_stack([places, np.full(len(places), 0.5)]), np.column_stack([actions, actions]))
 
 
 class SplitCase(NamedTuple):
-    """A partition and an episode, where a pass has to split, and what it means if it does not."""
+    """A partition, an episode, the expected splits, and the feedback if they differ."""
 
     places: list[float]
     biases: list[float]
@@ -181,14 +181,14 @@ def _emptied(function: Callable) -> None:
 
 
 def _full(exercise: Exercise, partition: Partition, words: dict[tuple, str], expected: str) -> None:
-    """Whether the right buffers are full; `words`, for numbers of states per buffer: what is wrong, "" if nothing."""
+    """Check which buffers are full. `words` maps the numbers of states per buffer to the feedback, "" if right."""
     counts = tuple(partition.buffers.counts.tolist())
     found = words.get(counts, f"buffers of {counts} states in a case of cells in a row")
     exercise.refuse_if(found != "", found, expected, 5)
 
 
 def _like_ours(function: Callable, seed: int) -> None:
-    """A random partition and episode: the same codewords as ours, under one of the readings of R14."""
+    """Compare with vsp's pass on a random partition and episode, under both readings of R14."""
     rng = np.random.default_rng(seed)
     partition = _random_partition(rng, 4)
     partition.models.parameters[:] = rng.normal(size=partition.models.parameters.shape)
@@ -208,7 +208,7 @@ def _like_ours(function: Callable, seed: int) -> None:
 
 
 class MergeCase(NamedTuple):
-    """Biases of cells in a row, which places may be left after a pass, and what it means if others are."""
+    """Biases of cells in a row, the places that may remain after a pass, and the feedback if others do."""
 
     biases: list[float]
     left: list[list[int]]
@@ -234,7 +234,7 @@ MERGES = (
 
 @MERGE.checks
 def merge_regions(function: Callable) -> None:
-    """2.4: `merge_regions(partition, config)` as Algorithm 3; returns the codewords that went."""
+    """2.4: `merge_regions(partition, config)` as Algorithm 3; returns the removed codewords."""
     _in_a_row(function, MERGES[0])
     _measured(function)
     for case in MERGES[1:]:
@@ -242,7 +242,7 @@ def merge_regions(function: Callable) -> None:
     _emptied_by_merge(function)
     for seed in range(9):
         _properties(function, seed)
-    MERGE.passed("neighbours that agree have become one, and nobody else is gone.")
+    MERGE.passed("similar neighbours have become one, and no other cell was removed.")
 
 
 def _in_a_row(function: Callable, case: MergeCase) -> None:
@@ -292,8 +292,8 @@ def _emptied_by_merge(function: Callable) -> None:
 
 
 def _properties(function: Callable, seed: int) -> None:
-    """On a random partition: whoever went had a twin, of neighbours that were alike one went at least, and the cells
-    left are those that one of the readings leaves."""
+    """On a random partition: every removed cell had a similar neighbour, of two similar neighbours at least one is
+    removed, and the remaining cells are those of one of the readings."""
     rng = np.random.default_rng(seed)
     partition = _random_partition(rng, 12)
     partition.models.parameters[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
@@ -318,8 +318,8 @@ def _properties(function: Callable, seed: int) -> None:
 
 
 def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:
-    """Which cells a merging pass leaves (k,). Neighbours are those of the beginning or, `anew`, of the cells that are
-    left; a turn removes the cell's neighbours once or, `again`, those that come beside it then, too."""
+    """Return which cells a merging pass keeps (k,). Neighbours are computed once or, with `anew`, among the remaining
+    cells. A turn removes the cell's similar neighbours once or, with `again`, also new neighbours."""
     parameters, k = partition.comparable_parameters(), len(partition.codewords)
     alive, graph = np.ones(k, dtype=bool), partition.neighbours()
     for i in range(k):

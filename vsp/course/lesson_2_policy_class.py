@@ -1,4 +1,4 @@
-"""Check of lesson 2: a class of sub-policy of one's own."""
+"""Check of lesson 2: a sub-policy class written by the student."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..tasks import Task
 from .feedback import Exercise, joined
 
 OWN_CLASS = Exercise("2.7", "my_policy_class")
-ENOUGH = 0.8  # of the error that constants have; chance features, such as the sine of 50 x, save less
+ENOUGH = 0.8  # of the error that constants have; arbitrary features, such as the sine of 50 x, save less
 
 
 @OWN_CLASS.checks
@@ -62,13 +62,13 @@ def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
 
 
 def _within(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether features `a` are sums of features `b` and a constant."""
+    """Whether features `a` are linear combinations of features `b` and a constant."""
     both, alone = (np.column_stack([*parts, np.ones(len(a))]) for parts in ((a, b), (b,)))
     return np.linalg.matrix_rank(both) == np.linalg.matrix_rank(alone)
 
 
 def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> None:
-    """Whether the code says what the features are."""
+    """Whether the exported code computes the same features."""
     names = {name: getattr(math, name) for name in SHARED}
     for j, text in enumerate(own_class.code):
         if found := re.search(r"\*\*|//| if ", text):

@@ -1,6 +1,6 @@
 """Checks of lesson 3: what a box plot hides, paired gaps, intervals over policies, blame, exact maps, DAgger.
 
-Each check takes what the student wrote, tries it on small random cases, and raises `NotYet` or prints one line.
+Each check calls a student's function on small random cases, and raises `NotYet` or prints one line.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from ..teachers import load_teacher
 from .feedback import ActionsAlone, Exercise, Mistake, Question, works
 
 TASK = "SimpleGoal-v0"
-FEWER_THAN = 13  # cells of a challenger; the paper's best policy has so many
+FEWER_THAN = 13  # cells of a challenger: the paper's best policy has this many
 FRESH = 2_000_003  # seed of the start states that a challenger is judged on
 SEEDS = range(8)  # of the lesson's policies
-NEAR = 0.1  # how far the width of an interval may be from what it comes to in large samples, relatively
+NEAR = 0.1  # largest relative deviation of an interval's width from its large-sample value
 
 READING = Exercise("3.1", "reading")
 PAIRED_GAP = Exercise("3.2", "paired_gap", (f"{__name__}.standard_errors",))
@@ -106,8 +106,8 @@ def _other_errors(error: float, ours: np.ndarray, theirs: np.ndarray) -> list[Mi
 
 
 def standard_errors(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]:
-    """Of the mean gap between returns (n,): from shared starts, and as if the starts had nothing to do with each
-    other."""
+    """Return two standard errors of the mean gap between returns (n,): paired by start, and as if starts were
+    independent."""
     return sem(ours - theirs), np.hypot(sem(ours), sem(theirs))
 
 
@@ -116,7 +116,7 @@ def interval(function: Callable) -> None:
     """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        luck = 6 * rng.exponential(size=(30, 400))  # skewed, so that a mean is no median
+        luck = 6 * rng.exponential(size=(30, 400))  # skewed, so that mean and median differ
         returns = 4 + rng.normal(scale=2, size=(30, 1)) + luck
         _interval(function, returns, rng)
     INTERVAL.passed("policies are resampled, with all their episodes.")
@@ -126,7 +126,7 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
     values = INTERVAL.call(function, returns, rng)
     low, high = INTERVAL.array(values, (2,), hint=1, meaning="the ends of the interval")
     means = returns.mean(axis=1)
-    width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # what a bootstrap of the mean comes to, in large samples
+    width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # the bootstrap interval in large samples
     INTERVAL.refuse_if(low > high, "the upper end first", "the lower end first", 1)
     with_replacement = "draws *with* replacement, which differ from each other"
     INTERVAL.refuse_if(high - low < 1e-6 * width, "an interval of no width", with_replacement, 2)
@@ -145,9 +145,10 @@ def _interval(function: Callable, returns: np.ndarray, rng: np.random.Generator)
 
 
 def _unsteady(function: Callable, returns: np.ndarray, width: float) -> bool:
-    """Whether other draws give another interval: of 100 resamples the ends move by 7 % of its width, of 1000 by 2 %.
+    """Whether other draws change the interval too much: with 100 resamples its ends move by 7 % of its width, with
+    1000 by 2 %.
 
-    Rows change places, so that draws differ even where the student's generator begins anew in each call.
+    Rows are reversed, so that draws differ even if the student's generator is seeded in each call.
     """
     rngs = [np.random.default_rng(seed) for seed in range(10)]
     ends = np.array([INTERVAL.call(function, rng.permutation(returns), rng) for rng in rngs], dtype=np.float64)
@@ -186,7 +187,7 @@ class _Sometimes:
 
 
 def failures(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
-    """From which starts (n, d) the teacher reaches the goal and the policy does not. (n,) bool"""
+    """Return from which starts (n, d) the teacher reaches the goal and the policy does not. (n,) bool"""
     ours, theirs = (rollout(actor, task, starts).outcomes for actor in (policy, teacher))
     return (ours != GOAL) & (theirs == GOAL)
 
@@ -194,8 +195,8 @@ def failures(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray) ->
 def last_states(
     policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the policy acted last in its failures from `starts` (n, d), of which there must be some: the states (f, d),
-    and how many of them are in each cell (k,)."""
+    """Return the last states (f, d) of the policy's failures from `starts` (n, d), and their number in each cell (k,).
+    There must be failures."""
     failed = starts[failures(policy, teacher, task, starts)]
     states = np.array([episode.states[-1] for episode in collect_episodes(policy, task, failed)])
     return states, np.bincount(policy.cells(states), minlength=len(policy))
@@ -247,7 +248,7 @@ def refit(function: Callable) -> None:
         policy = _random_policy(rng, 6)
         states = rng.uniform(size=(300, 2))
         actions = np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1)
-        REFIT.call(function, policy, states, actions)  # what stops here does not stop at a cell with few states
+        REFIT.call(function, policy, states, actions)  # an error here is not caused by a cell with few states
         cells = policy.cells(states)
         known, few = cells != 2, "where a cell has fewer states than parameters"
         _refits(function, policy, states[known], actions[known], "where no state is in a cell")
@@ -258,7 +259,7 @@ def refit(function: Callable) -> None:
 
 
 def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, where: str) -> None:
-    """With no state in cell 2, and perhaps few in cell 3, as `where` tells."""
+    """Check a case with no state in cell 2 and perhaps few in cell 3, as `where` tells."""
     before = policy.coefficients.copy()
     try:
         new = function(policy, states.copy(), actions.copy())
@@ -303,7 +304,7 @@ def _labels(
     function: Callable, policy: VoronoiPolicy, teacher: Policy, task: Task, starts: np.ndarray, before: Episode,
     asked: Policy | None = None,
 ) -> None:  # fmt: skip
-    """`asked` is the teacher that the student's function gets, if another one."""
+    """Check the labels. `asked` is the teacher that the student's function gets, if it is another one."""
     value = DAGGER.call(function, policy, asked or teacher, task, starts, before.states, before.actions)
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise DAGGER.wrong(f"a {type(value).__name__}", "two arrays, states and actions", 1)
@@ -362,13 +363,13 @@ def _best_policy() -> float:
 @CHALLENGE.checks
 def challenger(policy: VoronoiPolicy) -> None:
     """3.7: fewer than `FEWER_THAN` cells and a higher mean return than the best of the lesson's policies, from fresh
-    starts. Made anew from its numbers, so that no method of the student's own plays."""
+    starts. The policy is rebuilt from its numbers, so that no method of the student's class is called."""
     if policy is None:
         raise CHALLENGE.unsolved()
     if isinstance(policy, type):
         raise CHALLENGE.wrong(f"the class {policy.__name__} itself", "a policy that was made with it", 1)
     two = isinstance(policy, tuple) and any(isinstance(part, VoronoiPolicy) for part in policy)
-    alone = "the policy alone: `vsp.distill` returns two things"
+    alone = "the policy alone: `vsp.distill` returns two values"
     CHALLENGE.refuse_if(two, "a policy and something else", alone, 1)
     CHALLENGE.refuse_if(not isinstance(policy, VoronoiPolicy), f"a {type(policy).__name__}", "a vsp.VoronoiPolicy", 1)
     CHALLENGE.refuse_if(policy.task.name != TASK, f"a policy for {policy.task.name}", f"one for {TASK}", 1)

@@ -1,8 +1,8 @@
-"""The lessons as pages of the site: students' copies with the output of the worked cells.
+"""The lessons as pages of the site: student versions with the output of the worked cells.
 
     python -m vsp.course.pages --out .
 
-Each copy is run as students get it; exercises and their checks show no output.
+Each is run as students get it; exercises and their checks show no output.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ TIMEOUT = 600  # seconds for a cell
 
 
 def write_pages(out: str | os.PathLike) -> list[Path]:
-    """Write the pages to OUT/build/course/pages; returns the files. The same sources, the same bytes."""
+    """Write the pages to OUT/build/course/pages and return the files. Same sources, same bytes."""
     written = []
     for name, lesson in read_sources().items():
         written.append(Path(out) / "build" / "course" / "pages" / name)
@@ -30,7 +30,7 @@ def write_pages(out: str | os.PathLike) -> list[Path]:
 
 
 def page(lesson: NotebookNode) -> NotebookNode:
-    """Run a student's copy and return it with its outputs. Raises RuntimeError if a worked cell fails."""
+    """Run a student version and return it with its outputs. Raises RuntimeError if a worked cell fails."""
     from nbclient import NotebookClient
 
     lesson.metadata.kernelspec = {"name": KERNEL, "display_name": "Python 3", "language": "python"}

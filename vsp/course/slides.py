@@ -1,6 +1,6 @@
 """Slides of the lessons: the cells tagged `slide`, as one HTML file that opens from disk.
 
-reveal.js 5.2.1 (MIT license) shows them; it lies in `reveal/`, as its authors publish it.
+reveal.js 5.2.1 (MIT license) shows them; `reveal/` holds it as published by its authors.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def is_slide(cell: NotebookNode) -> bool:
 
 
 def slides(lesson: NotebookNode) -> str:
-    """The slides of a lesson as HTML, with figures, style and script in it. Raises ValueError if it has none."""
+    """Return a lesson's slides as one HTML page with figures, style and script. Raises ValueError if it has none."""
     import mistune  # nbconvert's own
 
     sources = [cell.source for cell in lesson.cells if is_slide(cell)]
@@ -65,7 +65,7 @@ def slides(lesson: NotebookNode) -> str:
 
 
 def _inline(found: re.Match) -> str:
-    """A figure of this repository in the page itself, no wider than a slide."""
+    """Embed a figure of this repository in the page, no wider than a slide."""
     file = io.BytesIO()
     with Image.open(ROOT / found[1]) as picture:
         small = picture.convert("RGB")
