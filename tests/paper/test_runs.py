@@ -163,7 +163,7 @@ def test_a_file_of_another_experiment_is_refused(tmp_path, kind, other, why):
     own, theirs = (next(one.folder(tmp_path).glob(f"{name}*.run")) for one in (SMALL, other))
     shutil.copy(theirs, own)
     with pytest.raises(
-        atomic.DamagedFile, match=f"^{re.escape(str(own))}: made with {why}: delete it, and it is made anew$"
+        atomic.DamagedFile, match=f"^{re.escape(str(own))}: made with {why}: delete it to make it again$"
     ):
         OF_A_RUN[kind](SMALL, tmp_path)
     own.unlink()

@@ -115,7 +115,5 @@ def test_a_table_stands_below_its_caption(book):
 
 def test_a_figure_of_ones_own_says_what_it_shows(book):
     assert captions.caption_of("figures", "mine", text="Seen.", alt="x") == captions.Caption("", "Seen.", "x")
-    with pytest.raises(
-        ValueError, match="figure 'mine' has no alternative text: hand in alt=, or write it into notebooks"
-    ):
+    with pytest.raises(ValueError, match="figure 'mine' has no alternative text: pass alt= or add it to notebooks"):
         captions.caption_of("figures", "mine")

@@ -1,4 +1,4 @@
-"""The reproduction of the paper: its printed values, our runs and tables, the ledger, the audit, the studies."""
+"""The reproduction of the paper: its printed values, the rerun and its tables, the ledger, the audit, the studies."""
 
 from .audit import audit_findings, audit_table, mean_inside
 from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison

@@ -1,8 +1,8 @@
 """The audit: do the numbers that the paper prints agree with each other, with its tables, and with its tasks?
 
-Each finding is a function that computes from the transcribed values in `data/paper`; `audit_findings()` runs them all.
-Returns have no unit, shares are in percent. Standard deviations divide by n, as NumPy's do; only for the 24 outliers of
-SimpleGoal's teacher does n - 1 make a difference. The rounding of the printed values changes no verdict.
+Each finding is a function of the transcribed values in `data/paper`; `audit_findings()` runs them all.
+Returns have no unit, shares are in percent. Standard deviations divide by n, as NumPy's do; n - 1 makes a difference
+only for the 24 outliers of SimpleGoal's teacher. The rounding of the printed values changes no verdict.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ class Finding:
 
 
 def audit_findings() -> list[Finding]:
-    """All findings, computed anew."""
+    """Compute all findings."""
     return [check() for check in _CHECKS]
 
 
 def in_doubt() -> set[str]:
-    """Ids of the printed values that a contradiction puts in doubt."""
+    """Return the ids of the printed values that a contradiction puts in doubt."""
     return {id for finding in audit_findings() for id in finding.concerns}
 
 
 def audit_table(findings: list[Finding]) -> pd.DataFrame:
-    """One row per finding: number, finding, printed, arithmetic, verdict."""
+    """Return one row per finding: number, finding, printed, arithmetic, verdict."""
     rows = [(i, f.title, f.printed, f.arithmetic, f.verdict) for i, f in enumerate(findings, start=1)]
     return pd.DataFrame(rows, columns=["number", "finding", "printed", "arithmetic", "verdict"])
 
 
 def mean_inside(task: str, subject: str) -> float:
-    """Mean return of the episodes without the outliers, from the printed totals and the printed outliers."""
+    """Return the mean return of the episodes without the outliers, from the printed totals and the printed outliers."""
     column = Column(task, subject)
     return remaining_mean(column.n, column.values["mean"], column.outliers)
 
@@ -62,10 +62,10 @@ def mean_inside(task: str, subject: str) -> float:
 
 
 class Column:
-    """A column of T5 or T6, and what the text adds.
+    """A column of T5 or T6, and the numbers that the text adds.
 
     `values` are min, max, mean, std, q1, median, q3, iqr, and coverage in percent. `below` and `above` are the
-    outliers that the text describes: at most one part each, none where it gives no mean.
+    outliers that the text describes: at most one part each, none if it gives no mean.
     """
 
     def __init__(self, task: str, subject: str):
@@ -78,7 +78,7 @@ class Column:
         self.below += self._parts("outliers_below", "min", "whisker_low")
         self.above = self._parts("outliers_above", "whisker_high", "max")
         self.outliers = self.below + self.above
-        self.low = self.below[0].high if self.below else self.values["min"]  # of the returns inside
+        self.low = self.below[0].high if self.below else self.values["min"]  # lowest and highest return inside
         self.high = self.above[0].low if self.above else self.values["max"]
 
     def _parts(self, side: str, low: str, high: str) -> list[Part]:
@@ -89,11 +89,11 @@ class Column:
         return [Part(size, *(numbers[f"{self.name}_{x}"] for x in (f"{side}_mean", f"{side}_std", low, high)))]
 
     def coverage(self) -> float:
-        """The share of episodes that are no outliers, in percent, from the printed counts."""
+        """Return the share of episodes that are not outliers, in percent, from the printed counts."""
         return 100 * (1 - self.n_outliers / self.n)
 
     def moments(self, n: int) -> tuple[str, bool]:
-        """Mean and std of n returns without the outliers, and whether the quartiles allow them."""
+        """Describe mean and std of n returns without the outliers; also return whether the quartiles allow them."""
         mean = remaining_mean(n, self.values["mean"], self.outliers)
         std = remaining_std(n, self.values["mean"], self.values["std"], self.outliers)
         sizes = [sum(part.size for part in side) for side in (self.below, self.above)]
@@ -104,12 +104,12 @@ class Column:
 
 
 def _columns() -> list[Column]:
-    """The columns of T5 and T6."""
+    """Return the columns of T5 and T6."""
     return [Column(task, subject) for task in printed.TASKS for subject in ("drl", "ours")]
 
 
 def _quote(*ids: str) -> str:
-    """Printed values and where they stand, without the transcription's own remarks after a semicolon."""
+    """Quote printed values and their places, without the transcription's own remarks after a semicolon."""
     rows = printed.printed_values().set_index("id").loc[list(ids)].itertuples()
     return "; ".join(f"{row.quantity} {row.paper} ({row.where.partition(';')[0]})" for row in rows)
 
@@ -122,7 +122,7 @@ def _finding(title: str, printed: str, arithmetic: str, agrees: bool, concerns: 
 
 
 def run_counts() -> Finding:
-    """The protocol, the text and the coverage each ask for a number of distilled policies."""
+    """Compare the numbers of distilled policies that the protocol, the text and the coverage imply."""
     notes, ids, wrong = [], [], []
     for task, name in PREFIX.items():
         protocol, text = printed_value(f"{name}_policies"), printed_value(f"{name}_text_policies")
@@ -134,11 +134,11 @@ def run_counts() -> Finding:
 
 
 def simplegoal_coverage() -> Finding:
-    """Coverage and outliers need different totals; the moments say which of the totals is right."""
+    """Show that coverage and outliers need different totals; the moments decide which total is right."""
     ours, episodes = Column(SIMPLEGOAL, "ours"), printed_value("episodes_per_policy")
     n, size, printed = ours.n, ours.n_outliers, ours.values["coverage"]
     share = 1 - printed / 100
-    other = int(round(size / share / episodes) * episodes)  # the whole number of policies that has this share
+    other = int(round(size / share / episodes) * episodes)  # episodes of a whole number of policies
     text = (
         f"1 - {size}/{n} = {ours.coverage():.2f} %; {printed:g} % asks for {share * n:.0f} outliers or {other} "
         f"episodes. By the moments, {ours.moments(other)[0]}; {ours.moments(n)[0]}"
@@ -149,7 +149,7 @@ def simplegoal_coverage() -> Finding:
 
 
 def other_columns() -> Finding:
-    """The coverage of every column but SimpleGoal's Ours, the moments of every column but MountainCar's Ours."""
+    """Check the coverage of all columns but SimpleGoal's Ours, and the moments of all but MountainCar's Ours."""
     notes, good, ids = [], True, []
     for column in _columns():
         if column.name != "sg_ours":
@@ -164,7 +164,7 @@ def other_columns() -> Finding:
 
 
 def mountaincar_quartiles() -> Finding:
-    """T6 against three statements of the text: the bounds, the moments, and a higher median with a larger spread."""
+    """Compare T6 with three statements of the text: bounds, moments, and a higher median with a larger spread."""
     column = Column(MOUNTAINCAR, "ours")
     ours, drl = column.values, Column(MOUNTAINCAR, "drl").values
     bounds = ["mc_ours_whisker_low", "mc_ours_whisker_high"]
@@ -183,9 +183,9 @@ def mountaincar_quartiles() -> Finding:
 
 
 def outlier_rules() -> Finding:
-    """The paper states no rule.
+    """Find the rule for outliers, which the paper does not state.
 
-    One fits a side if the outliers end beyond its bound or, where there are none, no return is beyond it.
+    A rule fits a side if the outliers there end beyond its bound. Without outliers it fits if no return is beyond it.
     """
     notes, common = [], {"1.5 IQR", "2 std"}
     for column in _columns():
@@ -207,13 +207,13 @@ def outlier_rules() -> Finding:
 
 
 def teacher_outliers() -> Finding:
-    """Are the outliers k episodes at the minimum, and others that differ little?"""
+    """Test whether the outliers are k episodes at the minimum, and others that differ little."""
     column, found = Column(SIMPLEGOAL, "drl"), []
     (p,), n = column.outliers, column.n
     for k in range(1, p.size):
         pit = [Part(k, p.low, 0, p.low, p.low)]
         other, std = remaining_mean(p.size, p.mean, pit), remaining_std(p.size, p.mean, p.std, pit)
-        if std <= p.high - other:  # false for NaN, where k at the minimum alone spread wider than printed
+        if std <= p.high - other:  # false for NaN: k at the minimum alone would spread wider than printed
             found.append(f"{k} at {p.low:g} and {p.size - k} with mean {other:.2f} and std {std:.1f}")
     near, reward = n * (GOAL_EDGE + STRIDE) ** 2, printed_value("sg_goal_reward")
     text = (
@@ -226,7 +226,7 @@ def teacher_outliers() -> Finding:
 
 
 def outlier_moments() -> Finding:
-    """Shares of outliers are whole numbers of episodes, and their deviations possible in their ranges."""
+    """Check that shares of outliers are whole numbers of episodes, and that deviations are possible in their ranges."""
     ours, notes, good = Column(MOUNTAINCAR, "ours"), [], True
     for side, part in zip(("below", "above"), ours.outliers):
         share = 100 * part.size / ours.n_outliers
@@ -242,7 +242,7 @@ def outlier_moments() -> Finding:
 
 
 def printed_twice() -> Finding:
-    """Numbers that the paper prints in two places are compared digit by digit."""
+    """Compare, digit by digit, the numbers that the paper prints in two places."""
     pairs = {}
     for column in _columns():
         task, subject = column.name.split("_")
@@ -260,7 +260,7 @@ def printed_twice() -> Finding:
 
 
 def simplegoal_wording() -> Finding:
-    """What the text calls similar, as ratios of the printed columns; a judgement, so left open."""
+    """Compute ratios of the printed columns that the text calls similar. This is a judgement, so it is left open."""
     ours, drl = (Column(SIMPLEGOAL, subject).values for subject in ("ours", "drl"))
     lost, spread, iqr = drl["mean"] - ours["mean"], ours["std"] / drl["std"], ours["iqr"] / drl["iqr"]
     text = (
@@ -273,7 +273,7 @@ def simplegoal_wording() -> Finding:
 
 
 def printed_digits() -> Finding:
-    """Three things that "rounded to 4 digits" may mean, for all coefficients and codewords of T3 and T4."""
+    """Test three meanings of "rounded to 4 digits" on all coefficients and codewords of T3 and T4."""
     ids = ["sg_table_digits", "mc_table_digits"]
     rows, digits = printed.printed_values(), printed_value(ids[0])
     numbers = rows.loc[rows["id"].str.contains("_cell_"), "paper"].str.lstrip("-")
@@ -288,7 +288,7 @@ def printed_digits() -> Finding:
 
 
 def simplegoal_rows() -> Finding:
-    """Rows of T3 without an x in any output, and codewords that lie in the pit."""
+    """Find rows of T3 without an x in any output, and codewords that lie in the pit."""
     frame = printed.linear_policies(SIMPLEGOAL)
     codewords, equations = frame.filter(like="codeword_"), frame.filter(like="_printed")
     in_pit = ((codewords > PIT_LOW) & (codewords < PIT_HIGH)).all(axis=1)
@@ -305,7 +305,7 @@ def simplegoal_rows() -> Finding:
 
 
 def mountaincar_colours() -> Finding:
-    """Colours of T4 whose forces at the codewords overlap."""
+    """Find colours of T4 whose forces at the codewords overlap."""
     frame, policy = printed.linear_policies(MOUNTAINCAR), printed.published_policy(MOUNTAINCAR)
     force = pd.Series(policy.predict(policy.codewords)[0][:, 0]).groupby(frame["colour"])
     low, high = force.min(), force.max()
@@ -317,7 +317,7 @@ def mountaincar_colours() -> Finding:
 
 
 def close_pairs(task: str, table: str) -> Finding:
-    """Pairs of codewords, and neighbours' parameters, that are closer than the thresholds of splits and merges."""
+    """Find pairs of codewords, and neighbours' parameters, closer than the thresholds of splits and merges."""
     policy, limits = printed.published_policy(task), printed.printed_hyperparameters(task)
     codewords, (i, j) = policy.codewords, np.triu_indices(len(policy), 1)
     gaps, neighbours = np.abs(policy.coefficients[i] - policy.coefficients[j]), delaunay_neighbours(codewords)[i, j]
@@ -335,7 +335,7 @@ def close_pairs(task: str, table: str) -> Finding:
 
 
 def outputs_beyond_limits() -> Finding:
-    """Linear outputs at the codewords that only clipping makes actions."""
+    """Count linear outputs at the codewords that lie outside the action limits before clipping."""
     notes = []
     for task in printed.TASKS:
         policy = printed.published_policy(task)
@@ -347,7 +347,7 @@ def outputs_beyond_limits() -> Finding:
 
 
 def dimensions() -> Finding:
-    """Coordinates and outputs counted in T3 and T4 against those that the text states."""
+    """Compare the coordinates and outputs counted in T3 and T4 with those that the text states."""
     frames = [printed.linear_policies(task) for task in printed.TASKS]
     states, actions = ([frame.filter(like=like).shape[1] for frame in frames] for like in ("codeword_", "_printed"))
     text = f"coordinates of codewords (T3, T4): {states}; outputs: {actions}"
@@ -357,7 +357,7 @@ def dimensions() -> Finding:
 
 
 def truncation() -> Finding:
-    """The longest episode as printed against that of the registered environment."""
+    """Compare the longest episode as printed with that of the registered environment."""
     steps, limit, lowest = get_task(MOUNTAINCAR).max_steps, printed_value("mc_max_steps"), printed_value("mc_ours_min")
     text = (
         f"{limit:.0f} and {steps} of the registered environment. No printed return depends on it: the lowest, "
@@ -367,7 +367,7 @@ def truncation() -> Finding:
 
 
 def thousands() -> Finding:
-    """The dot of one number separates thousands, those of all others decimals."""
+    """Show that the dot of one number separates thousands, but the dots of all others decimals."""
     numbers, steps = printed.printed_text_numbers()["printed"], printed_value("sg_training_steps")
     decimal = float(numbers["sg_training_steps"])
     others = numbers.drop("sg_training_steps").str.fullmatch("-?[0-9]+[.][0-9]+%?").sum()
@@ -381,7 +381,10 @@ def thousands() -> Finding:
 
 
 def return_limits() -> Finding:
-    """On SimpleGoal an episode earns its way to the last state before the goal, and then the goal's reward."""
+    """Compare the returns with their limits.
+
+    On SimpleGoal an episode earns its progress to the last state before the goal, and then the goal's reward.
+    """
     goal, factor, *sides = map(printed_value, ("sg_goal_reward", "sg_reward_factor", "sg_size_x", "sg_size_y"))
     x, y = np.meshgrid(*((np.arange(1000) + 0.5) / 1000 * side for side in sides))  # starts
     limits = np.maximum(goal, goal + factor * (np.hypot(x, y) - GOAL_EDGE))
@@ -402,7 +405,7 @@ def return_limits() -> Finding:
 
 
 def frozen_iterations() -> Finding:
-    """How many iterations may alter the partition, by each of the three places that say so."""
+    """Count the iterations that may alter the partition, by each of the three places that state it."""
     notes, agrees, ids = [], True, []
     for task, name in PREFIX.items():
         hyper = printed.printed_hyperparameters(task)

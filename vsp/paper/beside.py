@@ -1,4 +1,4 @@
-"""Simpler policies beside the distilled ones, fitted to the teacher data that each distillation saw."""
+"""Compare distilled policies with simpler ones, fitted to the teacher data that each distillation saw."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .results import load_made, settings_id
 from .runs import EVALUATION_SEED, Experiment, Results, Run
 from .statistics import crossed_interval
 
-VERSION = 1  # raise it when the same runs give another comparison
+VERSION = 1  # raise it when the same runs give other results
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
-N_BESIDE, QUICK_BESIDE = 20, 2  # whose teacher episodes the baselines are fitted to
+N_BESIDE, QUICK_BESIDE = 20, 2  # runs whose teacher episodes the baselines are fitted to
 
 
 def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Every state (n, d) and action (n, m) that `distill` sees of its teacher under `seed`."""
+    """Return all states (n, d) and actions (n, m) of the teacher that `distill` sees under `seed`."""
     check_seed(seed)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[0])
     task, n = get_task(experiment.task), experiment.config.n_iterations
@@ -37,7 +37,7 @@ def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndar
 
 
 def fit(experiment: Experiment, run: Run) -> dict[str, Policy]:
-    """The baselines that need a teacher, by name, fitted on the data that `run` was distilled from."""
+    """Fit the baselines that need a teacher to the data that `run` was distilled from; return them by name."""
     states, actions = teacher_data(experiment, run.seed)
     trees = {f"tree, {leaves} leaves": Tree(states, actions, leaves=leaves) for leaves in LEAVES}
     return {
@@ -49,12 +49,12 @@ def fit(experiment: Experiment, run: Run) -> dict[str, Policy]:
 
 
 def compare_simpler(result: Results, n_runs: int = N_BESIDE, *, jobs: int | str = 1) -> pd.DataFrame:
-    """What stands beside the distilled policies: one row per kind of policy (the index), best mean return first.
+    """Compare the distilled policies with simpler ones: one row per kind of policy (the index), best mean return first.
 
-    Columns: policies (how many), cells (or leaves, their mean), mean return, gap (to the teacher's, from the same
-    starts), low and high (95 %, of the gap), std of all returns, failing (share of episodes without the goal).
-    Intervals resample policies and start states together. Baselines are fitted to the data of the first `n_runs` runs,
-    by `jobs` as in `workers`.
+    Columns: policies (how many), cells (mean number of cells or leaves), mean (return), gap (mean return minus the
+    teacher's from the same starts), low and high (95 % interval of the gap), std (of all returns), failing (share of
+    episodes that miss the goal). Intervals resample policies and start states together. Baselines are fitted to the
+    data of the first `n_runs` runs; `jobs` as in `workers`.
     """
     experiment, task = result.experiment, result.experiment.task
     name, rule = rule_of_thumb(task)
@@ -65,7 +65,7 @@ def compare_simpler(result: Results, n_runs: int = N_BESIDE, *, jobs: int | str 
     found += [fitted[i] for i in range(len(asked))]
     own = result.teacher_returns
     rows = {"teacher (TD3)": _row(np.nan, [result.teacher_outcomes], own)}
-    for kind in {kind: None for one in found for kind in one}:  # in their order
+    for kind in {kind: None for one in found for kind in one}:  # in order of first appearance
         cells, played = zip(*(one[kind] for one in found if kind in one))
         rows[kind] = _row(np.mean(cells), played, own)
     cells = [len(run.policy) for run in result.runs]
@@ -79,7 +79,7 @@ def _fitted(experiment: Experiment, run: Run) -> dict[str, tuple[int, Outcomes]]
 
 
 def _played(experiment: Experiment, policies: dict[str, Policy]) -> dict[str, tuple[int, Outcomes]]:
-    """Cells and evaluated episodes of each policy."""
+    """Return the number of cells and the evaluated episodes of each policy."""
     n = experiment.n_episodes
     return {
         kind: (len(p), rollout_from_seed(p, experiment.task, n, seed=EVALUATION_SEED)) for kind, p in policies.items()
@@ -89,7 +89,7 @@ def _played(experiment: Experiment, policies: dict[str, Policy]) -> dict[str, tu
 def kept_comparison(
     result: Results, n_runs: int = N_BESIDE, *, runs: str | os.PathLike, jobs: int | str = -1
 ) -> pd.DataFrame:
-    """`compare_simpler`, kept beside the runs, since the fits differ on another CPU type."""
+    """Load `compare_simpler` from a file beside the runs, or make it: another CPU type would give other fits."""
     experiment = result.experiment
     settings = {"leaves": LEAVES, "printed": atomic.sha256(printed.FOLDER / listed.MANIFEST)}
     name = f"baselines-{n_runs}-{settings_id(settings | {'scikit-learn': version('scikit-learn')})}-v{VERSION}"

@@ -1,17 +1,19 @@
-"""The ledger: every value that the paper prints, compared with ours, with an interval and a verdict by stated rules.
+"""The ledger: every value that the paper prints, the rerun's value and interval, and a verdict by stated rules.
 
 Rules:
 
 1. A value that is inconsistent with the paper's other values "contradicts itself" (`audit` has the arithmetic).
 2. A setting (a limit of a task, a hyperparameter, a count of the protocol) is "reproduced" if the code uses the same
    number, else "differs".
-3. A result is "reproduced" if the printed value, give or take half a unit of its last digit, lies in the 95 % interval
-   of ours, widened by the square root of 2 because the paper's value comes from a sample of the same size; else it
-   "differs". Intervals come from 10,000 resamples: of runs for distilled policies, of start states for the one teacher.
-4. What no rerun can show, or what is not measured here (the parameters of one run, the machine), "cannot be checked".
+3. A result is "reproduced" if the printed value, plus or minus half a unit of its last digit, lies in the rerun's 95 %
+   interval; else it "differs". The interval is widened by the square root of 2, because the paper's value comes from a
+   sample of the same size. Intervals come from 10,000 resamples: of runs for distilled policies, of start states for
+   the one teacher.
+4. A value that no rerun can show, or that is not measured here (the parameters of one run, the machine), "cannot be
+   checked".
 
 A verdict on a return is marked "wide" if the widened interval is longer than the standard deviation that the paper
-prints for these returns: then "reproduced" says little.
+prints for these returns. Then "reproduced" says little.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "differs", "cannot be checked", "contradicts itself"
 )  # fmt: skip
 N_RESAMPLES = 10_000
-# Parts of the paper, by patterns of ids, of which the first that fits counts
+# Parts of the paper by patterns of ids; the first match counts
 PARTS = {
     "coefficients": "_cell_",
     "results": "_(?:spread|drl|ours)_(?!episodes)|^.._(?:caption_)?cells$",
@@ -42,10 +44,10 @@ COLUMNS = "id part task where quantity subject paper value here low high verdict
 
 
 def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """One row per printed value, `COLUMNS`; `results` by task. The same results give the same rows.
+    """Return one row per printed value, with columns `COLUMNS`; `results` by task. The same results give the same rows.
 
-    `here` is NaN where we have no such value; `low` and `high` are NaN for settings. Column `cell` names the notebook
-    and the cell that computes ours.
+    `here` is the rerun's value, NaN where there is none; `low` and `high` are NaN for settings. Column `cell` names the
+    notebook and the cell that computes it.
     """
     found = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"]).assign(low=np.nan, high=np.nan)
     parts = [found, *(measured(task, result, n_resamples=n_resamples) for task, result in results.items())]
@@ -67,13 +69,13 @@ def _wide(frame: pd.DataFrame) -> pd.Series:
 
 
 def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
-    """How many values of each part of the paper got which verdict."""
+    """Count the values of each part of the paper by verdict."""
     table = pd.crosstab(book["part"], book["verdict"])
     return table.reindex(index=[*reversed(PARTS)], columns=list(VERDICTS), fill_value=0).rename_axis(columns=None)
 
 
 def verdict(row, *, in_doubt: bool = False) -> str:
-    """The verdict by this module's rules; `row` has paper (as printed), value, here, low and high."""
+    """Return the verdict by this module's rules; `row` has paper (as printed), value, here, low and high."""
     if in_doubt:
         return CONTRADICTED
     if np.isnan(row.here):
@@ -91,14 +93,14 @@ def last_digit(printed: str) -> float:
 
 
 def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """Our results under the ids of the paper's values: columns here, low, high (95 %)."""
+    """Return the rerun's results under the ids of the paper's values: columns here, low, high (95 %)."""
     rows = {}
     for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
         here = outlier_numbers(returns) | spread(returns)
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
         for name in bounds.columns.intersection(list(here)):
-            known = not np.isnan(here[name])  # without outliers they have no mean
+            known = not np.isnan(here[name])  # an empty set of outliers has no mean
             row = (here[name], *bounds[name]) if known else (np.nan, np.nan, np.nan)
             rows[f"{printed.PREFIX[task]}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
     cells = _best_cells(result)
@@ -107,14 +109,14 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
 
 
 def _best_cells(result: Results) -> tuple[float, float, float]:
-    """Cells of the best run, and their interval for other samples of runs to choose the best from."""
+    """Return the cells of the best run, and their interval when the best is chosen from resampled runs."""
     runs = np.array([(run.validation_mean, len(run.policy)) for run in result.runs])
     low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])
     return len(result.best.policy), low, high
 
 
 def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
-    """The results in the ledger `book` for one task, the teacher's first; values of both table and text once."""
+    """Return one task's results in the ledger `book`, the teacher's first; values in both table and text once."""
     rows = book[(book["task"] == task) & (book["part"] == "results")]
     statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
     twice = ~rows["id"].str.contains("_spread_") & statistic.isin(["min", "max", "mean", "std"])
@@ -124,10 +126,10 @@ def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
 
 
 def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
-    """How far the printed values lie from ours, in half-widths of our intervals: gap, verdict, wide.
+    """Return gap (the printed value minus the rerun's, in half-widths of the rerun's interval), verdict and wide.
 
-    An interval without width (the smallest of all returns may be the same in every resample) counts as half a unit of
-    the last printed digit.
+    A half-width counts as at least half a unit of the last printed digit. Some intervals have no width: the smallest
+    of all returns may be the same in every resample.
     """
     rows = rows[rows["low"].notna()]
     value = rows["value"]
@@ -140,11 +142,11 @@ def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
     return frame.set_index(pd.Index(name, name="statistic"))
 
 
-# Settings, read from the code that acts on them
+# Settings, read from the code that uses them
 
 
 def _settings(results: dict[str, Results]) -> dict[str, float]:
-    """Our settings, under the ids of the paper's: limits, rewards, hyperparameters, counts."""
+    """Return the rerun's settings under the ids of the paper's: limits, rewards, hyperparameters, counts."""
     found = _environments() | {"initial_subpolicies": float(results[printed.TASKS[0]].runs[0].cells[0])}
     for task, result in results.items():
         prefix, (runs, episodes) = printed.PREFIX[task], result.returns.shape
@@ -160,7 +162,7 @@ def _settings(results: dict[str, Results]) -> dict[str, float]:
 
 
 def _environments() -> dict[str, float]:
-    """Limits and rewards of both tasks; rewards are measured by taking steps."""
+    """Return limits and rewards of both tasks; rewards are measured by taking steps."""
     goal, car = (registry.get_task(task) for task in printed.TASKS)
     found = {"state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps}
     for axis, name in enumerate("xy"):
@@ -192,7 +194,7 @@ _CELLS = {
 
 
 def cell(id: str) -> str:
-    """The notebook and the cell that compute our number for the printed value `id`."""
+    """Return the notebook and the cell that compute the rerun's number for the printed value `id`."""
     prefix, kind = id.split("_")[:2]
     task = {"sg": "simplegoal", "mc": "mountaincar"}.get(prefix)
     if id.endswith("caption_cells"):
@@ -205,12 +207,12 @@ def cell(id: str) -> str:
 
 
 def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """Statistics that describe many runs better than mean and quartiles of all episodes: here, low, high, teacher.
+    """Return statistics that describe many runs better than mean and quartiles of all episodes do.
 
-    One row per statistic, with 95 % intervals from resampled runs. The interquartile mean is the mean of the middle
-    half of the runs' means (Agarwal et al. 2021). A run "beats" its teacher with a higher mean return from the same
-    starts, an episode with a higher return. The interval for runs is the exact one of Clopper and Pearson, which has
-    a width even where all runs, or none, beat the teacher.
+    Columns: here, low, high, teacher. One row per statistic, with 95 % intervals from resampled runs. The
+    interquartile mean is the mean of the middle half of the runs' means (Agarwal et al. 2021). A run "beats" its
+    teacher if its mean return from the same starts is higher; an episode does if its return is higher. The interval for
+    runs is the exact one of Clopper and Pearson, which has a width even if all runs, or none, beat the teacher.
     """
     from scipy.stats import binomtest, trim_mean  # here: it takes long to import
 
@@ -222,7 +224,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     }
     for name, code in SHARES.items():
         ours, teacher = (result.outcomes == code).mean(axis=1), np.mean(result.teacher_outcomes.outcomes == code)
-        if name != "pit" or task.name == "SimpleGoal-v0":  # the other task has none
+        if name != "pit" or task.name == "SimpleGoal-v0":  # MountainCar has no pit
             rows[f"share of episodes: {name}"] = ours, np.mean, teacher
     for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
         rows[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan

@@ -1,4 +1,4 @@
-"""`make runs`: the distillations that the paper reports, and the simpler policies beside them."""
+"""`make runs`: make the distillations that the paper reports, and fit simpler policies to compare them with."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from .runs import N_RUNS, paper_results
 
 
 def main() -> None:
-    """Make the runs that the paper reports, or those of them that are missing."""
+    """Make the runs that the paper reports; skip those that exist."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="runs go to OUT/data/runs")
-    parser.add_argument("--quick", action="store_true", help="a few short runs, to see that all works")
+    parser.add_argument("--out", default=".", help="write runs to OUT/data/runs")
+    parser.add_argument("--quick", action="store_true", help="make a few short runs, as a test")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     out, jobs = Path(arguments.out), arguments.jobs
     runs, locks = out / "data" / "runs", out / "build" / "locks"
     with file_lock(locks / "runs", f"makes runs in {out}"):
         for left in runs.rglob(atomic.TEMPORARY):
-            left.unlink(missing_ok=True)  # of a process that was killed
+            left.unlink(missing_ok=True)  # left by a process that was killed
         try:
             for task in N_RUNS:
                 results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
                 n_runs = QUICK_BESIDE if arguments.quick else N_BESIDE
                 kept_comparison(results, n_runs, runs=runs, jobs=jobs)
-                print(f"{task}: {len(results.runs)} runs are there, and what stands beside them", flush=True)
+                print(f"{task}: {len(results.runs)} runs and their comparison are complete", flush=True)
         except workers.WorkerDied:
-            terminate_peers(locks)  # make would wait for its notebooks, minutes
+            terminate_peers(locks)  # else make waits minutes for its notebooks
             raise
 
 

@@ -1,7 +1,7 @@
-"""What the paper (arXiv:2511.13322) prints: its tables, the numbers in its text, and its policies, ready to run.
+"""Values printed in the paper (arXiv:2511.13322): its tables, the numbers in its text, and policies ready to run.
 
-The values are in `data/paper/*.csv`, as printed; column `where` names the place in the paper. A file is read only if it
-is byte for byte the one in its folder's manifest, which was checked against the paper.
+The values are in `data/paper/*.csv`, as printed; column `where` names the place in the paper. A file is read only if
+its bytes match the manifest of its folder; the listed files were checked against the paper.
 """
 
 from __future__ import annotations
@@ -21,46 +21,46 @@ from ..run.listed import read_listed
 
 FOLDER = ROOT / "data" / "paper"
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
-PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # of the ids of printed values
+PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # prefixes of the ids of printed values
 SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
 _POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
 
 
 def printed_hyperparameters(task: str) -> dict[str, int | float | bool]:
-    """The hyperparameters of `task`, by the name that the paper gives them (appendix, first table)."""
+    """Return the hyperparameters of `task` by their names in the paper (appendix, first table)."""
     column = check_task(task)
     frame = _read("hyperparameters.csv")
     return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
 
 
 def printed_spread(task: str) -> pd.DataFrame:
-    """How the returns on `task` spread: one row per metric (the index), columns drl, ours, unit, where.
+    """Return the spread of the returns on `task`: one row per metric (the index), columns drl, ours, unit, where.
 
-    Coverage, the share of episodes that are no outliers, is in percent; all else is in units of return.
+    Coverage, the share of episodes that are not outliers, is in percent; all else is in units of return.
     """
     frame = _read("spread.csv", numbers=["drl", "ours"])
     return frame[frame["task"] == check_task(task)].drop(columns="task").set_index("metric")
 
 
 def printed_spread_values(task: str, subject: str) -> dict[str, float]:
-    """A column of T5 or T6, "drl" or "ours", under the names of `statistics.spread`; coverage in percent."""
+    """Return a column of T5 or T6, "drl" or "ours", under the names of `statistics.spread`; coverage in percent."""
     check_choice("subject", subject, ("drl", "ours"))
     return {metric.lower().partition("/")[0]: value for metric, value in printed_spread(task)[subject].items()}
 
 
 def printed_text_numbers(task: str | None = None) -> pd.DataFrame:
-    """The numbers in running text and captions: one row per number, its id as index.
+    """Return the numbers in running text and captions: one row per number, its id as index.
 
     Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
-    (NaN for a version or a name), unit, printed (the paper's spelling), where. With `task`, its rows and those of both.
+    (NaN for a version or a name), unit, printed (the paper's spelling), where. `task` selects its rows and "both".
     """
     frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
     return frame if task is None else frame[frame["task"].isin([check_task(task), "both"])]
 
 
 def printed_value(id: str) -> float:
-    """The number called `id` in `printed_text_numbers()`; shares are in percent. Raises ValueError for other ids."""
+    """Return the number `id` of `printed_text_numbers()`; shares are in percent. Raises ValueError for other ids."""
     frame = printed_text_numbers()
     if not isinstance(id, str) or id not in frame.index:
         raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
@@ -77,7 +77,7 @@ def spread_id(task: str, subject: str, metric: str) -> str:
 
 
 def printed_values() -> pd.DataFrame:
-    """Every number that the paper prints, in tables T2 to T6, text and captions: one row per value.
+    """Return every number that the paper prints, in tables T2 to T6, text and captions: one row per value.
 
     Columns: id, task, where, quantity, subject, paper (the paper's spelling), value (NaN for a version or a name).
     """
@@ -93,7 +93,7 @@ def printed_values() -> pd.DataFrame:
             rows.append((f"{PREFIX[task]}_hyper_{name}", task, row["where"], name, "protocol", row[task]))
         for k, row in enumerate(_read(_POLICIES[task]).to_dict("records"), start=1):
             for name in _numbers(row):
-                if row[name] != "0":  # else the paper prints no such term
+                if row[name] != "0":  # 0 stands for a term that the paper does not print
                     rows.append((f"{PREFIX[task]}_cell_{k}_{name}", task, row["where"], name, "Ours", row[name]))
     tables = pd.DataFrame(rows, columns=["id", "task", "where", "quantity", "subject", "paper"])
     tables["value"] = [float(ast.literal_eval(printed)) for printed in tables["paper"]]
@@ -101,12 +101,12 @@ def printed_values() -> pd.DataFrame:
 
 
 def printed_tdavq_comparison() -> pd.DataFrame:
-    """TD-AVQ beside the paper's method, in words: one row per aspect (the index), columns TD-AVQ, Ours, where."""
+    """Return the paper's comparison with TD-AVQ in words: one row per aspect (index), columns TD-AVQ, Ours, where."""
     return _read("tdavq_comparison.csv").set_index("aspect")
 
 
 def linear_policies(task: str) -> pd.DataFrame:
-    """The best partition that the paper found for `task`: one row per cell, in the paper's order.
+    """Return the best partition that the paper found for `task`: one row per cell, in the paper's order.
 
     Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
     such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
@@ -119,7 +119,7 @@ def linear_policies(task: str) -> pd.DataFrame:
 
 
 def published_policy(task: str) -> VoronoiPolicy:
-    """The paper's best distilled policy for `task`, from its printed coefficients, ready to run."""
+    """Return the paper's best distilled policy for `task`, from its printed coefficients, ready to run."""
     frame = linear_policies(task)
     inputs = [name.removeprefix("codeword_") for name in frame if name.startswith("codeword_")]
     outputs = [name.removesuffix("_printed") for name in frame if name.endswith("_printed")]
@@ -130,25 +130,25 @@ def published_policy(task: str) -> VoronoiPolicy:
 
 
 def _numbers(columns: Iterable[str]) -> list[str]:
-    """The numeric columns of a table of linear policies."""
+    """Return the numeric columns of a table of linear policies."""
     return [name for name in columns if not name.endswith(("_printed", "colour", "where"))]
 
 
 def check_task(task: str) -> str:
-    """`task`. Raises ValueError unless the paper treats it."""
+    """Return `task`. Raises ValueError for a task that is not in the paper."""
     if not isinstance(task, str) or task not in TASKS:
-        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no other")
+        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no others")
     return task
 
 
 def _read(file: str, numbers: list[str] | None = None) -> pd.DataFrame:
-    """The rows of `file` as text, the columns `numbers` as float64 (NaN where empty)."""
+    """Read the rows of `file` as text, the columns `numbers` as float64 (NaN where empty)."""
     frame = _parse(read_listed(FOLDER / file)).copy()
     for column in numbers or []:
         frame[column] = pd.to_numeric(frame[column]).astype(np.float64)
     return frame
 
 
-@lru_cache  # the audit and the ledger ask for the same few tables hundreds of times
+@lru_cache  # the audit and the ledger read the same few tables hundreds of times
 def _parse(content: bytes) -> pd.DataFrame:
     return pd.read_csv(io.BytesIO(content), dtype=str, keep_default_na=False, encoding="utf-8")

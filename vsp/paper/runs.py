@@ -1,7 +1,7 @@
 """Many distillations: seeds, workers, one sealed file per run, resume, progress.
 
-A run lies in a folder named by its provenance (see `results`) and names it inside too, so a changed configuration,
-teacher or method never picks up old runs, nor a run that was copied to another place.
+A run lies in a folder named by its provenance (see `results`), and its file states the provenance, too. So a changed
+configuration, teacher or method never loads old runs, nor a run that was copied to another folder.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from .results import load_made, make_missing, provenance, provenance_folder
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
 N_EPISODES = 1000
-EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states to report on, and to choose the best run on
+EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states for the reported results, and for choosing the best run
 QUICK_RUNS, QUICK_EPISODES = 4, 100
-SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}  # the outcomes of episodes whose shares tables show
+SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}  # outcomes of episodes whose shares are in the tables
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class Run:
     cells: np.ndarray  # number of cells after each iteration
     splits: int
     merges: int
-    cpu: str  # the type of processor that it was made on
+    cpu: str  # type of the CPU that made it
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a set of runs has in common: task, configuration, teacher, and the episodes of the evaluation."""
+    """The settings that a set of runs shares: task, configuration, teacher, and the number of evaluation episodes."""
 
     task: str
     config: Config
@@ -60,7 +60,7 @@ class Experiment:
 
     @property
     def settings(self) -> dict:
-        """All that decides the result of a run beside teacher, version and seed, as JSON-able values."""
+        """Everything that determines the result of a run apart from teacher, version and seed, as JSON-able values."""
         return {
             "task": self.task,
             "config": self.config.settings(),
@@ -71,43 +71,43 @@ class Experiment:
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
-        """What names its runs: settings (an id), teacher, version."""
+        """The provenance of its runs: settings (an id), teacher, version."""
         return provenance(self.settings, self.teacher.digest, VERSION)
 
     def about(self, seed: int) -> dict:
-        """What a file of this experiment names, `seed` being that of the run or of the start states."""
+        """Return what a file of this experiment states; `seed` is that of the run or of the start states."""
         return {"task": self.task, **self.provenance, "seed": seed}
 
     def folder(self, runs: str | os.PathLike) -> Path:
-        """Where the runs of this experiment lie below the folder `runs`."""
+        """Return the folder of this experiment's runs, below the folder `runs`."""
         return provenance_folder(runs, self.task, self.provenance)
 
 
-_version = cache(version)  # which takes milliseconds, and is asked for each run
+_version = cache(version)  # it takes milliseconds, and each run needs it
 
 
 def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
-    """The paper's experiment on `task`: its hyperparameters, the shipped teacher, 1000 episodes."""
+    """Return the paper's experiment on `task`: its hyperparameters, the shipped teacher, 1000 episodes."""
     config, task = paper_preset(task), get_task(task).name
     episodes = QUICK_EPISODES if quick else N_EPISODES
     return Experiment(task, config.quick() if quick else config, load_teacher(task), episodes)
 
 
 def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int | str = 1) -> list[Run]:
-    """Distil once per seed, skip what is there, and return the runs in the order of `seeds`; `jobs` as in `workers`."""
+    """Distil once per seed, skip existing runs, and return the runs in the order of `seeds`; `jobs` as in `workers`."""
     seeds = list(seeds)
     make_all([(experiment, seed) for seed in seeds], runs=runs, jobs=jobs, label=experiment.task)
     return load_runs(experiment, seeds, runs=runs)
 
 
 def make_all(work: Iterable, *, runs: str | os.PathLike, jobs: int | str = 1, label: str) -> None:
-    """Make those runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
+    """Make the runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
     asked = {run_path(experiment.folder(runs), seed): (experiment, seed) for experiment, seed in work}
     make_missing(make_run, asked, label, jobs=jobs, unit="runs")
 
 
 def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], dict]:
-    """One distillation, evaluated: what its sealed file holds, arrays and about."""
+    """Distil and evaluate once; return the arrays and about of the run's sealed file."""
     task, n = experiment.task, experiment.n_episodes
     policy, history = distill(experiment.teacher, get_task(task), experiment.config, seed=seed)
     result = rollout_from_seed(policy, task, n, seed=EVALUATION_SEED)
@@ -139,12 +139,12 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
 
 
 def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:
-    """The runs of these seeds. Raises as `load_run` does."""
+    """Read the runs of these seeds. Raises as `load_run` does."""
     return [load_run(run_path(experiment.folder(runs), seed), experiment) for seed in seeds]
 
 
 def outcome_shares(outcomes: np.ndarray) -> dict[str, float]:
-    """Shares of the episodes that reached the goal, fell into the pit and were truncated, by name."""
+    """Return the shares of the episodes that reached the goal, fell into the pit and were truncated, by name."""
     return {name: np.mean(outcomes == code) for name, code in SHARES.items()}
 
 
@@ -168,7 +168,7 @@ class Results:
 
     @property
     def outcomes(self) -> np.ndarray:
-        """How their episodes ended, indices of `vsp.tasks.OUTCOMES`. (n_runs, n_episodes)"""
+        """Outcomes of the distilled policies, as indices of `vsp.tasks.OUTCOMES`. (n_runs, n_episodes)"""
         return np.stack([run.outcomes.outcomes for run in self.runs])
 
     @property
@@ -178,19 +178,19 @@ class Results:
 
 
 def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = -1) -> Results:
-    """The paper's experiment on `task`; runs that are missing in the folder `runs` are made."""
+    """Return the paper's experiment on `task`; make the runs that are missing in the folder `runs`."""
     experiment = paper_experiment(task, quick=quick)
     n = QUICK_RUNS if quick else N_RUNS[experiment.task]
     made = make_runs(experiment, range(n), runs=runs, jobs=jobs)
     return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
 
 
-@threadpool_limits.wrap(limits=1)  # the same sums in the same order, also where no `make` limits threads
+@threadpool_limits.wrap(limits=1)  # the same order of sums, also without the thread limit of `make`
 def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
-    """The teacher's episodes from the shared start states, kept beside the runs.
+    """Return the teacher's episodes from the shared start states, stored beside the runs.
 
-    Another CPU type rounds a network's sums differently, and an episode may end elsewhere. Tables made from the kept
-    files are the same there.
+    Another CPU type rounds a network's sums differently, so an episode may end elsewhere. Tables made from the stored
+    file stay the same.
     """
     path, about = experiment.folder(runs) / "teacher.run", experiment.about(EVALUATION_SEED)
     if not path.exists():
@@ -200,5 +200,5 @@ def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outc
 
 
 def run_path(folder: str | os.PathLike, seed: int) -> Path:
-    """Where the run with this seed lies in the folder of its experiment."""
+    """Return the path of the run with this seed in the folder of its experiment."""
     return Path(folder) / f"{seed:04d}.run"

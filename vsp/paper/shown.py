@@ -1,4 +1,4 @@
-"""Tables as people read them: headings in words, per cent, an interval in one column, no row numbers."""
+"""Tables for readers: headings in words, percentages, each interval in one column, no row numbers."""
 
 from __future__ import annotations
 
@@ -52,8 +52,11 @@ PERCENT = {
 
 
 def present(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame in words: named rows as columns, tasks by their short names, yes or nothing for true or false, shares
-    as per cent, `low` and `high` as one column of text, and headings."""
+    """Return the frame for readers.
+
+    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing, and shares become
+    percentages. `low` and `high` become one column of text, and headings are in words.
+    """
     index = frame.index
     if index.names != [None] or (len(index) and isinstance(index[0], str)):
         frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
@@ -76,7 +79,7 @@ def _in_words(value: object) -> object:
 
 
 def _about(column: str) -> str:
-    """The quantity that a column or an end of its interval belongs to."""
+    """Return the quantity that a column or an end of its interval belongs to."""
     return re.sub(r"_(low|high)$", "", str(column))
 
 
@@ -85,8 +88,7 @@ def _heading(column: str) -> str:
 
 
 def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
-    """The frame as a notebook shows it, below its caption: that of the table `name` in notebooks/captions.toml, or
-    `caption`."""
+    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml."""
     from IPython.display import HTML
 
     above = caption_of("tables", name, text=caption).to_html("caption")
@@ -96,14 +98,17 @@ def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = Non
 
 
 def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
-    """The frame as text. Floats have `digits` decimals, or as few as hold the whole column; from 100 on fewer, so that
-    five digits stand. All else is as it is."""
+    """Return the frame as text.
+
+    Floats have `digits` decimals, or fewer if these hold the whole column. From 100 on they have fewer, so that five
+    digits remain. All else stays as it is, apart from thousands separators.
+    """
     check_count("digits", digits, least=0)
     return frame.apply(lambda column: column.map(lambda value: _text(value, min(digits, _decimals(column)))))
 
 
 def _decimals(column: pd.Series) -> int:
-    """How few decimals hold all floats of a column, at most 9: counts become floats beside a missing one."""
+    """Return the fewest decimals that hold all floats of a column, at most 9: counts are floats if one is missing."""
     values = np.array([value for value in column if isinstance(value, float) and math.isfinite(value)])
     return next((n for n in range(9) if (values.round(n) == values).all()), 9)
 

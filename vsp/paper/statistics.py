@@ -22,12 +22,12 @@ from ..evaluation import fences
 
 
 def spread(returns: np.ndarray) -> dict[str, float]:
-    """How returns of any shape spread: the metrics of the paper's tables T5 and T6, and what its text adds.
+    """Return the spread of returns of any shape: the metrics of the paper's tables T5 and T6, and those its text adds.
 
     Keys, in units of return: min, max, mean, std (of the sample, n - 1), q1, median, q3, iqr; lower_fence and
     upper_fence, 1.5 interquartile ranges beyond the quartiles, which the paper calls bounds; outliers_below and
-    outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError for no returns
-    or some that are not finite.
+    outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError if there are
+    no returns, or some are not finite.
     """
     returns = check_finite("returns", returns).ravel()
     if not len(returns):
@@ -42,9 +42,9 @@ def spread(returns: np.ndarray) -> dict[str, float]:
 
 
 def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
-    """What the paper's text says about outliers, under the names that end its ids in `data/paper/text_numbers.csv`.
+    """Return the paper's statistics of outliers, under the names that end their ids in `data/paper/text_numbers.csv`.
 
-    Means, standard deviations and ranges of a set without members are NaN. Raises ValueError as `spread` does.
+    Means, standard deviations and ranges of an empty set are NaN. Raises ValueError as `spread` does.
     """
     facts, returns = spread(returns), np.ravel(returns)
     below = returns[returns < facts["lower_fence"]]
@@ -68,9 +68,9 @@ def _moments(values: np.ndarray) -> dict[str, float]:
 
 
 def bootstrap_draws(n_rows: int, n_resamples: int, seed: int) -> np.ndarray:
-    """Indices of the rows that each resample draws, with replacement: as many as there are. (n_resamples, n_rows)
+    """Return the indices of the `n_rows` rows that each resample draws with replacement. (n_resamples, n_rows)
 
-    Every interval over policies resamples in this way; the same seed draws the same rows.
+    Every interval over policies resamples this way; the same seed draws the same rows.
     """
     check_count("n_resamples", n_resamples)
     check_seed(seed)
@@ -78,7 +78,7 @@ def bootstrap_draws(n_rows: int, n_resamples: int, seed: int) -> np.ndarray:
 
 
 def percentile_interval(values: np.ndarray) -> tuple[float, float]:
-    """The middle 95 % of `values`: a percentile interval where they are the statistic of each resample."""
+    """Return the middle 95 % of `values`: a percentile interval if they are the statistic of each resample."""
     low, high = np.percentile(values, [2.5, 97.5])
     return float(low), float(high)
 
@@ -86,11 +86,12 @@ def percentile_interval(values: np.ndarray) -> tuple[float, float]:
 def interval(
     returns: np.ndarray, statistic: Callable, *, vectorized: bool = False, n_resamples: int = 10_000, seed: int = 0
 ) -> tuple[float, float]:
-    """Percentile bootstrap interval (95 %) of `statistic(returns)` that resamples policies, rows of `returns` (p, ...).
+    """Return the percentile bootstrap interval (95 %) of `statistic(returns)`.
 
-    All policies share start states, so single episodes are not independent and are never resampled on their own.
-    `vectorized` calls `statistic(returns, axis=1)` once, for all resamples of one number per policy (p,).
-    Raises ValueError for no returns or some that are not finite.
+    It resamples policies, which are the rows of `returns` (p, ...). All policies share start states, so episodes are
+    not independent and are never resampled alone. `vectorized` calls `statistic(resamples, axis=1)` once for all
+    resamples; `returns` are then one number per policy (p,). Raises ValueError if there are no returns, or some are not
+    finite.
     """
     returns = check_finite("returns", returns)
     if not returns.size or not returns.ndim:
@@ -102,10 +103,11 @@ def interval(
 
 
 def crossed_interval(values: np.ndarray) -> tuple[float, float]:
-    """Percentile bootstrap interval (95 %) of the mean of `values` (p, n) that resamples policies *and* start states.
+    """Return the percentile bootstrap interval (95 %) of the mean of `values` (p, n), over policies *and* start states.
 
-    Policies may be so alike (twenty fits to much the same data) that the starts matter most. How often a row or column
-    is drawn is multinomial: the same law as counting `bootstrap_draws`, without drawing p + n indices a resample.
+    Policies may be so alike (twenty fits to almost the same data) that the starts matter most. How often each row or
+    column is drawn is multinomial. This is the distribution of the counts in `bootstrap_draws`, without drawing p + n
+    indices per resample.
     """
     rng = np.random.default_rng(0)
     policies, starts = (rng.multinomial(k, np.full(k, 1 / k), size=2000) for k in values.shape)
@@ -113,11 +115,11 @@ def crossed_interval(values: np.ndarray) -> tuple[float, float]:
 
 
 def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0, jobs: int = -1) -> pd.DataFrame:
-    """Bootstrap of everything that `spread` and `outlier_numbers` give: one row per resample, one column per statistic.
+    """Bootstrap all statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
 
     Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
     that a resample leaves empty is NaN. `jobs` threads (-1: one per core) give the same numbers as one. Raises
-    ValueError for no returns or some that are not finite.
+    ValueError if there are no returns, or some are not finite.
     """
     returns = check_array("returns", returns, (-1, -1))
     if not returns.size:
@@ -127,7 +129,7 @@ def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0, j
     batches = [draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH)]
     work = (delayed(sample.statistics)(batch) for batch in batches)
     with threadpool_limits(1):
-        found = Parallel(n_jobs=jobs, prefer="threads")(work)  # NumPy's loops run side by side
+        found = Parallel(n_jobs=jobs, prefer="threads")(work)  # NumPy's loops run in parallel in threads
     return pd.DataFrame({name: np.concatenate([batch[name] for batch in found]) for name in found[0]})
 
 
@@ -137,7 +139,7 @@ _BATCH = 25  # resamples at a time, so that their arrays stay in the cache
 class _SortedReturns:
     """Returns (p, n) of policies, sorted once, so that no resample needs sorting.
 
-    A resample counts each policy, with all its returns, some number of times. Its order statistics are found in
+    A resample contains each policy, with all its returns, some number of times. Its order statistics are found in
     cumulative counts: first the block of sorted returns, then the return inside it.
     """
 
@@ -154,7 +156,7 @@ class _SortedReturns:
         self.by_policy = _Parts(np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1))
 
     def statistics(self, draws: np.ndarray) -> dict[str, np.ndarray]:
-        """What `resample` has, for the resamples that draw these policies (r, p)."""
+        """Return the columns of `resample`, for the resamples that draw these policies (r, p)."""
         counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
         q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
         lower, upper = fences(q1, q3)
@@ -171,7 +173,7 @@ class _SortedReturns:
         return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / len(self.values))}
 
     def _quantiles(self, counts: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
-        """Linear interpolation between order statistics, as `np.percentile` has it; an array (r,) per share."""
+        """Interpolate linearly between order statistics, as `np.percentile` does; return an array (r,) per share."""
         until = counts @ self.until
         found = []
         for place in np.multiply(shares, len(self.values) - 1):
@@ -180,7 +182,7 @@ class _SortedReturns:
         return found
 
     def _ranked(self, counts: np.ndarray, until: np.ndarray, rank: int) -> np.ndarray:
-        """The value of each resample with this rank, 0 for the smallest; `until` are values before each block. (r,)"""
+        """Return the value of this rank (0: smallest) in each resample; `until`: values before each block. (r,)"""
         block = (until[:, 1:] <= rank).sum(axis=1, keepdims=True)
         places = np.minimum(block * self.block + np.arange(self.block), len(self.values) - 1)
         inside = np.take_along_axis(counts, self.policy[places], axis=1).cumsum(axis=1)
@@ -188,7 +190,7 @@ class _SortedReturns:
         return self.values[block[:, 0] * self.block + passed.sum(axis=1)]
 
     def _outliers(self, counts: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[_Parts, _Parts]:
-        """The returns below and above the fences (r,) of each resample."""
+        """Summarise the returns below and above the fences (r,) of each resample."""
         n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
         below, above = np.arange(max(1, low.max())), np.arange(min(n - 1, high.min()), n)  # in any resample
         return (
@@ -197,7 +199,7 @@ class _SortedReturns:
         )
 
     def _part(self, places: np.ndarray, weights: np.ndarray) -> _Parts:
-        """The sorted returns at `places` (k,), each there `weights` (r, k) times."""
+        """Summarise the sorted returns at `places` (k,), each counted `weights` (r, k) times."""
         values, size, there = self.values[places], weights.sum(axis=1), weights > 0
         mean = values[0] + np.einsum("rk,k->r", weights, values - values[0]) / np.maximum(1, size)
         squares = np.einsum("rk,rk->r", weights, np.square(values - mean[:, None]))
@@ -206,16 +208,16 @@ class _SortedReturns:
 
 
 class _Parts(NamedTuple):
-    """Parts of resamples, as arrays (r, parts) or, where all resamples have the same, (parts,)."""
+    """Summary of parts of resamples: arrays (r, parts), or (parts,) for numbers that all resamples share."""
 
-    size: np.ndarray  # where it is 0, the others mean nothing
+    size: np.ndarray  # where it is 0, the other fields mean nothing
     mean: np.ndarray
     squares: np.ndarray  # sum of squared deviations from the mean
     low: np.ndarray
     high: np.ndarray
 
     def moments(self) -> dict[str, np.ndarray]:
-        """Moments and range of the parts together, NaN where all are empty. (r,)"""
+        """Return moments and range of all parts together, NaN where all are empty. (r,)"""
         n = self.size.sum(axis=1)
         mean = (self.size * self.mean).sum(axis=1) / np.maximum(1, n)
         squares = (self.squares + self.size * np.square(self.mean - mean[:, None])).sum(axis=1)
@@ -225,44 +227,44 @@ class _Parts(NamedTuple):
         return {name: np.where(n > 0, x, np.nan) for name, x in found.items()}
 
 
-Groups = Sequence[tuple[float, float, float]]  # (count, low, high): so many values lie in [low, high]
+Groups = Sequence[tuple[float, float, float]]  # (count, low, high): `count` values lie in [low, high]
 Part = namedtuple("Part", "size mean std low high")  # some of the returns, and the range that they lie in
 
 
 def quartiles_from_fences(low: float, high: float) -> tuple[float, float]:
-    """Q1 and Q3 with these fences, which lie 1.5 + 1 + 1.5 interquartile ranges apart."""
+    """Return Q1 and Q3 for these fences, which lie 1.5 + 1 + 1.5 interquartile ranges apart."""
     iqr = (high - low) / (1.5 + 1 + 1.5)
     return low + 1.5 * iqr, high - 1.5 * iqr
 
 
 def remaining_mean(n: float, mean: float, parts: Sequence[Part]) -> float:
-    """Mean of what is left of n values with this `mean` when `parts` are taken away."""
+    """Return the mean of the values that remain when `parts` are removed from n values with this `mean`."""
     return (n * mean - sum(p.size * p.mean for p in parts)) / (n - sum(p.size for p in parts))
 
 
 def remaining_std(n: float, mean: float, std: float, parts: Sequence[Part]) -> float:
-    """Standard deviation of what is left when `parts` are taken away; NaN if no values have such moments."""
+    """Return the standard deviation of the values that remain without `parts`; NaN if no values have such moments."""
     squares = n * (std**2 + mean**2) - sum(p.size * (p.std**2 + p.mean**2) for p in parts)
     variance = squares / (n - sum(p.size for p in parts)) - remaining_mean(n, mean, parts) ** 2
     return math.sqrt(variance) if variance >= 0 else math.nan
 
 
 def quarters(n: float, marks: Sequence[float], below: float = 0, above: float = 0) -> Groups:
-    """Where those of n values lie that are no outliers; `marks` are their lowest, Q1, median, Q3 and their highest.
+    """Return the quarters of n values without the outliers; `marks`: lowest of the rest, Q1, median, Q3, highest.
 
-    The quartiles count all values: outliers take their places in the first (`below`) and the last quarter (`above`).
+    The quartiles count all values: `below` outliers belong to the first quarter, `above` outliers to the last.
     """
     return list(zip((n / 4 - below, n / 4, n / 4, n / 4 - above), marks[:-1], marks[1:], strict=True))
 
 
 def mean_range(groups: Groups) -> tuple[float, float]:
-    """The least and the greatest mean that values in these ranges can have."""
+    """Return the least and the greatest mean that values in these ranges can have."""
     n = sum(count for count, _, _ in groups)
     return sum(count * low for count, low, _ in groups) / n, sum(count * high for count, _, high in groups) / n
 
 
 def least_std(mean: float, groups: Groups) -> float:
-    """A lower bound on the standard deviation of such values: each is at least as far from their mean as its range."""
+    """Return a lower bound on the standard deviation of such values: none is nearer to the mean than its range is."""
     squares = sum(count * float(np.max((low - mean, mean - high, 0))) ** 2 for count, low, high in groups)
     return math.sqrt(squares / sum(count for count, _, _ in groups))
 
@@ -273,7 +275,7 @@ def greatest_std(mean: float, low: float, high: float) -> float:
 
 
 def rounds_to(number: float, printed: float) -> bool:
-    """Whether `number` may be printed as `printed`, to the last decimal of this; NaN may not."""
+    """Return whether `number`, rounded to the decimals of `printed`, may be `printed`; NaN may not."""
     check_number("printed", printed)
     decimals = max(0, -Decimal(repr(float(printed))).normalize().as_tuple().exponent)
     return bool(abs(number - printed) <= 0.5 / 10**decimals + 1e-9)

@@ -1,4 +1,4 @@
-"""Tables: frames in, LaTeX (booktabs) and CSV out. The CSV holds the numbers, the LaTeX what a reader sees."""
+"""Tables: frames in, LaTeX (booktabs) and CSV out. The CSV holds the numbers, the LaTeX the text for readers."""
 
 from __future__ import annotations
 
@@ -28,18 +28,17 @@ from .statistics import interval, outlier_numbers, spread
 if TYPE_CHECKING:
     from IPython.display import HTML
 
-PAGE = 40  # rows that fit on one
+PAGE = 40  # rows that fit on one page
 
 
 def save_table(
     frame: pd.DataFrame, name: str, *, out: str | os.PathLike, shown: pd.DataFrame | None = None,
     caption: str | None = None,
 ) -> HTML:  # fmt: skip
-    """Write OUT/figures/tables/NAME.csv and .tex; returns the table as a notebook shows it.
+    """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
-    `shown` stands in print instead of the whole table: a part of it, or equations as LaTeX code. Without `caption`,
-    notebooks/captions.toml has one. The LaTeX needs the packages booktabs and xcolor, and longtable for more than
-    `PAGE` rows.
+    `shown` replaces the whole table for readers: a part of it, or equations as LaTeX code. The default `caption` is in
+    notebooks/captions.toml. The LaTeX needs the packages booktabs and xcolor, and longtable for more than `PAGE` rows.
     """
     path, shown = Path(out) / "figures" / "tables" / name, frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
@@ -53,7 +52,7 @@ def save_table(
 
 
 def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
-    """T2 as configured here, beside what the paper prints: one row per hyperparameter, two columns per task."""
+    """Return T2 as printed and as configured here: one row per hyperparameter, two columns per task."""
     names = printed_hyperparameters(tasks[0])
     columns = {"hyperparameter": list(names)}
     for task in tasks:
@@ -64,16 +63,16 @@ def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
 
 
 def interpretation_table(task: str) -> pd.DataFrame:
-    """What the paper leaves open: one row per field of the configuration that T2 does not print, with its default."""
+    """List what the paper leaves open: one row per configuration field that T2 does not print, with its default."""
     here, known = paper_preset(task), printed_hyperparameters(task).keys() | EXTENSIONS
     fields = {field.name: getattr(here, field.name) for field in dataclasses.fields(here) if field.name not in known}
     return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
 
 
 def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: bool = False) -> pd.DataFrame:
-    """T3 and T4: one row per cell, the codeword and an equation per action in LaTeX.
+    """Return T3 or T4: one row per cell, with its codeword and one equation per action, in LaTeX.
 
-    `swatch` puts a patch before the equation, in the force map's colour of the action at the codeword (one action).
+    `swatch` puts a patch before each equation, in the force map's colour of the action at the codeword (one action).
     """
     rows = []
     for i, codeword in enumerate(policy.codewords):
@@ -86,7 +85,7 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: boo
 
 
 def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
-    """The policy as a notebook shows it: its equations, and below `caption` the distance and the limits of actions.
+    """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
 
     `digits`: decimals of the numbers; None: as many as they have. Raises ValueError unless the sub-policies are linear.
     """
@@ -104,7 +103,10 @@ def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str =
 
 
 def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
-    """T5 and T6: the paper's columns beside ours; `teacher` (n,) and `runs` (p, n) are returns. Coverage in percent."""
+    """Return T5 or T6: the paper's columns beside the rerun's. `teacher` (n,) and `runs` (p, n) are returns.
+
+    Coverage is in percent.
+    """
     printed, columns = printed_spread(task), {}
     teacher, runs = _returns(teacher, runs)
     for name, values in (("drl", teacher), ("ours", runs)):
@@ -116,7 +118,7 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
 
 
 def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
-    """N: the numbers of the running text beside ours; NaN where the paper gives none.
+    """Return N: the numbers of the running text beside the rerun's; NaN where the paper gives none.
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
@@ -140,17 +142,17 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
 
 
 def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns of the teacher (n,) and of the runs (p, n), checked. Raises ValueError."""
+    """Check and return the returns of the teacher (n,) and of the runs (p, n). Raises ValueError."""
     return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
 
 
 def _like(printed: float, here: float) -> float | int:
-    """The paper's value, as an integer where ours is a count."""
+    """Return the paper's value, as an integer if the rerun's is a count."""
     return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
 
 
 def _escape(text: str) -> str:
-    """Text for LaTeX, with a minus as long as a plus; mathematics between dollars stays as it is."""
+    """Escape text for LaTeX and typeset minus signs; mathematics between dollars stays as it is."""
     parts = re.split(r"(\$[^$]*\$|\\textcolor.*?}} )", text)
     parts[::2] = [re.sub(r"([_%&])", r"\\\1", part) for part in parts[::2]]
     parts[::2] = [re.sub(r"(?<![\w.)-])-(?=\d)", "$-$", part) for part in parts[::2]]
@@ -163,7 +165,7 @@ def _patch(force: float) -> str:
 
 
 def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
-    """One row per run: seed, cells, splits, merges, spread of the returns and shares of the outcomes."""
+    """Return one row per run: seed, cells, splits, merges, spread of the returns and shares of the outcomes."""
     rows = []
     for run in runs:
         counts = {"seed": run.seed, "cells": len(run.policy), "splits": run.splits, "merges": run.merges}
@@ -173,16 +175,16 @@ def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
 
 
 def run_overview(results: Results) -> pd.DataFrame:
-    """Mean, lowest and highest value over the runs, one row per property of a run."""
+    """Return mean, lowest and highest value over the runs, one row per property of a run."""
     frame = run_summary(results.runs, results.experiment)
     return frame[["cells", "splits", "merges", "mean", *SHARES]].agg(["mean", "min", "max"]).T
 
 
 def teacher_beside_runs(results: Results) -> dict[str, float]:
-    """Teacher against distilled policies: means, and 95 % intervals that resample policies.
+    """Compare the teacher with the distilled policies: means, and 95 % intervals that resample policies.
 
-    The difference is taken start by start. "± if independent" is what the half-width would be if all episodes were
-    independent of each other, which they are not.
+    Differences are taken start by start. "± if independent" is the half-width for independent episodes, which these
+    are not.
     """
     teacher, runs = results.teacher_returns, results.returns
     means = runs.mean(axis=1)
@@ -199,7 +201,7 @@ def teacher_beside_runs(results: Results) -> dict[str, float]:
 
 
 def write_summary(results: Results, *, out: str | os.PathLike) -> None:
-    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them beside it."""
+    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them to made_on.txt."""
     folder, task = Path(out) / "data" / "results", results.experiment.task
     write_results(run_summary(results.runs, results.experiment), task, out=out)
     cpus = sorted({run.cpu for run in results.runs})

@@ -1,4 +1,4 @@
-"""Figures (arrays in, `Axes` out), animations, and a widget that distils anew at each change of a setting.
+"""Figures (arrays in, `Axes` out), animations, and a widget that distils again whenever a setting changes.
 
 Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 """
@@ -39,7 +39,7 @@ from .style import DISTILLED, OTHER, TEACHER, Picture, legend_below, letter, pan
 
 
 def __getattr__(name: str) -> type:
-    """Import `Laboratory` on first use: most notebooks have no widgets, which take long to import."""
+    """Import `Laboratory` on first use: widgets take long to import, and most notebooks have none."""
     if name == "Laboratory":
         return getattr(importlib.import_module(f".{name.lower()}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

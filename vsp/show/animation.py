@@ -28,24 +28,24 @@ from .stage import Stage, borders, cells_and_changes, changes, ground, moment, p
 
 WIDTH, HEIGHT = 6.0, 2.6  # inches
 FINE = 301  # grid points per axis for the borders of cells
-MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map: few arrows
+MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map; few for arrows
 FRAMES = 24
 STEP, HOLD = 200, 2500  # milliseconds per frame, and for the last one
-DPI, COLOURS = 120, 64  # of a GIF
+DPI, COLOURS = 120, 64  # dots per inch of a GIF, and the size of its palette
 
 
 class Maps:
-    """Draws policy maps of a task and the cells on them. Raises ValueError for a task without such a map."""
+    """Draw the policy maps of a task and the cells on them. Raises ValueError for a task without such a map."""
 
     def __init__(self, task: Task):
         if task.name not in MAPS:
-            raise ValueError(f"task is {task.name}, expected one of {list(MAPS)}: a map has two inputs")
+            raise ValueError(f"task is {task.name}, expected one of {list(MAPS)}: a policy map needs two inputs")
         self.task = task
         self._fine = state_space.grid(task.low, task.high, FINE)
         self._grid = state_space.grid(task.low, task.high, MAPS[task.name])
 
     def panels(self, teacher: Policy, dpi: int) -> tuple[Figure, np.ndarray]:
-        """A figure and its three axes: the teacher's map, an empty one for the distilled policy's, and a free one."""
+        """Return a figure and three axes: the teacher's map, an empty one for the distilled policy, and free axes."""
         fig, axes = style.panels(3, width=WIDTH, height=HEIGHT, dpi=dpi)
         fig.get_layout_engine().set(wspace=0.04)
         for ax in axes[:2]:
@@ -59,12 +59,12 @@ class Maps:
         return fig, axes
 
     def policy(self, ax: Axes, actor: Policy, *, color: str = style.DISTILLED) -> Artist:
-        """The actions of `actor`: arrows in `color` for two actions, a force map for one. Returns the drawn artist."""
+        """Draw the actions of `actor`: arrows in `color` for two actions, a force map for one. Return the artist."""
         x, y, states = self._grid
         return policy_map(ax, x, y, actor.predict(states)[0], color=color)
 
     def cells(self, ax: Axes, policy: VoronoiPolicy) -> None:
-        """The cells of `policy` with their codewords."""
+        """Draw the cells of `policy` with their codewords."""
         x, y, states = self._fine
         borders(ax, x, y, policy.cells(states))
         state_space.codewords(ax, policy.codewords)
@@ -76,10 +76,10 @@ def check_plays(policy: Policy, task: Task) -> None:
 
 
 class Growth:
-    """Draws a run at any iteration: the teacher's map, the distilled policy's with its cells, and the number of cells.
+    """Draw a run at any iteration: the teacher's map, the distilled policy's map and cells, and the number of cells.
 
-    Raises ValueError for a task without such maps, for anything but a history of the paper's method on that task, and
-    for a teacher that does not play it.
+    Raises ValueError for a task without policy maps, for anything but a history of the paper's method on this task,
+    and for a teacher that cannot act in the task.
     """
 
     def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI):
@@ -106,9 +106,9 @@ class Growth:
         return Stage(fig), axes
 
     def shoot(self, n: int, *, since: int | None = None) -> np.ndarray:
-        """The run after iteration n, as uint8 (height, width, 3). Raises ValueError for an iteration outside the run.
+        """Draw the run after iteration n, as uint8 (height, width, 3). Raises ValueError for n outside the run.
 
-        Marks what changed after iteration `since` (None: in the last pass with a change).
+        Marks the codewords added or removed after iteration `since` (None: in the last iteration with a change).
         """
         policy = self.history.policy_at(n)
         came, went, _ = self._changed(n, self.last_change(n) - 1 if since is None else since)
@@ -123,23 +123,23 @@ class Growth:
         return self.stage.shoot(paint)
 
     def _changed(self, n: int, since: int) -> tuple[set[tuple], set[tuple], set[tuple]]:
-        """What changed in the iterations `since` < i <= n: codewords added that remain, codewords removed, and those
-        both added and removed."""
+        """Return the codewords that changed in the iterations `since` < i <= n: those added that remain, those removed,
+        and those both added and removed."""
         recent = [(e.kind, tuple(e.codeword)) for e in self.history.events if since < e.iteration <= n]
         there = set(map(tuple, self.history.policy_at(n).codewords))
         split, merged = ({place for kind, place in recent if kind == one} for one in ("split", "merge"))
         return split & there, merged - there, (merged - there) & split
 
     def moments(self, number: int) -> list[int]:
-        """At most `number` iterations from the first to the last, denser early on, where most changes happen."""
+        """Return at most `number` iterations from first to last, denser early on, where most changes happen."""
         return np.unique((np.linspace(0, 1, number) ** 2 * (len(self) - 1)).astype(int)).tolist()
 
     def last_change(self, n: int) -> int:
-        """The last iteration up to n with a split or merge; 0 if there is none."""
+        """Return the last iteration up to n with a split or merge; 0 if there is none."""
         return max((e.iteration for e in self.history.events if e.iteration <= n), default=0)
 
     def words(self, n: int) -> str:
-        """A description of the run after iteration n."""
+        """Describe the run after iteration n."""
         k, last = self.history.cells[n], self.last_change(n)
         kinds = [e.kind for e in self.history.events if e.iteration == last]
         text = f"After iteration {n} (0 to {len(self) - 1}): {k} {'cell' if k == 1 else 'cells'}."
@@ -152,7 +152,7 @@ class Growth:
 
 
 class Animation:
-    """A GIF as a notebook shows it: its last frame, and the GIF folded away below, so that nothing moves unasked."""
+    """A GIF as shown in a notebook: its last frame, and the GIF in a closed fold, so that nothing moves unasked."""
 
     def __init__(self, gif: bytes, still: bytes, about: Caption):
         self.gif, self.still, self.about = gif, still, about
@@ -190,9 +190,9 @@ def save_frames(
     images: list[np.ndarray], name: str, *, out: str | os.PathLike, alt: str | None = None, step: int = STEP,
     hold: int = HOLD,
 ) -> Animation:  # fmt: skip
-    """Write images (height, width, 3) as OUT/figures/NAME.gif, and the last one as NAME.png; return what to show.
+    """Write images (height, width, 3) as OUT/figures/NAME.gif, and the last one as NAME.png; return an animation.
 
-    `step`: milliseconds per frame; `hold`: those of the last.
+    `step`: milliseconds per frame; `hold`: milliseconds of the last frame.
     """
     path, about = Path(out) / "figures" / name, caption_of("figures", name, alt=alt)
     with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
@@ -203,10 +203,10 @@ def save_frames(
 
 
 def _write_gif(path: Path, images: list[np.ndarray], step: int, hold: int) -> None:
-    """Write the frames with one common palette, so that each stores only what differs from the one before."""
+    """Write the frames with one common palette, so that each stores only the pixels that changed."""
     some = Image.fromarray(np.concatenate([images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]))
     colours = np.reshape(some.quantize(COLOURS).getpalette(), (-1, 3))
-    colours[(colours > 247).all(axis=1)] = 255  # paper stays white
+    colours[(colours > 247).all(axis=1)] = 255  # the background stays white
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]

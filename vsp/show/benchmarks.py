@@ -1,4 +1,4 @@
-"""Figures of benchmarks: the time of look-ups, neighbour graphs and fits, and what a kill costs."""
+"""Figures of benchmarks: the time of look-ups, neighbour graphs and fits, and the cost of a killed run."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from matplotlib.ticker import PercentFormatter
 from .methods import ticks_at
 from .style import COLOURS, DISTILLED, GOAL, OTHER, TEACHER
 
-# The methods that `beyond.benchmarks.lookup` measures, a colour each; dashed for the Manhattan distance
+# Colours of the methods that `beyond.benchmarks.lookup` measures; lines for the Manhattan distance are dashed
 _METHODS = {"cdist": OTHER, "matrix product": GOAL, "kd-tree": COLOURS[4]}
 _METHODS |= {"witnesses": GOAL, "linear programmes": OTHER, "Delaunay": COLOURS[3]}
 
 
 def times_over_dimension(ax: Axes, frame: pd.DataFrame, *, limit: float | None = None) -> Axes:
-    """Seconds over the number of dimensions, both logarithmic: a line per method and metric.
+    """Plot seconds over the number of dimensions, both logarithmic: one line per method and metric.
 
     `frame` has rows of `beyond.benchmarks.lookup` for one number of codewords. A missing time means more than `limit`
-    seconds: a cross marks the first one of each line.
+    seconds; a cross marks the first missing time of each line.
     """
     for (method, metric), rows in frame.groupby(["method", "metric"], sort=False):
         dashed, color = metric == "manhattan", _METHODS[method]
@@ -32,10 +32,9 @@ def times_over_dimension(ax: Axes, frame: pd.DataFrame, *, limit: float | None =
 
 
 def fit_times(ax: Axes, frame: pd.DataFrame, varied: str) -> Axes:
-    """Milliseconds of an evaluation of the loss over the quantity `varied`, both logarithmic; the dotted line is
-    proportional to it.
+    """Plot the milliseconds per evaluation of the loss over the quantity `varied`, both logarithmic.
 
-    `frame` has rows of `beyond.benchmarks.fits`.
+    The dotted line is proportional to `varied`. `frame` has rows of `beyond.benchmarks.fits`.
     """
     rows = frame[frame["varied"] == varied]
     taken = 1000 * rows["seconds"]
@@ -46,7 +45,7 @@ def fit_times(ax: Axes, frame: pd.DataFrame, varied: str) -> Axes:
 
 
 def kills(ax: Axes, frame: pd.DataFrame) -> Axes:
-    """Time of the re-run over the moment of the kill, both as shares of the time of an undisturbed run."""
+    """Plot the time of the re-run over the moment of the kill, both as shares of the time of an undisturbed run."""
     moment, again = frame["moment"] / frame["undisturbed"], frame["again"] / frame["undisturbed"]
     held = frame["wrong"].isna()
     ax.axhline(1, color=TEACHER, lw=0.8, label="undisturbed, from nothing")

@@ -1,6 +1,6 @@
 """Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml.
 
-They stand there, in the order of the notebooks, so that a code cell holds code alone.
+That file lists them in the order of the notebooks, so that code cells contain only code.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ KINDS = {"figures": "Figure", "tables": "Table"}
 
 
 class Caption(NamedTuple):
-    """`label` such as "Figure 6.2", empty outside the notebooks; what to see; and for those who cannot see it."""
+    """A `label` such as "Figure 6.2" (empty outside the notebooks), the caption, and the alternative text."""
 
     label: str
     text: str
     alt: str = ""
 
     def to_html(self, tag: str) -> str:
-        """The caption as the element `tag`, empty if there is nothing to say."""
+        """Return the caption as the element `tag`; empty if it has no text."""
         label = f"<b>{self.label}.</b> " if self.label else ""
         return f"<{tag}>{label}{html.escape(self.text, quote=False)}</{tag}>" if self.text else ""
 
 
 @cache
 def _book() -> dict[tuple[str, str], Caption]:
-    """Every caption by kind and name. Kinds are numbered on their own in each notebook."""
+    """Return all captions by kind and name. Each notebook numbers its figures and its tables separately."""
     found = {}
     for notebook, kinds in (tomllib.loads(BOOK.read_text("utf-8")) if BOOK.exists() else {}).items():
         for kind, entries in kinds.items():
@@ -43,15 +43,13 @@ def _book() -> dict[tuple[str, str], Caption]:
 
 
 def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None = None) -> Caption:
-    """The caption of a figure or table: `kind` is "figures" or "tables".
+    """Return the caption of a figure or table; `kind` is "figures" or "tables".
 
-    `text` and `alt` take the place of what the book says. Raises ValueError for a figure of which neither says `alt`.
+    `text` and `alt` override the entry in notebooks/captions.toml. Raises ValueError for a figure without any `alt`.
     """
     check_choice("kind", kind, KINDS)
     known = _book().get((kind, name), Caption("", ""))
     found = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
     if kind == "figures" and not found.alt:
-        raise ValueError(
-            f"figure {name!r} has no alternative text: hand in alt=, or write it into notebooks/{BOOK.name}"
-        )
+        raise ValueError(f"figure {name!r} has no alternative text: pass alt= or add it to notebooks/{BOOK.name}")
     return found

@@ -20,15 +20,15 @@ _TINT = (0.9289269797269006, 0.8326402247329995, 0.6730050641684175)  # of DISTI
 
 
 def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
-    """Where a two-dimensional state lies, by `policy.explain(state)`: its cell, codeword and nearest border.
+    """Draw where a two-dimensional state lies, from `policy.explain(state)`: its cell, codeword and nearest border.
 
-    The arrow is the smallest change of one input, in units of the look-up's distance, that leads to another cell. The
-    view is the box of the states, enlarged (and the box dashed) if the codeword lies outside. Raises ValueError unless
-    the task has two inputs.
+    The arrow is the smallest change of a single input that leads to another cell, in units of the look-up's distance.
+    The axes show the box of the states. If the codeword lies outside, they are larger and the box is dashed. Raises
+    ValueError unless the task has two inputs.
     """
     why, task = policy.explain(state), policy.task
     if len(task.inputs) != 2:
-        raise ValueError(f"{task.name} has inputs {task.inputs}, expected two: `contributions` takes any number")
+        raise ValueError(f"{task.name} has inputs {task.inputs}, expected two; `contributions` takes any number")
     ends = np.array([task.low, task.high, why.codeword])
     outside = ((why.codeword < task.low) | (why.codeword > task.high)).any()
     room = 0.06 * np.ptp(ends, axis=0) * outside
@@ -54,7 +54,7 @@ _FRAME = {"fill": False, "lw": 0.6, "ls": "--", "edgecolor": OTHER, "zorder": 2,
 
 
 def _way_out(why: Explanation, scale: np.ndarray) -> tuple[int, float, int] | None:
-    """The input that leaves the cell by the smallest change, that change, and the next cell; None without borders."""
+    """Return the input that leaves the cell by the smallest change, this change, and the next cell, or None."""
     changes = why.borders["change"].to_numpy()
     if np.isnan(changes).all():
         return None
@@ -63,7 +63,7 @@ def _way_out(why: Explanation, scale: np.ndarray) -> tuple[int, float, int] | No
 
 
 def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, own: int, behind: int | None) -> None:
-    """The borders of all cells; cell `own` in a tint of the policy's colour, cell `behind` in grey."""
+    """Draw the borders of all cells. Tint cell `own` in the policy's colour and cell `behind` in grey."""
     shades = np.ones((*x.shape, 4))
     shades[index == behind] = mpl.colors.to_rgba("0.91")
     shades[index == own] = mpl.colors.to_rgba(_TINT)
@@ -72,7 +72,7 @@ def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, own: i
 
 
 def _number(ax: Axes, x: np.ndarray, y: np.ndarray, inside: np.ndarray, cell: int) -> None:
-    """The number of a cell, where its region is widest; none if the region is too narrow."""
+    """Write the number of a cell where its region is widest; skip a region that is too narrow."""
     from scipy.ndimage import distance_transform_edt
 
     room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
@@ -82,7 +82,7 @@ def _number(ax: Axes, x: np.ndarray, y: np.ndarray, inside: np.ndarray, cell: in
 
 
 def _arrow(ax: Axes, state: np.ndarray, way: tuple[int, float, int], names: tuple[str, ...]) -> None:
-    """The arrow out of a cell, and its entry in the legend."""
+    """Draw the arrow out of a cell, and add it to the legend."""
     axis, change, cell = way
     style = {"arrowstyle": "-|>", "lw": 0.9, "color": "black", "shrinkA": 0, "shrinkB": 0, "mutation_scale": 7}
     ax.annotate("", state + change * np.eye(2)[axis], state, arrowprops=style, zorder=4)
@@ -91,7 +91,7 @@ def _arrow(ax: Axes, state: np.ndarray, way: tuple[int, float, int], names: tupl
 
 
 def contributions(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
-    """How inputs and bias add up to each action, by `policy.explain(state)`, as a waterfall.
+    """Draw how inputs and bias add up to each action, from `policy.explain(state)`, as a waterfall chart.
 
     One block per action: a bar per term, then their sum and the sum clipped to the action's limits (dashed). Orange is
     positive, purple negative, as in the force map. Raises ValueError unless the sub-policies are linear.
@@ -116,7 +116,7 @@ def contributions(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
         label.set_fontweight("bold" if label.get_text() in task.outputs else "normal")
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
-    ax.use_sticky_edges = False  # a bar may end at no edge of the axes
+    ax.use_sticky_edges = False  # keep a margin between the bars and the edges of the axes
     ax.margins(x=0.03)
     ax.set(ylim=(row - 0.7, -0.6), xlabel="action, and what adds up to it")
     ax.xaxis.set_major_locator(MaxNLocator(5, min_n_ticks=3))
@@ -124,7 +124,7 @@ def contributions(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
 
 
 def _waterfall(ax: Axes, rows: np.ndarray, lefts: np.ndarray, lengths: np.ndarray, colours: list) -> None:
-    """Bars with their lengths in the margin; thin lines join the end of each to the start of the next."""
+    """Draw bars, write their lengths in the margin, and join the end of each bar to the start of the next."""
     ax.barh(rows, lengths, left=lefts, height=0.72, color=colours, zorder=2)
     ax.vlines((lefts + lengths)[:-2], rows[:-2] + 0.36, rows[1:-1] - 0.36, color="0.4", lw=0.5, zorder=3)
     for row, length in zip(rows, lengths):

@@ -1,4 +1,4 @@
-"""A robot's gait as a stick figure, in the colour of the active cell, drawn from recorded numbers alone."""
+"""Draw a robot's gait as a stick figure, in the colour of the active cell, from recorded data alone."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from . import style
 from .animation import DPI, WIDTH, Animation, save_frames
 from .stage import Stage
 
-THICK = 3.0  # points: of the lines of the body
-GAP = 1.1  # from one pose to the next in a strip, in widths of the widest
+THICK = 3.0  # line width of the body, in points
+GAP = 1.1  # from one pose to the next in a strip, as a multiple of the widest pose
 ENDS = ("x0", "z0", "x1", "z1")
 
 
 def body_lines(gait: pd.DataFrame) -> dict[str, np.ndarray]:
-    """The lines of the body, each with its ends in every step (n, 2, 2): end, then x and z in metres."""
+    """Return the lines of the body, each as its ends in every step (n, 2, 2): end, then x and z in metres."""
     names = [name.removesuffix(" x0") for name in gait.columns if name.endswith(" x0")]
     return {name: gait[[f"{name} {end}" for end in ENDS]].to_numpy().reshape(-1, 2, 2) for name in names}
 
 
 def draw_pose(ax: Axes, lines: dict[str, np.ndarray], step: int, *, color, shift: float = 0.0) -> None:
-    """The body in one step, `shift` metres to the right of the middle of the axes."""
+    """Draw the body in one step, centred at x = `shift` metres."""
     parts = np.stack([ends[step] for ends in lines.values()])
     parts[:, :, 0] += shift - parts[:, :, 0].mean()
     ax.add_collection(LineCollection(list(parts), colors=[color], linewidths=THICK, capstyle="round"))
 
 
 def cell_colors(gait: pd.DataFrame) -> dict[int, str]:
-    """A colour for each cell, the most visited first."""
+    """Return a colour for each cell, the most visited cell first."""
     cells = gait.cell.value_counts(sort=True).index
     return {int(cell): style.COLOURS[i % len(style.COLOURS)] for i, cell in enumerate(cells)}
 
 
 def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: float) -> None:
-    """Poses side by side, each in the colour of its cell, with the time below.
+    """Draw poses side by side, each in the colour of its cell, with the time below.
 
     Raises ValueError for steps that were not recorded.
     """
@@ -59,7 +59,7 @@ def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: floa
 
 
 def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
-    """Over time: the cell that acts, as a band in its colour, and which foot is on the ground, as black bars."""
+    """Draw over time the active cell, as a band in its colour, and which foot is on the ground, as black bars."""
     colors, times = cell_colors(gait), step_seconds * np.arange(len(gait))
     ax.bar(times, 0.8, step_seconds, 1.6, align="edge", color=[colors[int(cell)] for cell in gait.cell])
     for i, foot in enumerate(("front", "back")):
@@ -72,11 +72,11 @@ def save_gait(
     gait: pd.DataFrame, name: str, *, step_seconds: float, out: str | os.PathLike, quick: bool = False,
     alt: str | None = None,
 ) -> Animation:  # fmt: skip
-    """Write OUT/figures/NAME.gif, the body step by step in the colours of its cells above `footfall`, and its last
-    frame as NAME.png; return the animation to show. The ground has a mark every metre.
+    """Write OUT/figures/NAME.gif, and its last frame as NAME.png; return the animation to show.
 
-    `alt` describes the animation for readers who cannot see it; `quick` adds a watermark. The same gait gives the same
-    bytes.
+    The GIF shows the body step by step, in the colours of its cells, above `footfall`. The ground has a mark every
+    metre. `alt` describes the animation for readers who cannot see it; `quick` adds a watermark. The same gait gives
+    the same bytes.
     """
     fig, (body, below) = style.panels(2, rows=2, width=WIDTH, height=2.8, dpi=DPI, height_ratios=(2, 1))
     lines, colors = body_lines(gait), cell_colors(gait)

@@ -1,4 +1,4 @@
-"""`Laboratory`: a distillation at each change of a setting, drawn by the explorer."""
+"""`Laboratory`: distil again whenever a setting changes, and draw the result with the explorer."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ from .explorer import Explorer, scene_of
 from .explorer.scene import N_STARTS, starts_of, to_json
 from .explorer.view import View
 
-# Range of each slider, as multiples of the initial setting. Half the distance makes three to four times the cells,
-# which limits the time of a trial.
+# Range of each slider, as multiples of the initial setting. Half the distance gives three to four times the cells, so
+# these limits keep a trial short.
 REACH = {"max_pol_loss": (1e-2, 1e4), "min_pol_distance": (0.5, 3.0), "min_param_distance": (0.2, 4.0)}
-DRAWN = ("linear", "constant")  # classes of sub-policy: a constant is a linear map without weights
-SHOWN = 8  # trials in the table, and among the explorer's policies
+DRAWN = ("linear", "constant")  # sub-policies that the explorer draws: a constant is a linear map without weights
+SHOWN = 8  # trials in the table and in the explorer
 
 _LABELS = {"style": {"description_width": "145px"}, "layout": {"width": "455px"}}
 
 
 class Laboratory:
-    """Laboratory: a distillation at each change of a setting, in the explorer, with its return beside earlier trials.
+    """Laboratory: distil again whenever a setting changes, explore the policy, and compare it with earlier trials.
 
     `config` holds the initial settings, by default the paper's preset. Raises ValueError for tasks other than the
-    paper's, for a `Refinement`, for sub-policies that are not linear or constant, and for a teacher that does not play
+    paper's, for a `Refinement`, for sub-policies that are not linear or constant, and for a teacher that cannot act in
     the task.
     """
 
-    ready, busy = "Change a setting: a distillation follows, in about a second.", "distilling …"
+    ready, busy = "Change a setting to distil again; this takes about a second.", "distilling …"
 
     def __init__(self, teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int = 0):
         self.teacher, self.task, self.seed = Remembered(teacher), get_task(task), seed
@@ -49,7 +49,7 @@ class Laboratory:
         check_plays(teacher, self.task)
         self.config = paper_preset(self.task) if config is None else config
         if not isinstance(self.config, Config):
-            raise ValueError(f"config is a {type(self.config).__name__}, expected a Config: it has no cells to split")
+            raise ValueError(f"config is a {type(self.config).__name__}, expected a Config, which splits cells")
         if self.config.sub_policy not in DRAWN:
             raise ValueError(f"config.sub_policy is {self.config.sub_policy!r}, expected one of {list(DRAWN)}")
         self.trials: list[tuple[Config, VoronoiPolicy, dict]] = []
@@ -83,7 +83,7 @@ class Laboratory:
             (control.observe if on else control.unobserve)(self._answer, names="value")
 
     def _go_back(self, _=None) -> None:
-        """Reset all settings at once, for a single trial."""
+        """Reset all settings at once, as a single trial."""
         self._listen(False)
         for name, control in self.settings.items():
             control.value = getattr(self.config, name)
@@ -91,7 +91,7 @@ class Laboratory:
         self._answer()
 
     def _answer(self, _=None) -> None:
-        """Show the trial of the current settings. Errors appear in the status too: Jupyter hides those of callbacks."""
+        """Show the trial of the current settings. Show errors in the status too: Jupyter hides those of callbacks."""
         self.status.value = self.busy
         try:
             self._put(self.trial({name: control.value for name, control in self.settings.items()}))
@@ -102,9 +102,9 @@ class Laboratory:
         self.status.value = self.ready
 
     def trial(self, changes: dict[str, object]) -> int:
-        """Distil and evaluate with these fields of the configuration changed; return the index in `trials`.
+        """Change these fields of the configuration, distil and evaluate; return the index in `trials`.
 
-        Settings that were tried before return that earlier trial.
+        Settings that were tried before give the index of the earlier trial.
         """
         rounded = {name: _rounded(value) for name, value in changes.items()}
         changed = {name: value for name, value in rounded.items() if value != _rounded(getattr(self.config, name))}
@@ -117,7 +117,7 @@ class Laboratory:
         return len(self.trials) - 1
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per trial: its results and its settings."""
+        """Return one row per trial: its results and its settings."""
         rows = [
             {"cells": len(policy), "mean return": result["mean"], "failures": result["failures"]}
             | {name: getattr(config, name) for name in self.settings}
@@ -133,7 +133,7 @@ class Laboratory:
         self.explorer.scene, self._shown = scene, place
 
     def words(self, place: int) -> str:
-        """What a trial came to, and the teacher."""
+        """Describe the results of a trial and of the teacher."""
         _, policy, result = self.trials[place]
         cells = "1 cell" if len(policy) == 1 else f"{len(policy)} cells"
         return (
@@ -143,18 +143,18 @@ class Laboratory:
         )
 
     def _places(self, place: int) -> list[int]:
-        """The newest trials and the one at `place`, the newest first."""
+        """Return the indices of the newest trials and of the one at `place`, the newest first."""
         rows = sorted({*range(len(self.trials))[-SHOWN:]} - {place})[-(SHOWN - 1) :] + [place]
         return sorted(rows, reverse=True)
 
     def _newest(self, place: int) -> pd.DataFrame:
-        """Their rows; an arrow marks the one at `place`, and headers without underscores can wrap."""
+        """Return the table of these trials. An arrow marks the one at `place`; headers without underscores can wrap."""
         table = self.to_frame().iloc[self._places(place)].reset_index()
         table["trial"] = table["trial"].astype(str).replace(str(place + 1), f"→\N{NO-BREAK SPACE}{place + 1}")
         return table.rename(columns=lambda name: name.replace("_", " "))
 
     def scene(self, place: int) -> dict:
-        """What the explorer draws: the trial at `place`, and earlier ones to choose."""
+        """Return the explorer's scene: the trial at `place` first, then the other trials of the table."""
         places = [place, *(other for other in self._places(place) if other != place)]
         policies = {f"trial {other + 1}": _as_linear(self.trials[other][1]) for other in places}
         if self._asked is None:
@@ -167,7 +167,7 @@ class Laboratory:
 
 
 def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
-    """The policy with linear maps: those of constants have no weights."""
+    """Return the policy with linear maps; a constant becomes a map with zero weights."""
     if policy.policy_class.name == "linear":
         return policy
     d, k, m = len(policy.task.low), len(policy), len(policy.task.outputs)
@@ -178,14 +178,14 @@ def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
 class Remembered:
     """A teacher whose answers to whole batches of states are cached.
 
-    With one seed, a distillation starts its episodes in the same states whatever the settings: all trials share them.
+    With one seed, every distillation starts its episodes in the same states, so all trials share these answers.
     """
 
     def __init__(self, teacher: Policy):
         self._teacher, self._answers = teacher, {}
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """As the teacher does."""
+        """Return the teacher's actions; ask it only about batches that are new."""
         obs = np.asarray(obs)
         key = obs.shape, obs.dtype.str, obs.tobytes()
         if key not in self._answers:
@@ -194,11 +194,11 @@ class Remembered:
 
 
 def _judge(policy: Policy, task: Task) -> dict[str, float]:
-    """The mean return, and how many episodes do not end in the goal, from the starts that the explorer plays."""
+    """Return the mean return and the number of episodes that miss the goal, from the explorer's starts."""
     result = rollout(policy, task, starts_of(task))
     return {"mean": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
 
 
 def _rounded(value: object) -> object:
-    """Six significant digits: a slider's value may be 0.30000000000000004."""
+    """Round to six significant digits: a slider's value may be 0.30000000000000004."""
     return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from .style import COLOURS, DISTILLED, OTHER, TEACHER
 
-# Methods before any tuning, and ours tuned: ours in its colour, two greys for the weakest
+# Methods before tuning, and our cells after it. Ours has its own colour; the two weakest methods are grey
 IMITATIONS = {
     "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, tuned on the return"},
     "refined, not tuned": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
@@ -17,7 +17,7 @@ IMITATIONS = {
     "k-means cells, DAgger": {"color": "0.65", "ls": "--", "label": "k-means cells, linear maps"},
 }
 
-# Policies at the limit and their rivals
+# Our policies, from the best policy and from the teacher, and their rivals
 LIMITS = {
     "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6, "label": "our cells, from the best policy"},
     "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, from the teacher"},
@@ -34,21 +34,21 @@ ROBOTS = {
     "one map, random search": {"color": "black", "marker": "s", "label": "one linear map, random search"},
 }
 
-# Other methods by how their names begin: marker and label
+# Marker and label of other methods, by the beginning of their names
 RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree"), "k-means": ("D", "k-means"),
                "small network": ("P", "small network"), "soft tree": ("v", "soft tree"),
                "critic-driven": ("<", "critic-driven"), "advantage-weighted": (">", "advantage-weighted")}  # fmt: skip
-OWN_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # cells of the lines on the map
-LARGEST = 13  # leaves of what is drawn there
+OWN_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # colours of our lines in `fidelity_map`, by number of cells
+LARGEST = 13  # most leaves of a method drawn there
 
 
 def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
-    """Return over fidelity: what can be had. To the right, policies act more like the teacher; up, they return more.
+    """Plot return over fidelity. Policies further right act more like the teacher; policies higher up return more.
 
-    `points` has method, size, mean and r2, as `beyond.comparison.possible` makes it. Lines are our cells, a colour per
-    number of cells: from the closest (circle) over those with the highest return at a given R² to the highest return
-    (star). Marks are other methods by kind, open as they imitate, filled where they are tuned; the larger the more
-    leaves. The scale is logarithmic in 1 - R² and, beyond `linear`, in the return.
+    `points` has the columns method, size, mean and r2 of `beyond.comparison.possible`. Each line is our method with one
+    number of cells. It runs from the highest R² (circle), through the highest returns at a given R², to the highest
+    return (star). Marks are other methods by kind: open for imitation, filled if tuned, larger for more leaves. The
+    scale is logarithmic in 1 - R², and in the return beyond `linear`.
     """
     points = points.assign(unlike=1.0 - points["r2"], gap=points["mean"] - teacher)
     others = points[points["size"] <= LARGEST]
@@ -71,7 +71,7 @@ def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: floa
     ax.set(xscale="log", xlim=(1.3 * drawn.max(), drawn.min() / 1.3), xlabel="R² of the actions")
     ticks = {5: "−4", 1: "0", 0.3: ".7", 0.1: ".9", 0.05: ".95", 0.01: ".99", 0.001: ".999"}
     ax.set_xticks(list(ticks), list(ticks.values()))
-    ax.set_xlim(1.3 * drawn.max(), drawn.min() / 1.3)  # ticks beyond it would widen it
+    ax.set_xlim(1.3 * drawn.max(), drawn.min() / 1.3)  # again: ticks beyond these limits widen them
     ax.minorticks_off()
     return ax
 
@@ -85,8 +85,11 @@ def _own_line(ax: Axes, points: pd.DataFrame, color: str, label: str) -> None:
 
 
 def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
-    """R² of the actions (from the lowest seed to the median), sameness of the cells and ratio of the actions'
-    differences over the number of cells; `table` as `beyond.comparison.likeness` makes it."""
+    """Plot three measures of likeness over the number of cells, from the `table` of `beyond.comparison.likeness`.
+
+    These are R² of the actions (band: from the lowest seed to the median), sameness of the cells, and ratio of the
+    actions' differences.
+    """
     ax.set_xscale("log")
     ax.fill_between(table["size"], table["r2_least"], table["r2"], color=TEACHER, alpha=0.2, lw=0)
     for column, color, marker, label in (
@@ -97,13 +100,13 @@ def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
         ax.plot(table["size"], table[column], color=color, marker=marker, ms=3.5, label=label)
     ax.set_ylim(min(0.0, table["r2_least"].min()) - 0.05, 0.05 + max(1.0, table["ratio"].max()))
     ax.set_xlabel("cells")
-    return ticks_at(ax, table.loc[table["size"] != 7, "size"])  # whose label would touch that of 8
+    return ticks_at(ax, table.loc[table["size"] != 7, "size"])  # the label of 7 would touch that of 8
 
 
 def return_over_cells(
     ax: Axes, frame: pd.DataFrame, teacher: float, *, linear: float, looks: dict[str, dict] = IMITATIONS
 ) -> Axes:
-    """`over_cells` of the mean return minus the teacher's, on a scale linear up to `linear`, logarithmic beyond."""
+    """Plot `over_cells` of the mean return minus the teacher's, on a scale linear up to `linear`, then logarithmic."""
     ax.set_yscale("symlog", linthresh=linear)
     over_cells(ax, frame.assign(gap=frame["mean"] - teacher), "gap", looks)
     ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher")
@@ -113,11 +116,11 @@ def return_over_cells(
 
 
 def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict] = IMITATIONS) -> Axes:
-    """A column of `frame` over the number of cells or leaves: a line per method, the median of its seeds.
+    """Plot a column of `frame` over the number of cells or leaves: one line per method, the median of its seeds.
 
-    `frame` has method, size, seed and cells, as `beyond.comparison` makes it. Only the methods in `looks` are drawn;
-    those that choose their own size (size 0) as a mark at their median number of cells. Our bands and the bars of marks
-    span the 10 % to 90 % quantiles over the seeds.
+    `frame` has the columns method, size, seed and cells of `beyond.comparison`. Only the methods in `looks` are drawn.
+    A method that chooses its own size (size 0) is a mark at its median number of cells. Our bands and the error bars of
+    marks span the 10 % to 90 % quantiles over the seeds.
     """
     ax.set_xscale("log")
     for method, style in looks.items():
@@ -127,7 +130,7 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
         low, middle, high = (rows.groupby("size")[column].quantile(share) for share in (0.1, 0.5, 0.9))
         if "marker" not in style:
             ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, "label": method, **style})
-            if style["color"] == DISTILLED and len(middle) > 2:  # of fewer sizes a band would hide more than it shows
+            if style["color"] == DISTILLED and len(middle) > 2:  # a band over fewer sizes would hide more than it shows
                 ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
             continue
         look = {
@@ -146,7 +149,7 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
 
 
 def ticks_at(ax: Axes, values: pd.Series) -> Axes:
-    """Ticks at exactly these values; from 1024 on in units of k."""
+    """Put ticks at exactly these values; from 1024 on, label them in units of k (1024)."""
     places = np.unique(values.dropna().astype(int))
     ax.set_xticks(places, [f"{place // 1024}k" if place >= 1024 else str(place) for place in places])
     ax.minorticks_off()

@@ -1,4 +1,4 @@
-"""What is proved: from which starts episodes reach the goal, and in how many steps."""
+"""Figures of proofs: which starts reach the goal, and in how many steps."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ STEPS = "viridis_r"  # few steps are light
 
 
 def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.ndarray, most: int) -> ScalarMappable:
-    """The pieces of SimpleGoal's starts: `polygons` (k, 2), the steps of their episodes (n,), and whether these reach
-    the goal (n,). Colours run to `most` steps; failing pieces are orange, and at least a hair wide."""
+    """Draw the pieces of SimpleGoal's starts.
+
+    Each of the n `polygons` (k, 2) has the `steps` (n,) of its episodes and whether these `reached` (n,) the goal.
+    Colours run to `most` steps. Failing pieces are orange, with an outline that keeps narrow ones visible.
+    """
     colours = ScalarMappable(Normalize(0, most), STEPS)
     faces = colours.to_rgba(np.asarray(steps, dtype=float))
     faces[~reached] = mpl.colors.to_rgba(FAILING)
@@ -36,8 +39,11 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
 
 
 def upright(ax: Axes, numbers: np.ndarray, most: int) -> ScalarMappable:
-    """Pendulum's states, in boxes of angle by angular velocity `numbers` (n, n): steps to a set around upright that is
-    never left, -1 in the set (pink), 0 where nothing is proved (white)."""
+    """Draw what is proved for boxes of Pendulum's states: angle by angular velocity.
+
+    `numbers` (n, n) are the steps to a set around upright that is never left. They are -1 in the set (pink) and 0 where
+    nothing is proved (white). Colours run to `most` steps.
+    """
     colours = ScalarMappable(Normalize(0, most), STEPS)
     pixels = colours.to_rgba(np.maximum(numbers.T, 0).astype(float))
     pixels[numbers.T == 0] = 1.0

@@ -1,6 +1,6 @@
 """Figures of returns: distributions, intervals, learning curves, the ledger.
 
-seaborn is imported where it is used: that takes a second, and most notebooks do without.
+seaborn is imported where it is used: the import takes a second, and most notebooks do not need it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _VERDICTS = {"reproduced": (GOAL, "o"), "differs": (COLOURS[3], "D"), "contradic
 
 
 def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
-    """Box plots of the returns of the teacher and of the distilled policies, in this order."""
+    """Draw box plots of the returns of the teacher and of the distilled policies, in this order."""
     import seaborn as sns
 
     returns = {name: check_finite(f"returns of {name}", values) for name, values in returns.items()}
@@ -30,7 +30,7 @@ def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False
 
 
 def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> Axes:
-    """One quantity over the iterations of a distillation."""
+    """Plot one quantity over the iterations of a distillation."""
     values = check_array("values", values, (-1,))
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
@@ -47,7 +47,7 @@ def phase(ax: Axes, begin: int, name: str) -> Axes:
 
 
 def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
-    """Mean return of each run, sorted, against the teacher's."""
+    """Plot the mean return of each run, sorted, against the teacher's."""
     means = check_array("means", means, (-1,))
     ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
     ax.axhline(teacher, color=TEACHER, label="teacher")
@@ -57,7 +57,7 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
 
 
 def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: float | None = None) -> Axes:
-    """Histogram of the returns (n,) of one policy, with their mean as a line; `bound`: the highest mean possible."""
+    """Draw a histogram of one policy's returns (n,), and their mean as a line; `bound`: the highest possible mean."""
     import seaborn as sns
 
     returns = check_array("returns", returns, (-1,))
@@ -70,7 +70,7 @@ def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: flo
 
 
 def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: str = "mean return") -> Axes:
-    """Mean return of the teacher over its training steps."""
+    """Plot the mean return of the teacher over its training steps."""
     steps = check_array("steps", steps, (-1,))
     means = check_array("means", means, steps.shape)
     ax.plot(steps / 1000, means, color=TEACHER)
@@ -79,7 +79,7 @@ def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: st
 
 
 def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED, label: str | None = None) -> Axes:
-    """One row per entry of `frame` (index: names; columns here, low, high), the first on top: a dot on its interval."""
+    """Draw a dot on its interval for each row of `frame` (index: names; columns here, low, high), the first on top."""
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color=color, lw=1.2)
     ax.scatter(frame["here"], rows, color=color, s=10, zorder=3, label=label)
@@ -91,7 +91,7 @@ def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILL
 
 
 def again(ax: Axes, frame: pd.DataFrame) -> Axes:
-    """A second measurement of the rows of `intervals`, as hollow dots; NaN where there is none."""
+    """Add a second measurement to the rows of `intervals`, as hollow dots; NaN where there is none."""
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color="black", lw=0.6, zorder=4)
     ax.scatter(frame["here"], rows, facecolor="white", edgecolor="black", s=10, lw=0.6, zorder=5)
@@ -99,23 +99,23 @@ def again(ax: Axes, frame: pd.DataFrame) -> Axes:
 
 
 def margin(ax: Axes, texts: list[str], title: str) -> Axes:
-    """A text beside each row of `intervals`, right of the axes, under a title."""
+    """Write a text beside each row of `intervals`, right of the axes, under a title."""
     for row, text in enumerate([title, *texts], start=-1):
         ax.text(1.03, row, text, transform=ax.get_yaxis_transform(), va="center", fontsize=7, color="0.3")
     return ax
 
 
 def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: str = "-") -> Axes:
-    """A vertical line at a reference value."""
+    """Draw a vertical line at a reference value."""
     ax.axvline(value, color=color, lw=0.8, ls=ls, zorder=1, label=name)
     return ax
 
 
 def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
-    """The paper's values minus those rerun here, in half-widths of the rerun's intervals: a row per value.
+    """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value.
 
-    `frame` (index: names) has gap, verdict, and wide (drawn hollow). Inside the shaded `band` a value counts as
-    reproduced; the scale is linear in the band and logarithmic outside.
+    `frame` (index: names) has the columns gap, verdict and wide (drawn hollow). Values inside the shaded `band` count
+    as reproduced. The scale is linear in the band and logarithmic outside.
     """
     ax.axvspan(-band, band, color="0.9", lw=0, label="reproduced if here")
     ax.axvline(0, color="0.6", lw=0.6)
@@ -134,7 +134,7 @@ def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
 
 
 def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours: list[str]) -> Axes:
-    """Horizontal boxes from Q1, median and Q3; the whiskers end at the bounds beyond which a return is an outlier."""
+    """Draw horizontal boxes from Q1, median and Q3; whiskers end at the bounds beyond which a return is an outlier."""
     stats = [
         {"label": name, "q1": q1, "med": median, "q3": q3, "fliers": []}
         | dict(zip(("whislo", "whishi"), fences(q1, q3), strict=True))
@@ -151,7 +151,7 @@ def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours
 
 
 def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DISTILLED) -> Axes:
-    """One dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
+    """Draw one dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
     import seaborn as sns
 
     sns.swarmplot(frame, x=x, y=y, ax=ax, color=color, size=3)

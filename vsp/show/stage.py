@@ -1,4 +1,4 @@
-"""`Stage`, a figure that is redrawn quickly many times, and what the widgets and the animations draw on it."""
+"""`Stage`, a figure that is redrawn quickly many times, and what the animations draw on it."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ _HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
 class Stage:
-    """A figure that is drawn in full once; each shot draws only its own artists over that image, and removes them.
+    """A figure that is drawn in full once. Each shot draws only its own artists over that image, then removes them.
 
-    This saves drawing axes, texts and legends, which is most of the work. What a shot adds must lie above the figure.
+    This skips axes, texts and legends, which take most of the time. The artists of a shot must lie above the figure.
     """
 
     def __init__(self, fig: Figure):
-        plt.close(fig)  # only pyplot forgets it: no notebook displays it by itself
+        plt.close(fig)  # only pyplot drops it, so that no notebook displays it by itself
         self.fig, self._canvas = fig, FigureCanvasAgg(fig)
         self.stand()
 
     def stand(self) -> None:
-        """Draw the figure as it is now, as the background of all shots from here on."""
+        """Draw the figure as it is now, as the background of all later shots."""
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(self.fig.bbox)
         self._standing = {ax: set(ax.get_children()) for ax in self.fig.axes}
@@ -46,13 +46,13 @@ class Stage:
         self.fig.text(0.5, 0.5, "quick run", animated=True, **about)  # drawn last, by each shot
 
     def shoot(self, paint: Callable[[], object]) -> np.ndarray:
-        """The figure with what `paint` draws into its axes, as uint8 (height, width, 3)."""
+        """Return the figure with what `paint` draws into its axes, as uint8 (height, width, 3)."""
         self._canvas.restore_region(self._still)
         try:
             paint()
             for ax in self._standing:
                 for artist in sorted([*self._added(ax), *ax.spines.values()], key=lambda artist: artist.zorder):
-                    ax.draw_artist(artist)  # the spines again: a map would cover half their width
+                    ax.draw_artist(artist)  # redraw the spines: a map would cover half their width
         finally:  # also after an error: the next shot must not contain these artists
             for ax in self._standing:
                 for artist in self._added(ax):
@@ -66,7 +66,7 @@ class Stage:
 
 
 def png(pixels: np.ndarray, *, small: bool = False) -> bytes:
-    """An image (height, width, 3) as a PNG file without dates; `small`: 256 colours, a third as large, but slower."""
+    """Encode an image (height, width, 3) as PNG without dates; `small`: 256 colours, a third the size, but slower."""
     picture, file = Image.fromarray(pixels), io.BytesIO()
     if small:
         picture.quantize(256, dither=Image.Dither.NONE).save(file, "png", optimize=True)
@@ -76,7 +76,7 @@ def png(pixels: np.ndarray, *, small: bool = False) -> bytes:
 
 
 def ground(ax: Axes, task: str) -> Axes:
-    """The axes of a task's policy maps: the unit square with goal and pit, or position and velocity."""
+    """Set up the axes of a task's policy maps: the unit square with goal and pit, or position and velocity."""
     if task == "SimpleGoal-v0":
         return square(ax)
     ax.set(xlabel="position", ylabel="velocity (per step)", xlim=(-1.2, 0.6), ylim=(-0.07, 0.07))
@@ -84,16 +84,16 @@ def ground(ax: Axes, task: str) -> Axes:
 
 
 def policy_map(ax: Axes, x: np.ndarray, y: np.ndarray, actions: np.ndarray, *, color: str):
-    """Actions (n, m) on a grid: arrows of one colour where m is 2, else a force map. Returns what is drawn."""
+    """Draw actions (n, m) on a grid: arrows of one colour if m is 2, else a force map. Return the artist."""
     if actions.shape[1] == 2:
         return arrows(ax, np.column_stack([x.ravel(), y.ravel()]), actions, color=color)
     return force_map(ax, x, y, actions[:, 0])
 
 
 def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray) -> Axes:
-    """Borders of Voronoi cells from the cell of each grid point.
+    """Draw the borders of Voronoi cells; `index` is the cell of each grid point.
 
-    Draws one image, which for many cells is much faster than the contours of `state_space.cells`.
+    The borders are one image. For many cells this is much faster than the contours of `state_space.cells`.
     """
     index = index.reshape(x.shape)
     outer = np.pad(index, 1, mode="edge")  # each point has four neighbours
@@ -105,7 +105,7 @@ def borders(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray) -> Axes:
 
 
 def changes(ax: Axes, came: np.ndarray, went: np.ndarray) -> Axes:
-    """Codewords (k, 2) added by a split, as rings, and codewords (j, 2) removed by a merge, as crosses."""
+    """Draw codewords (k, 2) added by a split as rings, and codewords (j, 2) removed by a merge as crosses."""
     look = {"zorder": 6, "path_effects": _HALO, "clip_on": False}
     ax.scatter(*came.T, s=70, facecolor="none", edgecolor="black", lw=1.2, label="came by a split", **look)
     ax.scatter(*went.T, s=36, color="black", marker="x", lw=1.4, label="went by a merge", **look)
@@ -113,7 +113,7 @@ def changes(ax: Axes, came: np.ndarray, went: np.ndarray) -> Axes:
 
 
 def cells_and_changes(ax: Axes, cells: np.ndarray, splits: Iterable[int], merges: Iterable[int]) -> Axes:
-    """The number of cells over the iterations, and below it a mark for each iteration that split or merged."""
+    """Plot the number of cells over the iterations, and below it a mark for each iteration that split or merged."""
     over_iterations(ax, cells, ylabel="cells")
     top = max(cells)
     for row, (name, marker, iterations) in enumerate((("split", "^", splits), ("merge", "v", merges)), start=1):
@@ -126,7 +126,7 @@ def cells_and_changes(ax: Axes, cells: np.ndarray, splits: Iterable[int], merges
 
 
 def moment(ax: Axes, n: int, cells: int) -> Axes:
-    """A mark at iteration n on `cells_and_changes`."""
+    """Mark iteration n on `cells_and_changes`."""
     ax.axvline(n, color="black", lw=0.8, ls=":")
     ax.plot(n, cells, "o", color="black", ms=4.5, zorder=5)
     ax.annotate(f"n = {n}", (1, 1), (0, 6), xycoords="axes fraction", textcoords="offset points", ha="right")

@@ -24,7 +24,10 @@ def cells(
     ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6,
     color: str = BORDER,
 ) -> Axes:  # fmt: skip
-    """Borders of Voronoi cells, `width` points wide; `fill` colours the cells. `index`: the cell of each grid point."""
+    """Draw the borders of Voronoi cells, `width` points wide.
+
+    `index`: the cell of each grid point; `fill` colours the cells.
+    """
     index = _on_grid("cells", x, y, index).astype(int)
     if fill:
         shades = mpl.colors.to_rgba_array(_PASTEL)[index % len(_PASTEL)]
@@ -39,7 +42,7 @@ def cells(
 def codewords(
     ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False, size: float = 14
 ) -> Axes:
-    """Codewords (k, 2) as black dots with a white rim; `numbers` are towards the middle of the axes, so inside."""
+    """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes."""
     points = check_array("codewords", points, (-1, 2))
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
     ax.scatter(*points.T, s=size, label=label, **look)
@@ -52,7 +55,7 @@ def codewords(
 
 
 def square(ax: Axes) -> Axes:
-    """The unit square of SimpleGoal with goal and pit."""
+    """Draw the unit square of SimpleGoal with goal and pit."""
     goal, pit = simplegoal.GOAL_EDGE, simplegoal.PIT_HIGH - simplegoal.PIT_LOW
     ax.add_patch(Rectangle((0, 0), goal, goal, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
     corner = (simplegoal.PIT_LOW, simplegoal.PIT_LOW)
@@ -62,7 +65,7 @@ def square(ax: Axes) -> Axes:
 
 
 def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
-    """An arrow for each action (n, 2) at its state (n, 2), on a grid; a full diagonal action spans one grid step."""
+    """Draw an arrow per action (n, 2) at its state (n, 2) on a grid; a full diagonal action spans one grid step."""
     states, actions = check_data(states, actions, 2, 2)
     step = np.diff(np.unique(states[:, 0]))[0]
     scale = {"angles": "xy", "scale_units": "xy", "scale": 1.4 / step}
@@ -76,13 +79,13 @@ def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, *, aspect=
 
 
 def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray) -> AxesImage:
-    """Force in [-1, 1] over position and velocity. Returns the image, for `force_bar`."""
+    """Draw force in [-1, 1] over position and velocity. Return the image, for `force_bar`."""
     ax.set(xlabel="position", ylabel="velocity (per step)")
     return image(ax, x, y, _on_grid("force", x, y, force), cmap=FORCE_MAP, vmin=-1, vmax=1)
 
 
 def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
-    """One colour bar for all force maps of a figure."""
+    """Add one colour bar for all force maps of a figure."""
     bar = fig.colorbar(drawn, ax=list(axes), label="force", ticks=[-1, 0, 1], aspect=30)
     bar.ax.set_yticklabels(["−1 (left)", "0", "+1 (right)"])
 
@@ -90,9 +93,10 @@ def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
 def error_map(
     ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str, beside: np.ndarray | None = None
 ) -> AxesImage:
-    """A non-negative quantity over a two-dimensional state, darker where larger, with a colour bar. Returns it.
+    """Draw a non-negative quantity over a two-dimensional state, darker where larger, with a colour bar.
 
-    All axes `beside` (None: `ax`) make room for the colour bar, so that they keep one size.
+    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size. Returns the
+    image.
     """
     drawn = image(ax, x, y, _on_grid("error", x, y, error), cmap="Reds", vmin=0)
     ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
@@ -100,7 +104,7 @@ def error_map(
 
 
 def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
-    """The states of one episode, joined: from a ring (labelled "start") to the state after the last action."""
+    """Draw the states of one episode as a line, from a ring (labelled "start") to the state after the last action."""
     last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
     way = np.concatenate([episode.states, last])
     ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
@@ -110,7 +114,7 @@ def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | No
 
 
 def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
-    """The outer edges (left, right, bottom, top) of an image whose pixel centres are the points of a `grid`."""
+    """Return the outer edges (left, right, bottom, top) of an image whose pixel centres are the points of a `grid`."""
     x, y = _grid(x, y)
     dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
     return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
@@ -124,7 +128,7 @@ def _grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """`values`, one for each grid point, in the shape of the grid. Raises ValueError for another number of values."""
+    """Return `values`, one per grid point, in the shape of the grid. Raises ValueError for another number of values."""
     (x, _), values = _grid(x, y), check_finite(what, values)
     if values.size != x.size:
         raise ValueError(f"{what} have shape {values.shape}, expected one for each point of the grid {x.shape}")
@@ -132,7 +136,7 @@ def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.
 
 
 def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A grid over a two-dimensional box, for drawing: x (r, r), y (r, r), and its points as states (r * r, 2)."""
+    """Make a grid over a two-dimensional box, to draw on: x (r, r), y (r, r), and its points as states (r * r, 2)."""
     low, high = check_array("low", low, (2,)), check_array("high", high, (2,))
     check_count("resolution", resolution)
     x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))

@@ -51,9 +51,9 @@ _STYLE = {
 def panels(
     n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, rows: int = 1, **subplots
 ) -> tuple[Figure, np.ndarray]:
-    """A figure with n panels in so many `rows`, as wide as an LNCS page; sizes in inches.
+    """Make a figure with n panels in `rows` rows, by default as wide as the text of an LNCS page; sizes in inches.
 
-    Returns the figure and its axes (n,). Sets the style for everything drawn afterwards.
+    Returns the figure and its axes (n,). Sets the style of all later figures.
     """
     mpl.rcParams.update(_STYLE)
     fig, axes = plt.subplots(rows, n // rows, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
@@ -61,7 +61,7 @@ def panels(
 
 
 def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
-    """The bytes of an image file as an HTML element, `width` pixels wide or as wide as there is room.
+    """Return the bytes of an image file as an HTML element, `width` pixels wide, or less if there is less room.
 
     Width and height are stated so that the page does not jump while it loads; decoding is synchronous so that replacing
     a picture does not flicker. Raises PIL.UnidentifiedImageError if `image` is no image.
@@ -74,7 +74,7 @@ def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
 
 
 class Picture:
-    """A saved figure as a notebook shows it: HTML, because nbconvert drops the alternative text of a plain image."""
+    """A saved figure as shown in a notebook: HTML, because nbconvert drops the alternative text of a plain image."""
 
     def __init__(self, png: bytes, about: Caption):
         self.png, self.about = png, about
@@ -92,9 +92,9 @@ def save_figure(
 ) -> Picture:  # fmt: skip
     """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show.
 
-    `alt` describes the figure for readers who cannot see it; both files contain it. Without `alt` and `caption`,
-    notebooks/captions.toml has them. `quick` adds a watermark. The files contain no dates or version numbers, so the
-    same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
+    `alt` describes the figure for readers who cannot see it; both files contain it. By default `alt` and
+    `caption` come from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
+    numbers, so the same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
     """
     about = caption_of("figures", name, text=caption, alt=alt)
     if quick:
@@ -118,5 +118,5 @@ def letter(axes: np.ndarray, titles: list[str]) -> None:
 
 
 def legend_below(fig: Figure, ax: Axes, *, ncol: int = 3) -> None:
-    """A legend for `ax` below the whole figure."""
+    """Put a legend for `ax` below the whole figure."""
     fig.legend(*ax.get_legend_handles_labels(), frameon=False, loc="outside lower center", ncol=ncol)

@@ -1,3 +1,3 @@
-"""Benchmarks: how look-ups and neighbour graphs grow with dimensions and cells; what faults cost (docs/trust.md)."""
+"""Benchmarks: how look-ups and neighbour graphs scale with dimensions and cells; what faults cost (docs/trust.md)."""
 
 from .lookup import LIMIT

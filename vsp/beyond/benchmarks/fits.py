@@ -1,9 +1,9 @@
-"""Benchmark: time and memory of a fit over dimensions, cells and states.
+"""Benchmark the time and memory of a fit against dimensions, cells and states.
 
-A fit is some 700 evaluations of the loss and its gradient (`refinement.search`), so one evaluation is measured. The
-states are normal, the actions those of cells: no task is needed. One quantity changes at a time; the others are those
-of HalfCheetah. The command writes data/results/fits.csv. Times are processor time of one thread and differ from run to
-run; memory is the most that NumPy has allocated at a time.
+A fit is some 700 evaluations of the loss and its gradient (`refinement.search`), so one evaluation is measured. No task
+is needed: states are normally distributed, and actions are those of a limited linear map. One quantity varies at a
+time; the others are those of HalfCheetah. The command writes data/results/fits.csv. Times are processor time of one
+thread and differ from run to run. Memory is NumPy's peak allocation.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ..refinement.search import LEAKS, TEMPERATURES, whole_loss
 from ..refinement.units import Cells, LabelledStates
 from .lookup import seconds
 
-VERSION = 1  # raise it when another way of measuring takes part
+VERSION = 1  # raise it when the way of measuring changes
 N_ACTIONS = 6
 USUAL = {"dimensions": 17, "cells": 8, "states": 32_768}
 VARIED = {
@@ -34,7 +34,10 @@ _STAGE = len(TEMPERATURES) // 2
 
 
 def evaluation(d: int, k: int, n: int, *, seed: int = 0):
-    """A call that evaluates the loss of k cells and its gradient on n states with d inputs, `N_ACTIONS` actions."""
+    """Return a function that evaluates the loss of k cells and its gradient.
+
+    It uses n states with d inputs, and `N_ACTIONS` actions.
+    """
     rng = np.random.default_rng(seed)
     inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
     cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
@@ -44,8 +47,11 @@ def evaluation(d: int, k: int, n: int, *, seed: int = 0):
 
 
 def study(varied: dict[str, tuple[int, ...]] = VARIED) -> pd.DataFrame:
-    """One row per measurement: varied (which quantity), dimensions, cells, states, seconds, and megabytes beside the
-    states."""
+    """Run all measurements, one row each.
+
+    Columns: varied (which quantity), dimensions, cells, states, seconds, megabytes (in addition to the states), and
+    what identifies the table.
+    """
     found, cases = [], [(name, value) for name, values in varied.items() for value in values]
     with threadpool_limits(1):
         for name, value in progress(cases, "fits", total=len(cases), unit="sizes"):
@@ -61,7 +67,7 @@ def study(varied: dict[str, tuple[int, ...]] = VARIED) -> pd.DataFrame:
 
 
 def made_with(varied: dict[str, tuple[int, ...]] = VARIED) -> dict[str, str | int]:
-    """What names the table: settings (an id) and version."""
+    """Return what identifies the table: settings (an id) and version."""
     return {"settings": settings_id({"fits": [varied, USUAL, N_ACTIONS]}), "version": VERSION}
 
 

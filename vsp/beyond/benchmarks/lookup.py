@@ -1,9 +1,9 @@
-"""Benchmark: up to how many dimensions kd-trees and Delaunay triangulations pay, and what replaces them beyond.
+"""Benchmark up to how many dimensions kd-trees and Delaunay triangulations pay off, and what replaces them beyond.
 
-The paper names both as limits in many dimensions. Codewords are uniform in the unit cube, which is hard for all methods
-alike. Distances are Euclidean, for which Delaunay's graph is exact; look-ups are measured for the Manhattan distance
-too. The command writes data/results/lookup.csv. Times are processor time of one thread; they, and which graphs are
-given up, differ from run to run. All other columns are the same everywhere.
+The paper names both as limits in many dimensions. Codewords are uniform in the unit cube, which is equally hard for all
+methods. Distances are Euclidean, for which the Delaunay graph is exact; look-ups are also measured for the Manhattan
+distance. The command writes data/results/lookup.csv. Times are processor time of one thread. Times, and which graphs
+exceed the time limit, differ from run to run. All other columns are the same on every machine.
 """
 
 from __future__ import annotations
@@ -23,23 +23,26 @@ from ...paper.results import settings_id, write_results
 from ...run.machine import cpu_type
 from ...run.progress import progress
 
-VERSION = 1  # raise it when another method or another way of measuring takes part
+VERSION = 1  # raise it when the methods or the way of measuring change
 DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)  # 8, 11 and 17 are those of LunarLander, Hopper and HalfCheetah
 SIZES = (10, 30, 100, 300, 1000)  # codewords
 N_STATES = 1000  # looked up at once, as in an evaluation of 1000 episodes
 WITNESSES = (256, 1024, 4096, 16384, 65536)
-LIMIT = 6.0  # seconds of wall time that a graph may take; Qhull allocates some 50 MB in each
+LIMIT = 6.0  # seconds of wall time that a graph may take; Qhull allocates some 50 MB per second
 METRIC = "euclidean"
-_CHUNK = 4096  # witnesses whose distances are in memory at once
+_CHUNK = 4096  # witnesses per chunk: their distances are in memory at once
 
 
 # Look-ups: the index of the nearest codeword (k, d) of each state (n, d)
 
 
 def nearest_by_product(codewords: np.ndarray, states: np.ndarray, metric: str = METRIC) -> np.ndarray:
-    """By one matrix product, as |s - c|^2 = |s|^2 + |c|^2 - 2 s.c and |s| does not matter. Euclidean distance only."""
+    """Find the nearest codewords by one matrix product. Euclidean distance only.
+
+    Uses |s - c|^2 = |s|^2 + |c|^2 - 2 s.c, where |s|^2 is the same for all codewords.
+    """
     gaps = states @ (-2 * codewords.T)
-    gaps += np.square(codewords).sum(axis=1)  # in place: memory is slower than arithmetic
+    gaps += np.square(codewords).sum(axis=1)  # in place, because memory is slower than arithmetic
     return gaps.argmin(axis=1)
 
 
@@ -56,7 +59,7 @@ LOOKUPS = {
 
 
 def witness_graph(codewords: np.ndarray, n: int = geometry.WITNESSES) -> np.ndarray:
-    """`geometry.lookup_neighbours` in the unit cube, with n witnesses."""
+    """Return the graph of `geometry.lookup_neighbours` in the unit cube, with n witnesses."""
     from scipy.stats import qmc
 
     k, d = codewords.shape
@@ -68,10 +71,10 @@ def witness_graph(codewords: np.ndarray, n: int = geometry.WITNESSES) -> np.ndar
 
 
 def touching(codewords: np.ndarray) -> np.ndarray:
-    """Which Euclidean cells touch inside the unit cube, exactly: one linear programme per pair.
+    """Compute exactly which Euclidean cells touch inside the unit cube, by one linear programme per pair.
 
-    Cells i and j touch if a point of the cube is as near to i as to j and no nearer to any other; nearer means a linear
-    inequality. The time grows with k^3 and hardly with d.
+    Cells i and j touch if some point of the cube is as near to i as to j and not nearer to any other codeword. Being
+    nearer is a linear inequality. The time grows as k^3 and hardly depends on d.
     """
     from scipy.optimize import linprog
 
@@ -93,12 +96,12 @@ GRAPHS = {"Delaunay": geometry.delaunay_neighbours, "linear programmes": touchin
 
 
 def codewords(d: int, k: int) -> np.ndarray:
-    """The codewords (k, d) of all measurements."""
+    """Return the codewords (k, d) that all measurements use."""
     return np.random.default_rng([d, k]).random((k, d))
 
 
 def seconds(work: Callable[[], object], *, total: float = 0.1) -> tuple[float, object]:
-    """The minimum processor time of `work` over calls that take `total` seconds together, and its result."""
+    """Return the minimum processor time of `work` over calls that together take `total` seconds, and its result."""
     times = []
     while not times or sum(times) < total:
         begin = time.process_time()
@@ -108,7 +111,10 @@ def seconds(work: Callable[[], object], *, total: float = 0.1) -> tuple[float, o
 
 
 def look_ups(dimensions=DIMENSIONS, sizes=SIZES, *, total: float = 0.1) -> pd.DataFrame:
-    """Seconds for `N_STATES` states, building the kd-tree included: one row per method, metric, d and k."""
+    """Time the look-up of `N_STATES` states, including building the kd-tree, one row per method, metric, d and k.
+
+    Times are in seconds.
+    """
     rows = []
     for d in progress(dimensions, "look-ups", total=len(dimensions), unit="dimensions"):
         states = np.random.default_rng(d).random((N_STATES, d))
@@ -121,9 +127,10 @@ def look_ups(dimensions=DIMENSIONS, sizes=SIZES, *, total: float = 0.1) -> pd.Da
 
 
 def column(method: str, d: int, sizes=SIZES, *, limit: float = LIMIT) -> dict[int, tuple[float, np.ndarray]]:
-    """Time and graph of a method of `GRAPHS` by the number of codewords, up to the first that takes over `limit`.
+    """Return time (s) and graph of a method of `GRAPHS` by number of codewords.
 
-    Works in a child process, because Qhull cannot be interrupted.
+    Stops at the first graph that takes over `limit` seconds. Works in a child process, because Qhull cannot be
+    interrupted.
     """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
@@ -146,7 +153,7 @@ def column(method: str, d: int, sizes=SIZES, *, limit: float = LIMIT) -> dict[in
 
 
 def _column(pipe, method: str, d: int, sizes) -> None:
-    """The child of `column`."""
+    """Do the work of `column` in its child process."""
     GRAPHS[method](codewords(2, 4))  # the first call imports modules
     pipe.send("ready")
     with threadpool_limits(1):
@@ -155,12 +162,12 @@ def _column(pipe, method: str, d: int, sizes) -> None:
 
 
 def graphs(dimensions=DIMENSIONS, sizes=SIZES, *, witnesses=WITNESSES, limit: float = LIMIT) -> pd.DataFrame:
-    """Times and agreement of neighbour graphs: one row per method, d and k, and per reference where there is one.
+    """Measure times and agreement of neighbour graphs: one row per method, d and k, and per reference if there is one.
 
-    "graph" rows have seconds (NaN if it took over `limit` or ran out of memory) and neighbours, the mean per codeword.
-    "agreement" rows have reference ("Delaunay", or "linear programmes", the exact graph inside the cube), witnesses,
-    neighbours, found (share of the reference's edges that the method has) and right (share of its edges that the
-    reference has).
+    "graph" rows have seconds (NaN if the graph took over `limit` or ran out of memory) and neighbours (the mean per
+    codeword). "agreement" rows have reference ("Delaunay", or "linear programmes", the exact graph inside the cube),
+    witnesses, neighbours, found (share of the reference's edges that the method has) and right (share of the method's
+    edges that the reference has).
     """
     rows = []
     for d in progress(dimensions, "graphs", total=len(dimensions), unit="dimensions"):
@@ -176,7 +183,7 @@ def graphs(dimensions=DIMENSIONS, sizes=SIZES, *, witnesses=WITNESSES, limit: fl
 
 
 def _agreements(known: dict[str, np.ndarray], points: np.ndarray, witnesses) -> list[dict]:
-    """Rows that compare the witness graphs with the references among the `known`, and these with each other."""
+    """Return the rows that compare witness graphs with the references among `known`, and references with each other."""
     references = {name: known[name] for name in ("Delaunay", "linear programmes") if name in known}
     compared = [("witnesses", n, witness_graph(points, n)) for n in witnesses] if references else []
     compared += [("Delaunay", np.nan, graph) for name, graph in known.items() if name == "Delaunay"]
@@ -189,18 +196,18 @@ def _agreements(known: dict[str, np.ndarray], points: np.ndarray, witnesses) -> 
 
 
 def agreement(graph: np.ndarray, reference: np.ndarray) -> dict[str, float]:
-    """Found: the share of the reference's edges that the graph has; right: of the graph's that are in the reference."""
+    """Compare edges: found (share of the reference's that `graph` has), right (share of its own in the reference)."""
     both = (graph & reference).sum()
     return {"found": float(both / reference.sum()), "right": float(both / graph.sum())}
 
 
 def _degree(graph: np.ndarray) -> float:
-    """The mean number of neighbours."""
+    """Return the mean number of neighbours."""
     return float(graph.sum() / len(graph))
 
 
 def study(dimensions=DIMENSIONS, sizes=SIZES) -> pd.DataFrame:
-    """All measurements; columns that do not apply to a row are NaN."""
+    """Run all measurements. Columns that do not apply to a row are NaN."""
     with threadpool_limits(1):
         parts = [look_ups(dimensions, sizes), graphs(dimensions, sizes)]
     frame = pd.concat(parts, ignore_index=True).astype({"witnesses": "Int64"})
@@ -208,7 +215,7 @@ def study(dimensions=DIMENSIONS, sizes=SIZES) -> pd.DataFrame:
 
 
 def made_with(dimensions=DIMENSIONS, sizes=SIZES) -> dict[str, str | int]:
-    """What names the table: settings (an id) and version."""
+    """Return what identifies the table: settings (an id) and version."""
     settings = [dimensions, sizes, N_STATES, WITNESSES, LIMIT, METRIC, geometry.WITNESSES]
     return {"settings": settings_id({"lookup": settings}), "version": VERSION}
 

@@ -1,4 +1,4 @@
-"""The figure of docs/trust.md: what a kill costs, by data/results/kills.csv."""
+"""Draw the figure of docs/trust.md from data/results/kills.csv: how much time a kill costs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The comparison of methods: how each row is made, and what the committed rows say."""
+"""The comparison of methods: how each row is made, and what the committed rows show."""
 
 from ...paper.results import RESULTS, read_results
 from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail

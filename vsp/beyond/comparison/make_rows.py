@@ -28,7 +28,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
-    parser.add_argument("--long", action="store_true", help="the tasks whose rows take hours")
+    parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
     parser.add_argument("--tables", nargs="+", choices=TABLES | ROBOT_TABLES, help="default: all")
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), (*LONG, *WALKERS) if arguments.long else TASKS

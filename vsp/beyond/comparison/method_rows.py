@@ -1,8 +1,8 @@
-"""Make the rows of the comparison beyond the paper: every method at every size, with the same teachers, budgets and
-starts.
+"""Make the rows of the comparison beyond the paper: every method at every size.
 
-`make beyond` makes the missing rows. data/results/beyond_<task>.csv holds the results, one row per method, size and
-seed. Distillation times differ from run to run, so they are in a separate file, beyond_seconds.csv.
+All methods have the same teachers, budgets and start states. `make beyond` makes the missing rows.
+data/results/beyond_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
+to run, so they are in a separate file, beyond_seconds.csv.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def tables_of(task: str) -> dict[str, Table]:
 
 
 def make_row(job: Job) -> tuple[dict, dict]:
-    """Distil and measure one policy. Returns the content of the row's file: arrays (none if not Voronoi cells), about."""
+    """Distil and measure one policy. Returns the arrays (of Voronoi cells only) and the metadata of the row's file."""
     teacher = _teacher(job.task, job.agent)
     budget = Budget(teacher, get_task(job.task), preset(job.task, job.how.preset))
     began = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Which methods are compared, at which sizes, with how many seeds: the tables beyond the paper, before any row."""
+"""Define the tables beyond the paper: which methods are compared, at which sizes, with how many seeds."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from ..refinement.config import Faithful, Refinement
 from . import apart, methods, peers
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
-LONG = ("LunarLanderContinuous-v3",)  # whose rows take hours
-WALKERS = ("BipedalWalker-v3", "HalfCheetah-v5")  # robots, whose rows take hours too
-SEEDS, FEW_SEEDS = range(20), range(5)  # of rows, and of those that take long
+LONG = ("LunarLanderContinuous-v3",)  # rows take hours
+WALKERS = ("BipedalWalker-v3", "HalfCheetah-v5")  # robots; rows take hours too
+SEEDS, FEW_SEEDS = range(20), range(5)  # by default, and for rows that take long
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
 OWN = (0,)
-TUNED_SIZES = (2, 3, 4, 8, 13)  # of rivals that are tuned as ours is
+TUNED_SIZES = (2, 3, 4, 8, 13)  # sizes of rivals that are tuned in the same way as ours
 EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
 TUNING = ("n_restarts", "n_generations", "n_tuning_episodes", "tuning_step")
 ALL = tuple(field.name for field in fields(Refinement) if field.name != "n_cells")
 OF_FAITHFUL = tuple(field.name for field in fields(Faithful) if field.name != "n_cells")
-PAPER = tuple(field.name for field in fields(Config))  # of the paper's preset
-ALIKE = ("faithful", "walking")  # kinds of presets whose rows say how alike the actions are
+PAPER = tuple(field.name for field in fields(Config))  # settings of the paper's preset
+ALIKE = ("faithful", "walking")  # kinds of presets whose rows also measure `fidelity`
 
-# `refined` that stays close to its teacher
+# Settings with which `refined` stays close to its teacher
 FAITHFUL = {"n_generations": 300, "n_tuning_episodes": 500, "tuning_step": 0.01, "error_penalty": 30.0}
 
 
@@ -39,13 +39,13 @@ class Method:
     """How a policy is made: `make(budget, size, seed, **settings)`."""
 
     make: Callable[..., Policy]
-    version: int = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
-    reads: tuple[str, ...] = ()  # settings of the budget that decide the policy
+    version: int = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
+    reads: tuple[str, ...] = ()  # settings of the budget that the policy depends on
     settings: dict = field(default_factory=dict)
     sizes: tuple[int, ...] = SIZES  # cells or leaves; `OWN` where the method finds its own number
-    chance: bool = True  # whether the seed matters
-    tasks: tuple[str, ...] | None = None  # None: for all
-    preset: str = "tuned"  # the kind of preset whose settings are the budget
+    chance: bool = True  # whether the policy depends on the seed
+    tasks: tuple[str, ...] | None = None  # None: all tasks
+    preset: str = "tuned"  # the kind of preset that gives the budget's settings
 
 
 def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
@@ -58,7 +58,7 @@ def _by_teacher(fit: str, *, sizes: tuple[int, ...] = SIZES) -> Method:
 
 
 def _tuned(fit: Method) -> Method:
-    """`fit`, then tuned; sizes of one leaf are left out, since one linear map stands for them."""
+    """Tune the policy of `fit`. Size 1 is left out, since "one linear map" covers it."""
     sizes = OWN if fit.sizes == OWN else TUNED_SIZES
     return replace(fit, make=partial(methods.tuned_fit, imitation=fit.make), reads=EPISODES + TUNING, sizes=sizes)
 
@@ -66,7 +66,7 @@ def _tuned(fit: Method) -> Method:
 METHODS = {
     "refined": Method(methods.refined, reads=ALL),
     "refined, not tuned": Method(methods.refined, reads=ALL, settings={"n_generations": 0}),
-    "refined, no teacher": Method(methods.no_teacher, reads=ALL, sizes=(3, 4)),  # those of presets
+    "refined, no teacher": Method(methods.no_teacher, reads=ALL, sizes=(3, 4)),  # sizes of presets
     "refined, closest": Method(methods.imitated, reads=ALL, sizes=(13,)),
     "refined, faithful": Method(methods.faithful, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]),
     "k-means cells, DAgger": _by_dagger("k-means", n_restarts=3),
@@ -86,7 +86,7 @@ METHODS = {
     ),
 }
 
-# Rivals, tuned as `refined` is
+# Rivals, tuned in the same way as `refined`
 UNTUNED = {
     "oblique tree, constant leaves, DAgger": _by_dagger("constant oblique tree", n_restarts=2, sizes=TUNED_SIZES),
     "small network, DAgger": _by_dagger("small network", n_restarts=2, sizes=TUNED_SIZES),
@@ -98,7 +98,7 @@ UNTUNED = {
 RIVALS = {f"{name}, tuned": _tuned(method) for name, method in UNTUNED.items()}
 RIVALS |= {name: method for name, method in UNTUNED.items() if name not in METHODS}
 
-# `refined` at the size of the preset, with one more part taken away
+# `refined` at the size of the preset, with one part removed or changed
 ABLATION = {
     "cold from the start": {"initial_temperature": 0.04},
     "one beginning": {"n_restarts": 1},
@@ -113,7 +113,7 @@ ABLATION = {
 FAITHFUL_SIZES = (1, 2, 3, 4, 6, 7, 8, 13)
 LIKE = {"faithful": Method(methods.faithfully, reads=OF_FAITHFUL, sizes=FAITHFUL_SIZES, preset="faithful")}
 
-# Fit and geometry apart, and newer methods: all imitate the teacher's own episodes
+# Fit and geometry separated, and newer methods: all imitate the teacher's own episodes
 APART = {
     name: Method(make, reads=EPISODES, sizes=(2, 4, 8))
     for name, make in {
@@ -126,13 +126,14 @@ APART = {
     }.items()
 }
 
-# The highest return of policies that are so much like the teacher: the way from `faithful` to `refined`
+# The highest return of policies whose R² is at least a given value: from `faithful` towards `refined`
 DEMANDED = {
     f"faithful, R² {r2:g}": replace(LIKE["faithful"], settings={"min_r2": r2}, sizes=(2, 4, 8))
     for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
 }
 
-# The highest return, from the best policy where it is known; and whether the start or the length of the search decides
+# LIMIT: the highest return, starting from the best policy where it is known.
+# STARTS: searches with another start or another length, to see which of the two matters
 LIMIT = {"at the limit": Method(methods.limited, limit.VERSION, reads=ALL, sizes=(1, 2, 3, 4, 8, 12), preset="limit")}
 _ON_THE_CAR = {"sizes": (3,), "tasks": printed.TASKS[1:]}
 STARTS = {
@@ -142,7 +143,7 @@ STARTS = {
     "refined, 800 generations": replace(METHODS["refined"], settings={"n_generations": 800}, **_ON_THE_CAR),
 }
 
-# Of robots: acting like the teacher, then training on as the teacher's actor; and one map by returns alone
+# Robots: imitate the teacher, then continue training as the teacher's actor; and one linear map by returns alone
 OF_IMITATION = (
     "push", "n_episodes", "n_corrections", "n_correction_episodes", "n_states", "n_restarts", "n_validation"
 )  # fmt: skip
@@ -168,29 +169,29 @@ ROBOTS = {
     "robot's teacher": replace(METHODS["teacher"], preset="walking"),
 }
 
-OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the nearest rivals
-AGENTS = (1, 2)  # further teachers of a task, data/teachers/short/, in the order of their names; 0 is the shipped one
+OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the closest rivals
+AGENTS = (1, 2)  # further teachers of a task, in data/teachers/short/, in order of name; 0 is the shipped one
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows that come into one file per task, data/results/<name>_<task>.csv."""
+    """Rows that are written to one file per task, data/results/<name>_<task>.csv."""
 
     methods: dict[str, Method]
     seeds: range = SEEDS
-    fewer: range = SEEDS  # of sizes that the preset does not have
-    sizes: tuple[int, ...] | None = None  # no others than these
+    fewer: range = SEEDS  # seeds of sizes other than the preset's
+    sizes: tuple[int, ...] | None = None  # only these sizes; None: all sizes of a method
     agents: tuple[int, ...] = (0,)
-    at_preset: bool = False  # only as many cells as the preset has
-    tail: bool = False  # the worst returns are measured too
-    by_task: dict[str, dict] = field(default_factory=dict)  # what differs for a task
+    at_preset: bool = False  # only the preset's size
+    tail: bool = False  # measure the worst returns too
+    by_task: dict[str, dict] = field(default_factory=dict)  # fields that differ for a task
 
     def of(self, task: str) -> Table:
-        """The table as it is for a task."""
+        """Return the table for `task`, with its own fields."""
         return replace(self, **self.by_task.get(task, {}))
 
     def has(self, task: str) -> bool:
-        """Whether a task has rows in it."""
+        """Return whether `task` has rows in this table."""
         return any(method.tasks is None or task in method.tasks for method in self.methods.values())
 
 
@@ -206,7 +207,7 @@ TABLES = {
     ),
     "limit": Table(
         LIMIT, fewer=range(3),
-        by_task={  # whose rows take 4 to 8 minutes
+        by_task={  # rows of these tasks take 4 to 8 minutes
             "MountainCarContinuous-v0": {"seeds": FEW_SEEDS, "sizes": (3, 4)},
             "Pendulum-v1": {"seeds": FEW_SEEDS, "sizes": (8,)},
         },
@@ -214,8 +215,8 @@ TABLES = {
     "starts": Table(STARTS, seeds=range(3), fewer=range(3)),
 }  # fmt: skip
 
-# Of the tasks whose rows take hours
-AGAIN = ("teacher", "refined")  # their tail is measured too, beside that of the rivals
+# Tables of the tasks whose rows take hours
+AGAIN = ("teacher", "refined")  # repeated here so that their tail is measured too, like that of the rivals
 LONG_RIVALS = ("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP)
 LONG_SIZES = (0, 1, 2, 4, 8)
 LONG_TABLES = {
@@ -226,7 +227,8 @@ LONG_TABLES = {
     ),
     "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
 }  # fmt: skip
-# No trees so far, and of most sizes one seed. One cell trained further is the control: it has a teacher, as eight have
+# No trees so far, and one seed for most sizes of HalfCheetah. One cell trained further is the control: it learns from a
+# teacher too, as eight cells do
 ROBOT_TABLES = {
     "robots": Table(
         {name: method for name, method in ROBOTS.items() if "tree" not in name},

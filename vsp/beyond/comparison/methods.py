@@ -1,8 +1,8 @@
 """The methods that are compared beyond the paper, each a function of a budget, a size and a seed.
 
-The budget is the teacher and the episodes of a `Refinement`. Fits to the teacher's own episodes alone get as many as
-the others get in all rounds. Methods that find their own size ignore the budget: the paper's method has the episodes of
-its own preset, and TD-AVQ has no teacher.
+The budget is the teacher and the episodes of a `Refinement`. A fit to the teacher's own episodes alone gets as many
+episodes as the other methods get in all rounds. Methods that find their own size ignore the budget: the paper's method
+uses the episodes of its own preset, and TD-AVQ has no teacher.
 """
 
 from __future__ import annotations
@@ -37,8 +37,10 @@ from .tuning import in_units, tuned
 
 @dataclass(frozen=True)
 class Budget:
-    """What a method may use: the teacher, its task, and the settings of its preset; of those that imitate or tune, the
-    episodes and rounds of a `Refinement`."""
+    """What a method may use: the teacher, its task, and the settings of its preset.
+
+    Methods that imitate or tune take their episodes and rounds from a `Refinement`.
+    """
 
     teacher: Policy
     task: Task
@@ -49,32 +51,32 @@ class Budget:
 
 
 def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """`refine`, with some settings changed."""
+    """Call `refine` with some settings changed."""
     config = replace(budget.config, n_cells=size, **changes)
     return refine(budget.teacher, budget.task, config, seed=seed)[0]
 
 
 def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
-    """`refine` with a teacher that does nothing: what the tuning finds by itself."""
+    """Call `refine` with a teacher that does nothing, to see what tuning finds without one."""
     return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
 
 
 def faithfully(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """`distill_faithfully`, by the faithful preset with some settings changed."""
+    """Call `distill_faithfully` with some settings of the faithful preset changed."""
     config = replace(budget.config, n_cells=size, **changes)
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "no policy of")  # the row says what was found
+        warnings.filterwarnings("ignore", "no policy of")  # the row shows what was found
         return distill_faithfully(budget.teacher, budget.task, config, seed=seed)[0]
 
 
 def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -> Policy:
-    """`at_the_limit`, from the best policy where it is known, or from the teacher."""
+    """Call `at_the_limit`, from the best policy where it is known, or with `by_teacher` from the teacher."""
     teacher = budget.teacher if by_teacher else None
     return at_the_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
 
 
 def imitated(budget: Budget, size: int, seed: int) -> Policy:
-    """The closest imitation of the teacher's own episodes: cells are relocated, nothing is corrected or tuned."""
+    """Imitate the teacher's own episodes as closely as possible: relocate cells, without correction or tuning."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
     config = replace(config, n_cells=size, n_episodes=n, n_restarts=3)
@@ -82,9 +84,9 @@ def imitated(budget: Budget, size: int, seed: int) -> Policy:
 
 
 def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """`imitated`, then tuned gently, as long as the gain outweighs the distance from the teacher.
+    """Tune the policy of `imitated` gently, as long as the gain outweighs the distance from the teacher.
 
-    The teacher plays the episodes of one round for the tuning, and those of the other rounds for the fit.
+    Of the teacher's episodes, those of one round serve the tuning, and those of the other rounds the fit.
     """
     config = budget.config
     start = imitated(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
@@ -96,12 +98,12 @@ def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
 
 
 def robot(budget: Budget, size: int, seed: int) -> Policy:
-    """`imitate_pushed`: cells that act like the teacher, also after a push or a mistake of their own."""
+    """Call `imitate_pushed`: cells act like the teacher, also after a push or a mistake of their own."""
     return imitate_pushed(budget.teacher, budget.task, replace(budget.config, n_cells=size), seed=seed)
 
 
 def robot_tree(budget: Budget, size: int, seed: int) -> Policy:
-    """An oblique tree with linear leaves, fitted to states gathered in the same way, in as many rounds."""
+    """Fit an oblique tree with linear leaves to states collected as in `robot`, in as many rounds."""
 
     def fit(frame: Frame, seen: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
         states, actions = frame.states(seen.inputs), frame.actions(seen.actions)
@@ -112,13 +114,13 @@ def robot_tree(budget: Budget, size: int, seed: int) -> Policy:
 
 
 def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy]) -> Policy:
-    """`imitation`, with which the training of the teacher goes on."""
-    from ..robots.further_training import train_further  # which imports torch
+    """Continue the teacher's training with the policy of `imitation` as its actor."""
+    from ..robots.further_training import train_further  # imported here, since it imports torch
 
     start, task = imitation(budget, size, seed), budget.task
     states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
     frame = Frame.of(task, states)
-    if isinstance(start, VoronoiPolicy):  # a single cell too
+    if isinstance(start, VoronoiPolicy):  # including a single cell
         frame = replace(frame, scale=start.scale)
         numbers = frame.cells(start)
     else:
@@ -127,11 +129,11 @@ def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable
 
 
 def searched(budget: Budget, size: int, seed: int) -> Policy:
-    """One linear map by random search on the return alone."""
+    """Find one linear map by random search on the return alone."""
     return search_one_map(budget.task, budget.config, seed=seed)
 
 
-# Fits to states x (n, d) and actions y (n, m), with so many cells or leaves
+# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves
 FITS: dict[str, Callable[..., Policy]] = {
     "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
     "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
@@ -149,9 +151,9 @@ FITS: dict[str, Callable[..., Policy]] = {
 
 
 def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy], rounds: int, n_restarts: int):
-    """`fit` by DAgger, with as many corrected episodes as `refine` has, in more rounds: these fits are quick.
+    """Run DAgger with `fit`, with as many corrected episodes as `refine`, in more rounds since these fits are quick.
 
-    `n_restarts` fits with other random numbers; the best is kept.
+    Makes `n_restarts` fits with different seeds and keeps the best.
     """
     n = budget.config.n_corrections * budget.config.n_correction_episodes
     config = replace(budget.config, n_corrections=rounds, n_correction_episodes=n // rounds)
@@ -159,14 +161,17 @@ def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy
 
 
 def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -> Policy:
-    """`fit` to the teacher's own episodes, without corrections."""
+    """Call `fit` on the teacher's own episodes, without corrections."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
     return _fitted(fit, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
 
 
 def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:
-    """`imitation`, tuned on the return as `refine` tunes its cells. Fits with random numbers have as many restarts."""
+    """Tune the policy of `imitation` on the return as `refine` tunes its cells.
+
+    Fits that use several restarts get as many as `refine` has.
+    """
     if settings.get("n_restarts", 1) > 1:
         settings["n_restarts"] = budget.config.n_restarts
     start = imitation(budget, size, seed, **settings)
@@ -174,7 +179,7 @@ def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., 
 
 
 def numbers_of(cells: int, task: Task) -> int:
-    """How many numbers linear maps in Voronoi cells have."""
+    """Return how many numbers a policy of `cells` Voronoi cells with linear maps has."""
     d, m = len(task.low), len(task.action_low)
     return cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
 
@@ -189,25 +194,25 @@ def _fitted(fit, config: Refinement, budget: Budget, size: int, seed: int, n_res
 
 
 def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
-    """The teacher itself."""
+    """Return the teacher itself."""
     return budget.teacher
 
 
 def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
-    """A rule that a person would write down."""
+    """Return the rule of thumb that a person would write down for the task."""
     return rule_of_thumb(budget.task.name)[1]
 
 
 def by_hand(budget: Budget, size: int, seed: int) -> Policy:
-    """A controller that a person programs."""
+    """Return a hand-written controller."""
     return {"Pendulum-v1": PumpAndBalance, "LunarLanderContinuous-v3": Heuristic}[budget.task.name]()
 
 
 def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
-    """Learned from rewards."""
+    """Learn from rewards by TD-AVQ, without a teacher."""
     return tdavq.learn(budget.task, seed=seed, **settings)
 
 
 def paper_method(budget: Budget, size: int, seed: int) -> Policy:
-    """`distill` with the paper's preset."""
+    """Call `distill` with the paper's preset."""
     return distill(budget.teacher, budget.task, budget.config, seed=seed)[0]

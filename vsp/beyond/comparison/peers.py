@@ -11,12 +11,12 @@ from .methods import Budget, alone
 
 
 def critic_driven_cells(budget: Budget, size: int, seed: int) -> Policy:
-    """Cells that are added where the critics value the distilled action too little: `critic_driven`."""
+    """Add cells where the critics give the distilled action too low a value: `critic_driven`."""
     return _with_critics(critic_driven, budget, size, seed)
 
 
 def advantage_weighted_cells(budget: Budget, size: int, seed: int) -> Policy:
-    """Cells of k-means with maps that are weighted by the cost of a wrong action: `advantage_weighted`."""
+    """Fit maps in k-means cells, weighted by the cost of a wrong action: `advantage_weighted`."""
     return _with_critics(advantage_weighted, budget, size, seed)
 
 

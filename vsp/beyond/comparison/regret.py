@@ -1,6 +1,6 @@
-"""How far returns are from the best that is possible, for the tasks whose optimum is computed.
+"""Compute regret: how far returns are below the best possible return, for the tasks whose optimum is computed.
 
-data/results/optimum.csv holds what the best policies return from the start states on which all rows are reported.
+data/results/optimum.csv holds the returns of the best policies, from the start states used for all reported rows.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from ..optimum import TASKS, best_policy, best_returns
 from ..optimum.grid import GridPolicy
 from .measure import N_REPORTED, REPORT_SEED
 
-VERSION = 1  # raise it when the best policies return something else; tests/golden/methods.json guards it
-# Tasks, and how much finer the grid: how far two returns of a task differ shows the grid's error
+VERSION = 1  # raise it when the best policies give different returns; tests/golden/methods.json checks this
+# Tasks, and how much finer the grid is; the difference between two returns of a task shows the grid's error
 WAYS = (("SimpleGoal-v0", 1.0), *((task, finer) for task in TASKS[1:] for finer in (1.0, 2.0)))
 CLOSED = "closed form"
 
 
 def optimum() -> pd.DataFrame:
-    """What the best policies return, one row per task and way to find them; the last of a task is the best.
+    """Return the returns of the best policies, one row per task and way to find them. A task's last row is its best.
 
-    Columns: task, found (how: `CLOSED`, or the points of the grid), mean, worst, failing (share of the
-    episodes without the goal; NaN where there is none), longest (steps), and the provenance. Takes about five minutes.
+    Columns: task, found (how: `CLOSED`, or the points of the grid), mean, worst, failing (share of the episodes that
+    miss the goal; NaN for a task without a goal), longest (steps), and the provenance. Takes about five minutes.
     """
     shown = progress(WAYS, "optimum", total=len(WAYS), unit="policies")
     return pd.DataFrame([_played(get_task(task), finer) for task, finer in shown])
 
 
 def _played(task: Task, finer: float) -> dict:
-    """The row of a task, from a grid with `finer` times the points."""
+    """Return the row of a task, from a grid with `finer` times the points in each variable."""
     policy, starts = best_policy(task, finer=finer), start_states(task, N_REPORTED, REPORT_SEED)
     result, on_grid = rollout(policy, task, starts), isinstance(policy, GridPolicy)
     returns, failing = result.returns if on_grid else best_returns(starts), np.mean(result.outcomes != GOAL)
@@ -48,19 +48,21 @@ def _played(task: Task, finer: float) -> dict:
 
 
 def provenance_of(task: str, finer: float) -> dict[str, str | int]:
-    """The provenance of a row; no teacher has a part in it."""
+    """Return the provenance of a row. Its teacher is "none"."""
     return provenance({"task": task, "finer": finer, "starts": [REPORT_SEED, N_REPORTED]}, "none", VERSION)
 
 
 def best_mean(task: str, folder: str | os.PathLike | None = None) -> float:
-    """The highest mean return that is possible from the report starts; NaN where it is not known."""
+    """Return the highest possible mean return from the report starts, or NaN if it is not known."""
     frame = read_results("optimum", folder)
     found = frame.loc[frame["task"] == task, "mean"]
     return float(found.iloc[-1]) if len(found) else np.nan
 
 
 def with_regret(table: pd.DataFrame, task: str) -> pd.DataFrame:
-    """`table` with a column regret: the best possible mean return minus its column mean; "not known" where the best is
-    not computed."""
+    """Add a column regret to `table`: the best possible mean return minus the column mean.
+
+    It is "not known" for a task whose best return is not computed.
+    """
     best = best_mean(task)
     return table.assign(regret="not known" if np.isnan(best) else best - table["mean"])

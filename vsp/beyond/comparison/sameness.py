@@ -1,4 +1,4 @@
-"""Whether another seed gives the same policy: the same cells, and the same actions."""
+"""Measure whether different seeds give the same policy: the same cells, and the same actions."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from .measure import common_states
 
 
 def sameness(policies: dict[int, VoronoiPolicy], teacher: Policy, task: Task) -> pd.DataFrame:
-    """Every pair of `policies`, by seed, compared on `common_states`, one row per pair.
+    """Compare every pair of `policies` (by seed) on `common_states`, one row per pair.
 
-    Columns: seed, other; index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same, about 0
-    for cells that have nothing to do with each other; NaN where a policy has one cell); ratio, the root mean square
-    difference of their actions over that to the teacher's (the mean of both).
+    Columns: seed, other; index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells,
+    about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their
+    actions, divided by that from the teacher's actions (mean over the two policies).
     """
     from sklearn.metrics import adjusted_rand_score
 

@@ -1,7 +1,7 @@
-"""Which committed results were made with other settings, another teacher or another version than today's.
+"""Find committed results that were made with other settings, another teacher or another version than today's.
 
-`python -m vsp.beyond.comparison.stale` prints them, and nothing where all are up to date. Tables that
-`make paper-figures` writes anew each time are not among them.
+`python -m vsp.beyond.comparison.stale` prints them, or nothing if all are up to date. Tables that `make paper-figures`
+rewrites each time are not checked.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ from .method_tables import LONG, TASKS, WALKERS
 
 
 def stale(folder: str | os.PathLike | None = None) -> list[str]:
-    """Which results, those in data/results or in another folder, differ from today's, in words; empty if none."""
+    """List the results in data/results, or in `folder`, that are missing, damaged or out of date, one message each.
+
+    The list is empty if all are up to date.
+    """
     found, folder = [], Path(folder or results.RESULTS)
     for name, target, today in committed():
         try:
@@ -42,7 +45,7 @@ def stale(folder: str | os.PathLike | None = None) -> list[str]:
 
 
 def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[dict]]]]:
-    """Committed files: the name, the target that makes it, and what its rows would name today, given its rows."""
+    """Yield the committed files: name, make target, and a function from a file's rows to their provenance today."""
     yield "readings.csv", "study", _readings
     yield "teachers.csv", "study", _teachers
     for task in (*TASKS, *LONG, *WALKERS):
@@ -65,7 +68,7 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
 
 
 def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dict]]) -> list[str]:
-    """The columns in which the provenance of the rows differs from today's; none if it is up to date."""
+    """Return the columns in which the provenance of the rows differs from today's; none if it is up to date."""
     now = pd.DataFrame(list(today(frame)))
     columns = [name for name in (*results.PROVENANCE, "seed") if name in now]
     now, then = now[columns].astype(str), frame.reindex(columns=columns).dropna(how="all").astype(str)
@@ -75,7 +78,7 @@ def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dic
 
 
 def _provenance(path: Path) -> pd.DataFrame:
-    """The rows of a table, or what a policy names as one row."""
+    """Read the rows of a table, or the metadata of a policy as one row."""
     if path.suffix == ".policy":
         return pd.DataFrame([sealed.load_arrays(path, kind="VoronoiPolicy")[1]])
     frame = results.read_results(path.stem, path.parent)
@@ -83,7 +86,7 @@ def _provenance(path: Path) -> pd.DataFrame:
 
 
 def _readings(frame: pd.DataFrame) -> Iterable[dict]:
-    """All variants were ranked; which of them were confirmed is for the ranking to say."""
+    """Yield today's provenance of the readings. All variants are ranked; the rows show which were also confirmed."""
     seeds = {"choosing": interpretations.CHOOSING, "confirming": interpretations.CONFIRMING}
     confirmed = set(frame.loc[frame["phase"] == "confirming", "variant"])
     for (name, _), experiment in interpretations.experiments(interpretations.variants()).items():
@@ -97,7 +100,7 @@ def _teachers(frame: pd.DataFrame) -> Iterable[dict]:
 
 
 def _rows(task: str, table: str, frame: pd.DataFrame) -> Iterable[dict]:
-    made_with: dict[Job, dict] = {}  # seeds have it in common
+    made_with: dict[Job, dict] = {}  # the same for all seeds
     for job in jobs_of(task, table):
         kind = replace(job, seed=0)
         if kind not in made_with:

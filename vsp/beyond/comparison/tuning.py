@@ -1,4 +1,4 @@
-"""The same tuning for everyone: CMA-ES on all numbers of a tree, a partition or a network, its structure fixed."""
+"""Tune every method in the same way: CMA-ES on all numbers of a tree, a partition or a network of fixed structure."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ class Numbers(Protocol):
 
     @property
     def vector(self) -> np.ndarray:
-        """All its numbers."""
+        """All its numbers, as one vector."""
 
     def like(self, vector: np.ndarray) -> Numbers:
-        """The same structure with other numbers."""
+        """Return the same structure with the numbers of `vector`."""
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
         """Actions (n, m), not limited, for inputs (n, d + 1)."""
@@ -35,34 +35,34 @@ class Numbers(Protocol):
 
 @dataclass(frozen=True)
 class TreeNumbers:
-    """The cuts and the maps of a tree. One leaf is one linear map."""
+    """The splits and the maps of a tree. A tree with one leaf is one linear map."""
 
-    sides: np.ndarray  # (leaves, nodes): 1 where the way to a leaf turns right, -1 where it turns left, else 0
+    sides: np.ndarray  # (leaves, nodes): 1 where the path to a leaf turns right, -1 where it turns left, else 0
     directions: np.ndarray  # (nodes, d)
-    thresholds: np.ndarray  # (nodes,) a state beyond turns right
+    thresholds: np.ndarray  # (nodes,) a state beyond its threshold turns right
     maps: np.ndarray  # (leaves, d + 1, m): weights, then bias
     oblique: bool  # whether directions are tuned
-    constant: bool  # whether leaves have biases alone
+    constant: bool  # whether leaves have only biases
 
     @classmethod
     def one_leaf(cls, maps: np.ndarray) -> TreeNumbers:
-        """One linear map, `maps` (1, d + 1, m)."""
+        """Return a tree with one leaf, whose map is `maps` (1, d + 1, m)."""
         d = maps.shape[1] - 1
         return cls(np.zeros((1, 0)), np.zeros((0, d)), np.zeros(0), maps, oblique=False, constant=False)
 
     @property
     def vector(self) -> np.ndarray:
-        """All that is tuned."""
+        """All tuned numbers, as one vector."""
         return joined(self.parts)
 
     @property
     def parts(self) -> list[np.ndarray]:
-        """What is tuned: directions, where they are, thresholds, maps."""
+        """What is tuned: directions (if oblique), thresholds, maps (biases only, if constant)."""
         directions = [self.directions] if self.oblique else []
         return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
 
     def like(self, vector: np.ndarray) -> TreeNumbers:
-        """The same structure with the numbers of `vector`."""
+        """Return the same structure with the numbers of `vector`."""
         *directions, thresholds, maps = parted(vector, self.parts)
         if self.constant:
             maps = np.concatenate([np.zeros_like(self.maps[:, :-1]), maps[:, None]], axis=1)
@@ -72,7 +72,7 @@ class TreeNumbers:
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
         """Actions (n, m), not limited, for inputs (n, d + 1)."""
         turns = np.where(inputs[:, :-1] @ self.directions.T > self.thresholds, 1.0, -1.0)
-        wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf whose turns are all taken
+        wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf that the state reaches
         return linear_outputs(inputs[:, :-1], self.maps[wrong.argmin(axis=1)])
 
 
@@ -85,11 +85,11 @@ class NetworkNumbers:
 
     @property
     def vector(self) -> np.ndarray:
-        """All that is tuned."""
+        """All tuned numbers, as one vector."""
         return joined([self.hidden, self.output])
 
     def like(self, vector: np.ndarray) -> NetworkNumbers:
-        """The same structure with the numbers of `vector`."""
+        """Return the same structure with the numbers of `vector`."""
         return NetworkNumbers(*parted(vector, [self.hidden, self.output]))
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class NetworkNumbers:
 
 
 class Tunable:
-    """The policy of `numbers` in the units of `frame`; as large and as costly as `start`."""
+    """The policy with `numbers` in the units of `frame`. Its size and cost are those of `start`."""
 
     def __init__(self, frame: Frame, numbers: Numbers, start: Policy):
         self.frame, self.numbers, self._start = frame, numbers, start
@@ -107,8 +107,8 @@ class Tunable:
         return len(self._start) if hasattr(self._start, "__len__") else 0
 
     @property
-    def COST(self) -> tuple[int, float]:  # as of policies whose cost is counted by hand
-        """What `cost` says of `start`: tuning changes no structure."""
+    def COST(self) -> tuple[int, float]:  # named as in policies whose cost is counted by hand
+        """The `cost` of `start`, since tuning does not change the structure."""
         return cost(self._start)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
@@ -118,18 +118,21 @@ class Tunable:
 
 @dataclass(frozen=True)
 class TunableFrame(Frame):
-    """A `Frame` for the numbers of another policy than Voronoi cells."""
+    """A `Frame` for the numbers of a policy that is not made of Voronoi cells."""
 
     start: Policy
 
     def policy(self, cells: Numbers) -> Tunable:
-        """`cells` as a policy in the units of the task."""
+        """Return the numbers `cells` as a policy in the units of the task."""
         return Tunable(self, cells, self.start)
 
 
 def tuned(start: Policy, teacher: Policy, task: Task, config: Refinement, seed: int) -> Policy:
-    """`start`, tuned on the return as `refine` tunes its cells: by the same search from as many starts, with the same
-    penalty. The best of as many snapshots by the validation starts is kept, or `start` itself."""
+    """Tune `start` on the return as `refine` tunes its cells.
+
+    The search, the number of its start states, the penalty and the number of snapshots are the same. Returns the best
+    snapshot on the validation starts, or `start` itself if none is better.
+    """
     streams = np.random.SeedSequence(seed).spawn(5)  # as in `refine`
     starts, _, _, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
@@ -143,10 +146,13 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Refinement, seed: 
 
 
 def in_units(policy: Policy, frame: Frame) -> tuple[Frame, Numbers]:
-    """The numbers of `policy`, and the frame that makes policies of them: its own scale where it has one, else that of
-    `frame`. Raises TypeError for a kind of policy that has no numbers to tune."""
+    """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
+
+    The frame has the policy's own scale, or that of `frame` if the policy has none. Raises TypeError for a kind of
+    policy that has no numbers to tune.
+    """
     if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
-        own = replace(frame, scale=policy.scale)  # which is part of its borders
+        own = replace(frame, scale=policy.scale)  # the scale is part of its borders
         return own, own.cells(policy)
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
     own = TunableFrame(frame.task, units.centre, units.scale, policy)
@@ -172,7 +178,7 @@ def _of_tree(tree: LinearTree, frame: Frame) -> TreeNumbers:
 
 
 def _of_cart(tree, frame: Frame) -> TreeNumbers:
-    """Of the arrays in which scikit-learn keeps a tree."""
+    """Return the numbers of a tree that is given by scikit-learn's arrays."""
     pairs = zip(tree.children_left.tolist(), tree.children_right.tolist())
     inner, ends, sides = _ways([pair if pair[0] >= 0 else () for pair in pairs])
     axes, m, d = tree.feature[inner], tree.value.shape[1], len(frame.centre)
@@ -183,9 +189,9 @@ def _of_cart(tree, frame: Frame) -> TreeNumbers:
 
 
 def _ways(children: list[tuple[int, ...]]) -> tuple[list[int], list[int], np.ndarray]:
-    """Inner nodes and leaves of a tree, and the sides to which the way to each leaf turns (leaves, nodes).
+    """Return the inner nodes and leaves of a tree, and which way the path to each leaf turns: `sides` (leaves, nodes).
 
-    `children` holds the left and the right child of every node, none for a leaf; parents come before their children.
+    `children` holds the left and the right child of every node (empty for a leaf). Parents come before their children.
     """
     inner = [i for i, pair in enumerate(children) if pair]
     ends = [i for i, pair in enumerate(children) if not pair]

@@ -1,7 +1,7 @@
-"""LIME (Ribeiro et al. 2016) compared with the equations of a partition: two linear maps that explain one teacher.
+"""Compare LIME (Ribeiro et al. 2016) with the equations of a partition: two linear maps that explain one teacher.
 
-LIME explains one state at a time by a linear map fitted around it; a `VoronoiPolicy` has one map for a whole cell, and
-acts by it. Both are compared with the teacher's own gradient.
+LIME explains one state at a time by a linear map fitted around it. A `VoronoiPolicy` has one map for a whole cell, and
+acts by this map. Both are compared with the teacher's own gradient.
 """
 
 from __future__ import annotations
@@ -15,21 +15,22 @@ from ...rollouts import Policy
 from ...tasks.base import Task
 from ...tasks.registry import get_task
 
-WIDTH = 0.75  # of LIME's kernel, in units of the square root of the number of inputs
+WIDTH = 0.75  # width of LIME's kernel, in units of the square root of the number of inputs
 NEAR = 0.25  # standard deviation of the test states around a state, in units of that of the data
-STEP = 0.01  # of the finite differences, in the same units
+STEP = 0.01  # step of the finite differences, in the same units
 
 
 def local_map(
     policy: Policy, task: str | Task, state: np.ndarray, *, scale: np.ndarray, rng: np.random.Generator, n: int = 5000
 ) -> np.ndarray:
-    """LIME's linear map around `state` (d,): weights, then bias, in the units of the task. (d + 1, m)
+    """Return LIME's linear map around `state` (d,): weights, then bias, in the units of the task. (d + 1, m)
 
-    LIME's procedure for tabular data without discretisation, around the state itself (`sample_around_instance`; the
-    default samples around the mean of all data): `n` normal perturbations with the data's standard deviation `scale`
-    (d,), weights from an exponential kernel of the standardised distance, ridge regression with penalty 1. As in the
-    authors' library, the weights are the square root of the kernel, and perturbed states may leave the task's box.
-    Raises ValueError for a state or scale of a wrong shape or not finite, and for a scale not above 0.
+    The procedure is LIME's for tabular data without discretisation. It draws `n` normal perturbations with the data's
+    standard deviation `scale` (d,), weights them by an exponential kernel of the standardised distance, and fits a
+    ridge regression with penalty 1. Samples lie around the state itself (`sample_around_instance`); LIME's default is
+    around the mean of all data. As in the authors' library, the weights are the square root of the kernel, and
+    perturbed states may leave the task's box. Raises ValueError for a state or scale that has a wrong shape or is not
+    finite, and for a scale that is not above 0.
     """
     from sklearn.linear_model import Ridge
 
@@ -45,7 +46,7 @@ def local_map(
 
 
 def gradient_map(policy: Policy, state: np.ndarray, *, scale: np.ndarray) -> np.ndarray:
-    """The tangent map of `policy` at `state` (d,), by central differences: weights, then bias. (d + 1, m)
+    """Return the tangent map of `policy` at `state` (d,), by central differences: weights, then bias. (d + 1, m)
 
     Raises ValueError as `local_map` does.
     """
@@ -60,12 +61,12 @@ def gradient_map(policy: Policy, state: np.ndarray, *, scale: np.ndarray) -> np.
 def compare_maps(
     policy: VoronoiPolicy, teacher: Policy, states: np.ndarray, *, scale: np.ndarray, rng: np.random.Generator
 ) -> pd.DataFrame:
-    """The linear maps of gradient, LIME and cell at `states` (n, d), and how well each predicts the teacher.
+    """Return the linear maps of gradient, LIME and cell at `states` (n, d), and how well each predicts the teacher.
 
-    One row per state, action and map. Columns: state, action, map, the weight of every input and the bias, and error,
-    the root mean square difference (in units of the action) between the map, limited to the action box, and the teacher
-    at 1000 states around, normal with deviation `NEAR` times `scale` and clipped to the task's box. Raises ValueError
-    as `local_map` does.
+    One row per state, action and map. Columns: state, action, map, the weight of every input, the bias, and error. The
+    error is the root mean square difference, in units of the action, between the map limited to the action box and the
+    teacher. It is measured at 1000 states around the state: normally distributed with standard deviation `NEAR` times
+    `scale`, and clipped to the task's box. Raises ValueError as `local_map` does.
     """
     policy.check_linear()
     task, rows = policy.task, []
@@ -88,7 +89,7 @@ def compare_maps(
 
 
 def _checked(states: np.ndarray, scale: np.ndarray, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Both in float64. Raises ValueError as `local_map` says."""
+    """Return both in float64. Raises ValueError as `local_map` does."""
     states = check_array("states", states, shape)
     scale = check_array("scale", scale, states.shape[-1:])
     if not (scale > 0).all():

@@ -1,7 +1,8 @@
-"""Cells in words: axis-aligned rules, such as "x > 0.42 and y <= 0.61", for which cell a state is in.
+"""Describe cells by axis-aligned rules, such as "x > 0.42 and y <= 0.61", that tell which cell a state is in.
 
-Borders between Voronoi cells are oblique, which the paper names as a limitation: regions are hard to describe. Here a
-small decision tree (CART, Breiman et al. 1984) learns the cell of visited states. Its leaves are boxes, hence rules.
+Borders between Voronoi cells are oblique, so the regions are hard to describe; the paper names this as a limitation.
+Here a small decision tree (CART, Breiman et al. 1984) learns the cell of visited states. Its leaves are boxes, and each
+box is a rule.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ...policy import VoronoiPolicy
 from ...subpolicies.base import linear_outputs, number
 
 MOST = 200  # leaves of the largest tree to try
-_DIGITS = range(1, 17)  # digits of the numbers in rules to try, the fewest first
+_DIGITS = range(1, 17)  # how many digits to try for the numbers in rules, in this order
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +31,12 @@ class Rule:
     high: np.ndarray  # (d,)
 
     def holds(self, states: np.ndarray) -> np.ndarray:
-        """Which of the states (n, d) lie in the box. (n,) bool"""
+        """Return which of the states (n, d) lie in the box. (n,) bool"""
         states = check_array("states", states, (-1, len(self.low)))
         return ((states > self.low) & (states <= self.high)).all(axis=1)
 
     def text(self, names: tuple[str, ...]) -> str:
-        """The box in words, with the names of the d inputs; "always" if it has no border."""
+        """Write the box in words, with the names of the d inputs; "always" if it has no border."""
         conditions = []
         for name, low, high in zip(names, map(_plain, self.low), map(_plain, self.high)):
             if low and high:
@@ -48,15 +49,17 @@ class Rule:
 def describe_rules(
     policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
 ) -> pd.DataFrame:
-    """The cells of `policy` as rules: the fewest that agree with its look-up in a share `agreement` of states.
+    """Describe the cells of `policy` by the fewest rules that agree with its look-up in a share `agreement` of states.
 
-    Rules are fitted to `states` (n, d). `unseen` (u, d), states of other episodes, both select and evaluate them, so
-    the agreement is slightly optimistic. The tree may have up to `leaves` leaves. One row per rule, cell by cell: cell;
-    share, of all states that are in this cell; rule; coverage, the share of the cell's states where the rule holds
-    (largest first); fidelity, the share of the rule's states that are in the cell. A cell without a rule has one row
-    with the rule "none". `attrs` hold agreement, asked, reached (whether it is as high as was asked), rules (their
-    number) and digits (of the numbers in them). Raises ValueError for arrays of a wrong shape, no states, `agreement`
-    outside (0, 1], or fewer than 2 leaves.
+    Rules are fitted to `states` (n, d). States of other episodes, `unseen` (u, d), both select and evaluate the rules,
+    so the agreement is slightly optimistic. The tree may have up to `leaves` leaves.
+
+    One row per rule, cell by cell. Columns: cell; share (of all states that are in this cell); rule; coverage (share of
+    the cell's states where the rule holds, largest first); fidelity (share of the rule's states that are in the cell).
+    A cell without a rule has one row with the rule "none". `attrs` has agreement, asked (the requested agreement),
+    reached (whether the agreement is as high as requested), rules (their number) and digits (of the numbers in them).
+
+    Raises ValueError for arrays of a wrong shape, no states, `agreement` outside (0, 1], or fewer than 2 leaves.
     """
     rules, digits = find_rules(policy, states, unseen, agreement=agreement, leaves=leaves)
     cells, rows = policy.cells(unseen), []
@@ -79,21 +82,22 @@ def describe_rules(
 def find_rules(
     policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
 ) -> tuple[list[Rule], int]:
-    """The rules, exactly one of which holds in each state, and the digits of their numbers.
+    """Find the rules, exactly one of which holds in each state, and the number of digits in them.
 
-    Arguments and errors are those of `describe_rules`. If no tree agrees as much as was asked, the best one is taken.
+    Arguments and errors are those of `describe_rules`. If no tree reaches the requested agreement, the best one is
+    used.
     """
     d = len(policy.task.low)
     states, unseen = check_array("states", states, (-1, d)), check_array("unseen", unseen, (-1, d))
     if not (len(states) and len(unseen)):
-        raise ValueError(f"{len(states)} states and {len(unseen)} unseen ones, expected some of both")
+        raise ValueError(f"{len(states)} states and {len(unseen)} unseen states, expected at least one of each")
     check_number("agreement", agreement)
     if not 0 < agreement <= 1:
         raise ValueError(f"agreement is {agreement}, expected a share above 0 and up to 1, such as 0.95")
     check_count("leaves", leaves, least=2)
     cells = policy.cells(unseen)
     rules, found = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
-    places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimals that hardly tell
+    places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimal place of the range
     for digits in _DIGITS:
         short = _rounded(rules, digits + places)
         if np.mean(apply(short, unseen) == cells) >= min(agreement, found):
@@ -104,8 +108,8 @@ def find_rules(
 class RulePolicy:
     """The maps of a `VoronoiPolicy` with rules in place of its look-up, to show what an occasional wrong cell costs.
 
-    A map is good in its own cell and may be far off beyond the border. So rules that agree in 95 of 100 states describe
-    a policy, but may not replace it.
+    A map is good in its own cell, but may be far off beyond the border. So rules that agree in 95 of 100 states can
+    describe a policy, but may not be able to replace it.
     """
 
     def __init__(self, policy: VoronoiPolicy, rules: list[Rule]):
@@ -120,7 +124,7 @@ class RulePolicy:
 
 
 def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
-    """The cell of the rule that holds in each state (n, d). (n,) Raises ValueError for no rules."""
+    """Return the cell of the rule that holds in each state (n, d). (n,) Raises ValueError if `rules` is empty."""
     if not rules:
         raise ValueError(f"rules are {rules!r}, expected at least one")
     held = np.array([rule.holds(states) for rule in rules])
@@ -128,14 +132,14 @@ def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
 
 
 def rules_latex(rule: str) -> str:
-    """The text of a rule as LaTeX code."""
+    """Return the text of a rule as LaTeX code."""
     if "<" not in rule and ">" not in rule:
         return rule
     return " and ".join(f"${symbol(condition)}$".replace("<=", r"\leq") for condition in rule.split(" and "))
 
 
 def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:
-    """The rules of the smallest tree that agrees enough, else of the one that agrees most, and its agreement."""
+    """Return the rules and the agreement of the smallest tree that agrees enough, else of the one that agrees most."""
     from sklearn.tree import DecisionTreeClassifier
 
     best, found = None, -1.0
@@ -143,14 +147,14 @@ def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tupl
         tree = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0).fit(states, cells)
         right = float(np.mean(tree.predict(unseen) == truth))
         best, found = (tree, right) if right > found else (best, found)
-        if right >= agreement or tree.get_n_leaves() < leaves:  # enough, or nothing is left to split
+        if right >= agreement or tree.get_n_leaves() < leaves:  # it agrees enough, or nothing is left to split
             break
     d = states.shape[1]
     return _merged(list(_leaves(best, 0, np.full(d, -np.inf), np.full(d, np.inf)))), found
 
 
 def _leaves(tree, node: int, low: np.ndarray, high: np.ndarray) -> Iterator[Rule]:
-    """The leaves below a node as rules; the node is the box from `low` to `high`."""
+    """Yield the leaves below a node as rules. The node is the box from `low` to `high`."""
     inner = tree.tree_
     if inner.children_left[node] < 0:
         yield Rule(int(tree.classes_[inner.value[node, 0].argmax()]), low, high)
@@ -163,7 +167,7 @@ def _leaves(tree, node: int, low: np.ndarray, high: np.ndarray) -> Iterator[Rule
 
 
 def _merged(rules: list[Rule]) -> list[Rule]:
-    """The same regions in fewer boxes: two boxes of one cell that share a whole face become one."""
+    """Describe the same regions by fewer boxes: merge two boxes of one cell that share a whole face."""
     for i, one in enumerate(rules):
         for j, other in enumerate(rules):
             axes = np.flatnonzero((one.low != other.low) | (one.high != other.high))
@@ -174,7 +178,7 @@ def _merged(rules: list[Rule]) -> list[Rule]:
 
 
 def _rounded(rules: list[Rule], decimals: np.ndarray) -> list[Rule]:
-    """The rules with bounds rounded to `decimals` (d,); boxes that become empty are dropped."""
+    """Round the bounds of the rules to `decimals` (d,) and drop boxes that become empty."""
     short = []
     for rule in rules:
         low, high = (np.array([round(b, int(n)) for b, n in zip(ends, decimals)]) for ends in (rule.low, rule.high))
@@ -184,10 +188,10 @@ def _rounded(rules: list[Rule], decimals: np.ndarray) -> list[Rule]:
 
 
 def _plain(bound: float) -> str:
-    """A bound without trailing zeros; "" for an infinite one."""
+    """Write a bound without trailing zeros; "" for an infinite one."""
     return number(bound + 0.0, None) if np.isfinite(bound) else ""
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> float:
-    """How much of `whole` is also `part`; NaN if it is empty."""
+    """Return the share of `whole` that is also in `part`, or NaN if `whole` is empty."""
     return float(part[whole].mean()) if whole.any() else float("nan")

@@ -1,4 +1,4 @@
-"""The best that any policy can return, computed from the dynamics: what teachers and policies are measured against."""
+"""Compute the best return that any policy can reach, from the dynamics: the reference for teachers and policies."""
 
 from .limit import at_the_limit, limit_preset
 from .losses import losses

@@ -1,7 +1,7 @@
-"""Dynamic programming (Bellman 1957) on a grid over two state variables: best returns, and the actions that earn them.
+"""Dynamic programming (Bellman 1957) on a grid over two state variables: best returns, and the actions that reach them.
 
-Between the points of the grid values are interpolated, so that a step of all points under one action is one sparse
-matrix. The error falls with the grid's width; two widths show it.
+Values are interpolated between the points of the grid, so one sparse matrix describes a step of all points under one
+action. The error falls with the spacing of the grid; comparing two spacings shows its size.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from scipy import sparse
 
 from ...tasks.base import RUNNING, Task
 
-SWEEPS = 60  # of evaluation between two improvements (modified policy iteration, Puterman & Shin 1978)
+SWEEPS = 60  # sweeps of evaluation between two improvements (modified policy iteration, Puterman & Shin 1978)
 MOST_IMPROVEMENTS = 1000
-AT_ONCE = 5000  # states that `GridPolicy` compares actions in
-CLOSE = 1e-6  # change of the values at which the iteration ends
+AT_ONCE = 5000  # states in which `GridPolicy` compares actions at once
+CLOSE = 1e-6  # the iteration ends when the values change by less
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Evenly spaced points over a box of two variables, ends included, or over a circle in a `periodic` one."""
+    """Evenly spaced points over a box of two variables, ends included. A `periodic` variable runs around a circle."""
 
     low: tuple[float, float]
     high: tuple[float, float]
@@ -30,28 +30,28 @@ class Grid:
     periodic: tuple[bool, bool] = (False, False)
 
     def finer(self, times: float) -> Grid:
-        """The same box with so many `times` the steps between points."""
+        """Return a grid over the same box, with `times` as many steps between points in each variable."""
         return replace(self, shape=tuple(_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic)))
 
     def points(self) -> np.ndarray:
-        """All points, the last variable the fastest. (n, 2)"""
+        """Return all points; the last variable varies fastest. (n, 2)"""
         about = zip(self.low, self.high, self.shape, self.periodic)
         axes = [np.linspace(low, high, n, endpoint=not closed) for low, high, n, closed in about]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
     def interpolation(self, states: np.ndarray) -> sparse.csr_array:
-        """The matrix that takes values at the points (n,) to values at the states (t, 2)."""
+        """Return the matrix that maps values at the points (n,) to values at the states (t, 2)."""
         columns, weights = self._corners(states)
         ends = np.arange(len(states) + 1) * 4
         return sparse.csr_array((weights.ravel(), columns.ravel(), ends), shape=(len(states), np.prod(self.shape)))
 
     def at(self, states: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Values at the points (n,), interpolated at the states (t, 2). (t,)"""
+        """Interpolate values at the points (n,) at the states (t, 2). (t,)"""
         columns, weights = self._corners(states)
         return (weights * values[columns]).sum(axis=1)
 
     def _corners(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The four points around each state, by number, and their weights. (t, 4) each"""
+        """Return the indices of the four points around each state, and their weights. (t, 4) each"""
         (i, j, u), (k, m, v) = (self._between(states[:, axis], axis) for axis in (0, 1))
         width = self.shape[1]
         columns = np.stack([i * width + k, i * width + m, j * width + k, j * width + m], axis=1)
@@ -59,7 +59,7 @@ class Grid:
         return columns.astype(np.int32), weights
 
     def _between(self, x: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The two neighbours of each x along an axis, and how far it is from the first, in units of their distance."""
+        """Return the two neighbours of each x along an axis, and its distance from the first in units of spacing."""
         low, high, n = self.low[axis], self.high[axis], self.shape[axis]
         if self.periodic[axis]:
             place = (x - low) / (high - low) * n
@@ -71,14 +71,15 @@ class Grid:
 
 
 def _steps(n: int, times: float, periodic: bool) -> int:
-    """Points in an axis of n after its steps were divided: an end more than steps, unless it is a circle."""
+    """Return the points of an axis of n points with `times` as many steps: one more than steps, unless periodic."""
     return 2 * round(times * (n - (not periodic)) / 2) + (not periodic)
 
 
 def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:
-    """The highest return from every point of `grid` with these `actions` (a,), less `price` for each step. (n,)
+    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step. (n,)
 
-    For a task with one action whose states are the grid's. Without a limit of steps: a price keeps episodes short.
+    The task must have one action, and the grid's variables as its state. Episodes have no step limit here; a price
+    keeps them short. Raises RuntimeError if the values do not converge.
     """
     moves = [_move(task, grid, action, price) for action in actions]
     values = np.zeros(len(grid.points()))
@@ -91,7 +92,7 @@ def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0
 
 
 def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The values a step earlier, and the best actions there, by index. (n,) each"""
+    """Return the values one step earlier, and the indices of the best actions there. (n,) each"""
     most, best = np.full(len(values), -np.inf), np.zeros(len(values), dtype=np.intp)
     for i, (rewards, matrix) in enumerate(moves):
         offer = rewards + matrix @ values
@@ -101,7 +102,10 @@ def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarray, sparse.csr_array]:
-    """The rewards of one action at all points, and the matrix to the values after it, 0 where an episode ended."""
+    """Return the rewards of one action at all points, and the matrix that maps values to those after the step.
+
+    Its rows are 0 where the episode ended.
+    """
     points = grid.points()
     after, rewards, outcomes = task.step(points, np.full((len(points), 1), action))
     goes_on = sparse.diags_array((outcomes == RUNNING).astype(np.float64))
@@ -109,7 +113,7 @@ def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarr
 
 
 def _followed(moves: list, best: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The values after `SWEEPS` steps of these actions (n,), by index."""
+    """Return the values after `SWEEPS` steps with the actions whose indices are `best` (n,)."""
     order = np.argsort(best, kind="stable")
     rows = np.split(order, np.searchsorted(best[order], np.arange(1, len(moves))))
     matrix = sparse.vstack([matrix[some] for (_, matrix), some in zip(moves, rows)], format="csr")
@@ -122,7 +126,7 @@ def _followed(moves: list, best: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 class GridPolicy:
-    """Takes the action that is best by the values of a grid: it looks one step ahead."""
+    """A policy that takes the best action by the values of a grid, looking one step ahead."""
 
     def __init__(
         self, task: Task, grid: Grid, values: np.ndarray, actions: np.ndarray, state_of: Callable, price: float = 0.0
@@ -137,15 +141,16 @@ class GridPolicy:
         return np.concatenate([self._best(part) for part in parts])[:, None], None
 
     def lost(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """What `actions` (n, 1) cost in the observations (n, d), if the best actions follow: in units of return. (n,)
+        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return.
 
-        Of an episode that ends where no more is to be had, the sum is its regret, but for the grid's error.
+        The shape is (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible
+        after its end.
         """
         states, best = self._state_of(obs.astype(np.float64)), self.predict(obs)[0]
         return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
 
     def _best(self, states: np.ndarray) -> np.ndarray:
-        """The top of the parabola through the best three actions. (n,)"""
+        """Return the action at the top of the parabola through the best action and its two neighbours. (n,)"""
         n = len(self._actions)
         offers = self._offers(np.tile(states, (n, 1)), np.repeat(self._actions, len(states))).reshape(n, -1)
         best, rows = offers.argmax(axis=0), np.arange(len(states))

@@ -1,6 +1,7 @@
-"""How near a few cells come to the best return: distilled from the best policy, then tuned on the return.
+"""Find how close a few cells come to the best return: distil the best policy, then tune on the return.
 
-The start decides where such a search ends. So several starts are tuned briefly, and the best of them to the end.
+The result of such a search depends on its start. So several starts are tuned briefly, and only the best is tuned to the
+end.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from ..refinement.faithful import distill_faithfully
 from ..refinement.refine import refine
 from .references import TASKS, best_policy
 
-VERSION = 1  # raise it when the same arguments give another policy; tests/golden/methods.json guards it
-N_STARTS, N_SLOW = 12, 2  # every other one is the closest imitation; N_SLOW: of a task with a physics engine
+VERSION = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
+N_STARTS, N_SLOW = 12, 2  # starts, every second one a closest imitation; N_SLOW: for tasks with a physics engine
 SCREENING = 0.2  # share of the generations for which each start is tuned
-PRICE = {"MountainCarContinuous-v0": 3e-3}  # of a step: a car that arrives sooner may be imitated less exactly
+PRICE = {"MountainCarContinuous-v0": 3e-3}  # per step: a car that arrives sooner tolerates a less exact imitation
 
 _LIMIT = {
     "SimpleGoal-v0": {"n_cells": 4, "n_generations": 400, "n_tuning_episodes": 500},
@@ -38,18 +39,20 @@ _LIMIT = {
 
 
 def limit_preset(task: str | Task) -> Refinement:
-    """The settings of `at_the_limit` for a task: those of `tuned_preset` with a longer search. Raises ValueError as it
-    does."""
+    """Return the settings of `at_the_limit` for a task: those of `tuned_preset` with a longer search.
+
+    Raises ValueError as `tuned_preset` does.
+    """
     return replace(tuned_preset(task), **_LIMIT[get_task(task).name])
 
 
 def at_the_limit(
     task: str | Task, config: Refinement | None = None, *, seed: int, teacher: Policy | None = None
 ) -> VoronoiPolicy:
-    """At most `config.n_cells` cells with a return as near the best as the search comes. Same arguments, same policy.
+    """Search for at most `config.n_cells` cells whose return is as high as possible. Same arguments, same policy.
 
-    `config`: by default `limit_preset(task)`. `teacher`: by default the best policy where it is known, else the shipped
-    teacher. Raises ValueError as `refine` does.
+    `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known, else the
+    shipped teacher. Raises ValueError as `refine` does.
     """
     check_seed(seed)
     task = get_task(task)
@@ -70,17 +73,17 @@ def _best_teacher(task: Task) -> Policy:
 
 
 def _screened(teacher: Policy, task: Task, config: Refinement, seed: int, *, closest: bool) -> VoronoiPolicy:
-    """Tuned briefly: the closest imitation that `distill_faithfully` finds, or the best one of `refine`."""
+    """Return a briefly tuned start: the closest imitation by `distill_faithfully`, or the best policy of `refine`."""
     if not closest:
         return refine(teacher, task, config, seed=seed)[0]
     like = replace(faithful_preset(task, n_cells=config.n_cells), n_episodes=config.n_episodes, n_generations=0)
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "no policy of")  # its return is not the aim
+        warnings.filterwarnings("ignore", "no policy of")  # the return of this imitation does not matter yet
         policy, _ = distill_faithfully(teacher, task, like, seed=seed)
     return _tuned(policy, teacher, task, config, seed)
 
 
 def _tuned(policy: VoronoiPolicy, teacher: Policy, task: Task, config: Refinement, seed: int) -> VoronoiPolicy:
-    """The policy tuned as `config` says."""
+    """Tune `policy` with the settings `config`."""
     config = replace(config, n_cells=len(policy), n_restarts=1, n_corrections=0)
     return refine(teacher, task, config, seed=seed, start=policy)[0]

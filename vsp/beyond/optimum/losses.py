@@ -1,4 +1,4 @@
-"""Where a policy loses return against the best one: what each of its steps costs, if the best actions follow."""
+"""Find where a policy loses return relative to the best one: what each step costs if the best actions follow."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from ...tasks.base import Task
 from ...tasks.registry import get_task
 from .grid import GridPolicy
 
-Region = Callable[[np.ndarray], np.ndarray]  # observations (n, d) to whether they belong to it (n,)
+Region = Callable[[np.ndarray], np.ndarray]  # maps observations (n, d) to whether they are in the region (n,)
 
-UPRIGHT, SLOW = 0.5, 2.0  # rad and rad/s: within both, Pendulum is held
+UPRIGHT, SLOW = 0.5, 2.0  # rad and rad/s: Pendulum is held if angle and velocity are below these
 
 
 def held(obs: np.ndarray) -> np.ndarray:
-    """Whether Pendulum is held upright in the observations (n, 3): cos θ, sin θ, ω. (n,)"""
+    """Return whether Pendulum is held upright in the observations (n, 3): cos θ, sin θ, ω. (n,)"""
     angle, velocity = np.arctan2(obs[:, 1], obs[:, 0]), obs[:, 2]
     return (np.abs(angle) < UPRIGHT) & (np.abs(velocity) < SLOW)
 
 
 def swung(obs: np.ndarray) -> np.ndarray:
-    """Whether Pendulum is on its way up, or falls. (n,)"""
+    """Return whether Pendulum is swinging up or falling in the observations (n, 3). (n,)"""
     return ~held(obs)
 
 
@@ -34,10 +34,11 @@ PENDULUM: dict[str, Region] = {"swing-up": swung, "hold": held}
 def losses(
     policy: Policy, best: GridPolicy, task: str | Task, starts: np.ndarray, regions: dict[str, Region] = PENDULUM
 ) -> pd.DataFrame:
-    """What `policy` loses in each region, a row each: share of its steps, and return lost there per episode.
+    """Return what `policy` loses in each region, one row per region.
 
-    The sum of all losses of an episode is its regret, but for the error of the grid, where the time is long enough for
-    no more to be had at its end. Raises ValueError as `visited_states` does.
+    Columns: steps (share of the policy's steps that are in the region) and lost (return lost there per episode). The
+    sum of all losses of an episode is its regret, up to the grid's error, if no more return is possible after its end.
+    Raises ValueError as `visited_states` does.
     """
     task = get_task(task)
     states = visited_states(policy, task, starts)

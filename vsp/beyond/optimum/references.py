@@ -1,4 +1,4 @@
-"""The best policies of the tasks whose optimum can be computed; each can be a teacher like any other."""
+"""Compute the best policies of the tasks whose optimum is known. Each can be used as a teacher."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from .simplegoal import Shortest
 
 @dataclass(frozen=True)
 class _Solvable:
-    """How a task with two state variables and one action is solved."""
+    """How to solve a task with two state variables and one action."""
 
     grid: Grid
     state_of: Callable[[np.ndarray], np.ndarray]  # from observations (n, d) to states (n, 2)
-    price: float = 0.0  # of a step
+    price: float = 0.0  # per step
 
 
 def _angle_first(seen: np.ndarray) -> np.ndarray:
-    """Pendulum's angle and velocity (n, 2) of observations (n, 3)."""
+    """Return Pendulum's angle and velocity (n, 2) from observations (n, 3)."""
     return np.column_stack([np.arctan2(seen[:, 1], seen[:, 0]), seen[:, 2]])
 
 
 N_ACTIONS = 61  # between which `GridPolicy` interpolates
 _SOLVABLE = {
-    # The gentler the push, the higher the return, and the later the goal. At this price all starts are there by step
-    # 985 of 999; at a tenth less, some are not
+    # A gentler push gives a higher return but reaches the goal later. At this price all starts reach the goal by step
+    # 985 of 999. At a price 10 % lower, some do not
     "MountainCarContinuous-v0": _Solvable(
         Grid((-1.2, -0.07), (0.6, 0.07), (361, 361)), state_of=lambda seen: seen, price=3e-4
     ),
-    # Upright at rest has to be a point: standing beside it costs something for ever
+    # Upright at rest has to be a point of the grid: holding the pendulum beside it would cost some return in every step
     "Pendulum-v1": _Solvable(
         Grid((-np.pi, -8.0), (np.pi, 8.0), (360, 361), periodic=(True, False)), state_of=_angle_first
     ),
@@ -45,11 +45,12 @@ TASKS = ("SimpleGoal-v0", *_SOLVABLE)
 
 
 def best_policy(task: str | Task, *, finer: float = 1.0, price: float | None = None) -> Policy:
-    """The policy with the highest mean return, for one of `TASKS`; made anew, in some seconds.
+    """Compute the policy with the highest mean return for one of `TASKS`. Takes some seconds.
 
-    SimpleGoal's is exact but 2e-5; the others are solved on a grid, with `finer` times as many points in each variable.
-    `price`: of each step, by default as little as the best return allows; a higher one comes sooner where there is a
-    goal. Raises ValueError for a task whose optimum is not known, for `finer` beyond 0.1 to 10, and a negative price.
+    SimpleGoal's is exact up to 2e-5 in return. The others are solved on a grid with `finer` times as many points in
+    each variable. `price` is subtracted in each step; by default it is as low as the best return allows. With a higher
+    price the policy reaches a goal sooner. Raises ValueError for a task whose optimum is not known, `finer` outside 0.1
+    to 10, and a negative price.
     """
     task = get_task(task)
     check_number("finer", finer, least=0.1, most=10.0)

@@ -1,7 +1,7 @@
-"""The study of the readings: what each choice that the paper leaves open does to the result.
+"""The study of the readings: how each choice that the paper leaves open changes the result.
 
-Every reading is tried on its own, and those that change the result most in all combinations too. One set of seeds ranks
-them; another checks the first few against the default.
+Every reading is tried alone. Those that change the result most are also tried in all combinations. One set of seeds
+ranks the variants; another compares the first few with the default.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from ..statistics import percentile_interval, quartiles_from_fences, resample, s
 
 VERSION = 1  # raise it when the same runs give other rows
 CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first
-N_RESAMPLES = 1000  # of an interval
-N_CONFIRMED = 5  # variants that are checked, beside the default and the nearest one of each task
+N_RESAMPLES = 1000  # per interval
+N_CONFIRMED = 5  # variants to check, in addition to the default and the nearest one of each task
 
-# Every reading on its own: fields of `Config` and the values that are not their defaults
+# Readings to try alone: fields of `Config` with values other than their defaults
 READINGS = {
     "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
     "R2": [{"split_lookup": "kept"}],
@@ -46,7 +46,7 @@ READINGS = {
     "R14": [{"loss_after_split": "kept"}],
     "R15": [{"inclusive": True}],
 }  # fmt: skip
-# Readings that change the number of cells or how fast the maps learn, in all combinations
+# Readings to try in all combinations: they change the number of cells or how fast the maps learn
 FACTORS = {
     "R2": {"split_lookup": "kept"},
     "R3": {"split_metric": "euclidean"},
@@ -54,7 +54,7 @@ FACTORS = {
     "R7 rate": {"learning_rate": 3e-3},
     "R7 zeros": {"initial": "zeros"},
 }
-# What Algorithms 1 to 3 print where the prose around them says something else
+# Algorithms 1 to 3 as printed, where the prose around them says something else
 AS_PRINTED = {
     "freeze": "first_n_freeze", "merge_reset": "neighbours", "merge_visits_removed": True, "split_reset": "neighbours",
     "split_neighbours": "new", "loss_after_split": "kept", "inclusive": True,
@@ -62,7 +62,7 @@ AS_PRINTED = {
 
 
 def variants() -> dict[str, dict]:
-    """What is tried, by name: the default, each reading on its own, the algorithms as printed, all combinations."""
+    """Return the variants by name: the default, each reading alone, the algorithms as printed, all combinations."""
     tried = {"default": {}}
     tried |= {f"{number} {name_of(change)}": change for number, changes in READINGS.items() for change in changes}
     tried["algorithms as printed"] = AS_PRINTED
@@ -74,13 +74,13 @@ def variants() -> dict[str, dict]:
 
 
 def name_of(change: dict) -> str:
-    """How a change of one field is written: "one_split", "learning_rate 0.01"."""
+    """Return the name of a change of one field: "one_split", "learning_rate 0.01"."""
     ((name, value),) = change.items()
     return name if value is True else f"{name} {value}"
 
 
 def experiments(tried: dict[str, dict]) -> dict[tuple[str, str], Experiment]:
-    """The paper's experiment with the readings of each variant, by name of the variant and task."""
+    """Return the paper's experiment with the readings of each variant, by name of the variant and task."""
     usual = {task: paper_experiment(task) for task in printed.TASKS}
     return {
         (name, task): dataclasses.replace(one, config=dataclasses.replace(one.config, **change))
@@ -93,9 +93,10 @@ def experiments(tried: dict[str, dict]) -> dict[tuple[str, str], Experiment]:
 
 
 def landmarks(task: str) -> dict[str, float]:
-    """Where the paper's distilled policies stand from its own teacher: see `standing`.
+    """Return the `standing` of the paper's distilled policies relative to the paper's own teacher.
 
-    MountainCar's quartiles come from the whisker bounds of the text, since T6 repeats the teacher's (see `audit`).
+    MountainCar's quartiles come from the whisker bounds of the text, since T6 repeats the teacher's quartiles (see
+    `audit`).
     """
     teacher, ours = (printed.printed_spread_values(task, who) for who in ("drl", "ours"))
     if task == "MountainCarContinuous-v0":
@@ -105,19 +106,22 @@ def landmarks(task: str) -> dict[str, float]:
 
 
 def standing(policies: dict[str, float], teacher: dict[str, float]) -> dict[str, float]:
-    """Mean and quartiles of the return as differences to the teacher's mean, in units of its standard deviation, and
-    the logarithm of the ratio of the standard deviations."""
+    """Return where policies stand relative to a teacher.
+
+    This is the mean and quartiles of the return minus the teacher's mean, in units of the teacher's standard deviation,
+    and the logarithm of the ratio of the standard deviations.
+    """
     scaled = {name: (policies[name] - teacher["mean"]) / teacher["std"] for name in ("mean", "q1", "q3")}
     return {**scaled, "std": float(np.log(policies["std"] / teacher["std"]))}
 
 
 def distance(here: dict[str, float], there: dict[str, float]) -> float:
-    """Root mean square difference of two standings."""
+    """Return the root mean square difference of two standings."""
     return float(np.sqrt(np.mean([(here[name] - there[name]) ** 2 for name in there])))
 
 
 def provenance_of(experiment: Experiment, seeds: range) -> dict[str, str | int]:
-    """The provenance of the row of an experiment in one phase; the version is that of the paper's method."""
+    """Return the provenance of the row of an experiment in one phase; the version is that of the paper's method."""
     settings = {"runs": experiment.settings, "seeds": list(seeds), "resamples": N_RESAMPLES, "study": VERSION}
     return experiment.provenance | {"settings": settings_id(settings)}
 
@@ -126,9 +130,9 @@ def provenance_of(experiment: Experiment, seeds: range) -> dict[str, str | int]:
 
 
 def study(runs: str | os.PathLike, *, jobs: int | str = 1, tried: dict | None = None) -> pd.DataFrame:
-    """Every variant with the seeds CHOOSING, and the nearest to the paper with the seeds CONFIRMING: a data frame.
+    """Run every variant with the seeds CHOOSING, and those nearest to the paper with the seeds CONFIRMING.
 
-    One row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
+    Returns one row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
     """
     tried = variants() if tried is None else tried
     chosen = _phase("choosing", tried, CHOOSING, runs, jobs)
@@ -139,7 +143,7 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tried: dict | None = 
 
 
 def ranking(frame: pd.DataFrame, task: str = "both") -> list[str]:
-    """The variants from the nearest to the paper to the farthest."""
+    """Return the variants from the nearest to the paper to the farthest."""
     rows = frame[frame["task"] == task]
     return rows.sort_values("distance", kind="stable")["variant"].tolist()
 
@@ -153,13 +157,15 @@ def _phase(phase: str, tried: dict, seeds, runs, jobs: int | str) -> pd.DataFram
     for (name, task), one in work.items():
         row, away[name, task] = _row(load_runs(one, seeds, runs=runs), own[task], landmarks(task))
         rows.append({"phase": phase, "variant": name, "task": task, **provenance_of(one, seeds), **row})
-    single = pd.DataFrame(rows).astype({"version": "Int64"})  # whole numbers, beside rows without one
+    single = pd.DataFrame(rows).astype({"version": "Int64"})  # integers, beside rows without a version
     return pd.concat([single, _joint(phase, away, printed.TASKS)], ignore_index=True)
 
 
 def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
-    """What the runs of one variant come to, with 95 % intervals over runs; and their distances to the paper, the
-    measured one first, then one per resample."""
+    """Return the results of one variant's runs, with 95 % intervals over runs, and their distances to the paper.
+
+    The measured distance is first, then one per resample.
+    """
     returns = np.stack([run.outcomes.returns for run in made])
     codes = np.stack([run.outcomes.outcomes for run in made])
     cells = np.array([len(run.policy) for run in made])
@@ -174,9 +180,9 @@ def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[d
 
 
 def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.DataFrame:
-    """The distance averaged over the tasks, and how much larger it is than the default's ("gap"), for each variant.
+    """Return each variant's distance averaged over the tasks, and this minus the default's ("gap").
 
-    Variants share seeds, and every variant's resamples draw the same of them, so gaps are taken resample by resample.
+    Variants share seeds, and resamples of all variants draw the same seeds, so gaps are taken resample by resample.
     """
     names = list(dict.fromkeys(name for name, _ in away))
     joint = {name: np.mean([away[name, task] for task in tasks], axis=0) for name in names}
@@ -190,14 +196,14 @@ def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.Dat
 
 
 def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
-    """A measured value and the 95 % interval of its resamples; `values` holds the one, then the others."""
+    """Return a measured value and the 95 % interval of its resamples; `values` holds it, then the resamples."""
     low, high = percentile_interval(values[1:])
     return {name: values[0], f"{name}_low": low, f"{name}_high": high}
 
 
-# What the notebook shows of it
+# Figures and tables of the notebook
 
-PANELS = [  # a panel of the figure: task, what is shown of it, label of the axis, its limits
+PANELS = [  # panels of the figure: task, column, axis label, axis limits
     ("SimpleGoal-v0", "mean", "mean return", (12.3, 16)),
     ("MountainCarContinuous-v0", "mean", "mean return", (81, 96)),
     ("SimpleGoal-v0", "distance", "distance", (0.04, 1.5)),
@@ -205,7 +211,7 @@ PANELS = [  # a panel of the figure: task, what is shown of it, label of the axi
 ]
 
 
-SHOWN = {  # the variants that change a result most, by what they do
+SHOWN = {  # the variants that change a result most, with their labels
     "default": "default",
     "R1 freeze last_n_split": "R1: split to the end",
     "R4 one_split": "R4: one split a pass",
@@ -217,9 +223,9 @@ SHOWN = {  # the variants that change a result most, by what they do
 
 
 def as_intervals(frame: pd.DataFrame, task: str, column: str, phase: str = "choosing") -> pd.DataFrame:
-    """One column of a phase with its interval, a row for each variant of `SHOWN`: columns here, low, high.
+    """Return one column of a phase with its interval, one row per variant of `SHOWN`: columns here, low, high.
 
-    Rows are missing (NaN) where the phase does not have the variant.
+    Rows are NaN where the phase does not have the variant.
     """
     rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant").reindex(SHOWN)
     found = rows[[column, f"{column}_low", f"{column}_high"]].set_axis(["here", "low", "high"], axis=1)
@@ -227,7 +233,7 @@ def as_intervals(frame: pd.DataFrame, task: str, column: str, phase: str = "choo
 
 
 def interpretation_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """The choosing phase: a row for each variant of `SHOWN` and task."""
+    """Summarise the choosing phase: one row per variant of `SHOWN` and task."""
     rows = frame[(frame["phase"] == "choosing") & frame["variant"].isin(SHOWN) & frame["task"].isin(printed.TASKS)]
     rows = rows.assign(failing=1 - rows["goal"], order=rows["variant"].map(list(SHOWN).index))
     rows = rows.sort_values(["task", "order"], ascending=[False, True], kind="stable").replace({"variant": SHOWN})

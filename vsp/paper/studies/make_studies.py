@@ -1,4 +1,4 @@
-"""`make study`: the studies of the readings and of the teachers, into data/results/readings.csv and teachers.csv."""
+"""`make study`: write the studies of the readings and of the teachers to data/results/readings.csv and teachers.csv."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ STUDIES = {"readings": interpretations.study, "teachers": teachers.study}
 
 
 def main() -> None:
-    """Make the runs of both studies, or those that are missing, and write their results."""
+    """Make the missing runs of both studies, and write their results."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="results go to OUT/data/results, runs to OUT/build/study")
+    parser.add_argument("--out", default=".", help="write results to OUT/data/results, runs to OUT/build/study")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     runs = Path(arguments.out) / "build" / "study"

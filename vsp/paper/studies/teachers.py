@@ -23,13 +23,15 @@ SEEDS = range(1000, 1010)  # of the distillations of each teacher
 
 
 def teachers(task: str) -> dict[str, Path]:
-    """The teachers of `task` by name: the shipped one, and those of shorter training."""
+    """Return the teachers of `task` by name: the shipped one, and those with shorter training."""
     return {"shipped": SHIPPED / f"{task}.safetensors"} | further_teachers(task)
 
 
 def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) -> pd.DataFrame:
-    """Distil every teacher with the seeds SEEDS: one row per run. The column `teacher` is the name of the teacher,
-    `checksum` what other tables call so."""
+    """Distil every teacher with the seeds SEEDS; return one row per run.
+
+    Column `teacher` is the name of the teacher; `checksum` is what other tables call `teacher`.
+    """
     work = experiments(tasks)
     make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
     rows = []
@@ -49,20 +51,20 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) 
 
 
 def provenance_of(experiment: Experiment) -> dict[str, str | int]:
-    """The provenance of the rows of an experiment; the version is that of the paper's method."""
+    """Return the provenance of the rows of an experiment; the version is that of the paper's method."""
     settings = {"runs": experiment.settings, "linear error of seed": SEEDS[0], "study": VERSION}
     return experiment.provenance | {"settings": settings_id(settings)}
 
 
 def linear_error(experiment: Experiment) -> float:
-    """Root mean square error, in units of the action, of one linear map for all that the teacher does on its way."""
+    """Return the root mean square error of one linear map fitted to the teacher's episodes, in units of the action."""
     states, actions = teacher_data(experiment, SEEDS[0])
     error = linear_map(states, actions, experiment.task).linear(states) - actions
     return float(np.sqrt(np.square(error).mean()))
 
 
 def experiments(tasks=printed.TASKS) -> dict[tuple[str, str], Experiment]:
-    """The paper's experiment with each teacher, by task and name of the teacher."""
+    """Return the paper's experiment with each teacher, by task and name of the teacher."""
     return {
         (task, name): dataclasses.replace(paper_experiment(task), teacher=load_teacher(path))
         for task in tasks
@@ -71,9 +73,9 @@ def experiments(tasks=printed.TASKS) -> dict[tuple[str, str], Experiment]:
 
 
 def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
-    """Variance of `values` between and within groups of equal size: one-way random effects.
+    """Return the variance of `values` between and within groups of equal size: one-way random effects.
 
-    Keys: between, within (variances, by moments; between is cut at zero), share (of between in the sum), share_low and
+    Keys: between, within (variances, by moments; between is cut at zero), share (between / sum of both), share_low and
     share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6). Raises ValueError for unequal groups.
     """
     from scipy.stats import f  # here: it takes long to import
@@ -94,7 +96,7 @@ def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
 
 
 def teacher_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """One row per teacher: its own return, and over its runs the mean, its deviation, cells and failed episodes."""
+    """Return one row per teacher: its own return, and the return, deviation, cells and failures over its runs."""
     groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)
     means = groups[["steps", "linear_error", "teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
     means.insert(5, "deviation between runs", groups["mean"].std())

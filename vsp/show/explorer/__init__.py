@@ -1,6 +1,6 @@
-"""The explorer: replay a distillation, ask a policy about a state, change it and watch the episodes.
+"""The explorer: replay a distillation, query a policy at a state, change the policy and watch its episodes.
 
-`explorer.js` draws it everywhere: on the site, in JupyterLab, and in an HTML file of its own; `scene` is what it draws.
+`explorer.js` draws on the site, in JupyterLab and in standalone HTML files; `scene` collects the data to draw.
 """
 
 from .explorer import SCRIPT, Explorer, explore

@@ -1,17 +1,17 @@
-// The explorer: replay a distillation, ask a policy about a state, change it and see what becomes of the episodes.
-// One module for JupyterLab (`render`, as anywidget asks), for the site and for one HTML file (`mount`). It draws a
-// scene, which vsp/show/explorer/scene.py describes.
+// The explorer: replay a distillation, query a policy at a state, change the policy and watch its episodes.
+// One module for JupyterLab (`render`, which anywidget calls), the site, and standalone HTML files (`mount`). It draws
+// a scene, which vsp/show/explorer/scene.py describes.
 
 const PALETTE = ["#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#56b4e9", "#949494", "#ece133"]
 const [GOAL, FAILED, HIDDEN, INK, PAPER] = ["#029e73", "#d55e00", "#777777", "#222222", "#ffffff"]
-const [COARSE, FINE] = [100, 240] // points of the map along an axis: while something moves, and afterwards
+const [COARSE, FINE] = [100, 240] // points per axis of the map: while something moves, and afterwards
 const ARROWS = 14
 
 const clip = (value, low, high) => Math.min(Math.max(value, low), high)
 
 // ---- The method: which cell, which action
 
-/** A policy with its codewords divided by the scale, one after the other: so a look-up is quick. */
+/** Prepare a policy for fast look-ups: store its codewords divided by the scale, in one flat array. */
 export function ready(policy) {
   const { codewords, scale } = policy
   policy.scaled = Float64Array.from(codewords.flatMap(codeword => codeword.map((value, i) => value / scale[i])))
@@ -20,8 +20,8 @@ export function ready(policy) {
   return policy
 }
 
-/** How far an observation is from each codeword, as the look-up measures (in squares, where it is Euclidean): valid until
- * the next call. */
+/** The distance of an observation from each codeword in the metric of the look-up (Euclidean: squared). The array is
+ * valid until the next call. */
 function distances({ scaled, scale, metric, place, far }, seen) {
   const d = scale.length,
     k = far.length
@@ -39,7 +39,7 @@ function distances({ scaled, scale, metric, place, far }, seen) {
   return far
 }
 
-/** The nearest codeword; of equally near ones the first. */
+/** The index of the nearest codeword; among equally near ones, the first. */
 export function cellOf(policy, seen) {
   const far = distances(policy, seen)
   let best = 0
@@ -47,14 +47,14 @@ export function cellOf(policy, seen) {
   return best
 }
 
-/** What a linear map gives for action k: the weights of the inputs, then the bias. */
+/** The output of a linear map for action k. Its rows are the weights of the inputs, then the bias. */
 function raw(rows, seen, k) {
   let sum = rows[seen.length][k]
   for (let i = 0; i < seen.length; i++) sum += seen[i] * rows[i][k]
   return sum
 }
 
-/** The cell, what its map gives, and the action within the limits. */
+/** The cell, the output of its map, and the action clipped to its limits. */
 export function act({ task }, policy, seen) {
   const cell = cellOf(policy, seen),
     rows = policy.coefficients[cell],
@@ -67,13 +67,13 @@ export function act({ task }, policy, seen) {
   return { cell, raw: given, action }
 }
 
-/** By how little the nearest codeword wins: zero on a border. */
+/** The difference between the two smallest distances to codewords: zero on a border. */
 export function margin(policy, seen) {
   const [first, second] = distances(policy, seen).slice().sort()
   return second === undefined ? Infinity : second - first
 }
 
-// ---- The tasks: `step` returns the next state, the reward and the outcome (0: it goes on, 1: goal, 2: pit)
+// ---- The tasks: `step` returns the next state, the reward and the outcome (0: running, 1: goal, 2: pit)
 
 const TASKS = {
   "SimpleGoal-v0": {
@@ -113,13 +113,13 @@ const TASKS = {
   },
 }
 
-/** A task that is not played here: a policy sees the state as it is stored. */
+/** A task that is not simulated here: a policy sees the stored state. */
 const UNKNOWN = { see: state => state, furniture: () => {} }
 
-/** The dynamics of a task: what a policy sees of a state, and a step. */
+/** The dynamics of a task: the observation of a state, and a step. */
 export const dynamics = name => TASKS[name]
 
-/** An episode: its return, outcome, states and cells (of the states that were acted in). */
+/** Run an episode: its return, its outcome, and with `keep` its states and the cells that acted. */
 export function rollout(scene, policy, start, keep = false) {
   const { see, step } = TASKS[scene.task.name],
     states = [start],
@@ -142,7 +142,7 @@ export function rollout(scene, policy, start, keep = false) {
 
 // ---- Drawing
 
-/** The canvas: what is at which point of the plane. */
+/** The canvas, with coordinates of the plane. */
 class Picture {
   constructor(canvas, plane) {
     Object.assign(this, { canvas, plane, ctx: canvas.getContext("2d"), map: new OffscreenCanvas(1, 1) })
@@ -188,7 +188,7 @@ class Picture {
     points.forEach((point, i) => {
       const [x, y] = this.at(point),
         far = i && Math.abs(x - this.at(points[i - 1])[0]) > this.wide / 2
-      i && !far ? ctx.lineTo(x, y) : ctx.moveTo(x, y) // an angle comes round
+      i && !far ? ctx.lineTo(x, y) : ctx.moveTo(x, y) // no line where an angle wraps around
     })
     ctx.strokeStyle = colour
     ctx.lineWidth = width
@@ -241,7 +241,7 @@ const rgb = colour => [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16))
 const TINTS = PALETTE.map(colour => rgb(colour).map(part => 255 - 0.3 * (255 - part)))
 const [LEFT, RIGHT] = [rgb("#2d004b"), rgb("#7f3b08")] // purple and orange, as in the force maps of the figures
 
-/** The policy's map: cells in pale colours, or, where there is one action, the action; borders dark. */
+/** Draw the policy's map: with one action the action, else the cells in pale colours; borders are dark. */
 function drawMap(view, n) {
   const { picture, scene, policy } = view,
     { low, high } = picture.plane
@@ -273,7 +273,7 @@ function drawMap(view, n) {
   picture.map.getContext("2d").putImageData(image, 0, 0)
 }
 
-/** The picture; a map that is out of date is drawn with few points first, and with many when nothing moves. */
+/** Draw the picture. An outdated map is drawn with few points at first, and with many once nothing moves. */
 function draw(view) {
   if (!view.stored && view.mapped !== view.cell) {
     drawMap(view, COARSE)
@@ -320,7 +320,7 @@ function drawAll(view) {
   picture.axes()
 }
 
-/** The chosen state: a ring, over coloured dots with a white rim. */
+/** Draw the chosen state: a ring, with a white rim if it lies on coloured dots. */
 function drawChosen({ picture, stored, asked, seen, place }) {
   const point = stored ? place(seen) : asked
   if (stored) picture.dot(point, 8, PAPER, INK)
@@ -328,7 +328,7 @@ function drawChosen({ picture, stored, asked, seen, place }) {
   picture.dot(point, 2, FAILED)
 }
 
-/** The states of all stored episodes, in the colours of their cells: one path a colour. */
+/** Draw the states of all stored episodes in the colours of their cells: one path per colour. */
 function drawStored(view) {
   const { picture, cells } = view,
     paths = PALETTE.map(() => new Path2D())
@@ -390,7 +390,7 @@ const STYLE = `
 .vsp-explorer input[type=number] { width: 5rem } .vsp-explorer input[type=range] { flex: 1 1 140px }
 .vsp-explorer p { margin: 0.3rem 0 }`
 
-/** An element with attributes, listeners (functions) and children. */
+/** Make an element with attributes, listeners (functions) and children. */
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag)
   for (const [name, value] of Object.entries(attributes)) {
@@ -401,7 +401,7 @@ function element(tag, attributes = {}, ...children) {
   return made
 }
 
-/** A table: names of the columns, then rows that begin with their name. */
+/** Make a table: names of the columns, then rows that begin with their name. */
 const table = (head, rows) =>
   element(
     "table",
@@ -417,11 +417,11 @@ const minus = text => text.replaceAll("-", "\u2212")
 const copied = policy => structuredClone(policy)
 const button = (label, click) => element("button", { type: "button", click }, label)
 
-/** A row that moves through something: back, play, on, and a slider. */
+/** A row of controls for a sequence: back, play, forward, and a slider. */
 class Player {
   constructor(name, labels, { turn, jump }) {
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches
-    Object.assign(this, { turn, wait: still ? 1000 : 0 }) // who asked for little motion gets a picture a second
+    Object.assign(this, { turn, wait: still ? 1000 : 0 }) // one picture a second for reduced motion
     const input = () => this.to(+this.slider.value)
     this.slider = element("input", { type: "range", min: 0, value: 0, "aria-label": name, input })
     this.toggle = button("play", () => (this.playing ? this.stop() : this.start()))
@@ -435,7 +435,7 @@ class Player {
   get last() {
     return +this.slider.max
   }
-  /** There are so many moments: go to one. */
+  /** Set the number of moments and go to one of them. */
   restart(count, at) {
     this.stop()
     this.slider.max = count - 1
@@ -469,11 +469,11 @@ class Player {
 
 const UNCHANGED = [
   "Dots are states of stored episodes, in the colours of their cells. Circles are codewords; some lie outside the picture.",
-  "Click a state, or move through its episode.",
+  "Click a state, or step through its episode.",
   "Nothing can be changed here: the browser cannot play this task, only SimpleGoal, MountainCar and Pendulum.",
 ].join(" ")
 
-/** The explorer in `root`, in place of what stands there: a view with its policy, its chosen state and what is said. */
+/** Replace the content of `root` by the explorer: a view with a policy, a chosen state and texts about them. */
 class Explorer {
   constructor(root, scene) {
     const { low, high } = scene.plane
@@ -509,7 +509,7 @@ class Explorer {
     const said = [this.stored ? this.steps.row : "", this.guessed ? "" : this.question(), this.result, this.answer]
     const panel = element("div", { class: "vsp-panel" }, ...rows, ...said, this.form, this.note())
     root.classList.add("vsp-explorer")
-    const held = root.contains(document.activeElement) // the picture that stood there has the keyboard's focus
+    const held = root.contains(document.activeElement) // the replaced picture has the keyboard's focus
     root.replaceChildren(element("style", {}, STYLE), this.canvas, panel)
     if (held) this.canvas.focus()
     this.listen()
@@ -517,7 +517,7 @@ class Explorer {
     this.choose(0)
   }
 
-  // -- Places: of a state, and of an observation, in the picture
+  // -- The place of a state and of an observation in the picture
   place = state => {
     if (this.stored) return this.stored.axes.map(i => state[i])
     if (!this.angular) return state
@@ -529,7 +529,7 @@ class Explorer {
     return this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen
   }
   see = point => this.task.see(point)
-  /** The episodes that are stored of the chosen policy. */
+  /** The stored episodes of the chosen policy. */
   get episodes() {
     return this.scene.policies[this.chosen].episodes
   }
@@ -537,7 +537,7 @@ class Explorer {
     return this.stored ? this.episodes[this.episode].states[this.steps.at] : this.see(this.asked)
   }
 
-  // -- What is said
+  // -- Texts about the policy and the chosen state
   ask() {
     const { inputs, outputs } = this.scene.task,
       seen = this.seen,
@@ -557,10 +557,10 @@ class Explorer {
     const adds = this.adds(seen, rows)
     if (this.many) this.results.replaceChildren(table(["", ...outputs], results))
     this.added.replaceChildren(table(["", ...outputs], this.many ? adds : [...adds, ...results]))
-    const keys = this.stored ? "Left and right go through the episode." : "Arrow keys move it."
+    const keys = this.stored ? "Left and right step through the episode." : "Arrow keys move it."
     this.canvas.setAttribute("aria-label", `Map of the policy. The chosen state is in cell ${cell + 1}. ${keys}`)
   }
-  /** Rows of what each input and the bias add; of many inputs those first that add most. */
+  /** One row for what each input and the bias add; with many inputs, the largest first. */
   adds(seen, rows) {
     const { inputs } = this.scene.task
     const found = [...inputs, ""].map((name, i) => {
@@ -574,7 +574,7 @@ class Explorer {
     if (this.many) found.sort((one, other) => other.size - one.size)
     return found.map(({ name, values }) => [this.many ? name : `${name} adds`, ...values.map(digits)])
   }
-  /** Where that is written. What stays, such as a box that scrolls, stays as the reader left it. */
+  /** Make the elements for these texts. They are kept, so that a scrolled box stays as the reader left it. */
   answers() {
     const box = name =>
       element("div", this.many ? { class: "vsp-scroll", tabindex: 0, role: "region", "aria-label": name } : {})
@@ -582,14 +582,14 @@ class Explorer {
     Object.assign(this, { results: box("sum and actions"), added: box("what each input adds") })
     if (!this.many) return element("div", {}, this.where, this.written, this.added)
     const folded = element("details", {}, element("summary", {}, "equations"), this.written)
-    const first = element("p", { class: "vsp-note" }, "What each input adds, the most first:")
+    const first = element("p", { class: "vsp-note" }, "What each input adds, largest first:")
     return element("div", {}, this.where, folded, this.results, first, this.added)
   }
   teachers() {
     if (this.stored) return this.episodes[this.episode].teacher?.[this.steps.at]
     return this.scene.teacher && teacherAt(this.scene, this.asked)
   }
-  /** In words: the least change of one input (of a coordinate of the plane) that leads to another cell. */
+  /** Describe the smallest change of one input (or coordinate of the plane) that leads to another cell. */
   border() {
     const { stored, scene } = this,
       labels = stored ? scene.task.inputs : scene.plane.labels
@@ -600,7 +600,7 @@ class Explorer {
     const share = stored ? ` (${(100 * found.share).toPrecision(2)} % of its range)` : ""
     return `A change of ${gap} in ${labels[found.axis]}${share} leads to cell ${found.to + 1}.`
   }
-  /** Plays the starts, and says how they end. */
+  /** Run an episode from every start, and describe the results. */
   judge(policy = this.policy) {
     const { scene } = this
     const found = scene.starts.map(start => rollout(scene, policy, start))
@@ -613,14 +613,14 @@ class Explorer {
     this.result.textContent = this.guessed ? text + minus(teacher) : ""
     return text
   }
-  /** The question. Results stay hidden until the reader has guessed, or does not want to; then both stand there. */
+  /** Ask the question. Results stay hidden until the reader guesses or asks to see them; then show guess and results. */
   question() {
     const { guess, policies } = this.scene
     const row = element("div", { class: "vsp-row" })
     const show = guessed => () => {
       if (guessed && !Number.isFinite(input.valueAsNumber)) return input.focus()
       const first = ready(copied(policies[0])),
-        answer = this.judge(first) // of the policy as it is given, whatever the reader chose or changed meanwhile
+        answer = this.judge(first) // of the original policy, whatever the reader chose or changed meanwhile
       const own = guessed ? ` Your guess: ${input.valueAsNumber}.` : ""
       this.guessed = true
       const said = element("p", { tabindex: -1 }, `${guess}${own} `, element("b", {}, `${first.name}: ${answer}`))
@@ -646,7 +646,7 @@ class Explorer {
       `Circles are codewords${this.angular ? "" : ": drag one"}. Click or drag elsewhere to choose a state; its episode is black.`,
       lost.length ? "Small dots are starts; orange ones fail." : "Small dots are starts.",
       teacher
-        ? `The teacher's action is read from a grid: in nine of ten states off by at most ${teacher.usual.toFixed(3)}, in all by ${teacher.error.toFixed(2)}.`
+        ? `The teacher's action is interpolated on a grid: its error is at most ${teacher.usual.toFixed(3)} in 90 % of states and ${teacher.error.toFixed(2)} in all.`
         : "",
     ]
     return element("p", { class: "vsp-note" }, said.join(" "))
@@ -686,7 +686,7 @@ class Explorer {
     this.form.replaceChildren(element("fieldset", {}, legend, table(["", "codeword", ...outputs], rows)))
   }
 
-  // -- What follows from policy and state, and the picture. `renewed`: the policy is another one.
+  // -- Update everything that depends on policy and state, and the picture. `renewed`: the policy changed.
   redo(renewed = true) {
     const before = this.cell
     if (renewed) {
@@ -702,11 +702,11 @@ class Explorer {
     draw(this)
     this.frames += 1
   }
-  /** The last steps of a stored episode up to the chosen one: the whole of it may fill the picture. */
+  /** The last steps of a stored episode up to the chosen one: the whole episode may fill the picture. */
   recent() {
     return this.episodes[this.episode].states.slice(Math.max(0, this.steps.at - 30), this.steps.at + 1)
   }
-  /** The same once before the next picture. `whole`: with the form, in which the reader may be writing. */
+  /** Schedule one update before the next frame. `whole`: with the form, in which the reader may be writing. */
   changed({ policy = false, whole = true } = {}) {
     this.renewed ||= policy
     this.whole ||= whole
@@ -784,7 +784,7 @@ class Explorer {
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => (dragged = null))
     canvas.addEventListener("keydown", event => this.key(event))
   }
-  /** Choose the stored state that is nearest, by a distance of places. */
+  /** Choose the nearest stored state; `distance` takes its place in the picture. */
   nearest(distance) {
     let best = { gap: Infinity }
     this.episodes.forEach(({ states }, episode) =>
@@ -807,7 +807,7 @@ class Explorer {
   }
 }
 
-/** The explorer in `root`. Returns its view, for tests. */
+/** Put the explorer into `root`. Returns its view, for tests. */
 export const mount = (root, scene) => new Explorer(root, scene)
 
 function equation(name, inputs, rows, k) {
@@ -819,7 +819,7 @@ function equation(name, inputs, rows, k) {
   return `${name} = ${sum.join("")}`
 }
 
-/** The least change of one coordinate of `point`, as a share of its range, that leads from `cell` to another. */
+/** The smallest change of one coordinate of `point`, as a share of its range, that leads from `cell` to another. */
 function leastChange(point, cell, { low, high }, cellAt) {
   const changed = [...point]
   let least = { share: 1 }
@@ -850,7 +850,7 @@ function leastChange(point, cell, { low, high }, cellAt) {
   return least
 }
 
-/** The teacher's action at a point of the plane, between the points of its grid. (linear) */
+/** The teacher's action at a point of the plane, by bilinear interpolation between the points of its grid. */
 export function teacherAt(scene, point) {
   const { low, high } = scene.plane,
     { n, actions } = scene.teacher
@@ -867,21 +867,21 @@ export function teacherAt(scene, point) {
   )
 }
 
-/** For anywidget: the scene comes as text. */
+/** For anywidget: the scene is JSON text. */
 export default {
   render({ model, el }) {
-    el.classList.add("vsp-controls") // hides the picture that stands there without a kernel: vsp/show/page.py
+    el.classList.add("vsp-controls") // hides the still picture for readers without a kernel: vsp/show/page.py
     let view = mount(el, JSON.parse(model.get("scene")))
     model.on("change:scene", () => {
       const { asked } = view // the reader's state stays chosen
       view = mount(el, JSON.parse(model.get("scene")))
       view.asked = asked
-      view.redo() // at once: the page keeps its height, and so the place it is scrolled to
+      view.redo() // at once: the page keeps its height, and so its scroll position
     })
   },
 }
 
-/** On a page: every explorer has its scene in itself, or in a file that loads when it comes into view. */
+/** On a page: every explorer contains its scene, or loads it from a file when it comes into view. */
 export function mountAll() {
   for (const root of document.querySelectorAll(".vsp-explorer:not([data-mounted])")) {
     root.dataset.mounted = true

@@ -1,4 +1,4 @@
-"""`Explorer`: policies of one task for a browser, as an element of a page or as a file of their own."""
+"""`Explorer`: policies of one task to explore in a browser, as an element of a page or as a standalone file."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ mountAll()
 
 
 class Explorer:
-    """Policies of one task, to be replayed, asked and changed in a browser.
+    """Policies of one task, to replay, query and change in a browser.
 
-    `policies`: names and policies with linear maps, all of one task; `history` replays the first of them. The script
-    plays SimpleGoal, MountainCarContinuous and Pendulum itself; of other tasks it shows stored episodes, over the two
-    inputs `axes`. Raises ValueError for other policies, unknown inputs, and a history that is none of the first policy.
+    `policies`: policies with linear maps by name, all of one task. `history`: replays the first of them. The script
+    simulates SimpleGoal, MountainCarContinuous and Pendulum itself; for other tasks it shows stored episodes, over the
+    two inputs `axes`. Raises ValueError for other policies, unknown inputs, and a history of another method or task.
     """
 
     def __init__(
@@ -64,13 +64,13 @@ class Explorer:
             self.scene["guess"] = guess
 
     def save(self, path: str | os.PathLike) -> None:
-        """Write an HTML file that opens from disk, without any other file or host."""
+        """Write a standalone HTML file, which opens from disk and needs no other file or host."""
         title = f"{self.task.name}: explore the policy"
         page = _PAGE.format(title=html.escape(title), body=self.element(), script=SCRIPT.read_text("utf-8"))
         atomic.write_text(path, page)
 
     def element(self, *, source: str | None = None) -> str:
-        """HTML in which the script finds its scene, in it or in the file `source`; without a script, a picture."""
+        """Return HTML with the script's scene (inside, or in the file `source`) and a picture to show without it."""
         said = f"<figcaption>{html.escape(self._alt())}</figcaption>"
         picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{said}</figure>"
         if source is not None:
@@ -79,7 +79,7 @@ class Explorer:
         return f'<div class="vsp-explorer">{picture}<script type="application/json">{scene}</script></div>'
 
     def _ipython_display_(self) -> None:
-        from .view import View  # with anywidget, which takes a while to import
+        from .view import View  # here: anywidget takes long to import
 
         page.show(View(scene=to_json(self.scene))._repr_mimebundle_()[0], self.element(), self._alt())
 
@@ -91,7 +91,7 @@ class Explorer:
         return f"The map of one policy ({name}, {cells}) over {plane}: cells and actions."
 
     def _still(self) -> bytes:
-        """The first policy, as a PNG: its map, or the states of its stored episodes in the colours of their cells."""
+        """Draw the first policy as a PNG: its map, or the states of its stored episodes in their cells' colours."""
         policy, (low, high, labels) = next(iter(self.policies.values())), self.scene["plane"].values()
         fig, (ax,) = style.panels(1, width=3.2, height=3.0)
         if "stored" in self.scene:
@@ -107,7 +107,7 @@ class Explorer:
         return file.getvalue()
 
     def _map(self, ax: Axes, policy: VoronoiPolicy, low: np.ndarray, high: np.ndarray) -> None:
-        """The policy over its plane: forces as colours, or cells and arrows."""
+        """Draw the policy over its plane: forces as colours, or cells and arrows."""
         x, y, points = state_space.grid(low, high, 201)
         single = len(self.task.outputs) == 1
         if single:
@@ -120,7 +120,7 @@ class Explorer:
 
 
 def _check_history(history: History | None, task: str) -> None:
-    """Raise ValueError unless it is the history of a run on the task, or None."""
+    """Raise ValueError unless `history` is None or the history of a run on the task."""
     if history is None:
         return
     if not isinstance(history, History):
@@ -138,13 +138,14 @@ def explore(
     axes: tuple[str, str] | None = None,
     guess: str | None = None,
 ) -> Explorer:
-    """Replay, ask and change a policy in a browser: shown by JupyterLab, or saved to an HTML file of its own.
+    """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
-    `policies`: one with linear maps, or some by name; `teacher`: its actions stand beside theirs; `history` of a
-    distillation: replays the first policy. SimpleGoal, MountainCarContinuous and Pendulum are played in the browser;
-    other tasks show stored episodes, over the two inputs `axes`, and cannot be changed. `guess`: a question about the
-    first policy, which the reader answers before returns and failures are shown. Raises ValueError for other policies,
-    unknown inputs, a history of another method or task, and a guess where the browser cannot play.
+    `policies`: one policy with linear maps, or several by name. `teacher`: its actions are shown beside theirs.
+    `history`: replays the distillation of the first policy. The browser simulates SimpleGoal, MountainCarContinuous and
+    Pendulum. For other tasks it shows stored episodes over the two inputs `axes`, and policies cannot be changed.
+    `guess`: a question about the first policy, which the reader answers before returns and failures are shown. Raises
+    ValueError for other policies, unknown inputs, a history of another method or task, and a guess for a task that the
+    browser cannot simulate.
     """
     several = policies if isinstance(policies, dict) else {"policy": policies}
     return Explorer(several, teacher=teacher, history=history, axes=axes, guess=guess)

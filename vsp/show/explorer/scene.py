@@ -1,4 +1,4 @@
-"""What an explorer shows, as plain data for its script: a task, policies, a replay, a teacher, starts."""
+"""Collect what an explorer shows, as plain data for its script: task, policies, replay, teacher, starts."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ...rollouts import Policy, collect_episodes, rollout
 from ...tasks import PIT, RUNNING
 from ...tasks.base import Task
 
-PLANES = {  # of each task that the script can play: the states that are drawn, and how their axes are called
+PLANES = {  # for each task that the script can simulate: lower and upper limits of the plane, and its axis labels
     "SimpleGoal-v0": ([0.0, 0.0], [1.0, 1.0], ["x", "y"]),
     "MountainCarContinuous-v0": ([-1.2, -0.07], [0.6, 0.07], ["position", "velocity (per step)"]),
     "Pendulum-v1": ([-np.pi, -8.0], [np.pi, 8.0], ["angle (rad)", "angular velocity (rad/s)"]),
 }
 N_STARTS = 400
-TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid along an axis; states at which its error is measured
-N_EPISODES, N_STEPS = 8, 250  # that are stored of a task that the script cannot play, and steps of each, at most
+TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid, per axis; states to measure the grid's error at
+N_EPISODES, N_STEPS = 8, 250  # stored for a task that the script cannot simulate: episodes, and most steps of each
 EPISODE_SEED = 0
-DIGITS = 4  # of what is stored, in the range of each variable
-MOST = 490_000  # bytes of a scene with stored episodes
+DIGITS = 4  # of stored numbers, within the range of each variable
+MOST = 490_000  # most bytes of a scene with stored episodes
 N_MOMENTS = 80  # of a replay, in addition to those with a split or merge
 
 
@@ -36,13 +36,13 @@ def scene_of(
     history: History | None = None,
     axes: tuple[str, str] | None = None,
 ) -> dict:
-    """The scene of some policies, of which `history` replays the first.
+    """Return the scene of some policies; `history` replays the first.
 
-    Keys: task (names and limits), plane (low, high, labels), policies; of a task that the script can play starts (n,
-    2), lost (which outcomes are failures) and teacher: its actions on a grid, the largest error of reading them from
-    there, and its mean return. Other tasks have stored episodes instead, drawn over two inputs, `axes`; these scenes
-    stay below `MOST` bytes, with fewer moments and steps where needed. Raises ValueError for names that are no inputs,
-    for a teacher whose actions do not fit, and as `collect_episodes` does.
+    Keys: task (names and limits), plane (low, high, labels), policies. A task that the script can simulate also has
+    starts (n, 2), lost (which outcomes are failures) and teacher: its actions on a grid, the largest error of
+    interpolating them, and its mean return. Other tasks have stored episodes instead, drawn over the two inputs `axes`.
+    Their scenes stay below `MOST` bytes, with fewer moments and steps where needed. Raises ValueError for `axes` that
+    are not inputs, for a teacher whose actions have another shape, and as `collect_episodes` does.
     """
     scene = _numbers_of_task(task) | {"policies": [_numbers(policy, name) for name, policy in policies.items()]}
     if history is not None:
@@ -57,7 +57,7 @@ def scene_of(
 
 
 def to_json(scene: object) -> str:
-    """A scene, or a part of one, as the script reads it."""
+    """Return a scene, or a part of one, as JSON for the script."""
     return json.dumps(scene, separators=(",", ":"), allow_nan=False)
 
 
@@ -71,7 +71,7 @@ def _numbers_of_task(task: Task) -> dict:
 
 
 def _played(task: Task, teacher: Policy | None) -> dict:
-    """What the script needs to play a task: plane, starts, failures, and a teacher's grid."""
+    """Return what the script needs to simulate a task: plane, starts, failures, and a teacher's grid."""
     (low, high, labels), starts = PLANES[task.name], starts_of(task)
     found = {
         "plane": {"low": low, "high": high, "labels": labels},
@@ -87,8 +87,7 @@ def _played(task: Task, teacher: Policy | None) -> dict:
 def _stored(
     policies: dict[str, VoronoiPolicy], task: Task, teacher: Policy | None, axes: tuple[str, str] | None, into: list
 ) -> dict:
-    """Episodes of every policy, with the teacher's actions, added to `into`; returns the plane and the box of the
-    states."""
+    """Add every policy's episodes and the teacher's actions to `into`; return the plane and the box of the states."""
     first, starts = next(iter(policies.values())), start_states(task, N_EPISODES, EPISODE_SEED)
     _check_axes(task, axes)  # before the episodes are played
     played = [[one.states for one in collect_episodes(policy, task, starts)] for policy in policies.values()]
@@ -98,7 +97,7 @@ def _stored(
     for most in (N_STEPS // n for n in count(1)):
         for episodes, about in zip(played, into):
             about["episodes"] = [_episode(states, decimals, teacher, task, max(most, 1)) for states in episodes]
-        if len(to_json(into).encode()) < MOST - 10_000 or most <= 1:  # plane and names need little
+        if len(to_json(into).encode()) < MOST - 10_000 or most <= 1:  # the rest is for plane and names
             break
     room = 0.03 * np.maximum(high - low, 1e-3 * np.maximum(1.0, np.abs(high)))
     plane = {
@@ -110,7 +109,7 @@ def _stored(
 
 
 def _episode(states: np.ndarray, decimals: list[int], teacher: Policy | None, task: Task, most: int) -> dict:
-    """At most `most` states of an episode, one `every` so many of its `steps`, and the teacher's actions there."""
+    """Return at most `most` evenly spaced states of an episode, and the teacher's actions there."""
     every = 1 + (len(states) - 1) // most
     kept = _rounded(states[::every], decimals)
     found = {"states": kept.tolist(), "every": every, "steps": len(states)}
@@ -121,7 +120,7 @@ def _episode(states: np.ndarray, decimals: list[int], teacher: Policy | None, ta
 
 
 def _decimals(values: np.ndarray) -> list[int]:
-    """For each column, the decimals with which its range has `DIGITS` digits or one more."""
+    """Return for each column the number of decimals that gives its range `DIGITS` digits or one more."""
     size = np.maximum(np.ptp(values, axis=0), 1e-6 * np.abs(values).max(axis=0))
     return [DIGITS - int(np.floor(np.log10(one))) if one else 0 for one in size.tolist()]
 
@@ -131,15 +130,17 @@ def _rounded(values: np.ndarray, decimals: list[int]) -> np.ndarray:
 
 
 def _check_axes(task: Task, names: tuple[str, str] | None) -> None:
-    """Raise ValueError unless these are two inputs, or None."""
+    """Raise ValueError unless `names` are two inputs, or None."""
     given = [] if names is None or isinstance(names, str) else list(names) if np.iterable(names) else []
     if names is not None and (len(given) != 2 or given[0] == given[1] or not all(one in task.inputs for one in given)):
         raise ValueError(f"axes are {names!r}, expected two of the inputs {', '.join(task.inputs)}")
 
 
 def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str, str] | None) -> list[int]:
-    """The two inputs to draw: those of these names, or where the states vary most in units of the look-up; inputs with
-    two values, such as contacts, only where there are no others. (a single input twice)"""
+    """Return the two inputs to draw: those named, or those that vary most in units of the look-up.
+
+    Inputs with two values, such as contacts, are drawn only if there are no others; a single input is drawn twice.
+    """
     if names is not None:
         return [task.inputs.index(name) for name in names]
     spread = (seen / policy.scale).std(axis=0)
@@ -149,8 +150,10 @@ def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str,
 
 
 def _thinned(moments: list[dict], most: int) -> list[dict]:
-    """As many moments of a replay as fit into `most` bytes, evenly, with the first and the last; rather those with a
-    split or merge."""
+    """Thin a replay to `most` bytes. Moments without a split or merge go first, then evenly spaced ones of the rest.
+
+    The first and the last moment stay.
+    """
     changes = [i for i, one in enumerate(moments) if one["change"] or i in (0, len(moments) - 1)]
     for places in ([*range(len(moments))], changes):
         if len(to_json([moments[i] for i in places])) <= most:
@@ -163,7 +166,7 @@ def _thinned(moments: list[dict], most: int) -> list[dict]:
 
 
 def starts_of(task: Task) -> np.ndarray:
-    """Starts in a regular grid over those of the task. (n, 2)"""
+    """Return starts in a regular grid over the range of the task's starts. (n, 2)"""
     drawn = task.start(np.random.default_rng(0), 10_000)
     low, high = drawn.min(axis=0), drawn.max(axis=0)
     sides = [1 if a == b else None for a, b in zip(low, high)]
@@ -178,7 +181,10 @@ def _numbers(policy: VoronoiPolicy, name: str) -> dict:
 
 
 def _teacher(teacher: Policy, task: Task, low: np.ndarray, high: np.ndarray) -> dict:
-    """Its actions at the points of a grid, the first axis slowest, and how far off the others are, at most."""
+    """Return the teacher's actions on a grid, the first axis slowest, and how wrong interpolation is between them.
+
+    "error" is the largest error in any action, "usual" its 90 % quantile.
+    """
     n, rng = TEACHER_POINTS, np.random.default_rng(0)
     axes = [np.linspace(a, b, n) for a, b in zip(low, high)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -188,7 +194,7 @@ def _teacher(teacher: Policy, task: Task, low: np.ndarray, high: np.ndarray) -> 
     first = np.minimum(place.astype(int), n - 2)
     share = place - first
     read = np.zeros((N_ERRORS, actions.shape[1]))
-    for i, j in np.ndindex(2, 2):  # the corners around each state
+    for i, j in np.ndindex(2, 2):  # the four grid points around each state
         weight = np.where(i, share[:, 0], 1 - share[:, 0]) * np.where(j, share[:, 1], 1 - share[:, 1])
         read += weight[:, None] * actions[(first[:, 0] + i) * n + first[:, 1] + j]
     error = np.abs(read - teacher.predict(task.see(states))[0])
@@ -196,7 +202,7 @@ def _teacher(teacher: Policy, task: Task, low: np.ndarray, high: np.ndarray) -> 
 
 
 def _replay(history: History) -> list[dict]:
-    """The partition at every change, and at moments between: iteration, codewords, coefficients, and what changed."""
+    """Return the partition at every change and at moments between: iteration, codewords, coefficients and changes."""
     last = len(history.cells) - 1
     changes: dict[int, list[str]] = {}
     for event in history.events:

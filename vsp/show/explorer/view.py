@@ -9,7 +9,7 @@ import traitlets
 
 
 class View(anywidget.AnyWidget):
-    """Draws a scene, which it gets as JSON."""
+    """Draw a scene, given as JSON."""
 
     _esm = Path(__file__).with_name("explorer.js")
     scene = traitlets.Unicode().tag(sync=True)
