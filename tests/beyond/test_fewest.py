@@ -32,7 +32,7 @@ def test_what_does_nothing_goes_and_the_return_stays():
 
 def test_a_policy_that_returns_nothing_and_a_share_beyond_one_are_refused():
     still = VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 1)), task=MOUNTAINCAR)
-    with pytest.raises(ValueError, match="the policy returns 0 in the mean, expected more than 0"):
+    with pytest.raises(ValueError, match="the policy returns 0 on average, expected more than 0"):
         fewest_numbers(still, keep=0.95, n_episodes=3, seed=0)
     with pytest.raises(ValueError, match="keep is 1.5, expected"):
         fewest_numbers(pumping(), keep=1.5, n_episodes=3, seed=0)

@@ -177,7 +177,7 @@ def test_the_mean_distance_from_the_origin():
 
 @pytest.mark.parametrize(
     ("policy", "match"),
-    [(vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR), "need a proof of their own"),
+    [(vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR), "need their own proof"),
      (policy_of([[0, 0]], np.zeros((1, 3, 2)), metric="chebyshev"), "metric 'chebyshev'"),
      ("a name", "expected a VoronoiPolicy")],
 )  # fmt: skip

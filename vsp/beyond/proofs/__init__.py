@@ -1,10 +1,10 @@
-"""What can be known for certain of a few linear maps: not sampled, but followed from all starts at once.
+"""Prove properties of policies with a few linear maps: follow all starts at once instead of sampling some.
 
 `prove` follows SimpleGoal's starts in exact arithmetic, runs MountainCar's program from every state that it can reach,
-and finds from where Pendulum surely gets upright. Every proof writes a certificate, which `check/`, a program of its
-own, verifies. `steps_to_goal` proves over a grid what holds of SimpleGoal on borders, under rounding, and under
-disturbances too; `teacher_steps_to_goal` asks the same of a network. `at_rest` looks for starts of MountainCar from
-which the car never moves.
+and finds the starts from which Pendulum surely gets upright. Every proof writes a certificate, which the separate
+program in `check/` verifies. `steps_to_goal` proves over a grid what holds for SimpleGoal also on borders, under
+rounding, and under disturbances. `teacher_steps_to_goal` does the same for the teacher. `at_rest` finds starts of
+MountainCar from which the car never moves.
 """
 
 from .dead_points import at_rest

@@ -1,4 +1,4 @@
-"""`make proofs` and `make proofs-teacher`: certificates into data/proofs/, and what they say into data/results/."""
+"""`make proofs` and `make proofs-teacher`: write certificates to data/proofs/ and their results to data/results/."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ from .robust import largest_disturbance, outside_pit, steps_to_goal
 from .simplegoal_proof import ENDS, SimpleGoalProof
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
-N_SAMPLED = 1_000_000  # episodes beside a proof
-MARGIN = 0.01  # of the policy that is tuned to be proved: a tenth of a step
+N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
+MARGIN = 0.01  # margin for which simplegoal_margin is tuned: a tenth of a step
 TEACHER_GRIDS = (500, 1000, 2000, 4000, 8000)
 HOUR = 3600.0
 
 
 def main() -> None:
-    """Prove what is not proved yet, and write a certificate of each policy to data/proofs/, what they say to
-    data/results/proofs.csv; MountainCar over the reals to proofs_reals.csv, and Pendulum over smaller boxes to
-    proofs_grid.csv. --teacher: proofs_teacher.csv instead."""
+    """Prove the policies that are not proved yet. Write a certificate of each to data/proofs/ and the results to
+    data/results/proofs.csv. Write the proof of MountainCar over the reals to proofs_reals.csv, and that of Pendulum
+    over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
-    parser.add_argument("--teacher", action="store_true", help="how much can be proved of a network within an hour")
+    parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
     arguments = parser.parse_args()
     if arguments.teacher:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
-    """The policies that are proved, by the names of their certificates."""
+    """Return functions that make the policies to prove, by the names of their certificates."""
     teacher, config, own = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
     best = int(read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
     spacious = replace(own, step=partial(simplegoal.step, margin=MARGIN))
@@ -79,7 +79,7 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
 
 
 def certificates(out: Path) -> None:
-    """Write the certificates that are missing, and the table, row by row: what is killed goes on."""
+    """Write the missing certificates and the table, row by row: an interrupted run can continue."""
     table = out / "data" / "results" / "proofs.csv"
     rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
     makers = policies()
@@ -90,7 +90,7 @@ def certificates(out: Path) -> None:
 
 
 def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
-    """Prove one policy: its row, and its certificate at `path`."""
+    """Prove one policy. Write its certificate to `path` and return its row of the table."""
     began = time.perf_counter()
     proof = prove(policy)
     seconds = time.perf_counter() - began
@@ -114,7 +114,7 @@ def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
 def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
     low, high = proof.mean_return()
     areas = {name: float(area) for name, area in proof.areas.items()}
-    areas["failing_outside"] = float(proof.failing_outside)  # the pit
+    areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
     found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
     of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
@@ -122,7 +122,8 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:
-    """Mean return and shares of outcomes over `N_SAMPLED` episodes."""
+    """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
+    SimpleGoal."""
     n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
     found = rollout(policy, policy.task, start_states(policy.task, n, 1))
     shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
@@ -130,7 +131,7 @@ def _sampled(policy: VoronoiPolicy) -> dict:
 
 
 def reals() -> dict:
-    """From which share of its starts MountainCar's car surely arrives, in real numbers."""
+    """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
     began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
     parts = prove_reals(policy)
     found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
@@ -138,7 +139,7 @@ def reals() -> dict:
 
 
 def smaller_boxes() -> pd.DataFrame:
-    """From which share of its starts Pendulum surely gets upright, by a grid and by smaller boxes of starts."""
+    """Prove from which share of its starts Pendulum gets upright, by a grid and by smaller boxes of starts."""
     began = time.perf_counter()
     proof = prove_pendulum(_kept("faithful", PENDULUM))
     shares = shares_of_starts(proof)
@@ -147,8 +148,8 @@ def smaller_boxes() -> pd.DataFrame:
 
 
 def of_teacher() -> pd.DataFrame:
-    """Which share of SimpleGoal's starts outside the pit its teacher surely takes to the goal, by ever finer grids, as
-    long as the next one ends within an hour."""
+    """Prove which share of SimpleGoal's starts outside the pit the teacher takes to the goal, by ever finer grids. Stop
+    before a grid that would not end within an hour in all."""
     began, rows = time.perf_counter(), []
     for n in TEACHER_GRIDS:
         last = time.perf_counter()
@@ -172,7 +173,7 @@ def _one_map(teacher) -> VoronoiPolicy:
 
 
 def _of_simplegoal(policy: VoronoiPolicy) -> VoronoiPolicy:
-    """A policy of SimpleGoal with a margin, as one of SimpleGoal."""
+    """Convert a policy for SimpleGoal with a margin to one for SimpleGoal."""
     return VoronoiPolicy(
         policy.codewords, policy.coefficients, task=SIMPLEGOAL, metric=policy.metric, scale=policy.scale
     )

@@ -1,9 +1,9 @@
-"""MountainCar over the reals: short pieces of the line of starts, followed to the flag with bounds of the error.
+"""Prove MountainCar over the reals: follow short pieces of the line of starts to the flag, with bounds on the error.
 
-The states of a piece are c + g t + r, with t from -1 to 1 along it. The remainder r is bounded in a norm in which
-the car's swing at the bottom of the valley is a rotation, so that it hardly grows there (a mean-value form; boxes would
-grow with every step). Where a piece crosses a border of cells, a limit of the action, or the flag, it is cut in three:
-of two parts it is sure on which side they are, and of the sliver between them both ways are followed.
+The states of a piece are c + g t + r, with t from -1 to 1 along the piece. The remainder r is bounded in a norm in
+which the car's swing at the bottom of the valley is a rotation, so the bound hardly grows there. (This is a mean-value
+form; boxes would grow with every step.) A piece that crosses a border of cells, a limit of the action, or the flag is
+cut in three. For two parts the side is certain. For the sliver between them, both branches are followed.
 """
 
 from __future__ import annotations
@@ -18,37 +18,37 @@ from ...run import workers
 from ...tasks.mountaincar import FLAG, TASK
 from .mountaincar import LEFT, RIGHT, check_runnable
 
-SWING = 0.0866  # rad per step, at the bottom: a velocity counts 1 / SWING as much as a position
+SWING = 0.0866  # rad per step, at the bottom: a velocity counts 1 / SWING times as much as a position
 BOTH = np.hypot(1.0, 1.0 / SWING)  # norm of an error of 1 in both coordinates
 POWER, PULL = 0.0015, 0.0025
 BEND = 4.5 * PULL  # half the largest second derivative of the pull along the position
-ROUNDING = 1e-15  # of each coordinate and step: several times what float64 loses
+ROUNDING = 1e-15  # per coordinate and step: several times what float64 loses
 FASTEST, WALL = 0.07, -1.2
-LOST = 1e-3  # remainder of a piece that is given up
-N_PIECES, N_PARTS = 100_000, 100  # of the line, and how many of them at a time
+LOST = 1e-3  # a piece with this remainder is given up
+N_PIECES, N_PARTS = 100_000, 100  # pieces of the line, and parts of it that are proved separately
 
 
 @dataclass(frozen=True)
 class Pieces:
     """Pieces of the line of starts, each with its states after some steps."""
 
-    low: np.ndarray  # (n,) of the starts
+    low: np.ndarray  # (n,) ends of the range of starts
     high: np.ndarray
     centre: np.ndarray  # (2, n) c
     along: np.ndarray  # (2, n) g
-    rest: np.ndarray  # (n,) bound of r, in the norm of x and v / SWING
-    cost: np.ndarray  # (n,) of the actions so far, at most
-    cell: np.ndarray  # (n,) in which the states are; -1: not decided
+    rest: np.ndarray  # (n,) bound on r, in the norm of x and v / SWING
+    cost: np.ndarray  # (n,) upper bound on the cost of the actions so far
+    cell: np.ndarray  # (n,) cell of the states; -1: undecided
 
     def __len__(self) -> int:
         return len(self.low)
 
     def at(self, index: np.ndarray) -> Pieces:
-        """Some of them."""
+        """Return the pieces at `index`."""
         return Pieces(*(getattr(self, field.name)[..., index] for field in fields(self)))
 
     def between(self, begin: np.ndarray, end: np.ndarray) -> Pieces:
-        """The part of each piece from t = `begin` to `end`; empty ones are left out."""
+        """Return the part of each piece from t = `begin` to `end`, without empty parts."""
         kept = np.flatnonzero(end > begin)
         whole, begin, end = self.at(kept), begin[kept], end[kept]
         low, high = (whole.low + (t + 1) / 2 * (whole.high - whole.low) for t in (begin, end))
@@ -56,13 +56,15 @@ class Pieces:
         return replace(whole, low=low, high=high, centre=centre, along=along, rest=whole.rest + ROUNDING * BOTH)
 
     def ranges(self, x, v, constant, lost=0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a linear function: its value in the middle, how much it changes from there to the end of the piece, and
-        what the remainder may add. (n,) each. `lost`: the size of what cancelled in its numbers"""
+        """Bound the linear function with coefficients `x`, `v` and `constant`. Return its value in the middle, its
+        change from there to the end of the piece, and the largest effect of the remainder. (n,) each. `lost` is the
+        size of the terms that cancelled in its coefficients."""
         size = self.rest * np.hypot(x, v * SWING) + ROUNDING * (np.abs(x) + np.abs(v) + np.abs(constant) + lost)
         return x * self.centre[0] + v * self.centre[1] + constant, x * self.along[0] + v * self.along[1], size
 
     def cut(self, x, v, constant, lost=0.0) -> tuple[Pieces, Pieces, Pieces]:
-        """The parts where a linear function of the state is surely below 0, in doubt, and surely above."""
+        """Return the parts where a linear function of the state is surely below 0, where its sign is undecided, and
+        where it is surely above 0."""
         value, change, size = self.ranges(x, v, constant, lost)
         change = np.where(np.abs(change) > 1e-300, change, 1e-300)
         up, ends = change > 0, np.ones(len(self))
@@ -72,21 +74,21 @@ class Pieces:
 
 
 def joined(parts: list[Pieces]) -> Pieces:
-    """All pieces of `parts`."""
+    """Join all pieces of `parts`."""
     return Pieces(*(np.concatenate([getattr(part, one.name) for part in parts], axis=-1) for one in fields(Pieces)))
 
 
 @dataclass(frozen=True)
 class Part:
-    """What was found from a part of the line of starts."""
+    """The result for a part of the line of starts."""
 
-    share: float  # of the starts, from which the car surely arrives
-    longest: int  # steps from these
-    least: float  # return from these, at least
+    share: float  # share of the starts from which the car surely arrives
+    longest: int  # most steps from these starts
+    least: float  # lower bound on the return from these starts
 
 
 def prove_reals(policy: VoronoiPolicy, *, jobs: int | str | None = None) -> list[Part]:
-    """From which starts the car surely arrives, in real numbers, for each part of the line; minutes.
+    """Prove from which starts the car reaches the flag, in real numbers, for each part of the line. Takes minutes.
 
     `jobs` as in `vsp.run.workers`, by default one per core. Raises ValueError for a policy that is not made of linear
     maps and Euclidean cells for MountainCar.
@@ -99,7 +101,8 @@ def prove_reals(policy: VoronoiPolicy, *, jobs: int | str | None = None) -> list
 
 
 def prove_part(policy: VoronoiPolicy, low: float, high: float, n: int = N_PIECES // N_PARTS) -> Part:
-    """From which starts between `low` and `high` the car surely arrives, by `n` pieces that are cut where needed."""
+    """Prove from which starts between `low` and `high` the car reaches the flag, by `n` pieces that are cut where
+    needed."""
     ends = np.linspace(low, high, n + 1)
     pieces, loop, lost = started(ends[:-1], ends[1:]), Loop(policy), []
     longest, least = 0, np.inf
@@ -115,14 +118,14 @@ def prove_part(policy: VoronoiPolicy, low: float, high: float, n: int = N_PIECES
 
 
 def started(low: np.ndarray, high: np.ndarray) -> Pieces:
-    """Pieces of the line of starts, at rest."""
+    """Make pieces of the line of starts, with the car at rest."""
     zero, half = np.zeros(len(low)), (high - low) / 2
     centre, along = np.stack([(low + high) / 2, zero]), np.stack([half, zero])
     return Pieces(low, high, centre, along, np.full(len(low), ROUNDING), zero, np.full(len(low), -1))
 
 
 class Loop:
-    """The closed loop: a policy, and the car that answers it."""
+    """The closed loop of a policy and the car."""
 
     def __init__(self, policy: VoronoiPolicy):
         weights = 1.0 / policy.scale**2
@@ -131,7 +134,7 @@ class Loop:
         self.largest = float(np.abs(self.slopes).sum(axis=1).max() + self.offsets.max())  # before they cancel
 
     def step(self, pieces: Pieces) -> tuple[Pieces, Pieces, Pieces]:
-        """Pieces that go on after a step, that arrived, and that are given up."""
+        """Advance pieces by one step. Return those that go on, those that arrived, and those that are given up."""
         moved = self.moved(self.in_cells(pieces))
         speed, change, size = moved.ranges(0.0, 1.0, 0.0)
         sure = (np.abs(speed) + np.abs(change) + size < FASTEST) & (moved.rest < LOST)
@@ -140,11 +143,12 @@ class Loop:
         below, doubt, above = _sides(moved, FLAG)
         arrived = joined([above, doubt])
         speed, change, size = arrived.ranges(0.0, 1.0, 0.0)
-        forward = speed - np.abs(change) - size > 0  # to arrive, it must not roll back
+        forward = speed - np.abs(change) - size > 0  # to arrive, the car must not roll back
         return joined([below, doubt]), arrived.at(forward), joined([failed, arrived.at(~forward)])
 
     def in_cells(self, pieces: Pieces) -> Pieces:
-        """The parts of `pieces` with their cells; slivers on a border stand in several."""
+        """Return the parts of `pieces` with their cells; a sliver on a border is listed for each cell that it may be
+        in."""
         decided = []
         while len(pieces):
             near = self.slopes @ pieces.centre - self.offsets[:, None]  # (k, n)
@@ -168,7 +172,8 @@ class Loop:
         return joined(decided)
 
     def _doubt(self, pieces: Pieces, best: np.ndarray, near: np.ndarray) -> np.ndarray:
-        """By how much another codeword may be nearer than the best in the middle; -inf for that one. (k, n)"""
+        """Bound by how much each codeword may be nearer than `best`, the nearest in the middle; -inf for `best` itself.
+        (k, n)"""
         columns, found = np.arange(len(best)), np.empty_like(near)
         for k in range(len(near)):
             x, v = (self.slopes[best] - self.slopes[k]).T
@@ -178,7 +183,7 @@ class Loop:
         return found
 
     def moved(self, pieces: Pieces) -> Pieces:
-        """The pieces after a step, cut where the action comes to a limit."""
+        """Advance the pieces by one step, cut where the action reaches a limit."""
         parts = []
         for side in (1, -1):
             x, v, bias = side * self.maps[pieces.cell].T
@@ -196,8 +201,8 @@ class Loop:
         return joined([*parts, self._after(pieces, 0)])
 
     def _after(self, pieces: Pieces, side: int) -> Pieces:
-        """The pieces after a step with the action at a limit, or with that of the map (side 0), be it a little beyond
-        a limit: then the rest grows by as much."""
+        """Advance the pieces by one step, with the action at a limit (side -1 or 1) or as the map gives it (side 0).
+        Where the map goes a little beyond a limit, the remainder grows by as much."""
         x, v, bias = (0.0 if side else 1.0) * self.maps[pieces.cell].T
         action, change, size = pieces.ranges(x, v, bias + side)
         most = np.abs(action) + np.abs(change) + size
@@ -216,7 +221,7 @@ class Loop:
 
 
 def _sides(pieces: Pieces, position: float) -> tuple[Pieces, Pieces, Pieces]:
-    """The parts surely to the left of a position, in doubt, and surely to the right."""
+    """Return the parts surely to the left of a position, the undecided parts, and the parts surely to the right."""
     gap, change, size = pieces.ranges(1.0, 0.0, -position)
     near = np.abs(gap) <= np.abs(change) + size
     left, doubt, right = pieces.at(near).cut(1.0, 0.0, -position)
@@ -224,7 +229,7 @@ def _sides(pieces: Pieces, position: float) -> tuple[Pieces, Pieces, Pieces]:
 
 
 def _at_wall(pieces: Pieces) -> Pieces:
-    """The pieces stopped by the wall on the left: all in one state."""
+    """Stop the pieces at the wall on the left: each is then a single state."""
     centre, zero = np.array([[WALL], [0.0]]) + 0 * pieces.centre, np.zeros(len(pieces))
     return replace(pieces, centre=centre, along=0 * pieces.along, rest=zero)
 
@@ -236,7 +241,7 @@ def _norm(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndar
 
 
 def _length(intervals: list[tuple[float, float]]) -> float:
-    """Of the union."""
+    """Return the length of the union of `intervals`."""
     total, end = 0.0, -np.inf
     for low, high in sorted(intervals):
         total, end = total + max(0.0, high - max(low, end)), max(end, high)

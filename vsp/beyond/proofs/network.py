@@ -1,9 +1,9 @@
-"""The teacher, a ReLU network, asked what `robust` asks a policy of linear maps: how much of SimpleGoal can be proved?
+"""Prove for SimpleGoal's teacher, a ReLU network, what `robust` proves for a policy of linear maps.
 
-Over a box of states every unit is an affine function of the state, give or take an error: none where a ReLU is on or
-off over the whole box, else that of the best line through its kink. (Affine arithmetic, as in Singh et al., "Fast and
-effective robustness certification", 2018.) Errors grow from layer to layer by the absolute weights, so boxes have to be
-small. It is about the network's real numbers: what float32 rounds is left out.
+Over a box of states, every unit is an affine function of the state plus a bounded error. A ReLU that is on or off over
+the whole box adds no error. Otherwise it adds the error of the best line through its kink. (Affine arithmetic, as in
+Singh et al., "Fast and effective robustness certification", 2018.) Errors grow from layer to layer by the absolute
+weights, so boxes have to be small. The proof is about the network's real numbers: float32 rounding is left out.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ BEND = 0.385  # half of the largest second derivative of tanh
 
 
 def teacher_steps_to_goal(teacher: Teacher, *, n: int = 1000) -> np.ndarray:
-    """`steps_to_goal` for the teacher. (n, n)
+    """Compute `steps_to_goal` for the teacher. (n, n)
 
-    A minute for a million boxes. Raises ValueError for a teacher of another task.
+    Takes a minute for a million boxes. Raises ValueError for a teacher of another task.
     """
     if not isinstance(teacher, Teacher) or teacher.task.name != TASK.name:
         raise ValueError(f"the teacher is {teacher!r}, expected a Teacher for {TASK.name}")
@@ -40,12 +40,12 @@ def teacher_steps_to_goal(teacher: Teacher, *, n: int = 1000) -> np.ndarray:
 
 
 def _after(teacher: Teacher, states: np.ndarray, half: float) -> np.ndarray:
-    """Between which states a step leads from boxes around `states` (n, 2), `half` wide on each side. (2, 2, n)"""
+    """Bound the states after a step from boxes around `states` (n, 2), `half` wide on each side. (2, 2, n)"""
     value, slopes, error = affine_outputs(teacher, states, half)
     radius = half * np.abs(slopes).sum(axis=0) + error  # (n, 2)
     action = np.tanh(value)
     steep = 1.0 - action**2
-    # x + 0.1 tanh(z): as one affine function, or bounded apart; the narrower holds
+    # Bound x + 0.1 tanh(z) as one affine function, and each term on its own; use the tighter bound
     along = np.eye(2)[:, None, :] + STRIDE * steep * slopes  # (2, n, 2)
     spread = half * np.abs(along).sum(axis=0) + STRIDE * (steep * error + BEND * radius**2)
     middle = states + STRIDE * action
@@ -55,7 +55,8 @@ def _after(teacher: Teacher, states: np.ndarray, half: float) -> np.ndarray:
 
 
 def affine_outputs(teacher: Teacher, states: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The last layer before its tanh over boxes: values in the middle (n, m), slopes (d, n, m), and errors (n, m)."""
+    """Bound the last layer before its tanh over boxes. Return values in the middle (n, m), slopes (d, n, m), and errors
+    (n, m)."""
     (n, d), layers = states.shape, [(w.astype(np.float64), b.astype(np.float64)) for w, b in teacher.layers]
     value, slopes, error = states, np.repeat(np.eye(d)[:, None, :], n, axis=1), np.zeros_like(states)
     for i, (weight, bias) in enumerate(layers):

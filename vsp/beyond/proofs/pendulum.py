@@ -1,8 +1,9 @@
-"""Pendulum under a policy of linear maps: a set around upright that it never leaves, and from where it gets there.
+"""Prove for Pendulum and a policy of linear maps: a set around upright that it never leaves, and from where it gets
+there.
 
 The states, angle and angular velocity, are cut into boxes (`grid`). Each coordinate after a step is a smooth function
-of the state, so over a box it differs from its value in the middle by no more than its steepest slope allows. What is
-proved holds for the program, which sees float32 and rounds.
+of the state. So over a box it differs from its value in the middle by no more than its steepest slope allows. The proof
+holds for the program, which observes float32 and rounds.
 """
 
 from __future__ import annotations
@@ -19,41 +20,42 @@ from .grid import Way, around, invariant, steps_into
 from .proof import Proof
 from .robust import ROUNDING, SEEN, largest_tie, least_gap
 
-FASTEST, LIMIT = 8.0, 2.0  # rad/s; of the torque
-START_SPEED = 1.0  # rad/s, of starts
-DT, FALL, PUSH = 0.05, 0.75, 0.15  # of a step: seconds, and what sine and torque add to the angular velocity
-UPRIGHT = 0.5  # rad: a set "around upright" lies within
+FASTEST, LIMIT = 8.0, 2.0  # largest angular velocity, rad/s; largest torque
+START_SPEED = 1.0  # rad/s, largest of the starts
+DT, FALL, PUSH = 0.05, 0.75, 0.15  # per step: seconds, and what sine and torque add to the angular velocity
+UPRIGHT = 0.5  # rad: a set "around upright" lies within this angle
 
 
 @dataclass(frozen=True)
 class PendulumProof(Proof):
-    """What was proved, for boxes of an n by n grid: row i has angles from -pi + 2 pi i / n, column j angular velocities
-    from -8 + 16 j / n."""
+    """What is proved for the boxes of an n by n grid. The boxes of row i begin at angle -pi + 2 pi i / n, those of
+    column j at angular velocity -8 + 16 j / n."""
 
     kept: np.ndarray  # (n, n) whether the box belongs to a set around upright that no step leaves
     steps: np.ndarray  # (n, n) the most steps into that set; 0: not proved
 
     @property
     def starts(self) -> np.ndarray:
-        """Which columns hold the starts, slower than 1 rad/s. (n,)"""
+        """Which columns hold starts: angular velocities below 1 rad/s. (n,)"""
         n = len(self.steps)
         middle = FASTEST * (2 * (np.arange(n) + 0.5) / n - 1)
         return np.abs(middle) < START_SPEED
 
     @property
     def share(self) -> float:
-        """The share of starts from which the pendulum is proved to get there."""
+        """The share of starts from which the pendulum is proved to get into the set."""
         return float((self.steps > 0)[:, self.starts].mean())
 
     @property
     def claim(self) -> dict:
-        """The grid's `n`, how many boxes of starts are proved, how many there are, and the most steps of any box."""
+        """The grid's `n`, the number of proved boxes of starts, the number of all boxes of starts, and the most steps
+        from any box."""
         of_starts = (self.steps > 0)[:, self.starts]
         counts = {"proved": int(of_starts.sum()), "starts": of_starts.size}
         return {"n": len(self.steps), **counts, "longest": int(self.steps[~self.kept].max(initial=0))}
 
     def parts(self) -> list:
-        """For each row, runs of boxes: steps (-1 in the set), length, steps, length, ..."""
+        """Return for each row its runs of boxes: steps (-1 in the set), length, steps, length, ..."""
         found = []
         for row in np.where(self.kept, -1, self.steps):
             begins = np.flatnonzero(np.diff(row, prepend=row[0] - 1))
@@ -63,7 +65,7 @@ class PendulumProof(Proof):
 
 
 def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
-    """From which boxes the pendulum surely gets upright within 200 steps, and stays; seconds, and 200 bytes a box.
+    """Prove from which boxes the pendulum gets upright within 200 steps, and stays. Takes seconds, and 200 bytes a box.
 
     Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
     for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
@@ -80,10 +82,10 @@ def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
 
 
 def equilibria(policy: VoronoiPolicy, *, n: int = 100_000) -> np.ndarray:
-    """Angles (rad) at which a pendulum at rest stays, in increasing order: starts from which nothing moves.
+    """Find angles (rad) at which a pendulum at rest stays, in increasing order: starts from which nothing moves.
 
-    Looked for between `n` angles, where the acceleration changes its sign within a cell; not proved to be all. Raises
-    ValueError as `prove_pendulum` does.
+    The search looks between `n` angles, where the acceleration changes its sign within a cell. It is not proved to find
+    all. Raises ValueError as `prove_pendulum` does.
     """
     check_swinging(policy)
     check_count("n", n, least=16)
@@ -92,7 +94,7 @@ def equilibria(policy: VoronoiPolicy, *, n: int = 100_000) -> np.ndarray:
         states = np.column_stack([angle, np.zeros_like(angle)])
         return FALL * np.sin(angle) + PUSH * policy.predict(see(states))[0][:, 0]
 
-    angles = np.linspace(-np.pi, np.pi, n) + 1e-7  # no root by symmetry lies on one of them
+    angles = np.linspace(-np.pi, np.pi, n) + 1e-7  # shifted, so that no root lies on one of them by symmetry
     found, cells = acceleration(angles), policy.cells(see(np.column_stack([angles, np.zeros(n)])))
     crossed = np.flatnonzero((np.sign(found[:-1]) != np.sign(found[1:])) & (cells[:-1] == cells[1:]))
     pairs = zip(angles[crossed], angles[crossed + 1])
@@ -107,7 +109,7 @@ def check_swinging(policy: VoronoiPolicy) -> None:
 
 
 def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
-    """Where a step by the map of `cell` leads from each box that touches the cell."""
+    """Bound where a step by the map of `cell` leads from each box that touches the cell."""
     half = np.array([np.pi, FASTEST]) / n  # of a box
     angles, speeds = (width * (2 * np.arange(n) + 1 - n) for width in half)  # their middles
     touched = _touched(policy, cell, angles, speeds, half)
@@ -120,7 +122,7 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
     spread = slope * half[0] + abs(w_speed) * half[1] + slack
     low, high = (np.clip(raw + side * spread, -LIMIT, LIMIT) for side in (-1, 1))
     free, fixed = np.abs(raw) + spread <= LIMIT, low == high
-    # The new speed in the middle, and how steep it is along the angle and along the speed
+    # The new speed in the middle, and its slopes along the angle and along the speed
     torque = np.where(free, raw, (low + high) / 2)
     along = np.where(free, (FALL + PUSH * w_sin) * cos - PUSH * w_cos * sin, FALL * cos)
     bend = FALL + PUSH * (abs(w_cos) + abs(w_sin)) * free
@@ -141,8 +143,8 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
 
 
 def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first box between two angles and two speeds, and before which box these end, as in `Way`. Angles may be any
-    number of turns away, but less than a turn apart."""
+    """Return the first box between two angles and two speeds, and the exclusive end of these boxes, as in `Way`. Angles
+    may be any number of turns away, but less than a turn apart."""
     first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
     begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
     begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
@@ -151,7 +153,7 @@ def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) ->
 
 
 def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
-    """The boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
+    """Return the boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
     n, found, tie = len(angles), [], largest_tie(policy, np.array([1.0, 1.0, FASTEST]))
     ranges = [(np.maximum(f(angles) - half[0], -1.0), np.minimum(f(angles) + half[0], 1.0)) for f in (np.cos, np.sin)]
     for i in range(n):  # a row at a time

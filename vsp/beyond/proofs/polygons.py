@@ -1,8 +1,8 @@
 """Convex polygons with exact corners: cut by lines, measured, never rounded.
 
-A line (a, b, c) of integers stands for a x + b y + c = 0, its positive side for a x + b y + c > 0. A corner (X, Y, W)
-of integers with W > 0 stands for the point (X / W, Y / W). Each corner is where two of the lines meet that cut the
-polygon, so numbers grow with those of the lines alone, and not with the number of cuts.
+A line (a, b, c) of integers stands for a x + b y + c = 0; its positive side is a x + b y + c > 0. A corner (X, Y, W) of
+integers with W > 0 stands for the point (X / W, Y / W). Each corner is the intersection of two of the lines that cut
+the polygon. So its numbers grow only with those of the lines, not with the number of cuts.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ class Polygon:
     edges: tuple[Line, ...]
 
     def sign(self, line: Line) -> int:
-        """1 or -1: all of the inside lies on this side of the line; 0: the line cuts it, or is no line at all."""
+        """Return 1 or -1 if all of the inside lies on this side of the line; 0 if the line cuts it, or is no line at
+        all."""
         signs = {_side(line, corner) for corner in self.corners} - {0}
         return signs.pop() if len(signs) == 1 else 0
 
     def cut(self, line: Line) -> tuple[Polygon | None, Polygon | None]:
-        """The parts on the negative and on the positive side; None for a part without area.
+        """Return the parts on the negative and on the positive side; None for a part without area.
 
-        A line (0, 0, c) has everything on the side of the sign of c. Raises ValueError for (0, 0, 0), on which the
+        For a line (0, 0, c), everything lies on the side of the sign of c. Raises ValueError for (0, 0, 0), which the
         caller has to decide.
         """
         if line == (0, 0, 0):
@@ -44,7 +45,7 @@ class Polygon:
         return self._part(sides, line, -1), self._part(sides, line, 1)
 
     def _part(self, sides: list[int], line: Line, wanted: int) -> Polygon:
-        """The part where the sides are `wanted` or 0. (Sutherland and Hodgman 1974)"""
+        """Return the part where the sides are `wanted` or 0. (Sutherland and Hodgman 1974)"""
         corners, edges = [], []
         for i, (corner, edge) in enumerate(zip(self.corners, self.edges)):
             here, there = wanted * sides[i], wanted * sides[(i + 1) % len(sides)]
@@ -57,16 +58,16 @@ class Polygon:
         return Polygon(tuple(corners), tuple(edges))
 
     def middle(self) -> tuple[float, float]:
-        """The mean of the corners, rounded."""
+        """Return the mean of the corners, rounded."""
         n = len(self.corners)
         return sum(x / w for x, _, w in self.corners) / n, sum(y / w for _, y, w in self.corners) / n
 
     def points(self) -> list[tuple[Fraction, Fraction]]:
-        """The corners as pairs of fractions."""
+        """Return the corners as pairs of fractions."""
         return [(Fraction(x, w), Fraction(y, w)) for x, y, w in self.corners]
 
     def area(self) -> Fraction:
-        """Exact, by the shoelace formula."""
+        """Return the exact area, by the shoelace formula."""
         common = lcm(*(w for _, _, w in self.corners))
         points = [(x * (common // w), y * (common // w)) for x, y, w in self.corners]
         twice = sum(x * v - u * y for (x, y), (u, v) in zip(points, points[1:] + points[:1]))
@@ -74,27 +75,27 @@ class Polygon:
 
 
 def box(x: tuple[Fraction, Fraction], y: tuple[Fraction, Fraction]) -> Polygon:
-    """The rectangle between two values of x and two of y."""
+    """Return the rectangle between two values of x and two of y."""
     edges = [line_of((0, 1, -y[0])), line_of((-1, 0, x[1])), line_of((0, -1, y[1])), line_of((1, 0, -x[0]))]
     return Polygon(tuple(meet(edges[i - 1], edges[i]) for i in range(4)), tuple(edges))
 
 
 @lru_cache(maxsize=10_000)
 def line_of(numbers: tuple[Fraction, Fraction, Fraction]) -> Line:
-    """The line with coefficients in the ratio of `numbers`, in the smallest integers."""
+    """Return the line with coefficients in the ratio of `numbers`, in the smallest integers."""
     fractions = [Fraction(number) for number in numbers]
     common = lcm(*(number.denominator for number in fractions))
     return reduced(tuple(number.numerator * (common // number.denominator) for number in fractions))
 
 
 def reduced(line: Line) -> Line:
-    """The same line, in the smallest integers."""
+    """Return the same line, in the smallest integers."""
     shared = gcd(*line) or 1
     return tuple(number // shared for number in line)
 
 
 def meet(one: Line, other: Line) -> Corner:
-    """Where two lines meet, which are not parallel."""
+    """Return the intersection of two lines that are not parallel."""
     (a, b, c), (d, e, f) = one, other
     w = a * e - b * d
     corner = (b * f - c * e, c * d - a * f, w)
@@ -102,7 +103,7 @@ def meet(one: Line, other: Line) -> Corner:
 
 
 def total(numbers: list[Fraction]) -> Fraction:
-    """The exact sum; in pairs, so that few of the additions have large denominators."""
+    """Return the exact sum. Numbers are added in pairs, so that few additions have large denominators."""
     while len(numbers) > 1:
         numbers = [sum(numbers[i : i + 2], Fraction(0)) for i in range(0, len(numbers), 2)]
     return numbers[0] if numbers else Fraction(0)

@@ -1,4 +1,5 @@
-"""What every proof has: a certificate, which `vsp.beyond.proofs.check` verifies without the code of the prover."""
+"""The base class of all proofs: each writes a certificate, which `vsp.beyond.proofs.check` verifies without the
+prover's code."""
 
 from __future__ import annotations
 
@@ -17,21 +18,21 @@ CERTIFICATES = atomic.ROOT / "data" / "proofs"
 
 @dataclass(frozen=True)
 class Proof(ABC):
-    """What was proved of a policy."""
+    """A proved claim about a policy."""
 
     policy: VoronoiPolicy
 
     @property
     @abstractmethod
     def claim(self) -> dict:
-        """What is proved, as JSON-able values."""
+        """The proved claim, as JSON-serialisable values."""
 
     @abstractmethod
     def parts(self) -> list:
-        """The parts of the proof, as JSON-able values."""
+        """Return the parts of the proof, as JSON-serialisable values."""
 
     def certificate(self) -> dict:
-        """Task, policy, claim and pieces, as JSON-able values."""
+        """Return task, policy, claim and pieces, as JSON-serialisable values."""
         numbers = {name: getattr(self.policy, name).tolist() for name in ("codewords", "coefficients", "scale")}
         return {
             "task": self.policy.task.name,
@@ -46,7 +47,7 @@ class Proof(ABC):
 
 
 def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
-    """The policy of the certificate data/proofs/NAME.json, and all that it says. Raises `DamagedFile`."""
+    """Load the certificate data/proofs/NAME.json: return its policy and its whole content. Raises `DamagedFile`."""
     content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
     numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
     return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content

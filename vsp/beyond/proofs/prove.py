@@ -1,4 +1,4 @@
-"""`prove`: what is certain of a policy of linear maps, from every start of its task."""
+"""`prove`: prove what a policy of linear maps does from every start of its task."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ PROVERS = {
 
 
 def prove(policy: VoronoiPolicy) -> Proof:
-    """What is certain of `policy`: on SimpleGoal how every episode ends, exactly (seconds to a minute); on MountainCar
-    what Gymnasium's program does from every start (ten minutes on two cores); on Pendulum from which starts it surely
-    gets upright and stays (a minute).
+    """Prove what `policy` does from every start of its task.
 
-    Raises ValueError for a policy of another task or class: a proof needs a bound of where a step leads.
+    On SimpleGoal: how every episode ends, exactly (seconds to a minute). On MountainCar: what Gymnasium's program does
+    from every start (ten minutes on two cores). On Pendulum: from which starts it surely gets upright and stays
+    (a minute). Raises ValueError for a policy of another task or class: a proof needs a bound on where a step leads.
     """
     if not isinstance(policy, VoronoiPolicy):
         raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy: others have no cells to follow")
     if policy.task.name not in PROVERS:
-        needs = "others need a bound of where a step of theirs leads from a set of states"
+        needs = "other tasks need a bound on where a step leads from a set of states"
         raise ValueError(f"the policy is for {policy.task.name}, expected one of {sorted(PROVERS)}: {needs}")
     return PROVERS[policy.task.name](policy)

@@ -1,9 +1,10 @@
-"""What SimpleGoal's episodes return, from the pieces: bounds of the mean over the square, and the worst start.
+"""Compute the returns of SimpleGoal's episodes from the pieces: bounds on the mean over the square, and the worst
+start.
 
-The progress of all steps but the last adds up, so an episode returns 10 |s| - 10 |s'| + 10, with s the start and s'
-the state before it enters the goal. In the pit the last term is -10; after 50 steps it is 0, and s' the last state.
-Distances are convex: over a triangle the mean of |s'| is at least its value at the centroid, and at most the mean of
-its values at the corners.
+The rewards for progress of all steps but the last telescope. So an episode that reaches the goal returns
+10 |s| - 10 |s'| + 10, where s is the start and s' the state before the last step. If the episode ends in the pit, the
+last term is -10. After 50 steps it is 0, and s' is the last state. Distances are convex: over a triangle the mean of
+|s'| is at least its value at the centroid, and at most the mean of its values at the corners.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from ...tasks.base import GOAL, PIT, TRUNCATED
 from .simplegoal import Piece
 
 LAST = {GOAL: 10.0, PIT: -10.0, TRUNCATED: 0.0}
-MEAN_DISTANCE = (np.sqrt(2.0) + np.arcsinh(1.0)) / 3  # of the square's points from the origin
+MEAN_DISTANCE = (np.sqrt(2.0) + np.arcsinh(1.0)) / 3  # mean distance of the square's points from the origin
 ROUNDING = 1e-11  # far more than float64 loses in these sums
 
 
 def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float, float]:
-    """Bounds of the mean return from all starts of the square, at most `width` apart. `pieces`: of `follow`."""
+    """Return bounds on the mean return from all starts of the square, at most `width` apart. `pieces` come from
+    `follow`."""
     starts, ends, last = _triangles(pieces)
     areas = _areas(starts)
     sure = 10.0 * MEAN_DISTANCE + float(areas @ last)
@@ -37,7 +39,7 @@ def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float,
 
 
 def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.ndarray, float]:
-    """A start (2,) whose return is the lowest, to `width`, and this return. It lies inside its piece."""
+    """Return a start (2,) with the lowest return, to `width`, and this return. The start lies inside its piece."""
     starts, ends, last = _triangles(pieces)
     found, least = starts[0].mean(axis=0), np.inf
     while len(starts):
@@ -45,7 +47,7 @@ def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.nda
         returns = 10.0 * (_distance(inside) - _distance(ends.mean(axis=1))) + last
         if returns.min() < least:
             found, least = inside[returns.argmin()], returns.min()
-        # |s| is at least its tangent at the centroid, |s'| at most the plane through its corners: the sum is linear
+        # |s| is at least its tangent at the centroid, |s'| at most the plane through its corners: the bound is linear
         centre = starts.mean(axis=1, keepdims=True)
         tangent = (starts * centre).sum(axis=2) / np.maximum(_distance(centre), 1e-12)
         bound = (10.0 * (tangent - _distance(ends)) + last[:, None]).min(axis=1)
@@ -55,8 +57,8 @@ def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.nda
 
 
 def _triangles(pieces: Sequence[Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles (n, 3, 2) of which the pieces consist, the largest first; the states before the last reward there; and
-    that reward (n,)."""
+    """Cut the pieces into triangles (n, 3, 2), the largest first. Return them, the states before the last reward at
+    their corners, and that reward (n,)."""
     starts, ends, last = [], [], []
     for piece in pieces:
         corners = [(x / w, y / w) for x, y, w in piece.starts.corners]
@@ -80,7 +82,7 @@ def _distance(points: np.ndarray) -> np.ndarray:
 
 
 def _quarters(triangles: np.ndarray) -> np.ndarray:
-    """Each triangle (n, 3, 2) as four equal ones, in a row. (4 n, 3, 2)"""
+    """Cut each triangle (n, 3, 2) into four of equal area, listed one after another. (4 n, 3, 2)"""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

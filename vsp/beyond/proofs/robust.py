@@ -1,9 +1,9 @@
-"""What holds of SimpleGoal's program, and under disturbances: boxes of a grid, and where they can go.
+"""Prove over a grid what SimpleGoal's program does, also under disturbances.
 
 The square is cut into equal boxes. From each box a step leads into the boxes that its next states can touch, over all
-cells in which the box may lie, all roundings, and all disturbances. A box is good if all of these are, or are surely in
-the goal. Boxes that are good within so many steps are found backwards. Whatever is proved in this way holds for every
-start, also on borders; what is not proved may hold nevertheless.
+cells that the box may overlap, all roundings, and all disturbances. A box is good if all of these boxes are good or
+surely in the goal. Boxes that are good within a given number of steps are found backwards. What is proved in this way
+holds for every start, also on borders. What is not proved may still hold.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from ...tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
 from .grid import Way, around, steps_into
 from .simplegoal import check_provable
 
-SEEN = 1e-7  # observations are float32, and may be so far from the state
-TIES = 1e-12  # share of the distances: far more than float64 loses in one
-ROUNDING = 1e-9  # far more than float64 loses in a step; goal and pit are narrower and wider by as much
+SEEN = 1e-7  # largest distance of an observation (float32) from the state
+TIES = 1e-12  # relative to the distances: far more than float64 loses in one
+ROUNDING = 1e-9  # far more than float64 loses in a step; the goal is narrower and the pit wider by as much
 
 
 def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1000) -> np.ndarray:
-    """The most steps from every state of a box into the goal, never into the pit; 0 where this is not proved. (n, n)
+    """Return the most steps from any state of each box into the goal, without entering the pit; 0 where this is not
+    proved. (n, n)
 
     Row i, column j: the box from (i / n, j / n). Each step may be disturbed by up to `disturbance` in both coordinates.
     Raises ValueError for a policy that is not made of linear maps for SimpleGoal, and for numbers out of range.
@@ -38,8 +39,9 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
 
 
 def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
-    """The largest disturbance of a step under which every start outside the pit is proved to arrive; NaN: not even
-    without one. To `tolerance`. A coarse grid finds less, by about 1 / n."""
+    """Return the largest disturbance of a step, to `tolerance`, under which every start outside the pit is proved to
+    reach the goal; NaN if this is not proved even without a disturbance. A coarse grid finds a smaller one, by about
+    1 / n."""
     check_number("tolerance", tolerance, least=1e-6, most=0.1)
     low, high = 0.0, STRIDE
     if not proved(steps_to_goal(policy, n=n)):
@@ -51,19 +53,19 @@ def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: floa
 
 
 def proved(steps: np.ndarray) -> bool:
-    """Whether every start outside the pit arrives, from `steps_to_goal`."""
+    """Return whether every start outside the pit reaches the goal, by the result of `steps_to_goal`."""
     return bool((steps > 0)[outside_pit(steps)].all())
 
 
 def outside_pit(steps: np.ndarray) -> np.ndarray:
-    """Which boxes of a grid like `steps` (n, n) have starts outside the pit. (n, n)"""
+    """Return which boxes of a grid like `steps` (n, n) have starts outside the pit. (n, n)"""
     low, high = (np.arange(len(steps)) + end for end in (0, 1))
     within = (low > PIT_LOW * len(steps) - ROUNDING) & (high < PIT_HIGH * len(steps) + ROUNDING)
     return ~np.logical_and.outer(within, within)
 
 
 def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int) -> Way:
-    """Where a step by the map of `cell` leads from each box `low` to `high` (2, n * n) that touches the cell."""
+    """Bound where a step by the map of `cell` leads from each box `low` to `high` (2, n * n) that touches the cell."""
     seen_low, seen_high, tie = low - SEEN, high + SEEN, largest_tie(policy, np.ones(2))
     touched = np.ones(low.shape[1], dtype=bool)
     for other in range(len(policy)):
@@ -74,7 +76,7 @@ def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, sp
     for axis in (0, 1):
         *weights, bias = policy.coefficients[cell, :, axis]
         raw = np.stack(_bounds(weights, bias, seen_low, seen_high))
-        free = (np.abs(raw) <= 1.0).all(axis=0)  # no limit acts: state and action together, which is narrower
+        free = (np.abs(raw) <= 1.0).all(axis=0)  # no limit acts: bounding state and action together is tighter
         both = _bounds([(i == axis) + STRIDE * w for i, w in enumerate(weights)], STRIDE * bias, low, high)
         slack = spread + STRIDE * SEEN * np.abs(weights).sum()
         for after, own, action, one, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
@@ -84,28 +86,30 @@ def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, sp
 
 
 def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: int) -> Way:
-    """The way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls."""
+    """Return the way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls limit
+    them."""
     after_low, after_high = (np.clip(one, 0.0, 1.0) for one in (after_low, after_high))
     in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
     return Way(boxes, *around(after_low * n - ROUNDING, after_high * n + ROUNDING, n), ~in_pit)
 
 
 def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the largest value of a linear function over boxes."""
+    """Return the least and the largest value of a linear function over boxes."""
     ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
     return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
 
 
 def largest_tie(policy: VoronoiPolicy, reach: np.ndarray) -> float:
-    """Up to which difference of two distances (of squares, where it is Euclidean) rounding may decide, for observations
-    up to `reach` (d,) in size."""
+    """Return the largest difference of two distances at which rounding may decide which is smaller, for observations up
+    to `reach` (d,) in size. Euclidean distances are squared."""
     sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
     return TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
 
 
 def least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """How much farther observations in a box are from codeword `cell` than from `other`, at least, as the look-up
-    measures (in squares, where it is Euclidean): each coordinate adds a monotone function. `low`, `high` (d, m)."""
+    """Bound from below how much farther observations in a box are from codeword `cell` than from `other`. `low`, `high`
+    (d, m). Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone
+    function."""
     found = 0.0
     for axis, scale in enumerate(policy.scale):
         gaps = []

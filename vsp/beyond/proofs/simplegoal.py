@@ -1,11 +1,12 @@
-"""SimpleGoal under a policy of linear maps, followed from every start at once, in exact arithmetic.
+"""Follow a policy of linear maps from every start of SimpleGoal at once, in exact arithmetic.
 
-In each step the square of starts is cut into convex pieces on which the next state is one affine function of the start:
-by the borders of the cells, the limits of the actions, and the walls. Goal and pit cut once more. The numbers of the
-policy are taken as they are stored, those of the task as they are written: a stride of 1/10, a pit from 2/5 to 3/5.
+In each step the square of starts is cut into convex pieces on which the next state is one affine function of the start.
+The cuts are the borders of the cells, the limits of the actions, and the walls. Goal and pit cut once more. The numbers
+of the policy are taken as they are stored, those of the task as they are written: a stride of 1/10, a pit from 2/5 to
+3/5.
 
-The time goes into long integers: each step makes the corners some 50 to 90 binary digits longer. For the paper's policy
-of 13 cells they have 115 after one step, and up to 1,400 after 16.
+Long integers take most of the time: each step makes the corners some 50 to 90 binary digits longer. For the paper's
+policy of 13 cells they have 115 digits after one step, and up to 1,400 after 16.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from .polygons import Line, Polygon, box, line_of, reduced
 STRIDE, GOAL_EDGE = Fraction(1, 10), Fraction(1, 10)
 PIT_LOW, PIT_HIGH = Fraction(2, 5), Fraction(3, 5)
 METRICS = ("euclidean", "manhattan")
-MOST = 200_000  # pieces: some minutes
+MOST = 200_000  # most pieces: some minutes
 SQUARE = box((Fraction(0), Fraction(1)), (Fraction(0), Fraction(1)))
 
 Form = tuple[Fraction, Fraction, Fraction]  # p x + q y + r of a state (x, y)
@@ -40,18 +41,18 @@ class State:
     unit: int = 1
 
     def pull(self, line: Line) -> Line:
-        """The line of those starts whose states lie on `line`; (0, 0, 0) if all do."""
+        """Return the line of those starts whose states lie on `line`; (0, 0, 0) if all do."""
         return reduced(self._combined(*line))
 
     def moved(self, forms: tuple[Form, Form]) -> State:
-        """The state whose coordinates are `forms` of this one."""
+        """Return the state whose coordinates are `forms` of this one."""
         common = lcm(*(number.denominator for form in forms for number in form))
         found = [self._combined(*(int(number * common) for number in form)) for form in forms]
         shared = gcd(unit := common * self.unit, *found[0], *found[1])
         return State(tuple(tuple(number // shared for number in one) for one in found), unit // shared)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """The state from one start, rounded."""
+        """Return the state from one start, rounded."""
         return tuple(a / self.unit * x + b / self.unit * y + c / self.unit for a, b, c in self.coordinates)
 
     def _combined(self, p: int, q: int, r: int) -> Line:
@@ -61,8 +62,8 @@ class State:
 
 @dataclass(frozen=True)
 class Step:
-    """What all states of a piece have in common in a step: the cell, and per coordinate at which limit the action is
-    and at which wall the next state (-1 the low one, 1 the high one, 0 neither)."""
+    """What all states of a piece have in common in a step: the cell, and for each coordinate the limit that the action
+    reaches and the wall that the next state reaches (-1 the low one, 1 the high one, 0 neither)."""
 
     cell: int
     limits: tuple[int, int]
@@ -80,7 +81,7 @@ class Piece:
     outcome: int = RUNNING
 
     def bounds(self) -> list[tuple[Fraction, Fraction]]:
-        """Between which values each coordinate of the state lies."""
+        """Return the least and the largest value of each coordinate of the state."""
         found = []
         for a, b, c in self.state.coordinates:
             values = [Fraction(a * x + b * y + c * w, self.state.unit * w) for x, y, w in self.starts.corners]
@@ -89,10 +90,10 @@ class Piece:
 
 
 def follow(policy: VoronoiPolicy, *, starts: Polygon = SQUARE, most: int = MOST) -> list[Piece]:
-    """The pieces of `starts`, with how each ends: at the goal, in the pit, or truncated.
+    """Cut `starts` into pieces and follow each to its end: at the goal, in the pit, or truncated.
 
-    Raises ValueError for a policy of another task or class, for a metric that is not in `METRICS`, and where there are
-    more than `most` pieces: a policy that wanders cuts the square ever finer.
+    Raises ValueError for a policy of another task or class, for a metric that is not in `METRICS`, and for more than
+    `most` pieces: a policy that wanders cuts the square ever finer.
     """
     loop, ended, running = Loop(policy), [], [Piece(starts)]
     for t in range(TASK.max_steps):
@@ -105,7 +106,7 @@ def follow(policy: VoronoiPolicy, *, starts: Polygon = SQUARE, most: int = MOST)
 
 
 class Loop:
-    """The closed loop: a policy, and the task that answers it."""
+    """The closed loop of a policy and the task."""
 
     def __init__(self, policy: VoronoiPolicy):
         check_provable(policy)
@@ -113,7 +114,7 @@ class Loop:
         self.distance = Distance(policy)
 
     def advance(self, piece: Piece) -> Iterator[Piece]:
-        """The pieces into which one step cuts `piece`, after it."""
+        """Cut `piece` by one step, and yield the parts after the step."""
         for part, cell in self.distance.cells(piece):
             for acting, actions, limits in _clipped_both(part, self.maps[cell], -ONE, ONE):
                 wanted = [_sum(state, action, STRIDE) for state, action in zip((X, Y), actions)]
@@ -123,7 +124,8 @@ class Loop:
 
 
 class Distance:
-    """Which codeword is nearest, of equally near ones the lowest: a tie over an area has to be decided too."""
+    """Finds the nearest codeword. Of equally near ones it takes the first, because a tie over an area has to be decided
+    too."""
 
     def __init__(self, policy: VoronoiPolicy):
         self.codewords = [_exact(codeword) for codeword in policy.codewords]
@@ -131,9 +133,9 @@ class Distance:
         self.metric = policy.metric
 
     def cells(self, piece: Piece) -> Iterator[tuple[Piece, int]]:
-        """The parts of `piece` by their cells."""
+        """Yield the parts of `piece`, each with its cell."""
         state = [float(value) for value in piece.state.at(*piece.starts.middle())]
-        near = sorted(range(len(self.codewords)), key=lambda i: self._between(state, i))  # most are soon decided
+        near = sorted(range(len(self.codewords)), key=lambda i: self._between(state, i))  # nearest first, for speed
         bounds = piece.bounds() if self.metric == "manhattan" else None
         yield from self._among(piece, near, bounds)
 
@@ -152,7 +154,8 @@ class Distance:
             yield from self._among(part, [nearer, *rivals[2:]], bounds)
 
     def _range(self, i: int, j: int, bounds) -> tuple[Fraction, Fraction]:
-        """Between which values `gap` lies where the state is within `bounds`: it is monotone in each coordinate."""
+        """Return the least and the largest value of `gap` for states within `bounds`: it is monotone in each
+        coordinate."""
         least = most = Fraction(0)
         for weight, ends, c, d in zip(self.weights, bounds, self.codewords[i], self.codewords[j]):
             low, high = sorted(weight * (abs(end - c) - abs(end - d)) for end in ends)
@@ -160,9 +163,9 @@ class Distance:
         return least, most
 
     def _compared(self, piece: Piece, i: int, j: int) -> Iterator[tuple[Piece, int]]:
-        """The parts of `piece` by the nearer of two codewords, of which `i` is the lower."""
+        """Yield the parts of `piece`, each with the nearer of two codewords; `i` is the lower index."""
         sides = ()
-        if self.metric == "manhattan":  # a distance is affine where no coordinate passes that of its codeword
+        if self.metric == "manhattan":  # a distance is affine where no coordinate passes the codeword's
             for axis, value in ((axis, self.codewords[which][axis]) for axis in (0, 1) for which in (i, j)):
                 low, high = _split(piece, _minus((X, Y)[axis], value))
                 if low and high:
@@ -176,11 +179,11 @@ class Distance:
         if farther:
             yield farther, j
 
-    @cache  # noqa: B019 - as long as the proof
+    @cache  # noqa: B019 - it lives as long as the proof
     def gap(self, i: int, j: int, sides: tuple[int, ...] = ()) -> Form:
-        """The distance (the squared one of "euclidean") to `i` minus that to `j`.
+        """Return the distance (for "euclidean", the squared distance) to `i` minus that to `j`.
 
-        `sides` of "manhattan": on which sides of the two codewords the first coordinate lies, then the second.
+        `sides`, for "manhattan": on which side of each of the two codewords the first coordinate lies, then the second.
         """
         found = (0 * ONE, 0 * ONE, 0 * ONE)
         for axis, weight in enumerate(self.weights):
@@ -199,14 +202,14 @@ def check_provable(policy: VoronoiPolicy) -> None:
         raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy: others have no cells to follow")
     policy.check_linear()
     if policy.task.name != TASK.name:
-        why = "whose steps are affine but for limits and walls: others need a proof of their own"
+        why = "whose steps are affine except for limits and walls: other tasks need their own proof"
         raise ValueError(f"the policy is for {policy.task.name}, expected {TASK.name}, {why}")
     if policy.metric not in METRICS:
         raise ValueError(f"the policy has metric {policy.metric!r}, expected one of {METRICS}")
 
 
 def _ended(piece: Piece) -> Iterator[Piece]:
-    """The parts of `piece` in the goal, in the pit, and elsewhere; both are open."""
+    """Yield the parts of `piece` in the goal, in the pit, and elsewhere; goal and pit are open sets."""
     for part, inside in _within(piece, IN_GOAL):
         if inside:
             yield replace(part, outcome=GOAL)
@@ -216,7 +219,7 @@ def _ended(piece: Piece) -> Iterator[Piece]:
 
 
 def _within(piece: Piece, forms: list[Form]) -> Iterator[tuple[Piece, bool]]:
-    """The parts of `piece` where a form is not positive, and the part where all are."""
+    """Yield the parts of `piece` where a form is not positive, and the part where all forms are."""
     for form in forms:
         outside, piece = _split(piece, form)
         if outside:
@@ -227,7 +230,7 @@ def _within(piece: Piece, forms: list[Form]) -> Iterator[tuple[Piece, bool]]:
 
 
 def _clipped_both(piece: Piece, forms: list[Form], low: Fraction, high: Fraction):
-    """The parts of `piece` by how two forms are limited: the part, the forms there, and at which limits they are."""
+    """Yield the parts of `piece` by the limits that two forms reach: the part, the limited forms, and these limits."""
     for first, x, at_x in _clipped(piece, forms[0], low, high):
         for second, y, at_y in _clipped(first, forms[1], low, high):
             yield second, (x, y), (at_x, at_y)
@@ -246,7 +249,7 @@ def _clipped(piece: Piece, form: Form, low: Fraction, high: Fraction) -> Iterato
 
 
 def _split(piece: Piece, form: Form) -> tuple[Piece | None, Piece | None]:
-    """The parts of `piece` where a form of the state is at most 0, and above. What has no area is left out."""
+    """Return the parts of `piece` where a form of the state is at most 0, and above 0; None for a part without area."""
     line = piece.state.pull(line_of(form))
     if line == (0, 0, 0):
         return piece, None
@@ -268,7 +271,7 @@ def _below(edge: Fraction, form: Form) -> Form:
     return -form[0], -form[1], edge - form[2]
 
 
-IN_GOAL = [_below(GOAL_EDGE, axis) for axis in (X, Y)]  # where these are positive
+IN_GOAL = [_below(GOAL_EDGE, axis) for axis in (X, Y)]  # inside, all of these are positive
 IN_PIT = [form for axis in (X, Y) for form in (_minus(axis, PIT_LOW), _below(PIT_HIGH, axis))]
 
 

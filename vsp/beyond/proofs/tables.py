@@ -1,4 +1,4 @@
-"""What was proved, as tables and curves: from data/results/proofs*.csv and the certificates."""
+"""Tables and curves of what is proved, from data/results/proofs*.csv and the certificates."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ NAMES = {
     "simplegoal_tuned": "tuned",
     "simplegoal_margin": "tuned with a margin",
 }
-N_RETURNS = 2000  # starts whose mean return stands beside a dead point
+N_RETURNS = 2000  # starts for the mean return in `dead_point_table`
 
 
 def simplegoal_table() -> pd.DataFrame:
-    """What is certain of policies for SimpleGoal, one row per policy.
+    """Return what is proved of policies for SimpleGoal, one row per policy.
 
-    Columns: policy, cells; failing, the exact area of starts that do not reach the goal, outside, of those outside the
-    pit, sampled, the share of 10^6 episodes; steps, the most; mean, its lower bound; program, the share of starts
-    outside the pit that the program surely takes to the goal; disturbance, the largest one that it stands.
+    Columns: policy; cells; failing, the exact area of starts that do not reach the goal; outside, the same for starts
+    outside the pit; sampled, the share of 10^6 episodes that fail; steps, the most; mean, the lower bound on the mean
+    return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
+    largest one under which all of these surely reach it.
     """
     rows = read_results("proofs").set_index("name").loc[list(NAMES)]
     table = pd.DataFrame({"policy": rows.index.map(NAMES), "cells": rows["cells"].to_numpy()})
@@ -46,10 +47,10 @@ def simplegoal_table() -> pd.DataFrame:
 
 
 def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
-    """Whether policies for MountainCar have a dead point, and what they return.
+    """Return whether policies for MountainCar have a dead point, and their returns.
 
-    Columns: policy; left and right, the acceleration at rest at both ends of the starts times 1000; borders, of cells
-    between them; dead point, where one is (NaN: nowhere); mean return; failing, the share of starts.
+    Columns: policy; left and right, 1000 times the acceleration at rest at both ends of the starts; borders, the number
+    of cell borders between them; dead point, its position (NaN: none); mean return; failing, the share of starts.
     """
     rows = []
     for name, policy in policies.items():
@@ -66,32 +67,33 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
 
 
 def pendulum_table() -> pd.DataFrame:
-    """What is proved of Pendulum by a grid, and by smaller and smaller boxes of starts. Columns: boxes (so many would
-    cut an axis), share of starts."""
+    """Return what is proved of Pendulum by a grid, and by smaller and smaller boxes of starts. Columns: boxes (per
+    axis, if all were so small), share of starts."""
     return read_results("proofs_grid")[["boxes", "share"]]
 
 
 def teacher_table() -> pd.DataFrame:
-    """What is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit, steps (at
-    most), minutes that it took."""
+    """Return what is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit,
+    steps (at most), minutes (computing time)."""
     found = read_results("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
     return found.assign(minutes=found["seconds"] / 60).drop(columns="seconds")
 
 
 def least_returns() -> tuple[np.ndarray, np.ndarray]:
-    """MountainCar's starts, and the least return that the program has from there. (n,) each"""
+    """Return MountainCar's starts, and the lowest return of the program from there. (n,) each"""
     blocks = load_certificate("mountaincar_limit")[1]["pieces"]
     middles = [edge(block["first"] + block["n"] // 2, -1) for block in blocks]
     return np.array(middles), np.array([block["least"] for block in blocks])
 
 
 def pendulum_steps() -> np.ndarray:
-    """Pendulum's boxes, angle by angular velocity: steps upright, -1 in the set, 0 where nothing is proved. (n, n)"""
+    """Return the steps to upright of Pendulum's boxes, angle by angular velocity; -1 in the set around upright, 0 where
+    nothing is proved. (n, n)"""
     return unpacked(load_certificate("pendulum_faithful")[1]["pieces"])
 
 
 def _zero(policy: VoronoiPolicy, part: pd.Series) -> float:
-    """Where the acceleration at rest is zero, in a part in which it changes its sign."""
+    """Find where the acceleration at rest is zero, in a part of the starts where it changes its sign."""
     from scipy.optimize import brentq
 
     from .dead_points import acceleration

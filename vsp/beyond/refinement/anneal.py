@@ -10,11 +10,11 @@ from ...subpolicies.stacked import BETA1, BETA2, EPSILON
 from .config import Refinement
 from .units import Cells, LabelledStates
 
-WARM = 10  # in units of the final temperature: where cells that are good already are annealed from
+WARM = 10  # initial temperature for cells that are already good, in units of the final temperature
 
 
 def warm(config: Refinement) -> Refinement:
-    """`config` for cells that are good already: annealing begins colder and takes half as many steps."""
+    """Return `config` for cells that are already good: annealing begins colder and takes half as many steps."""
     heat = min(config.initial_temperature, WARM * config.final_temperature)
     return replace(config, initial_temperature=heat, n_steps=max(1, config.n_steps // 2))
 
@@ -46,8 +46,8 @@ def random_init(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells
 def anneal(seen: LabelledStates, cells: Cells, config: Refinement, rng: np.random.Generator) -> Cells:
     """Optimise codewords and maps by Adam while the temperature falls from the initial to the final one of `config`.
 
-    Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance, and the
-    temperature says how fast. The last tenth of the steps stays at the final temperature.
+    Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
+    lower the temperature, the faster they fall. The last tenth of the steps stays at the final temperature.
     """
     unit = temperature_unit(seen, len(cells.codewords))
     first, n_steps = config.initial_temperature, config.n_steps
@@ -66,9 +66,10 @@ def anneal(seen: LabelledStates, cells: Cells, config: Refinement, rng: np.rando
 
 
 def temperature_unit(seen: LabelledStates, k: int) -> float:
-    """The variance of the states inside one of k cells: much hotter, codewords collapse onto each other and stay there.
+    """Return the variance of the states inside one of k cells. At much higher temperatures, codewords collapse onto
+    each other and stay there.
 
-    A single state has none; its unit is 1.
+    A single state has no variance; its unit is 1.
     """
     states = seen.inputs[:, :-1]
     return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])

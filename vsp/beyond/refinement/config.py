@@ -10,7 +10,7 @@ from ...checks import check_count, check_number
 from ...config import check_field
 from ...tasks import Task, get_task
 
-MOST_CELLS, MOST = 1000, 10**8  # cells that a person could look at, and numbers of anything else: beyond lies a slip
+MOST_CELLS, MOST = 1000, 10**8  # largest plausible number of cells, and of anything else: a larger value is a mistake
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Refinement:
     n_episodes: int = 500
     """Episodes of the teacher that the first fit sees."""
     n_restarts: int = 3
-    """Fits from other random initial cells; the one with the best validation score is kept."""
+    """Fits from different random initial cells; the one with the best validation score is kept."""
     n_steps: int = 1500
     """Steps of Adam in a first fit; later fits continue from the last one and take half as many."""
     batch_size: int = 256
@@ -51,7 +51,7 @@ class Refinement:
     """First standard deviation of CMA-ES, in scaled units."""
     failure_penalty: float = 0.0
     """Subtracted from the mean return per failed episode, wherever candidates are compared: a mean hides rare failures.
-    An episode fails if it does not end in a goal; for tasks without a goal, such as walking, leave it at 0."""
+    An episode fails if it does not end in a goal. For tasks without a goal, such as walking, leave it at 0."""
     error_penalty: float = 0.0
     """Subtracted from the mean return per unit of mean squared action error (in half action ranges, on the teacher's
     states). 0 maximises the return alone, however much the policy then differs from the teacher."""
@@ -81,25 +81,26 @@ class Faithful:
     n_cells: int
     """Cells of the policy, at most."""
     tolerance: float | None = None
-    """What a mean return may be lower than it should be, in units of return: half of it is accepted. None: 2 % of the
-    teacher's mean return."""
+    """Tolerance of the mean return, in units of return: a candidate is accepted if it misses its target by at most half
+    of it. None: 2 % of the teacher's mean return."""
     margin: float = 0.0
-    """What the mean return should be above the teacher's, from the same starts."""
+    """Target for the mean return minus the teacher's, from the same starts."""
     failure_penalty: float = 0.0
     """Subtracted from the mean return per failed episode, as in `Refinement`."""
     min_r2: float | None = None
-    """None: as like the teacher as its return allows. Otherwise the highest return of all policies whose R² is this or
-    more: a point on the way from the teacher's actions to the best return."""
+    """None: find the policy most like the teacher among those that return enough. Otherwise, find the highest return
+    among policies whose R² is at least this: a point on the trade-off between the teacher's actions and the best
+    return."""
     n_episodes: int = 30_000
     """Episodes of the teacher that the fit sees."""
     n_states: int = 60_000
-    """States of these episodes that are kept, evenly over where they lie."""
+    """States of these episodes that are kept, as dense as all of them (`search.spread`)."""
     n_restarts: int = 32
-    """Descents from other random initial cells; the closest imitation is kept."""
+    """Descents from different random initial cells; the closest imitation is kept."""
     n_generations: int = 250
     """Generations of CMA-ES that raise the return where it is below the teacher's."""
     n_tuning_episodes: int = 500
-    """Episodes that each candidate of a generation plays, from starts drawn anew out of twenty times as many."""
+    """Episodes that each candidate of a generation plays; the starts are drawn anew from twenty times as many."""
     n_validation: int = 5000
     """Episodes that decide which candidate is kept."""
 
@@ -121,18 +122,18 @@ class Faithful:
 
 
 def _is_off(value: object, kind: type) -> bool:
-    """Whether `value` is 0, which switches a part off."""
+    """Return whether `value` is 0, which switches a part off."""
     return value == 0 and isinstance(value, int | kind) and not isinstance(value, bool)
 
 
 def _tenth(config, *names: str):
-    """`config` with a tenth of each of these numbers, at least 1 where it is not 0."""
+    """Return `config` with a tenth of each of these numbers, at least 1 where the number is not 0."""
     values = {name: getattr(config, name) for name in names}
     return dataclasses.replace(config, **{name: value and max(1, value // 10) for name, value in values.items()})
 
 
 def check_faithful(config: Faithful) -> None:
-    """Raise ValueError for anything else, such as a `Refinement`."""
+    """Raise ValueError unless `config` is a `Faithful`."""
     if not isinstance(config, Faithful):
         raise ValueError(f"config is {config!r}, expected a Faithful, such as vsp.preset('SimpleGoal-v0', 'faithful')")
 
@@ -149,8 +150,8 @@ _FAITHFUL = {
         n_cells=8, tolerance=1.0, n_episodes=1500, n_generations=60, n_tuning_episodes=100,
         n_validation=1000,
     ),
-    # Many generations of few episodes: in a third as many, of 40 episodes, the search did not arrive. Without a price
-    # on failures some seeds end with a crash in forty landings
+    # Many generations of few episodes: a third as many generations, of 40 episodes, did not reach the target. Without a
+    # failure penalty, some seeds end with a crash in forty landings
     "LunarLanderContinuous-v3": Faithful(
         n_cells=8, tolerance=4.0, margin=3.0, failure_penalty=100.0, n_episodes=300, n_generations=130,
         n_tuning_episodes=12, n_validation=300,
@@ -159,10 +160,10 @@ _FAITHFUL = {
 
 
 def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: float | None = None) -> Faithful:
-    """The settings of `distill_faithfully` for any task; `n_cells` and `min_r2` as in `Faithful`.
+    """Return the settings of `distill_faithfully` for any task; `n_cells` and `min_r2` as in `Faithful`.
 
-    Of a task that nobody has tried they follow from its dimensions, its length, and whether it has a physics engine,
-    which steps one state at a time.
+    For a task without tested settings, they follow from its dimensions, its length, and whether it has a physics
+    engine, which steps one state at a time.
     """
     task = get_task(task)
     found = _FAITHFUL.get(task.name) or _by_size(task)
@@ -170,7 +171,7 @@ def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: flo
 
 
 def _by_size(task: Task) -> Faithful:
-    steps = 60_000 if task.one_by_one else 300_000  # of the teacher, if episodes are as long as may be
+    steps = 60_000 if task.one_by_one else 300_000  # of the teacher, if all episodes have the maximum length
     episodes = min(max(100, steps // task.max_steps), 30_000)
     generations, tuning, validation = (40, 20, 200) if task.one_by_one else (100, 100, 1000)
     return Faithful(
@@ -180,14 +181,14 @@ def _by_size(task: Task) -> Faithful:
 
 
 def check_refinement(config: Refinement) -> None:
-    """Raise ValueError for anything else, such as a `Config`."""
+    """Raise ValueError unless `config` is a `Refinement`."""
     if not isinstance(config, Refinement):
         raise ValueError(f"config is {config!r}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'tuned')")
 
 
 _TUNED = {
     "SimpleGoal-v0": Refinement(n_cells=4, n_restarts=6, n_generations=150, failure_penalty=100.0),
-    # One failure in ten thousand costs ten points of return: tuning makes the force so gentle that it may not suffice
+    # One failure in ten thousand costs ten points of return: else tuning makes the force so gentle that it may fail
     "MountainCarContinuous-v0": Refinement(
         n_cells=3, n_episodes=100, n_correction_episodes=50, n_generations=40, n_tuning_episodes=30,
         failure_penalty=100_000.0,
@@ -202,7 +203,8 @@ _TUNED = {
 
 
 def tuned_preset(task: str | Task) -> Refinement:
-    """The settings of `refine` for `task`: a high return. Raises ValueError for a task without any."""
+    """Return the settings of `refine` for `task`, chosen for a high return. Raises ValueError for a task without a
+    preset."""
     name = get_task(task).name
     if name not in _TUNED:
         raise ValueError(f"no preset for task {name!r}, expected one of {list(_TUNED)}: write a Refinement of your own")

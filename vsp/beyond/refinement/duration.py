@@ -1,4 +1,4 @@
-"""How long `distill_faithfully` will take, measured on this machine in a moment."""
+"""Estimate how long `distill_faithfully` will take, from a short measurement on this machine."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from .tune import candidates_per_generation
 from .units import METRIC, Cells, LabelledStates
 
 PLAYED, IN_BATCH = 10, 500  # episodes of the teacher that are timed: one by one, or in one batch
-STEPS = 20  # of such a batch, by cells
+STEPS = 20  # steps of such a batch that are timed for cells
 
 
 @threadpool_limits.wrap(limits=1)
 def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[float, float]:
-    """About how many seconds the fit takes, and how many more the tuning, where the return needs it.
+    """Estimate the seconds of the fit, and the further seconds of the tuning, which runs only if the return needs it.
 
-    From the times of some episodes and of one loss, and from how many there will be of each.
+    The estimate multiplies the times of some episodes and of one loss by how many of each there will be.
     """
     starts = task.start(np.random.default_rng(0), PLAYED if task.one_by_one else IN_BATCH)
-    rollout(teacher, task, starts[:1])  # the first takes longer
+    rollout(teacher, task, starts[:1])  # the first call takes longer
     by_teacher, by_cells = _of_an_episode(teacher, task, config, starts)
     candidates = config.n_generations * candidates_per_generation(_numbers(task, config))
     loss = _one_loss(task, config) * _losses(config.n_restarts, config.n_states)
@@ -37,11 +37,11 @@ def expected_seconds(teacher: Policy, task: Task, config: Faithful) -> tuple[flo
 
 
 def _of_an_episode(teacher: Policy, task: Task, config: Faithful, starts: np.ndarray) -> tuple[float, float]:
-    """Seconds of an episode of the teacher, and of cells that take as many steps."""
+    """Measure the seconds of an episode of the teacher, and of cells that take as many steps."""
     began = time.perf_counter()
     result = rollout(teacher, task, starts)
     seconds = (time.perf_counter() - began) / len(starts)
-    if task.one_by_one:  # where the physics engine takes most of it
+    if task.one_by_one:  # the physics engine takes most of the time
         return seconds, seconds
     states, m = task.begin(starts), len(task.action_low)
     seen = task.observe(states)
@@ -52,13 +52,14 @@ def _of_an_episode(teacher: Policy, task: Task, config: Faithful, starts: np.nda
 
 
 def announcement(teacher: Policy, task: Task, config: Faithful) -> str:
-    """How long it will take, in words."""
+    """Say in words how long it will take."""
     fit, tuning = expected_seconds(teacher, task, config)
     return f"{in_words(fit)}, and {in_words(tuning)} more where its return has to be raised"
 
 
 def _losses(n_restarts: int, n_states: int) -> float:
-    """Losses on `search.FEW` states that `least_error` computes, one per iteration; the last ones see all states."""
+    """Return how many losses on `search.FEW` states `least_error` computes, one per iteration; the last ones use all
+    states."""
     live, found = n_restarts, 0
     for stages, n_kept in search.ROUNDS:
         found, live = found + len(stages) * live, min(live, n_kept)
@@ -86,7 +87,7 @@ def _seconds(work) -> float:
 
 
 def in_words(seconds: float) -> str:
-    """As "about 20 seconds" or "about 3 minutes"."""
+    """Return `seconds` in words, such as "about 20 seconds" or "about 3 minutes"."""
     if seconds < 90:
         return f"about {max(5, 5 * round(seconds / 5))} seconds"
     return f"about {round(seconds / 60)} minutes"

@@ -1,7 +1,7 @@
-"""`distill_faithfully`: few cells that act like the teacher and return what it returns.
+"""`distill_faithfully`: find few cells that act like the teacher and match its return.
 
-The cells with the least action error come first; then CMA-ES raises their return to the teacher's where that costs the
-least error. The return is a constraint, not the aim: beyond the teacher's it earns nothing.
+First it finds the cells with the least action error. Then CMA-ES raises their return to the teacher's where that costs
+the least error. The return is a constraint, not the objective: a return above the teacher's earns nothing.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from .tune import cma_es, is_snapshot
 from .units import Cells, Frame, LabelledStates
 
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
-TUNING_STATES = 8000  # on which the error of a candidate is measured
-POOL = 20  # times the episodes of a generation: the starts that generations draw from, where the teacher plays once
-MANY = 150  # numbers; of more, the tuning learns no covariances: it is too short for them
-FIRST_STEP = 0.02  # of the tuning: its candidates have about so much more error, relatively
-NUDGE = 0.05  # of a codeword, for the curvature of the error; in deviations of the states
-SHARE = 0.02  # of the teacher's mean return: the tolerance, if none is given
-BEYOND = 0.001  # unexplained variance beyond that of `min_r2` that weighs as much as a tolerance of return
-NEAR = 2.0  # times the error of the closest cells: the most of what is kept where no candidate returns enough
-PRICE = 0.03  # of a return that is missed by the whole tolerance, in units of the unexplained variance, 1 - R²
+TUNING_STATES = 8000  # states on which the error of a candidate is measured
+POOL = 20  # times the episodes of a generation: size of the pool of starts, from each of which the teacher plays once
+MANY = 150  # with more numbers, the tuning learns no covariances: it is too short for them
+FIRST_STEP = 0.02  # relative increase of the error by the first candidates of the tuning, about
+NUDGE = 0.05  # move of a codeword that shows the curvature of the error, in deviations of the states
+SHARE = 0.02  # default tolerance, as a share of the teacher's mean return
+BEYOND = 0.001  # unexplained variance beyond that of `min_r2` that costs as much as one tolerance of return
+NEAR = 2.0  # times the error of the closest cells: limit for what is kept if no candidate returns enough
+PRICE = 0.03  # penalty for missing the return by one tolerance, in units of the unexplained variance, 1 - R²
 
 
 @threadpool_limits.wrap(limits=1)
@@ -45,8 +45,8 @@ def distill_faithfully(
     """Distil `teacher` to at most `config.n_cells` cells that act like it and are as good. Same arguments, same policy.
 
     Returns the policy and its history, one row per candidate: stage ("fit", "tune"), r2 (of the limited actions, on the
-    states of the fit), gap (of the mean return, less the failure penalty, to the teacher's from the same starts), kept.
-    The most visited cell comes first. Warns where no such policy is found. Raises ValueError as `distill` does.
+    states of the fit), gap (mean return less the failure penalty, minus the teacher's from the same starts), kept. The
+    most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does.
     """
     check_seed(seed)
     check_faithful(config)
@@ -66,7 +66,7 @@ def distill_faithfully(
         for tuned in _tune(frame, teacher, some, cells, config, search):
             judge.add("tune", tuned)
     if judge.shortfall:
-        warnings.warn(judge.shortfall, stacklevel=4)  # of whoever calls `vsp.distill`
+        warnings.warn(judge.shortfall, stacklevel=4)  # points at the caller of `vsp.distill`
     cells, fewer = judge.best, needed_only(judge.best, seen)
     if len(fewer.codewords) < len(cells.codewords) and judge.returns_enough(fewer):
         cells = fewer
@@ -76,7 +76,8 @@ def distill_faithfully(
 class _Judge:
     """Chooses between candidates: the least error among those whose return is accepted.
 
-    Where none is, the highest return among those `NEAR` the closest, which is the first.
+    If none is accepted, it chooses the highest return among those with at most `NEAR` times the error of the first,
+    which is the closest.
     """
 
     def __init__(self, frame: Frame, teacher: Policy, seen: LabelledStates, config: Faithful, starts: np.ndarray):
@@ -97,7 +98,7 @@ class _Judge:
         return score(result, self._config.failure_penalty) - self._own
 
     def returns_enough(self, cells: Cells) -> bool:
-        """Whether they return as much as the best, or what is accepted."""
+        """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
         kept = self.rows[self._best]["gap"]
         return self._gap(cells) >= (kept if self._config.min_r2 is not None else min(kept, self._least_gap))
 
@@ -111,18 +112,18 @@ class _Judge:
 
     @property
     def shortfall(self) -> str | None:
-        """What was asked for and not found, in words."""
+        """The requirement that no candidate meets, in words; None if one meets all."""
         kept, cells, floor = self.rows[self._best], self._config.n_cells, self._config.min_r2
         if floor is not None and kept["r2"] < floor:
             return f"no policy of {cells} cells with R² {floor:g} was found: the closest is kept, R² {kept['r2']:.3f}"
         if floor is None and kept["gap"] < self._least_gap:
-            what = f"{kept['gap']:+.4g} over the teacher's return less penalties, expected {self._least_gap:+.4g}"
-            return f"no policy of {cells} cells that acts like the teacher returns enough: the best has {what}"
+            what = f"{kept['gap']:+.4g} to the teacher's return less penalties, expected {self._least_gap:+.4g} or more"
+            return f"no policy of {cells} cells that acts like the teacher returns enough: the best has a gap of {what}"
         return None
 
     @property
     def goes_on(self) -> bool:
-        """Whether tuning may gain: not where the closest cells return enough already, and no more is asked for."""
+        """Whether tuning may gain: always with `min_r2`, else only if the closest cells do not return enough."""
         return self._config.min_r2 is not None or self.rows[-1]["gap"] < self._least_gap
 
     @property
@@ -134,12 +135,13 @@ class _Judge:
 
 
 def _first_by(value: np.ndarray, accepted: np.ndarray, *, else_by: np.ndarray) -> int:
-    """The accepted candidate with the highest value; if none is accepted, that with the highest `else_by`."""
+    """Return the accepted candidate with the highest value; if none is accepted, the one with the highest `else_by`."""
     return int(np.where(accepted, value, -np.inf).argmax() if accepted.any() else else_by.argmax())
 
 
 def variance(seen: LabelledStates) -> float:
-    """Mean squared error of the best constant: what R² is measured against; 1 for a teacher that is constant."""
+    """Return the mean squared error of the best constant, which R² is measured against; 1 if the teacher is
+    constant."""
     found = float(seen.actions.var(axis=0).mean())
     return found if found > 1e-12 else 1.0
 
@@ -147,9 +149,10 @@ def variance(seen: LabelledStates) -> float:
 def _tune(
     frame: Frame, teacher: Policy, seen: LabelledStates, cells: Cells, config: Faithful, rng: np.random.Generator
 ) -> Iterator[Cells]:
-    """CMA-ES (Hansen 2016) on the error and the price of a return below the teacher's; yields it `SNAPSHOTS` times.
+    """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
+    `SNAPSHOTS` times.
 
-    Steps have units in which each raises the error by as much: so the search goes where fidelity costs little.
+    Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
     """
     move, _ = moves(cells, *_units(seen, cells))
     whole = variance(seen)
@@ -171,10 +174,10 @@ def _tune(
 
 
 def _cost(errors: np.ndarray, missed: np.ndarray, config: Faithful) -> np.ndarray:
-    """What is minimised, of unexplained variances and of what the returns miss (p,).
+    """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,).
 
-    The error and the price of a return that is missed; with `min_r2`, what is missed and the price of an error beyond
-    it.
+    It is the error plus a penalty for a missed return. With `min_r2`, it is the missed return plus a penalty for an
+    error beyond it.
     """
     if config.min_r2 is None:
         return errors + PRICE / config.tolerance * np.maximum(0.0, missed)
@@ -182,7 +185,7 @@ def _cost(errors: np.ndarray, missed: np.ndarray, config: Faithful) -> np.ndarra
 
 
 def _units(seen: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
-    """Bases of the maps and units of the codewords for `moves`, by the curvature of the error."""
+    """Return bases of the maps and units of the codewords for `moves`, from the curvature of the error."""
     own = cells.nearest(seen.inputs[:, :-1])
     here, vector, units = squared_error(seen, cells), cells.vector, np.empty(cells.codewords.size)
     for j in range(len(units)):
@@ -194,8 +197,8 @@ def _units(seen: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
 
 
 def needed_only(cells: Cells, seen: LabelledStates) -> Cells:
-    """Without cells that the error does not need: their states are as well served by the next codeword, as where two
-    neighbours hold the same map."""
+    """Remove cells that the error does not need: the next codeword serves their states as well, as where two neighbours
+    hold the same map."""
     while (k := len(cells.codewords)) > 1:
         errors = [squared_error(seen, _without(cells, i)) for i in range(k)]
         if min(errors) > squared_error(seen, cells):
@@ -209,8 +212,8 @@ def _without(cells: Cells, i: int) -> Cells:
 
 
 def among_states(cells: Cells, seen: LabelledStates) -> Cells:
-    """The same border between two cells, drawn by codewords among the states: of the many pairs that draw it, the one
-    around the mean state. More codewords have no such choice."""
+    """Draw the same border between two cells by codewords among the states. Of the many pairs that draw it, choose the
+    one around the mean state. With more codewords there is no such choice."""
     if len(cells.codewords) != 2:
         return cells
     states, (one, other) = seen.inputs[:, :-1], cells.codewords
@@ -221,7 +224,7 @@ def among_states(cells: Cells, seen: LabelledStates) -> Cells:
 
 
 def by_visits(cells: Cells, seen: LabelledStates) -> Cells:
-    """The same cells, the one with the most states of `seen` first."""
+    """Return the same cells, the one with the most states of `seen` first."""
     visits = np.bincount(cells.nearest(seen.inputs[:, :-1]), minlength=len(cells.codewords))
     order = np.argsort(-visits, kind="stable")
     return Cells(cells.codewords[order], cells.maps[order])

@@ -1,8 +1,8 @@
-"""`imitate`: cells that act as much like the teacher as possible, whereas `refine` maximises the return.
+"""`imitate`: find cells that act as much like the teacher as possible, whereas `refine` maximises the return.
 
-Annealing alone ends in local optima where some cells do little and others too much. So cells are relocated: one that
-the error hardly needs moves to where another cell errs most, all are fitted again, and the result is kept if it is
-better (split and merge, as for mixtures in Ueda et al. 2000).
+Annealing alone ends in local optima, where some cells do little and others too much. So cells are relocated: a cell
+that the error hardly needs moves to where another cell errs most. All cells are fitted again, and the result is kept if
+it is better (split and merge, as for mixtures in Ueda et al. 2000).
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from .config import Refinement, check_refinement
 from .units import Cells, Frame, LabelledStates
 
 N_MOVES = 40  # relocations tried after each restart
-SPARE = 3  # how many of the cells that are needed least may be relocated
+SPARE = 3  # number of the least needed cells that may be relocated
 
 
 @threadpool_limits.wrap(limits=1)
 def imitate(teacher: Policy, task: str | Task, config: Refinement, *, seed: int) -> VoronoiPolicy:
-    """The policy with the least mean squared action error found on `config.n_episodes` of the teacher's own episodes.
+    """Find the policy with the least mean squared action error on `config.n_episodes` of the teacher's own episodes.
 
     Best of `config.n_restarts`; nothing is corrected or tuned. Same arguments, same policy. Raises ValueError for a bad
-    seed, and where `config.n_cells` is below 2: then there is nothing to relocate.
+    seed, and if `config.n_cells` is below 2: then there is nothing to relocate.
     """
     check_seed(seed)
     check_refinement(config)
@@ -50,10 +50,10 @@ def imitate(teacher: Policy, task: str | Task, config: Refinement, *, seed: int)
 
 
 def relocate(seen: LabelledStates, cells: Cells, rng: np.random.Generator) -> Cells:
-    """The cells, one of which moves to a state of another cell and takes over that cell's map.
+    """Move one cell to a state of another cell, where it takes over that cell's map.
 
-    It is one of those that are needed least: without it, its states would go to their second nearest codewords, and
-    the error would grow least. The state is drawn in proportion to its error.
+    The moved cell is one of those that are needed least: without it, its states would go to their second nearest
+    codewords, and the error would grow least. The state is drawn in proportion to its error.
     """
     k, every = len(cells.codewords), np.arange(len(seen.inputs))
     errors, (first, second) = squared_errors(seen, cells), nearest_two(seen, cells)
@@ -70,7 +70,7 @@ def relocate(seen: LabelledStates, cells: Cells, rng: np.random.Generator) -> Ce
 
 
 def nearest_two(seen: LabelledStates, cells: Cells) -> np.ndarray:
-    """The nearest and the second nearest codeword of every state. (2, n)"""
+    """Return the nearest and the second nearest codeword of every state. (2, n)"""
     near = cells.closeness(seen.inputs[:, :-1])
     first = near.argmax(axis=0)
     near[first, np.arange(len(first))] = -np.inf

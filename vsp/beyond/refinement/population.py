@@ -13,7 +13,7 @@ from ...tasks.base import Task
 
 
 def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -> list[Outcomes]:
-    """`rollout` for policies of one kind, in one batch; Voronoi policies are Euclidean, of one shape and scale."""
+    """Roll out policies of one kind in one batch. Voronoi policies must be Euclidean, of one shape and scale."""
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])
     batch = PolicyBatch if isinstance(policies[0], VoronoiPolicy) else InTurn
@@ -23,7 +23,7 @@ def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -
 
 
 def numbered(task: Task, n: int) -> Task:
-    """`task` with a number below n appended to every start, state and observation, which never changes."""
+    """Return `task` with a constant number below n appended to every start, state and observation."""
 
     def own(states: np.ndarray) -> np.ndarray:
         return states[:, 0] if task.one_by_one else states[:, :-1]
@@ -43,7 +43,7 @@ def numbered(task: Task, n: int) -> Task:
 
 
 class InTurn:
-    """Several policies as one, each asked for its own states: observations as for `PolicyBatch`."""
+    """Several policies as one; each predicts for its own states. Observations are as for `PolicyBatch`."""
 
     def __init__(self, policies: list[Policy]):
         self._policies = policies

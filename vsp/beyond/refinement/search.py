@@ -1,8 +1,8 @@
-"""`least_error`: the cells that act most like the teacher on given states, by L-BFGS from many beginnings.
+"""`least_error`: find the cells that act most like the teacher on given states, by L-BFGS from many initial cells.
 
 The error has many local minima, and no slope where an action lies beyond its limits. So descents begin with soft cells
-and a leak beyond the limits, and both fall step by step (deterministic annealing, Rose 1998). Descents that are behind
-on the way are given up (successive halving, Jamieson & Talwalkar 2016).
+and a small slope beyond the limits. Softness and slope both fall stage by stage (deterministic annealing, Rose 1998).
+Descents that fall behind are stopped early (successive halving, Jamieson & Talwalkar 2016).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
 LEAKS = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
 N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last descent
-FEW = 8000  # states that the rounds see; too few, and the rare states decide by chance
-# Stages, and how many descents go on: giving up sooner is quicker, and loses the best ends of few cells
+FEW = 8000  # states that the rounds use; with too few, the outcome depends on which rare states are drawn
+# Stages of a round, and how many descents go on: stopping sooner is quicker, but loses the best results of few cells
 ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))
-LAST = range(12, N_STAGES)  # of the last descent, which sees all states
-AT_ONCE = 60_000  # numbers of the largest arrays in a loss: what fits into the cache
-RIDGE = 1e-4  # of `uncorrelated`, in states of unit size per state
+LAST = range(12, N_STAGES)  # stages of the last descent, which uses all states
+AT_ONCE = 60_000  # size of the largest arrays in a loss: they fit into the cache
+RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
 def least_error(seen: LabelledStates, n_cells: int, n_beginnings: int, rng: np.random.Generator) -> Cells:
-    """The cells with the least `squared_error` on `seen` that `n_beginnings` descents find."""
+    """Return the cells with the least `squared_error` on `seen` that `n_beginnings` descents find."""
     some = seen.rows(spread(seen.inputs[:, :-1], FEW, rng))
     live = [local_maps(some, n_cells, rng) for _ in range(n_beginnings)]
     for stages, n_kept in ROUNDS:
@@ -37,8 +37,9 @@ def least_error(seen: LabelledStates, n_cells: int, n_beginnings: int, rng: np.r
 
 
 def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
-    """The rows of n of the `points`, as dense as all of them, but with less chance than draws: one of each n-th part
-    in the order of a k-d tree. All rows, if there are no more."""
+    """Return the rows of n of the `points`, as dense as all of them: a stratified sample. It takes one point of each
+    n-th part in the order of a k-d tree, so it depends less on chance than independent draws. Returns all rows if there
+    are no more than n."""
     if len(points) <= n:
         return np.arange(len(points))
     order = KDTree(points, leafsize=max(1, len(points) // n)).indices
@@ -46,20 +47,20 @@ def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
-    """k codewords at states drawn from `seen`, each with the least-squares map of the states in its cell."""
+    """Place k codewords at states drawn from `seen`, each with the least-squares map of the states in its cell."""
     d, inputs = seen.inputs.shape[1] - 1, seen.inputs
     common = np.linalg.lstsq(inputs, seen.actions, rcond=None)[0]
     codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
     cells = Cells(codewords, np.tile(common, (k, 1, 1)))
     own = cells.nearest(inputs[:, :d])
-    for i in range(k):  # a weak pull to the map of all states, for cells with few
+    for i in range(k):  # a weak pull to the map of all states, for cells with few states
         rows = np.vstack([inputs[own == i], np.eye(d + 1)])
         cells.maps[i] = np.linalg.lstsq(rows, np.vstack([seen.actions[own == i], common]), rcond=None)[0]
     return cells
 
 
 def descend(seen: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
-    """`cells` after L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
+    """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
     unit = temperature_unit(seen, len(cells.codewords))
     for stage in stages:
@@ -81,7 +82,7 @@ def _cooler(seen: LabelledStates, cells: Cells, unit: float, stage: int, n_itera
 
 
 def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
-    """`expected_loss` of all states, some at a time."""
+    """Compute `expected_loss` of all states, some at a time."""
     n, value, gradient = len(seen.inputs), 0.0, np.zeros(cells.vector.size)
     step = max(1, AT_ONCE // (len(cells.maps) * seen.actions.shape[1]))
     for i in range(0, n, step):
@@ -92,9 +93,10 @@ def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[floa
 
 
 def uncorrelated(seen: LabelledStates, shares: np.ndarray) -> np.ndarray:
-    """Bases of the maps in which a step of length 1 changes the mean squared output of a cell by about 1. (k, p, p)
+    """Return bases of the maps in which a step of length 1 changes the mean squared output of a cell by about 1.
+    (k, p, p)
 
-    `shares` (k, n) say how much of each state belongs to each cell.
+    `shares` (k, n): how much of each state belongs to each cell.
     """
     p = seen.inputs.shape[1]
     products = np.stack([(seen.inputs * share[:, None]).T @ seen.inputs for share in shares]) / len(seen.inputs)
@@ -102,8 +104,8 @@ def uncorrelated(seen: LabelledStates, shares: np.ndarray) -> np.ndarray:
 
 
 def moves(cells: Cells, bases: np.ndarray, codeword_units: np.ndarray | float):
-    """Two functions: from a step in these units to the moved cells, and from a gradient by `Cells.vector` to that by
-    the step."""
+    """Return two functions: one from a step in these units to the moved cells, and one from a gradient with respect to
+    `Cells.vector` to the gradient with respect to the step."""
     cut, shape = cells.codewords.size, cells.maps.shape
 
     def move(step: np.ndarray) -> Cells:

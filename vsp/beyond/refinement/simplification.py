@@ -61,11 +61,11 @@ def simplify(
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
-    """The same cells with codewords nearer to `states` (n, d): tuning fixes the borders only.
+    """Move the codewords nearer to `states` (n, d) without changing the cells: tuning fixes the borders only.
 
     The borders of up to d + 1 Euclidean cells have a point in common, at the same distance from all codewords. Moving
-    all codewords towards it in one proportion moves no border. Other policies are returned unchanged. Raises ValueError
-    for no states, or some that do not fit or are not finite.
+    all codewords towards it by the same proportion moves no border. Other policies are returned unchanged. Raises
+    ValueError for an empty array of states, and for states that do not fit the task or are not finite.
     """
     states = check_array("states", states, (-1, len(policy.task.low)))
     if not len(states):
@@ -79,7 +79,7 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
     gaps = points[1:] - points[0]
     if np.linalg.matrix_rank(gaps) < k - 1:
         return policy
-    halves = 0.5 * np.square(gaps).sum(axis=1)  # x is as far from codeword i as from the first if gaps[i] @ x is this
+    halves = 0.5 * np.square(gaps).sum(axis=1)  # x is equally far from codeword i and the first if gaps[i] @ x is this
     arms = points - points[0] - np.linalg.lstsq(gaps, halves, rcond=None)[0]
     common = np.linalg.lstsq(gaps, halves + gaps @ points[0], rcond=None)[0]  # the common point nearest to the middle
     nearest = -(arms @ common).sum() / np.square(arms).sum()  # proportion that brings codewords nearest to the middle
@@ -89,7 +89,7 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
 
 
 def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
-    """Set coefficients to zero one by one, as long as the policy stays `good`, a function of a policy.
+    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True.
 
     Coefficients are tried in order of increasing effect on the action, for a change of the input by `policy.scale`.
     """
@@ -106,7 +106,7 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
 
 
 def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
-    """The policy rounded to `digits` significant digits; None if two codewords become equal."""
+    """Return the policy rounded to `digits` significant digits; None if two codewords become equal."""
     check_count("digits", digits)
     parts = policy.codewords, policy.coefficients, policy.scale
     codewords, coefficients, scale = (_significant(values, digits) for values in parts)
@@ -119,7 +119,7 @@ def _significant(values: np.ndarray, digits: int) -> np.ndarray:
 
 
 def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
-    """A policy for the same task with the same metric, and these numbers."""
+    """Return a policy for the same task with the same metric, and these numbers."""
     about = {"task": policy.task, "metric": policy.metric, "sub_policy": policy.policy_class.name}
     return VoronoiPolicy(codewords, coefficients, scale=scale, **about)
 
@@ -132,7 +132,7 @@ class _Tried:
         self._task, self._starts, self._failure_penalty = task, starts, failure_penalty
 
     def reaches(self, threshold: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:
-        """Play `policy`, add its row, and return whether it scores at least `threshold`."""
+        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
         result = rollout(policy, self._task, self._starts)
         self.scores.append(score(result, self._failure_penalty))
         about = {"stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients)}

@@ -19,20 +19,20 @@ SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its genera
 
 @dataclass(frozen=True)
 class Objective:
-    """What is maximised: the mean return, minus penalties for failures and for differing from the teacher."""
+    """The objective to maximise: the mean return, minus penalties for failures and for differing from the teacher."""
 
     failure_penalty: float
     error_penalty: float = 0.0
     seen: LabelledStates | None = None  # the states of the teacher, for the error penalty
 
     def score(self, result: Outcomes, cells: Cells) -> float:
-        """The value for `cells` whose episodes ended as `result`."""
+        """Return the value for `cells` whose episodes ended as `result`."""
         value = score(result, self.failure_penalty)
         return value - self.error_penalty * squared_error(self.seen, cells) if self.error_penalty else value
 
 
 class Candidates:
-    """Candidates, scored by an `Objective` from the same starts; the first of the best is kept."""
+    """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
 
     def __init__(self, frame: Frame, starts: np.ndarray, objective: Objective):
         self.rows, self.best, self.best_restart = [], None, 0
@@ -50,7 +50,7 @@ class Candidates:
 def tune(
     frame: Frame, cells: Cells, config: Refinement, objective: Objective, rng: np.random.Generator
 ) -> Iterator[Cells]:
-    """CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
+    """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
 
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
     """
@@ -66,11 +66,12 @@ def tune(
 
 
 def cma_es(start: np.ndarray, step: float, rng: np.random.Generator, *, diagonal: bool = False):
-    """The library's search from `start` with this first standard deviation, with the draws of `rng`.
+    """Return the search of the library `cma` from `start`, with first standard deviation `step` and random draws from
+    `rng`.
 
     `diagonal`: learn variances only (sep-CMA-ES, Ros & Hansen 2008), for more numbers than there are generations.
     """
-    import cma  # which few need
+    import cma  # here, because few uses need it
 
     options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
     options["CMA_diagonal"] = diagonal
@@ -78,10 +79,10 @@ def cma_es(start: np.ndarray, step: float, rng: np.random.Generator, *, diagonal
 
 
 def is_snapshot(i: int, n: int, n_snapshots: int) -> bool:
-    """Whether generation i of n is one of `n_snapshots` that are evenly spread; the last one is."""
+    """Return whether generation i of n is one of `n_snapshots` that are evenly spread; the last one always is."""
     return (i + 1) * n_snapshots // n > i * n_snapshots // n
 
 
 def candidates_per_generation(n: int) -> int:
-    """How many candidates CMA-ES has in a generation for n numbers, by default (Hansen 2016, table 1)."""
+    """Return the default number of candidates in a generation of CMA-ES for n numbers (Hansen 2016, table 1)."""
     return 4 + int(3 * np.log(n))

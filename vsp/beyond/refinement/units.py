@@ -1,4 +1,5 @@
-"""What is optimised, in units in which one step size fits all: inputs of mean 0 and deviation 1, actions in [-1, 1]."""
+"""The optimised numbers, in units in which one step size fits all: inputs of mean 0 and deviation 1, actions in
+[-1, 1]."""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ class Frame:
 
     @classmethod
     def of(cls, task: Task, states: np.ndarray) -> Frame:
-        """The frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
+        """Return the frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
         scale = states.std(axis=0)
         return cls(task, states.mean(axis=0), np.where(scale > 0, scale, 1.0))
 
@@ -37,27 +38,27 @@ class Frame:
         return 0.5 * (self.task.action_high - self.task.action_low)
 
     def inputs(self, states: np.ndarray) -> np.ndarray:
-        """Scaled states and a column of ones, (n, d + 1), of states (n, d)."""
+        """Return scaled states and a column of ones, (n, d + 1), for states (n, d)."""
         return np.column_stack([(states - self.centre) / self.scale, np.ones(len(states))])
 
     def states(self, inputs: np.ndarray) -> np.ndarray:
-        """The states (n, d) of `inputs` (n, d + 1)."""
+        """Return the states (n, d) of `inputs` (n, d + 1)."""
         return inputs[:, :-1] * self.scale + self.centre
 
     def outputs(self, actions: np.ndarray) -> np.ndarray:
-        """Actions (n, m) in units in which the limits are -1 and 1."""
+        """Convert actions (n, m) to units in which the limits are -1 and 1."""
         return (actions - self._middle) / self._half
 
     def actions(self, outputs: np.ndarray) -> np.ndarray:
-        """`outputs` (n, m) in the units of the task, limited to its box."""
+        """Convert `outputs` (n, m) to the units of the task, limited to its action range."""
         return np.clip(outputs, -1.0, 1.0) * self._half + self._middle
 
     def maps(self, maps: np.ndarray) -> np.ndarray:
-        """Maps (..., p + 1, m) to actions as maps to `outputs`."""
+        """Convert maps (..., p + 1, m) to actions into maps to `outputs`."""
         return np.concatenate([maps[..., :-1, :] / self._half, self.outputs(maps[..., -1:, :])], axis=-2)
 
     def policy(self, cells: Cells) -> VoronoiPolicy:
-        """`cells` as a policy in the units of the task."""
+        """Return `cells` as a policy in the units of the task."""
         weights = cells.maps[:, :-1] * self._half / self.scale[:, None]
         biases = cells.maps[:, -1] * self._half + self._middle - self.centre @ weights
         coefficients = np.concatenate([weights, biases[:, None]], axis=1)
@@ -65,26 +66,26 @@ class Frame:
         return VoronoiPolicy(codewords, coefficients, task=self.task, metric=METRIC, scale=self.scale)
 
     def cells(self, policy: VoronoiPolicy) -> Cells:
-        """The codewords and maps of `policy` in these units."""
+        """Return the codewords and maps of `policy` in these units."""
         weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
         biases = biases + self.centre @ weights
         maps = self.maps(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
         return Cells((policy.codewords - self.centre) / self.scale, maps)
 
     def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
-        """`states` (n, d) with the teacher's actions and, if asked for, their criticality."""
+        """Return `states` (n, d) with the teacher's actions and, if asked for, their criticality."""
         actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
         weights = teacher.criticality(states) if criticality else None
         return LabelledStates(self.inputs(states), self.outputs(actions), weights)
 
 
 def joined(parts: list[np.ndarray]) -> np.ndarray:
-    """The numbers of all `parts` in one array, as a search wants them."""
+    """Join the numbers of all `parts` in one array, as a search needs them."""
     return np.concatenate([part.ravel() for part in parts])
 
 
 def parted(vector: np.ndarray, like: list[np.ndarray]) -> list[np.ndarray]:
-    """The parts that `joined` put together, of the shapes of those in `like`."""
+    """Split `vector` into parts of the shapes of those in `like`: the inverse of `joined`."""
     found, start = [], 0
     for part in like:
         found.append(vector[start : start + part.size].reshape(part.shape))
@@ -106,33 +107,35 @@ class Cells:
 
     @property
     def parts(self) -> list[np.ndarray]:
-        """Where the cells lie, then their maps."""
+        """Codewords, then maps."""
         return [self.codewords, self.maps]
 
     def like(self, vector: np.ndarray) -> Cells:
-        """Cells of the same shape with the numbers of `vector`."""
+        """Return cells of the same shape with the numbers of `vector`."""
         return Cells(*parted(vector, self.parts))
 
     def closeness(self, states: np.ndarray) -> np.ndarray:
-        """How near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
+        """Return how near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
 
         |x|² - |x - c|² = 2 x·c - |c|²: one matrix product.
         """
         return 2 * self.codewords @ states.T - np.square(self.codewords).sum(axis=1)[:, None]
 
     def nearest(self, states: np.ndarray) -> np.ndarray:
-        """The cell of each of `states` (n, d). (n,)"""
+        """Return the cell of each of `states` (n, d). (n,)"""
         return self.closeness(states).argmax(axis=0)
 
     def shares(self, states: np.ndarray, temperature: float) -> np.ndarray:
-        """How much of each of `states` (n, d) belongs to each cell: in the cold, all of it to the nearest. (k, n)"""
+        """Return the share of each of `states` (n, d) that belongs to each cell; at a low temperature, all of it to the
+        nearest. (k, n)"""
         closeness = self.closeness(states) / temperature
         shares = np.exp(closeness - closeness.max(axis=0))
         shares /= shares.sum(axis=0)
         return shares
 
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
-        """Actions of every cell for `inputs` (n, d + 1), not limited. (k, m, n): states along whole rows, for speed"""
+        """Return the actions of every cell for `inputs` (n, d + 1), not limited. (k, m, n): states along the last axis,
+        for speed"""
         k, rows, m = self.maps.shape
         return (self.maps.transpose(0, 2, 1).reshape(k * m, rows) @ inputs.T).reshape(k, m, -1)
 
@@ -146,17 +149,17 @@ class LabelledStates:
     criticality: np.ndarray | None = None  # (n,) what a wrong action costs there; None: the same everywhere
 
     def rows(self, rows: np.ndarray) -> LabelledStates:
-        """Some of the states."""
+        """Return the states at `rows`."""
         weights = None if self.criticality is None else self.criticality[rows]
         return LabelledStates(self.inputs[rows], self.actions[rows], weights)
 
     def with_more(self, other: LabelledStates) -> LabelledStates:
-        """These states, then the others."""
+        """Return these states, then those of `other`."""
         pairs = ((self.inputs, other.inputs), (self.actions, other.actions), (self.criticality, other.criticality))
         return LabelledStates(*(None if one is None else np.concatenate([one, more]) for one, more in pairs))
 
     def draw(self, size: int, rng: np.random.Generator) -> Callable[[], np.ndarray]:
-        """A function that draws `size` rows, with probabilities in proportion to the criticality."""
+        """Return a function that draws `size` rows, with probabilities in proportion to the criticality."""
         n = len(self.inputs)
         if self.criticality is None or not self.criticality.any():
             return lambda: rng.integers(n, size=size)

@@ -1,7 +1,7 @@
-"""Robots that walk: many inputs, several actions, and a teacher whose every mistake adds up.
+"""Methods for walking robots: many inputs, several actions, and a teacher whose every mistake adds up.
 
-Imitation sees states after pushes and after its own mistakes; then the teacher's own training goes on, with a few cells
-as its actor.
+Imitation includes states after pushes and after the policy's own mistakes. Then the teacher's own training continues,
+with a few cells as its actor.
 """
 
 from .fewest import fewest_numbers

@@ -6,7 +6,7 @@ import torch
 
 from ..refinement.units import Cells, Frame, parted
 
-LEAK = 0.02  # slope of the limited action beyond the limits, while it learns: without any, a saturated map stays so
+LEAK = 0.02  # slope of the limited action beyond the limits in training: without it, a saturated map stays saturated
 
 
 class SoftActor(torch.nn.Module):
@@ -25,11 +25,12 @@ class SoftActor(torch.nn.Module):
 
     @property
     def numbers(self):
-        """What has been learned, of the kind that it began with."""
+        """The learned numbers, of the same kind as the initial ones."""
         return self._numbers.like(self.vector.detach().double().numpy())
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Actions of the nearest piece; while it trains, of all, in shares that fall with the distance."""
+        """Return the actions of the nearest piece; during training, of all pieces, in shares that fall with the
+        distance."""
         states = (observations - self.centre) / self.scale
         *places, maps = parted(self.vector, self._numbers.parts)
         closeness = self._closeness(states, places, self._numbers)  # (n, k)
@@ -44,14 +45,14 @@ class SoftActor(torch.nn.Module):
 
 
 def _to_codewords(states: torch.Tensor, places: list[torch.Tensor], numbers: Cells) -> torch.Tensor:
-    """How near each codeword is, as `Cells.closeness` has it. (n, k)"""
+    """Return how near each codeword is, as in `Cells.closeness`. (n, k)"""
     (codewords,) = places
     return 2 * states @ codewords.T - codewords.square().sum(dim=1)
 
 
 def _to_leaves(states: torch.Tensor, places: list[torch.Tensor], numbers) -> torch.Tensor:
-    """How far a state is on the side of each leaf: the sum of the distances by which it is beyond a border on the way
-    there, negative on the wrong side. 0 for a leaf whose turns are all taken. (n, k)"""
+    """Return how near each state is to each leaf: 0 for the leaf that it is in, else minus twice the sum of its
+    distances to those borders on the way to the leaf of which it is on the wrong side. (n, k)"""
     directions, thresholds = places
     sides = torch.tensor(numbers.sides, dtype=torch.float32)  # (k, nodes)
     beyond = states @ directions.T - thresholds  # (n, nodes)

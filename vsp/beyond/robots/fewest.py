@@ -1,4 +1,4 @@
-"""The fewest numbers that keep most of a robot's return: cells that it can do without, small coefficients, digits."""
+"""Find the fewest numbers that keep most of a robot's return: remove cells, small coefficients, and digits."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ...rollouts import rollout, visited_states
 from ...run.progress import progress
 from ..refinement.simplification import like, rounded
 
-DIGITS = (1, 2, 3, 4)  # significant ones to try, the fewest first
-N_HALVINGS = 6  # of the interval in which the number of coefficients that may go is sought
+DIGITS = (1, 2, 3, 4)  # significant digits to try, the fewest first
+N_HALVINGS = 6  # steps of the bisection for the number of zero coefficients
 
 
 def fewest_numbers(
     policy: VoronoiPolicy, *, keep: float, n_episodes: int, seed: int
 ) -> tuple[VoronoiPolicy, pd.DataFrame]:
-    """`policy` with fewer cells, coefficients and digits, and at least `keep` of its mean return.
+    """Return `policy` with fewer cells, coefficients and digits, and at least `keep` of its mean return.
 
-    Cells go one by one, the least visited first; their states then belong to the next codewords. Coefficients become
-    zero together, those first that move the action least where their cell acts. Every candidate plays `n_episodes`
-    episodes from the same starts. Returns the policy, and a row per candidate: stage ("cells", "zeros", "digits"),
-    cells, nonzero coefficients, digits (0: all), mean return, kept. Raises ValueError unless `policy` has linear cells
-    and a positive mean return, and for a bad seed.
+    Cells are removed one by one, the least visited first; their states then belong to the next codewords. Coefficients
+    are set to zero together, in order of increasing effect on the action where their cell acts. Every candidate plays
+    `n_episodes` episodes from the same starts. Returns the policy, and a row per candidate: stage ("cells", "zeros",
+    "digits"), cells, nonzero coefficients, digits (0: all), mean return, kept. Raises ValueError unless `policy` has
+    linear cells and a positive mean return, and for a bad seed.
     """
     check_seed(seed)
     check_count("n_episodes", n_episodes)
@@ -33,7 +33,7 @@ def fewest_numbers(
     starts = policy.task.start(np.random.default_rng(seed), n_episodes)
     own = float(rollout(policy, policy.task, starts).returns.mean())
     if own <= 0:
-        raise ValueError(f"the policy returns {own:.4g} in the mean, expected more than 0 for a share of it to be kept")
+        raise ValueError(f"the policy returns {own:.4g} on average, expected more than 0: `keep` is a share of it")
     rows = []
 
     def good(stage: str, candidate: VoronoiPolicy, digits: int = 0) -> bool:
@@ -53,7 +53,7 @@ def fewest_numbers(
 
 
 def _fewer_cells(policy: VoronoiPolicy, starts: np.ndarray, good) -> VoronoiPolicy:
-    """Without the least visited cells, as long as the policy stays `good`; each is tried once."""
+    """Remove the least visited cells, as long as the policy stays `good`; each is tried once."""
     visits = _visits(policy, visited_states(policy, policy.task, starts))
     places = list(range(len(policy)))
     order = np.argsort(visits, kind="stable").tolist()
@@ -65,7 +65,7 @@ def _fewer_cells(policy: VoronoiPolicy, starts: np.ndarray, good) -> VoronoiPoli
 
 
 def _more_zeros(policy: VoronoiPolicy, starts: np.ndarray, good) -> VoronoiPolicy:
-    """With the most zeros that keep it `good`, by bisection over their number."""
+    """Set as many coefficients to zero as keep the policy `good`, by bisection over their number."""
     states = visited_states(policy, policy.task, starts)
     effect = np.abs(policy.coefficients) * _spread(policy, states)
     order = np.argsort(effect, axis=None, kind="stable")
@@ -87,8 +87,8 @@ def _visits(policy: VoronoiPolicy, states: np.ndarray) -> np.ndarray:
 
 
 def _spread(policy: VoronoiPolicy, states: np.ndarray) -> np.ndarray:
-    """How much each input varies where a cell acts, times the root of the cell's share of the states; 1 for the bias.
-    (k, d + 1, 1)"""
+    """Return how much each input varies where a cell acts (1 for the bias), times the square root of the cell's share
+    of the states. (k, d + 1, 1)"""
     own, found = policy.cells(states), np.ones(policy.coefficients.shape[:2])
     for cell in range(len(policy)):
         here = states[own == cell]

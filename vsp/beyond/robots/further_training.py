@@ -1,7 +1,7 @@
-"""The teacher's training goes on with a few cells as its actor: tuning for policies of a thousand numbers.
+"""Continue the teacher's training with a few cells as its actor: tuning for policies of a thousand numbers.
 
-TD3 (Fujimoto et al. 2018, in Stable-Baselines3) learns from every single step, CMA-ES from whole episodes alone. The
-critics begin with the teacher's.
+TD3 (Fujimoto et al. 2018, in Stable-Baselines3) learns from every single step, CMA-ES only from whole episodes. The
+critics begin with the teacher's weights.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from ..refinement.units import Frame
 from .choice import most_rewarding
 from .settings import Walking
 
-N_CHOICES = 20  # times, evenly spread over the training, that the actor is kept
-NOISE = 0.1  # of exploration, as in the teacher's own training
-STEPS_PER_UPDATE = 2  # twice as many updates for the same steps return no more
+N_CHOICES = 20  # actors kept as candidates, evenly spread over the training
+NOISE = 0.1  # standard deviation of exploration, as in the teacher's own training
+STEPS_PER_UPDATE = 2  # twice as many updates for the same steps do not raise the return
 
 
 def train_further(frame: Frame, numbers, teacher: Teacher, config: Walking, *, seed: int) -> Policy:
-    """The most rewarding of `N_CHOICES` policies on the way and of the first. Same arguments, same policy.
+    """Return the most rewarding of the first policy and `N_CHOICES` policies during training. Same arguments, same
+    policy.
 
-    `numbers`: `Cells`, or others that a `SoftActor` takes. Raises ValueError for a bad seed and for a teacher without
-    critics.
+    `numbers`: `Cells`, or other numbers that a `SoftActor` takes. Raises ValueError for a bad seed and for a teacher
+    without critics.
     """
     import torch
 
@@ -34,7 +35,7 @@ def train_further(frame: Frame, numbers, teacher: Teacher, config: Walking, *, s
     try:
         return _best_on_the_way(frame, numbers, teacher, config, seed)
     finally:
-        torch.set_flush_denormal(False)  # in this process others may need them
+        torch.set_flush_denormal(False)  # other code in this process may need them
 
 
 def _best_on_the_way(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int) -> Policy:
@@ -49,7 +50,7 @@ def _best_on_the_way(frame: Frame, numbers, teacher: Teacher, config: Walking, s
 
 
 def _model(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int):
-    """TD3 of the library with the cells in place of its actor, and the teacher's critics."""
+    """Build the library's TD3 with the cells as its actor, and with the teacher's critics."""
     import gymnasium
     import torch
     from stable_baselines3 import TD3
@@ -65,7 +66,7 @@ def _model(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int):
                 super().train(gradient_steps, batch_size)
 
         def _update_learning_rate(self, optimizers: list) -> None:
-            """The cells' falls to 0, so that they come to rest; the critics' to a tenth, so that they follow."""
+            """The cells' rate falls to 0, so that they come to rest; the critics' to a tenth, so that they follow."""
             left = max(0.0, 1 - self.num_timesteps / config.n_steps)
             for optimizer, rate in (
                 (self.actor.optimizer, config.learning_rate * left),
@@ -88,5 +89,5 @@ def _model(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int):
         actor.mu = SoftActor(frame, numbers, config.temperature)
     model.actor.optimizer = torch.optim.Adam(model.actor.parameters(), lr=config.learning_rate, fused=True)
     for critic in (model.critic, model.critic_target):
-        critic.load_state_dict(critics, strict=False)  # the features are the observations: nothing to load
+        critic.load_state_dict(critics, strict=False)  # the features are the observations and have no weights
     return model

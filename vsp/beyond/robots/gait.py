@@ -1,4 +1,4 @@
-"""What a robot's body does step by step, as numbers: lines from joint to joint, the feet on the ground, and the cell.
+"""Record a robot's gait step by step, as numbers: lines from joint to joint, the feet on the ground, and the cell.
 
 A picture of the gait then needs neither a physics engine nor a renderer.
 """
@@ -15,12 +15,12 @@ from ...policy import VoronoiPolicy
 from ...tasks.base import RUNNING, Task
 from ...tasks.registry import get_task
 
-DIGITS = 4  # of a position, in metres
-Body = tuple[dict[str, np.ndarray], tuple[bool, bool]]  # lines (4,) as x, z of both ends; the back foot down, the front
+DIGITS = 4  # decimals of a position, in metres
+Body = tuple[dict[str, np.ndarray], tuple[bool, bool]]  # lines (4,): x, z of both ends; back foot down, front foot
 
 
 def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_steps: int) -> pd.DataFrame:
-    """An episode from the seed `start`: a row per step with cell, feet, and the lines that make up the body.
+    """Record an episode from the seed `start`: one row per step with cell, feet, and the lines that make up the body.
 
     Columns step, cell, back and front (whether this foot touches the ground), and for each line of the body x0, z0, x1
     and z1 in metres, such as "torso x0". Raises ValueError for a robot whose body is not known here.
@@ -44,8 +44,8 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
 
 
 def phases(gait: pd.DataFrame) -> pd.DataFrame:
-    """Of each cell: its share of the steps, and the shares of them with the back foot and the front foot down, none,
-    or both."""
+    """Return for each cell its share of the steps, and the shares of these with the back foot down, the front foot
+    down, both, or none."""
     feet = pd.DataFrame(
         {
             "back down": gait.back == 1, "front down": gait.front == 1,
@@ -71,7 +71,8 @@ def _cheetah(env) -> Body:
 
 
 def _walker(env) -> Body:
-    """The edges of the hull and the axes of the four parts of the legs, above the height where the ground begins."""
+    """The edges of the hull and the axes of the four parts of the legs, relative to the height where the ground
+    begins."""
     from gymnasium.envs.box2d.bipedal_walker import LEG_H, TERRAIN_HEIGHT
 
     ground = np.array([0.0, TERRAIN_HEIGHT])

@@ -1,5 +1,5 @@
-"""Imitation that sees what comes after a mistake: the teacher's episodes, those in which it is pushed, and the
-policy's own."""
+"""Imitate on states that come after mistakes, too: from the teacher's episodes, from episodes in which it is pushed,
+and from the policy's own."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .settings import Walking
 
 AGAIN = range(N_STAGES // 2, N_STAGES)  # stages of a fit from the cells of the last round
 
-# A policy from labelled states; from the one before, after the first round
+# Makes a policy from labelled states; after the first round, it begins from the policy of the round before
 Fit = Callable[[Frame, LabelledStates, Policy | None, np.random.Generator], Policy]
 
 
@@ -41,7 +41,7 @@ class Pushed:
 
 @threadpool_limits.wrap(limits=1)
 def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: int, fit: Fit | None = None) -> Policy:
-    """The most rewarding policy of the fits of all rounds. Same arguments, same policy.
+    """Fit a policy in each round, and return the most rewarding one. Same arguments, same policy.
 
     `fit`: by default the closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed.
     """
@@ -62,7 +62,8 @@ def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: 
 
 
 def cells_fit(config: Walking) -> Fit:
-    """The cells with the least error, then a descent from those of the round before."""
+    """Return the default fit: the cells with the least error, and in later rounds a descent from the cells of the round
+    before."""
 
     def fit(frame: Frame, seen: LabelledStates, before: VoronoiPolicy | None, rng: np.random.Generator) -> Policy:
         if before is None:

@@ -1,4 +1,5 @@
-"""One linear map, learned from returns alone by augmented random search (ARS V2-t, Mania et al. 2018): no teacher."""
+"""Learn one linear map from returns alone, without a teacher, by augmented random search (ARS V2-t, Mania et al.
+2018)."""
 
 from __future__ import annotations
 
@@ -16,9 +17,9 @@ from ..refinement.units import METRIC
 from .choice import most_rewarding
 from .settings import Walking
 
-EVERY = 8  # of so many observations, one counts for their mean and deviation
-N_CHOICES = 20  # times, evenly spread over the search, that the map is kept
-LEAST_REWARD = -10.0  # per step, in the search: the price of a fall, 100, hides what a map did before it
+EVERY = 8  # one observation out of so many counts for the mean and deviation
+N_CHOICES = 20  # maps kept as candidates, evenly spread over the search
+LEAST_REWARD = -10.0  # per step, in the search: the penalty of a fall, 100, hides what a map did before it
 
 
 class RunningMoments:
@@ -28,7 +29,7 @@ class RunningMoments:
         self.n, self.mean, self._squares = 0, np.zeros(d), np.zeros(d)
 
     def add(self, states: np.ndarray) -> None:
-        """Count the rows of `states` (n, d) in."""
+        """Add the rows of `states` (n, d)."""
         n, gap = self.n + len(states), states.mean(axis=0) - self.mean
         within = np.square(states - states.mean(axis=0)).sum(axis=0)
         self._squares = self._squares + within + gap**2 * self.n * len(states) / n
@@ -36,17 +37,17 @@ class RunningMoments:
 
     @property
     def deviation(self) -> np.ndarray:
-        """1 where nothing varies yet. (d,)"""
+        """The standard deviation; 1 where nothing varies yet. (d,)"""
         found = np.sqrt(self._squares / max(1, self.n))
         return np.where(found > 1e-6, found, 1.0)
 
 
 @threadpool_limits.wrap(limits=1)
 def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPolicy:
-    """The best map that `config.n_random_steps` steps of the robot find, as one cell. Same arguments, same policy.
+    """Find the best map within `config.n_random_steps` steps of the robot, as one cell. Same arguments, same policy.
 
-    A round plays maps on both sides of the present one, in random directions; it then moves along those `n_best`
-    directions that had the highest returns. Raises ValueError for a bad seed.
+    Each round plays maps on both sides of the current one, in random directions. The map then moves along the `n_best`
+    directions with the highest returns. Raises ValueError for a bad seed.
     """
     check_seed(seed)
     task = get_task(task)
@@ -71,7 +72,7 @@ def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPo
 
 
 def _forgiving(task: Task) -> Task:
-    """`task` without rewards below `LEAST_REWARD`."""
+    """Return `task` without rewards below `LEAST_REWARD`."""
 
     def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         moved, rewards, outcomes = task.step(states, actions)
@@ -81,7 +82,7 @@ def _forgiving(task: Task) -> Task:
 
 
 def _policy(weights: np.ndarray, moments: RunningMoments, task: Task) -> VoronoiPolicy:
-    """The map `weights` (d, m) of scaled inputs to scaled actions, as one cell in the units of the task."""
+    """Return the map `weights` (d, m) of scaled inputs to scaled actions, as one cell in the units of the task."""
     half = 0.5 * (task.action_high - task.action_low)
     slopes = weights / moments.deviation[:, None] * half
     biases = 0.5 * (task.action_high + task.action_low) - moments.mean @ slopes
@@ -90,7 +91,7 @@ def _policy(weights: np.ndarray, moments: RunningMoments, task: Task) -> Voronoi
 
 
 def _played(policies: list[VoronoiPolicy], task: Task, starts: np.ndarray):
-    """How the episodes ended, and every `EVERY`-th observation (n, d)."""
+    """Roll out `policies`. Return how the episodes end, and every `EVERY`-th observation (n, d)."""
     seen = []
 
     def see(states: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""`Walking`: the settings of everything that makes policies for robots, and its presets."""
+"""`Walking`: the settings of all methods that make policies for robots, and its presets."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Walking:
     n_cells: int
     """Cells of the policy."""
     push: float = 0.4
-    """Standard deviation of noise on the teacher's actions, in half action ranges: the teacher labels the states to
-    which this leads (DART, Laskey et al. 2017)."""
+    """Standard deviation of the noise on the teacher's actions, in half action ranges: the teacher labels the states
+    that this noise leads to (DART, Laskey et al. 2017)."""
     n_episodes: int = 20
     """Episodes of the teacher. With the noise it plays twice as many."""
     n_corrections: int = 12
@@ -25,21 +25,21 @@ class Walking:
     n_correction_episodes: int = 10
     """Episodes of the policy per round."""
     n_states: int = 30_000
-    """States that a fit sees, evenly over where they lie."""
+    """States that a fit uses, as dense as all of them (`search.spread`)."""
     n_restarts: int = 8
-    """Descents from other random initial cells in the first round; the closest imitation is kept."""
+    """Descents from different random initial cells in the first round; the closest imitation is kept."""
     n_validation: int = 20
-    """Episodes by which the policies on the way are compared; the best are compared over more (`choice`)."""
+    """Episodes over which policies are compared; the best are compared again over more (`choice`)."""
     n_steps: int = 320_000
-    """Steps for which TD3 goes on, with the cells as its actor."""
+    """Steps for which TD3 continues, with the cells as its actor."""
     n_filling: int = 5000
-    """The first of these steps: the replay buffer fills, and nothing learns."""
+    """The first of these steps, in which the replay buffer fills and nothing learns."""
     learning_rate: float = 2e-4
-    """Of Adam, for the cells, at the start; it falls evenly to 0, and the cells come to rest."""
+    """Initial learning rate of Adam for the cells; it falls linearly to 0, and the cells come to rest."""
     critic_rate: float = 1e-3
-    """Of Adam, for the critics, at the start, as in the teacher's own training; it falls to a tenth."""
+    """Initial learning rate of Adam for the critics, as in the teacher's own training; it falls to a tenth."""
     batch_size: int = 100
-    """Steps out of the replay buffer that each update sees."""
+    """Steps from the replay buffer that each update uses."""
     gamma: float = 0.99
     """Discount per step, as in the teacher's own training."""
     temperature: float = 0.3
@@ -47,13 +47,13 @@ class Walking:
     n_random_steps: int = 20_000_000
     """Steps of the random search for one linear map."""
     n_directions: int = 32
-    """Directions that a round of it tries, forwards and backwards."""
+    """Directions that a round of the random search tries, forwards and backwards."""
     n_best: int = 4
-    """The best of these, which the map follows."""
+    """Number of the best directions, which the map follows."""
     step_size: float = 0.02
-    """How far, in deviations of the returns."""
+    """Step size along these directions, for returns scaled to unit deviation."""
     search_noise: float = 0.03
-    """Standard deviation of what is tried."""
+    """Standard deviation of the changes that are tried."""
 
     def __post_init__(self) -> None:
         check_count("n_cells", self.n_cells, most=MOST_CELLS)
@@ -64,8 +64,8 @@ class Walking:
         check_number("gamma", self.gamma, least=0.0, most=1.0)
 
 
-# The walker's engine takes three times as long for a step: half the steps, and in the search for one map more rounds of
-# fewer directions, all of them followed
+# The walker's engine takes three times as long for a step. So TD3 takes half the steps, and the search for one map has
+# more rounds of fewer directions and follows all of them
 _WALKING = {
     "BipedalWalker-v3": Walking(
         n_cells=8, gamma=0.98, n_steps=160_000, n_random_steps=6_000_000, n_directions=16, n_best=16
@@ -74,5 +74,5 @@ _WALKING = {
 
 
 def walking_preset(task: str | Task) -> Walking:
-    """The settings for a robot: eight cells. Raises ValueError as `get_task` does."""
+    """Return the settings for a robot: eight cells. Raises ValueError as `get_task` does."""
     return _WALKING.get(get_task(task).name, Walking(n_cells=8))

@@ -1,5 +1,5 @@
-"""Checks certificates, and shares no code with the prover: who trusts these files need not trust the others. Only of
-MountainCar, whose proof is a run of all states, a check is a sample.
+"""Check certificates without the prover: these files share no code with it. For MountainCar, whose proof is a run from
+all states, the check is only a sample.
 
 python -m vsp.beyond.proofs.check FILE ...
 """

@@ -6,7 +6,7 @@ from . import Refused, check
 
 
 def main() -> None:
-    """Print what each file proves; end at the first that does not prove its claim."""
+    """Print what each file proves; stop at the first that does not prove its claim."""
     for name in sys.argv[1:]:
         try:
             print(name, "proves", check(name))

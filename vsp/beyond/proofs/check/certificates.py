@@ -1,4 +1,4 @@
-"""Certificates: sealed JSON files, and who checks which."""
+"""Read certificates, which are sealed JSON files, and call the checker of their task."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHECKS = {"SimpleGoal-v0": simplegoal, "MountainCarContinuous-v0": mountaincar, 
 
 
 def check(path) -> dict:
-    """The claim of the certificate in `path`. Raises `Refused` where it is not proved."""
+    """Return the claim of the certificate in `path`. Raises `Refused` if it is not proved."""
     with open(path, "rb") as file:
         seal, _, payload = file.read().partition(b"\n")
     if hashlib.sha256(payload).hexdigest().encode() != seal:
@@ -22,7 +22,7 @@ def check(path) -> dict:
 
 
 def check_content(content: dict) -> dict:
-    """The claim of a certificate that was read. Raises `Refused`."""
+    """Return the claim of a certificate that was read. Raises `Refused` if it is not proved."""
     if content["task"] not in CHECKS:
         raise Refused(f"the task is {content['task']!r}, expected one of {sorted(CHECKS)}")
     try:

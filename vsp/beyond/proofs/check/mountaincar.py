@@ -1,7 +1,7 @@
-"""Checks MountainCar's certificates by a sample: to verify one, run the proof again.
+"""Check MountainCar's certificates by a sample; for a full check, run the proof again.
 
-Do blocks of starts cover all, and bear out the claim? Then one start of each block, drawn anew at every check, is
-played in Python, with the types that Gymnasium uses, and has to end within what the block says.
+The blocks of starts must cover all starts and agree with the claim. Then one start of each block, drawn anew at every
+check, is played in Python, with the types that Gymnasium uses. Its episode must end within what the block says.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from .refused import Refused
 
 LOW, HIGH, N_STEPS = -0.6, -0.4, 999
 BLOCK = 10_000  # observations, at most
-SAME = 1e-9  # of returns, in another order of the sums
-ERRORS = 5  # standard errors that the sample's mean may be away
+SAME = 1e-9  # tolerance for returns that are summed in another order
+ERRORS = 5  # standard errors by which the sample's mean may differ
 
 
 def check_content(content: dict) -> dict:
-    """The claim of a certificate that was read. Raises `Refused`."""
+    """Return the claim of a certificate that was read. Raises `Refused` if the blocks or the sample contradict it."""
     claim, blocks, policy, n = content["claim"], content["pieces"], Policy(**content["policy"]), 0
     for block in blocks:
         if block["first"] != n or not 1 <= block["n"] <= BLOCK or not block["n"] <= block["n_states"]:
@@ -38,12 +38,13 @@ def check_content(content: dict) -> dict:
     gaps = [played(policy, block) for block in blocks]
     deviation = math.sqrt(sum(gap * gap for gap in gaps) / len(gaps) / len(gaps))
     if abs(sum(gaps) / len(gaps)) > ERRORS * deviation + SAME:
-        raise Refused(f"one start of each block returns {sum(gaps) / len(gaps)} more in the mean than the blocks say")
+        raise Refused(f"one start of each block returns {sum(gaps) / len(gaps)} more on average than the blocks say")
     return claim
 
 
 def played(policy: Policy, block: dict) -> float:
-    """How much more than the block's mean one of its starts returns. Raises `Refused` where the block is wrong."""
+    """Play one start of the block, and return by how much its return exceeds the block's mean. Raises `Refused` where
+    the block is wrong."""
     start = random.SystemRandom().uniform(edge(block["first"], -1), edge(block["first"] + block["n"], -1))
     total, steps, arrived = policy.play(start)
     if total < block["least"] - SAME or steps > block["longest"] or arrived < (block["n_left"] == 0):
@@ -52,7 +53,7 @@ def played(policy: Policy, block: dict) -> float:
 
 
 class Policy:
-    """Linear maps, each for the states that are nearest to its codeword; of equally near ones the first."""
+    """Linear maps, each for the states that are nearest to its codeword; of equally near codewords the first counts."""
 
     def __init__(self, codewords, coefficients, scale, metric):
         if metric != "euclidean":
@@ -61,15 +62,15 @@ class Policy:
         self.scale = scale
 
     def action(self, x: float, v: float) -> float:
-        """The limited force."""
+        """Return the limited force."""
         _, ((a,), (b,), (c,)) = min(
             self.cells, key=lambda cell: sum(((s - w) / r) ** 2 for s, w, r in zip((x, v), cell[0], self.scale))
         )
         return max(-1.0, min(1.0, a * x + b * v + c))
 
     def play(self, start: float) -> tuple[float, int, bool]:
-        """Return, steps, and whether the car arrives, as Gymnasium has it: the first step in float64, then the state in
-        float32."""
+        """Play an episode as Gymnasium does: the first step in float64, then the state in float32. Return its return,
+        its steps, and whether the car arrives."""
         x, v, total = start, 0.0, 0.0
         for t in range(1, N_STEPS + 1):
             action = self.action(single(x), v)
@@ -90,16 +91,17 @@ class Policy:
 
 
 def single(value: float) -> float:
-    """The nearest float32."""
+    """Return the nearest float32."""
     return struct.unpack("f", struct.pack("f", value))[0]
 
 
 def magnitude(value: float) -> int:
-    """The number of the nearest float32 among those of its sign, by their size."""
+    """Return the number of the nearest float32 among those of its sign, by their size."""
     return struct.unpack("I", struct.pack("f", abs(value)))[0]
 
 
 def edge(i: int, side: int) -> float:
-    """Where the starts end that are seen as the float32 number `i` from -0.6 on: left (side -1) or right (1)."""
+    """Return the left end (side -1) or right end (1) of the starts that are seen as the float32 number `i` from -0.6
+    on."""
     own, other = (-struct.unpack("f", struct.pack("I", magnitude(LOW) - j))[0] for j in (i, i + side))
     return min(HIGH, max(LOW, (own + other) / 2))

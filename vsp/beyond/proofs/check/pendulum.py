@@ -1,9 +1,9 @@
-"""Checks Pendulum's certificates: from every box of a grid, a step leads to boxes that need a step less.
+"""Check Pendulum's certificates: from every box of a grid, a step leads to boxes that need one step fewer.
 
-A certificate names a policy, a claim, and for each row of boxes (one range of angles) runs of boxes (along the angular
-velocity) with a number each: -1 in the set that no step leaves, n for "at most n steps to it", 0 for nothing claimed.
-Where the next state lies is a sum of one sine wave of the angle and a line along the velocity, so it is largest at the
-ends of the box, or where the wave has its crest.
+A certificate names a policy, a claim, and for each row of boxes (one range of angles) runs of boxes along the angular
+velocity. Each run has a number: -1 in the set that no step leaves, n for "at most n steps to it", 0 for nothing
+claimed. The next state is a sum of one sine wave of the angle and a linear function of the velocity. So it is largest
+at the ends of the box, or at the crest of the wave.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ FASTEST, LIMIT, N_STEPS = 8.0, 2.0, 200
 DT, FALL, PUSH = 0.05, 0.75, 0.15
 SIDES = np.array([[-1.0], [1.0]])
 SEEN, ROUNDING = 1e-7, 1e-10  # observations are float32; float64 loses less
-TIES = 1e-12  # share of the distances that rounding may decide
+TIES = 1e-12  # relative difference of distances that rounding may decide
 
 
 def check_content(content: dict) -> dict:
-    """The claim of a certificate that was read. Raises `Refused`."""
+    """Return the claim of a certificate that was read. Raises `Refused` if it is not proved."""
     claim, numbers = content["claim"], unpacked(content["pieces"])
     n = len(numbers)
     if numbers.dtype.kind != "i":
@@ -44,12 +44,12 @@ def check_content(content: dict) -> dict:
 
 
 def unpacked(rows: list[list[int]]) -> np.ndarray:
-    """The numbers of all boxes, from runs: number, length, number, length, ..."""
+    """Return the numbers of all boxes, from runs: number, length, number, length, ..."""
     return np.stack([np.repeat(row[::2], row[1::2]) for row in rows])
 
 
 def check_row(policy: Policy, i: int, numbers: np.ndarray, worst: np.ndarray) -> None:
-    """Raise `Refused` where a step from a box of row `i` may lead to boxes that are not nearer."""
+    """Raise `Refused` where a step from a box of row `i` may lead to boxes that do not need fewer steps."""
     n = len(numbers)
     boxes = np.flatnonzero(numbers)
     angle = (2 * np.array([i, i + 1]) / n - 1) * np.pi
@@ -83,19 +83,19 @@ class Policy:
         self.tie = TIES * float(np.sum(reach**self.power))
 
     def after(self, cell: int, angle: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """From those boxes of a row that touch a cell: between which angles and speeds a step leads (2, m), and which
-        boxes these are (m,)."""
+        """Bound a step from those boxes of a row that touch a cell. Return the ranges of the new angle and the new
+        speed (2, m), and which boxes these are (m,)."""
         touched = np.flatnonzero(self.touches(cell, angle, speed))
         speed, (w_cos, w_sin, w_speed, bias) = speed[:, touched], self.maps[cell]
         slack = SIDES * (SEEN * (abs(w_cos) + abs(w_sin) + FASTEST * abs(w_speed)) + ROUNDING)
         torque = wave(w_cos, w_sin, angle) + np.sort(w_speed * speed, axis=0) + bias + slack
         free = (np.abs(torque) <= LIMIT).all(axis=0)
         push = PUSH * np.clip(torque, -LIMIT, LIMIT)
-        # Where no limit acts, torque and fall together: a wave of the angle and a line of the speed
+        # Where no limit acts, torque and fall add up to a wave of the angle and a line of the speed
         cosine, sine = PUSH * w_cos, FALL + PUSH * w_sin
         line = np.sort((1 + PUSH * w_speed) * speed, axis=0) + PUSH * (bias + slack)
         new_speed = np.where(free, wave(cosine, sine, angle) + line, wave(0.0, FALL, angle) + speed + push)
-        # The new angle rises with the angle, for these waves are flat: it is largest at the ends
+        # These waves are flat, so the new angle rises with the angle and is largest at the ends
         if DT * np.hypot(cosine, sine) >= 1:
             raise Refused(f"cell {cell} is too steep to be checked")
         ends, fall = angle[:, None], np.sin(angle[:, None])
@@ -107,7 +107,7 @@ class Policy:
         return new_angle + SIDES * ROUNDING, new_speed + SIDES * ROUNDING, touched
 
     def touches(self, cell: int, angle: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """Which boxes (2, m) may hold a state that is nearest to the codeword of `cell`."""
+        """Return which boxes (2, m) may hold a state that is nearest to the codeword of `cell`."""
         ranges = [ends + SIDES * FASTEST * SEEN for ends in (wave(1.0, 0.0, angle), wave(0.0, 1.0, angle), speed)]
         found = np.ones(speed.shape[1], dtype=bool)
         for other in range(len(self.maps)):
@@ -120,7 +120,7 @@ class Policy:
 
 
 def wave(cosine: float, sine: float, angle: np.ndarray) -> np.ndarray:
-    """The least and the largest value of a sum of cosine and sine over a short range of angles. (2, 1)"""
+    """Return the least and the largest value of a sum of cosine and sine over a short range of angles. (2, 1)"""
     size, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine)
     ends = size * np.cos(angle - crest)
     low, high = ends.min(), ends.max()

@@ -1,4 +1,4 @@
-"""What the checkers raise."""
+"""The error that the checkers raise."""
 
 
 class Refused(Exception):

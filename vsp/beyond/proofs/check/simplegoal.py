@@ -1,9 +1,9 @@
-"""Checks SimpleGoal's certificates. It works otherwise than the prover: it moves the corners of polygons.
+"""Check SimpleGoal's certificates by another method than the prover's: move the corners of polygons.
 
 A certificate names a policy, a claim, and the itineraries of all starts: per step the cell, which actions are at a
-limit and which coordinates at a wall. For each itinerary the checker cuts from the square of starts what follows it.
-No start follows two itineraries, so the parts do not overlap; if their areas add up to 1, nothing is missing but lines
-without area. All numbers are fractions.
+limit and which coordinates at a wall. For each itinerary the checker cuts from the square of starts those that follow
+it. No start follows two itineraries, so the parts do not overlap. If their areas add up to 1, nothing is missing except
+lines without area. All numbers are fractions.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .refused import Refused
 SQUARE = [(Fraction(x), Fraction(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 STRIDE, GOAL, PIT, N_STEPS = Fraction(1, 10), Fraction(1, 10), (Fraction(2, 5), Fraction(3, 5)), 50
 OWN = [(Fraction(1), Fraction(0), Fraction(0)), (Fraction(0), Fraction(1), Fraction(0))]  # the coordinates of a state
-DOUBT = 1e-9  # share of the numbers added up: far more than rounding can do
+DOUBT = 1e-9  # relative to the numbers added up: far more than the rounding error
 SIDES = {"-": -1, "=": 0, "+": 1}
 
 
 def check_content(content: dict) -> dict:
-    """The claim of a certificate that was read. Raises `Refused`."""
+    """Return the claim of a certificate that was read. Raises `Refused` if it is not proved."""
     policy, areas, longest = Policy(**content["policy"]), {"goal": 0, "pit": 0, "left": 0}, 0
     pieces = [line.split(" ") for line in content["pieces"]]
     corners = [[corner(start, start) for start in SQUARE]]
@@ -38,9 +38,9 @@ def check_content(content: dict) -> dict:
 
 
 def followed(policy: Policy, polygons: list, pieces: list[tuple[list[str], str]], depth: int):
-    """End, depth and area of all `pieces`, which share their first `depth` steps; `polygons` are the starts of these.
+    """Yield end, depth and area of all `pieces`, which share their first `depth` steps; `polygons` are their starts.
 
-    A polygon is a list of corners, as `corner` makes them.
+    A polygon is a list of corners made by `corner`.
     """
     ended = {end for steps, end in pieces if len(steps) == depth}
     if ended and depth == N_STEPS:
@@ -72,7 +72,7 @@ class Form:
         self.doubt = DOUBT * sum(map(abs, self.rough))
 
     def at(self, state) -> Fraction:
-        """Its value in a state."""
+        """Return its value in a state."""
         *slopes, value = self.exact
         for slope, one in zip(slopes, state):
             if slope:
@@ -80,7 +80,8 @@ class Form:
         return value
 
     def signs(self, polygon: list) -> list:
-        """Numbers with the signs of the values at the corners: rounded ones, if these are beyond doubt."""
+        """Return numbers with the signs of the values at the corners: rounded ones where their signs are certain, else
+        exact ones."""
         p, q, r = self.rough
         values = [p * x + q * y + r for _, _, (x, y) in polygon]
         sure = min(values) > self.doubt or max(values) < -self.doubt
@@ -88,12 +89,12 @@ class Form:
 
 
 def corner(start, state) -> tuple:
-    """A start, the state that it leads to, and that state rounded."""
+    """Return a start, the state that it leads to, and that state rounded."""
     return start, state, (float(state[0]), float(state[1]))
 
 
 class Policy:
-    """Linear maps, each for the states that are nearest to its codeword; of equally near ones the first."""
+    """Linear maps, each for the states that are nearest to its codeword; of equally near codewords the first counts."""
 
     def __init__(self, codewords, coefficients, scale, metric):
         if metric not in ("euclidean", "manhattan"):
@@ -105,7 +106,7 @@ class Policy:
         self.maps = [[[Fraction(row[axis]) for row in one] for axis in (0, 1)] for one in coefficients]
 
     def step(self, polygons: list, step: str) -> list:
-        """The parts of `polygons` that make this step, such as "3+=--", with the states after it."""
+        """Return the parts of `polygons` that make this step, such as "3+=--", with the states after it."""
         number, limits, moves, stops, walls = self.plan(step)
         parts = [part for polygon in polygons for part in self.cell(polygon, number)]
         for one in limits:
@@ -117,9 +118,9 @@ class Policy:
 
     @cache  # noqa: B019 - it lives as long as the check
     def plan(self, step: str) -> tuple:
-        """The cell of a step, the forms of its actions with their sides, the next state, that before the walls with its
-        sides, and that at the walls (None: there are none)."""
-        if step[:-4] not in map(str, range(len(self.maps))):  # one way to write it: no start is counted twice
+        """Return the cell of a step, the limits of the actions with their sides, the forms of the next state, the
+        limits at the walls with their sides, and the forms of the state at the walls (None: at no wall)."""
+        if step[:-4] not in map(str, range(len(self.maps))):  # a cell has one spelling, so no start is counted twice
             raise Refused(f"a step is {step!r}, expected one in a cell from 0 to {len(self.maps) - 1}")
         number, sides = int(step[:-4]), [SIDES[sign] for sign in step[-4:]]
         actions = [(0, 0, side) if side else one for one, side in zip(self.maps[number], sides)]
@@ -130,16 +131,17 @@ class Policy:
         return number, limits, moves, stops, walls if any(sides[2:]) else None
 
     def cell(self, polygon: list, number: int) -> list:
-        """The convex parts of `polygon` in a cell."""
+        """Return the convex parts of `polygon` in a cell."""
         parts = [polygon]
         for other in self.rivals(polygon, number):
             parts = [part for one in parts for part in self.nearer(one, number, other)]
         return parts
 
     def rivals(self, polygon: list, number: int) -> list[int]:
-        """Other codewords that may be nearer to some of `polygon`, if only for rounding.
+        """Return other codewords that may be nearer to some of `polygon`, be it only by rounding.
 
-        In the Manhattan distance, what a coordinate adds to the difference is monotone, so it is largest at an end.
+        In the Manhattan distance, each coordinate adds a monotone function to the difference, which is largest at an
+        end.
         """
         others = [other for other in range(len(self.codewords)) if other != number]
         if self.metric == "euclidean":
@@ -157,7 +159,7 @@ class Policy:
         return found
 
     def nearer(self, polygon: list, number: int, other: int) -> list:
-        """The convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
+        """Return the convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
         parts = [(polygon, ())]
         if self.metric == "manhattan":  # between the coordinates of the codewords, distances are linear
             for axis in (0, 1):
@@ -175,9 +177,9 @@ class Policy:
 
     @cache  # noqa: B019 - it lives as long as the check
     def gap(self, number: int, other: int, at: tuple) -> Form:
-        """The distance to codeword `number` minus that to `other`; of squares, where the metric is Euclidean.
+        """Return the distance to codeword `number` minus that to `other`; Euclidean distances are squared.
 
-        `at`: on which sides of the two codewords the first coordinate is, then the second.
+        `at`: on which side of each of the two codewords the first coordinate is, then the second.
         """
         slopes, constant = [], Fraction(0)
         for axis, scale in enumerate(self.scale):
@@ -192,13 +194,13 @@ class Policy:
 
 
 def between(form, low: int) -> tuple[Form, Form]:
-    """Forms that are positive above `low`, and above 1."""
+    """Return two forms, which are positive above `low` and above 1."""
     p, q, r = form
     return Form(p, q, r - low), Form(p, q, r - 1)
 
 
 def limited(polygons: list, above_low: Form, above_high: Form, side: int) -> list:
-    """The parts below both (side -1), above both (side 1), or between (0)."""
+    """Return the parts below both (side -1), above both (side 1), or between (0)."""
     if side <= 0:
         polygons = [part for one in polygons if (part := halves(one, above_low)[side + 1])]
     if side >= 0:
@@ -207,12 +209,12 @@ def limited(polygons: list, above_low: Form, above_high: Form, side: int) -> lis
 
 
 def moved(polygon: list, forms: list[Form]) -> list:
-    """The same starts, with the states that these forms are of the states before."""
+    """Return the same starts, with new states: `forms` of the states before."""
     return [corner(start, tuple(form.at(state) for form in forms)) for start, state, _ in polygon]
 
 
 def inside(polygons: list, forms: list) -> tuple[list, list]:
-    """The parts where all forms are positive, and the rest."""
+    """Return the parts where all forms are positive, and the rest."""
     rest = []
     for form in forms:
         both = [halves(polygon, form) for polygon in polygons]
@@ -222,7 +224,7 @@ def inside(polygons: list, forms: list) -> tuple[list, list]:
 
 
 def halves(polygon: list, form: Form) -> tuple[list | None, list | None]:
-    """The parts of `polygon` where `form` is at most 0, and above; None for one without area."""
+    """Return the parts of `polygon` where `form` is at most 0, and above 0; None for a part without area."""
     values = form.signs(polygon)
     if max(values) <= 0:
         return polygon, None
@@ -251,5 +253,5 @@ def area(polygons: list) -> Fraction:
     return found
 
 
-IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in OWN]  # where these are positive
+IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in OWN]  # inside, all of these are positive
 IN_PIT = [form for p, q, _ in OWN for form in (Form(p, q, -PIT[0]), Form(-p, -q, PIT[1]))]
