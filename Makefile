@@ -7,7 +7,6 @@
 # CSV) and data/results/.
 FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
-ANIMATIONS_02_distillation := growth_simplegoal
 FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
 RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv made_on.txt
 TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_policies mountaincar_linear_policies \

@@ -387,7 +387,7 @@ def test_every_class_is_trained_split_and_merged(sub_policy, fit):
 
 
 def test_a_class_that_the_task_cannot_have_is_one_clear_error(teacher):
-    with pytest.raises(ValueError, match="SimpleGoal-v0 names no error"):
+    with pytest.raises(ValueError, match="SimpleGoal-v0 defines no error"):
         distill(teacher, SIMPLEGOAL, tiny(sub_policy="pid"), seed=0)
 
 

@@ -171,7 +171,7 @@ def test_a_pilot_that_does_not_fit_is_one_clear_error(act, why):
 def test_a_task_that_never_ends_is_refused():
     gymnasium.register("Endless-v0", entry_point="own_tasks:Tank")
     try:
-        with pytest.raises(ValueError, match="Endless-v0 has no limit of steps, expected one: give gymnasium.register"):
+        with pytest.raises(ValueError, match="Endless-v0 has no step limit, expected one: pass max_episode_steps"):
             vsp.distill(vsp.agent(own_tasks.tank_pilot), "Endless-v0", seed=0)
     finally:
         del gymnasium.registry["Endless-v0"]

@@ -51,7 +51,7 @@ OUTSIDE = {
         beyond.comparison teachers.recipes teachers.train""",
     "draw such tables, histories and runs, with tests of what they refuse": """
         show.animation show.benchmarks show.explanation show.explorer show.gait show.laboratory show.methods
-        show.page show.proofs show.stage""",
+        show.page show.proofs""",
     "checks certificates, which its own tests spoil; writes and reads them": """
         beyond.proofs.check beyond.proofs.make_proofs beyond.proofs.tables""",
     "machinery around the method, and the course, with tests of their own faults": "run course",

@@ -1,9 +1,9 @@
 """vsp: distil reinforcement-learning policies to linear policies in Voronoi cells of the state space.
 
-The method of the paper is the files of this folder: begin with `algorithms.py`. The folders are its wings: tasks/,
-subpolicies/ and teachers/ are what it works on; baselines/, paper/, beyond/ and course/ are what is done with it; show/
-draws, run/ runs. This file is the public face: names of tasks are resolved here, and `distill` and `preset` choose
-between the paper's method and ours.
+The modules of this folder implement the paper's method: start with `algorithms.py`. Its inputs are in tasks/,
+subpolicies/ and teachers/. The folders baselines/, paper/, beyond/ and course/ compare, reproduce, extend and teach it.
+show/ draws figures; run/ runs jobs and notebooks. This file is the public API: it resolves names of tasks, and
+`distill` and `preset` choose between the paper's method and ours.
 """
 
 from __future__ import annotations
@@ -36,19 +36,20 @@ from .teachers import agent, load_teacher
 def distill(
     teacher: Policy, task: str | Task, config: Config | Refinement | Faithful | None = None, *, seed: int
 ) -> tuple[VoronoiPolicy, History | pd.DataFrame]:
-    """Distil `teacher` to a `VoronoiPolicy`: by the paper's method for a `Config`, by ours for a `Refinement`
-    (few cells that return much) or a `Faithful` (few cells that act like the teacher, and return what it returns).
+    """Distil `teacher` to a `VoronoiPolicy`, by the method that the type of `config` selects.
 
-    `teacher` is anything with `.predict(obs) -> (actions, None)` for batches; `config` defaults to the paper's preset,
-    and for a task that the paper does not treat to `preset(task, "faithful")`, printed with its time. Returns the
-    policy and its history: a `History` that lets a notebook replay the run, or a row for each candidate of our methods.
-    Same arguments, same policy. Raises ValueError when the teacher does not fit the task, its states or actions are not
-    finite, or `seed` is no integer from 0 on.
+    A `Config` selects the paper's method. Ours are a `Refinement` (few cells with a high return) and a `Faithful` (few
+    cells with the teacher's actions and return). `teacher` is any object with `.predict(obs) -> (actions, None)` for
+    batches. `config` defaults to the paper's preset; for a task that is not in the paper, it defaults to
+    `preset(task, "faithful")` and prints the expected time. Returns the policy and its history: a `History` that a
+    notebook can replay, or for our methods a table with a row per candidate. The same arguments give the same policy.
+    Raises ValueError if the teacher does not fit the task, if states or actions are not finite, or if `seed` is not a
+    non-negative integer.
     """
     check_seed(seed)
     task = get_task(task)
     if config is None and task.name not in PAPER_TASKS:
-        from .beyond.refinement.duration import announcement  # which takes a while to import
+        from .beyond.refinement.duration import announcement  # slow to import
 
         config = faithful_preset(task)
         how = f"{task.name} is not in the paper: distilling by vsp.preset({task.name!r}, 'faithful')"
@@ -56,7 +57,7 @@ def distill(
     if isinstance(config, Refinement):
         return refine(teacher, task, config, seed=seed)
     if isinstance(config, Faithful):
-        from .beyond.refinement.faithful import distill_faithfully  # likewise
+        from .beyond.refinement.faithful import distill_faithfully  # slow to import
 
         return distill_faithfully(teacher, task, config, seed=seed)
     if config is not None and not isinstance(config, Config):
@@ -73,12 +74,12 @@ def preset(
     n_cells: int | None = None,
     min_r2: float | None = None,
 ) -> Config | Refinement | Faithful:
-    """The settings for `task`: the paper's (table T2, with the default readings), or ours.
+    """Return the settings for `task`: the paper's (table T2, with the default readings), or ours.
 
-    Ours are "faithful", for actions like the teacher's, of any task, and "tuned", for a high return alone. Two numbers
-    choose between faithful policies: `n_cells`, at most, and `min_r2`, how much of the teacher's actions the policy has
-    to explain; it then returns as much as it can. Raises ValueError for an unknown task or kind, for a task without
-    such settings, and for numbers that are out of range or of another kind.
+    Ours are "faithful", for actions like the teacher's, in any task, and "tuned", for a high return alone. Two numbers
+    constrain a faithful policy: `n_cells` is the largest number of cells, and `min_r2` is the least R² of its actions
+    against the teacher's. Given `min_r2`, the policy maximises the return. Raises ValueError for an unknown task or
+    kind, for a task without such settings, and for numbers that are out of range or belong to another kind.
     """
     check_choice("kind", kind, ("paper", "faithful", "tuned"))
     if kind == "faithful":
@@ -89,7 +90,7 @@ def preset(
 
 
 def __getattr__(name: str) -> ModuleType | Callable:
-    """The other wings, as in `vsp.paper.published_policy`, and `vsp.explore`, imported when asked for."""
+    """Import the other subpackages and `vsp.explore` on first use, as in `vsp.paper.published_policy`."""
     if name == "explore":
         return importlib.import_module("vsp.show.explorer").explore
     if name in ("baselines", "beyond", "course", "paper", "show"):

@@ -1,8 +1,8 @@
 """Algorithms 1, 2 and 3 of the paper, in this order: distil a teacher to linear policies in Voronoi cells.
 
-The teacher never sees the partition, so its episodes are rolled out in large batches ahead of the loop; the cells'
-models are stacked, so one step trains them all. Neither changes the algorithm. "l. 4" is a line of the algorithm as the
-paper prints it; "R4" is an open question, a field of `Config`.
+Two speed-ups leave the algorithm unchanged. The teacher's episodes do not depend on the partition, so they are rolled
+out in large batches ahead of the loop. The cells' models are stacked, so one step trains all of them. "l. 4" is a line
+of the algorithm as the paper prints it; "R4" is an open question, a field of `Config`.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from .policy import VoronoiPolicy
 from .rollouts import Episode, Policy, collect_episodes
 from .tasks import Task
 
-# Teacher episodes rolled out together. The last bits of a float32 network's actions depend on the batch, and a run may
-# depend on them: this number is part of what a seed stands for.
+# Number of teacher episodes rolled out together. The last bits of the teacher's float32 actions depend on the batch,
+# and a run may depend on these bits: a seed reproduces a run only with this number.
 EPISODES_AHEAD = 500
-VERSION = 1  # raise it when the same arguments give another policy
+VERSION = 1  # increase it when a change makes the same arguments give another policy
 
 
 @threadpool_limits.wrap(limits=1)  # the same sums in the same order on any machine
 def distill(teacher: Policy, task: Task, config: Config, *, seed: int) -> tuple[VoronoiPolicy, History]:
     """Algorithm 1: imitate `teacher` by sub-policies, each valid in the Voronoi cell of its codeword.
 
-    Returns the policy and the history of the run. Same arguments, same policy. `vsp.distill` checks arguments first.
+    Returns the policy and the history of the run. The same arguments give the same policy. `vsp.distill` checks the
+    arguments first.
     """
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     partition, history = Partition(task, config), History(config.n_iterations)
@@ -56,7 +57,7 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
     Returns the new codewords, each (d,).
     """
     cells, losses = partition.cells(episode.states), np.zeros(len(episode.states))
-    previous, first, added = None, 0, []  # the running loss is that of the states from `first` on
+    previous, first, added = None, 0, []  # the running loss averages over the states from `first` on
     for t, (state, action) in enumerate(zip(episode.states, episode.actions)):
         i = cells[t]  # l. 4
         if i != previous:  # l. 5-8
@@ -68,7 +69,7 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
             near = np.append(before, False) if config.split_neighbours == "old" else partition.neighbours()[j]  # R13
             near[i] |= config.split_reset == "cell_and_neighbours"  # R13
             partition.reset(near)  # l. 13-14
-            added.append(state.copy())  # a view would keep all episodes that were rolled out with its own
+            added.append(state.copy())  # a view would keep the whole batch of episodes in memory
             if config.one_split:  # R4
                 break
             if config.split_lookup == "refreshed":  # R2
@@ -79,11 +80,11 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
 
 def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
-    """Algorithm 3: remove neighbours whose parameters agree with a cell's own. Returns the removed codewords."""
+    """Algorithm 3: for each cell, remove neighbours with similar parameters. Returns the removed codewords."""
     k = len(partition.codewords)
     parameters = partition.comparable_parameters()
     alive = np.ones(k, dtype=bool)
-    members, graph = alive, partition.neighbours()  # the graph of `members`, drawn anew only when these change
+    members, graph = alive, partition.neighbours()  # the graph of `members`, recomputed only when these change
     for i in range(k):  # l. 1
         if not alive[i] and not config.merge_visits_removed:  # R6
             continue
@@ -96,7 +97,7 @@ def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
         apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
         similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
         if not alive[i]:
-            similar[:i] = False  # those before it had their turn: two equal cells must not remove each other
+            similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other
         if similar.any():
             alive = alive & ~similar  # l. 5-6
             near[i] |= config.merge_reset == "survivor_and_neighbours"  # R6
@@ -115,7 +116,7 @@ def may_alter(n: int, config: Config) -> bool:
 
 
 def due(n: int, every: int, config: Config) -> bool:
-    """R15: whether something that happens `every` so many iterations happens in iteration n."""
+    """R15: whether an event with a period of `every` iterations happens in iteration n."""
     return n % every == 0 and (n > 0 or config.inclusive)
 
 

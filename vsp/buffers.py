@@ -1,6 +1,6 @@
-"""What cells remember of the states in them: `Buffers` keeps rows, `SufficientStatistics` what least squares needs.
+"""Training data of the cells: `Buffers` keeps rows, `SufficientStatistics` only the sums that least squares needs.
 
-A row is the features of a state, on which a sub-policy's parameters work (the state itself, for linear ones), and the
+A row holds the features of a state, which are the inputs of a sub-policy (for linear ones, the state itself), and the
 teacher's action there.
 """
 
@@ -12,10 +12,11 @@ import numpy as np
 
 
 class Buffers:
-    """Growing per-cell buffers with uniform minibatches: one log of rows, and per cell a list of row numbers into it.
+    """Growing per-cell buffers with uniform minibatches: one log of rows, and a list of row numbers per cell.
 
-    Rows live until `clear`, whose period bounds the memory: r rows between two take at most 16 (q + 1 + m) r bytes in
-    the log, which doubles as it grows, and 8 k r in the lists of k cells, if all of them lie in one.
+    Rows live until `clear`, so its period bounds the memory. With r rows between two calls, the log takes at most
+    16 (q + 1 + m) r bytes, since it doubles as it grows. The lists of k cells take at most 8 k r bytes; the worst case
+    is all rows in one cell.
     """
 
     def __init__(self, q: int, m: int):
@@ -43,7 +44,10 @@ class Buffers:
         self.counts += np.bincount(cells, minlength=len(self.counts))
 
     def sample(self, cells: np.ndarray, size: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """A minibatch for each of `cells` (c,), with replacement: inputs (c, size, q + 1) and actions (c, size, m)."""
+        """Draw a minibatch for each of `cells` (c,), with replacement.
+
+        Returns inputs (c, size, q + 1) and actions (c, size, m).
+        """
         slots = (rng.random((len(cells), size)) * self.counts[cells, None]).astype(np.intp)
         rows = self._table[cells[:, None], slots]
         return self._inputs.take(rows, axis=0), self._actions.take(rows, axis=0)
@@ -54,7 +58,7 @@ class Buffers:
         self.counts = np.append(self.counts, 0)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop the buffers of all cells but those of the mask `kept` (k,)."""
+        """Keep only the buffers of the cells in the mask `kept` (k,)."""
         self._table, self.counts = self._table[kept], self.counts[kept]
 
     def reset(self, cells: np.ndarray) -> None:
@@ -62,16 +66,16 @@ class Buffers:
         self.counts[cells] = 0
 
     def clear(self) -> None:
-        """Empty all buffers and use the log from its start again."""
+        """Empty all buffers and reuse the log from its start."""
         self.counts[:] = 0
         self._size = 0
 
 
 class SufficientStatistics:
-    """The sums over a cell's rows that least squares needs, and no row: constant memory."""
+    """The sums over each cell's rows that least squares needs, without the rows: constant memory per cell."""
 
     def __init__(self, q: int, m: int):
-        self.products = np.zeros((0, q + 1, q + 1))  # (k, q + 1, q + 1) X'X, features and a column of ones
+        self.products = np.zeros((0, q + 1, q + 1))  # (k, q + 1, q + 1) X'X, where X is features and a column of ones
         self.targets = np.zeros((0, q + 1, m))  # (k, q + 1, m) X'y
         self.squares = np.zeros(0)  # (k,) y'y, over all actions
         self.counts = np.zeros(0, dtype=np.int64)  # (k,) rows per cell
@@ -87,7 +91,7 @@ class SufficientStatistics:
             self.counts[cell] += len(own)
 
     def losses(self, cells: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Mean squared error of linear maps (c, q + 1, m) over all rows of `cells` (c,). (c,)"""
+        """Mean squared error of linear maps (c, q + 1, m), each over all rows of its cell in `cells` (c,). (c,)"""
         products, targets = self.products[cells], self.targets[cells]
         squares = self.squares[cells] + (parameters * (products @ parameters - 2 * targets)).sum(axis=(1, 2))
         return np.maximum(squares, 0.0) / (self.counts[cells] * targets.shape[2])  # rounding may go below 0
@@ -99,22 +103,22 @@ class SufficientStatistics:
             setattr(self, name, np.concatenate([sums, np.zeros((1, *sums.shape[1:]), sums.dtype)]))
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop the sums of all cells but those of the mask `kept` (k,)."""
+        """Keep only the sums of the cells in the mask `kept` (k,)."""
         self.products, self.targets = self.products[kept], self.targets[kept]
         self.squares, self.counts = self.squares[kept], self.counts[kept]
 
     def reset(self, cells: np.ndarray | slice) -> None:
-        """Empty the sums of `cells` (mask, indices or slice)."""
+        """Set the sums of `cells` (mask, indices or slice) to zero."""
         for sums in (self.products, self.targets, self.squares, self.counts):
             sums[cells] = 0
 
     def clear(self) -> None:
-        """Empty all sums."""
+        """Set all sums to zero."""
         self.reset(slice(None))
 
 
 class RecentStates:
-    """The last `size` states that were seen, or all of them while there are fewer."""
+    """The most recent `size` states, or all states while there are fewer."""
 
     def __init__(self, size: int):
         self.size, self._held = size, 0

@@ -1,7 +1,7 @@
-"""`Config`: the hyperparameters of the paper (table T2), and what it leaves open, R1 to R15, as fields with defaults.
+"""`Config`: the hyperparameters of the paper (table T2), and its open questions R1 to R15 as fields with defaults.
 
-The code that a field decides about names it: search for "R9", say, in this folder. R11 (which states a splitting pass
-reads) has one answer in the prose, "this iteration's episode", and is no field.
+Code that depends on an open question names it: search this folder for "R9", for example. R11 (which states a splitting
+pass reads) is not a field, because the paper's prose answers it: "this iteration's episode".
 """
 
 from __future__ import annotations
@@ -13,27 +13,27 @@ from typing import Literal, get_args, get_origin, get_type_hints
 
 from .tasks import Task, get_task
 
-EXTENSIONS = {"sub_policy": "linear", "fit": "adam"}  # fields beyond the paper, and the values that are its method
+EXTENSIONS = {"sub_policy": "linear", "fit": "adam"}  # fields beyond the paper, with the values of the paper's method
 
 
 @dataclass(frozen=True)
 class Config:
-    """Everything that decides a distillation beside the teacher, the task and the seed.
+    """All settings of a distillation, apart from the teacher, the task and the seed.
 
     Raises ValueError for a value out of range; the message shows the value and what was expected.
     """
 
     # Table T2
     n_epochs: int
-    """Iterations of Algorithm 1; each plays one teacher episode."""
+    """Iterations of Algorithm 1; each uses one teacher episode."""
     n_split: int
-    """A splitting pass every `n_split` iterations."""
+    """A splitting pass runs every `n_split` iterations."""
     n_merge: int
-    """A merging pass every `n_merge` iterations."""
+    """A merging pass runs every `n_merge` iterations."""
     n_freeze: int
-    """Length in iterations of the phase of R1."""
+    """Length, in iterations, of the phase that R1 is about."""
     n_reset: int
-    """Period in iterations of the reset of R5."""
+    """Period, in iterations, of the reset that R5 is about."""
     min_param_distance: float
     """Neighbours whose parameters are closer than this (L-infinity) are merged."""
     min_pol_distance: float
@@ -41,64 +41,69 @@ class Config:
     max_pol_loss: float
     """A cell is split where its running mean loss exceeds this; in squared units of the action."""
     one_split: bool = False
-    """R4. At most one split per pass. Only T2 names it (False in both columns), so its meaning is read off its name."""
+    """R4. Whether a pass makes at most one split. Only T2 names this setting (False in both columns), so its meaning is
+    inferred from the name."""
 
     # Open questions
     freeze: Literal["last_n_freeze", "first_n_freeze", "last_n_split"] = "last_n_freeze"
     """R1. When cells are neither split nor merged: in the last `n_freeze` iterations (prose, twice), in all but the
-    first `n_freeze` (Algorithm 1 prints n < n_freeze), or in the last `n_split` (prose, once)."""
+    first `n_freeze` iterations (Algorithm 1 prints n < n_freeze), or in the last `n_split` (prose, once)."""
     split_lookup: Literal["refreshed", "kept"] = "refreshed"
-    """R2. Whether a splitting pass looks states up among all codewords, those it just added included (Algorithm 2 has
-    line 4 inside the loop), or among those it began with."""
+    """R2. The codewords among which a splitting pass looks states up: all, including those that it has just added
+    (Algorithm 2 has line 4 inside the loop), or those that existed before the pass."""
     split_metric: Literal["manhattan", "euclidean"] = "manhattan"
-    """R3. Norm of `min_pol_distance`. In T3, 1 pair of codewords is nearer than 0.3 in Manhattan distance, the distance
-    of the look-up; 12 pairs are in Euclidean distance."""
+    """R3. Metric of `min_pol_distance`. In T3, 1 pair of codewords is closer than 0.3 in Manhattan distance, which the
+    look-up uses; 12 pairs are closer in Euclidean distance."""
     periodic_reset: Literal["buffers", "off"] = "buffers"
-    """R5. What happens every `n_reset` iterations: all buffers are cleared, which also bounds their memory."""
+    """R5. What happens every `n_reset` iterations: nothing, or all buffers are cleared, which also bounds memory."""
     merge_reset: Literal["survivor_and_neighbours", "neighbours"] = "survivor_and_neighbours"
-    """R6. Whose buffers a merge resets: the survivor's and its neighbours' (prose) or the neighbours' (Algorithm 3)."""
+    """R6. Buffers that a merge resets: those of the survivor and its neighbours (prose), or of the neighbours only
+    (Algorithm 3)."""
     merge_visits_removed: bool = False
     """R6. Whether a cell removed earlier in the pass is still visited, as in Algorithm 3, which removes while it
-    iterates. If so, it may only remove cells that are visited later: else two equal cells would remove each other."""
+    iterates. If so, it may only remove cells that are visited later; otherwise equal cells would remove each other."""
     batch_size: int = 64
-    """R7. States per minibatch and cell, drawn with replacement; not stated."""
+    """R7. States per minibatch and cell, drawn with replacement. The paper does not state it."""
     n_minibatches: int = 1
-    """R7. Minibatches per iteration and cell; not stated. At the rate below a parameter can move by about 5 in 5000
-    iterations and by 2 in 2000; the largest printed coefficients are 5.3 (T3) and 3.0 (T4)."""
+    """R7. Minibatches per iteration and cell. The paper does not state it. With the default learning rate, a parameter
+    can move by about 5 in 5000 iterations and by 2 in 2000; the largest printed coefficients are 5.3 (T3) and 3.0
+    (T4)."""
     learning_rate: float = 1e-3
-    """R7. Step size of Adam; not stated, so Adam's own default."""
+    """R7. Step size of Adam. The paper does not state it, so this is Adam's default."""
     initial: Literal["uniform", "zeros"] = "uniform"
-    """R7. First parameters of a sub-policy, "initialized randomly": uniform in +-1/sqrt(d), as in torch.nn.Linear."""
+    """R7. Initial parameters of a sub-policy, "initialized randomly": uniform in +-1/sqrt(d), as in torch.nn.Linear."""
     adam_on_reset: Literal["keep", "restart"] = "keep"
-    """R7. Whether Adam's moments survive a buffer reset: the paper resets buffers and nothing else."""
+    """R7. Whether a buffer reset keeps Adam's moments. The paper resets buffers and nothing else."""
     scale: Literal["raw", "box"] = "raw"
-    """R8. Distances between raw states, or between states divided by the widths of the state box: for the look-up,
-    `min_pol_distance` and neighbours. T4's codewords are in raw units."""
+    """R8. Whether distances are taken between raw states or between states divided by the widths of the state box. This
+    applies to the look-up, `min_pol_distance` and neighbours. T4's codewords are in raw units."""
     neighbours: Literal["delaunay", "lookup", "visited"] = "delaunay"
     """R9. Which cells are neighbours: those that share a Euclidean Delaunay edge (prose), or those that touch under the
-    look-up's metric, in the state box or (beyond the paper, for many dimensions) where the teacher went lately."""
+    look-up's metric. "lookup" samples the state box; "visited" (beyond the paper, for many dimensions) uses states that
+    the teacher visited recently."""
     split_loss: Literal["raw", "clipped"] = "raw"
-    """R10. Whether the loss that splits sees the raw output, as training does, or the output clipped to the action
+    """R10. Whether the loss of splitting uses the raw output, as training does, or the output clipped to the action
     box."""
     merge_parameters: Literal["all", "weights"] = "all"
     """R12. Whether `min_param_distance` compares biases too: "both sets of parameters" includes them."""
     split_reset: Literal["cell_and_neighbours", "neighbours"] = "cell_and_neighbours"
-    """R13. Whose buffers a split resets: the neighbours' and that of the split cell, which holds states it lost, or the
-    neighbours' only (Algorithm 2)."""
+    """R13. Buffers that a split resets: those of the neighbours and of the split cell, which still holds states of the
+    new cell, or those of the neighbours only (Algorithm 2)."""
     split_neighbours: Literal["old", "new"] = "old"
-    """R13. Whose neighbours these are: those of the split cell (prose: "of the old region") or of the new one."""
+    """R13. Which neighbours a split resets: those of the split cell (prose: "of the old region") or of the new cell."""
     loss_after_split: Literal["reset", "kept"] = "reset"
-    """R14. Whether the running loss starts anew after a split; not stated. The default: the split has answered it."""
+    """R14. Whether the running loss restarts after a split. The paper does not state it. By default it restarts, since
+    the split already responds to the loss so far."""
     inclusive: bool = False
-    """R15. False: n = 0 ... n_epochs - 1; n = 0, where one cell was trained once, neither splits nor merges. True: also
-    n = n_epochs ("n = 0 to n_epochs"), and n = 0 splits and merges."""
+    """R15. The range of n. False: n = 0 ... n_epochs - 1; n = 0, where one cell was trained once, neither splits nor
+    merges. True: n = n_epochs is included ("n = 0 to n_epochs"), and n = 0 splits and merges."""
 
     # Beyond the paper
     sub_policy: Literal["linear", "constant", "quadratic", "pid", "network"] = "linear"
     """Class of the sub-policies, an entry of `subpolicies.POLICY_CLASSES`; the paper's is linear."""
     fit: Literal["adam", "closed_form"] = "adam"
     """How each iteration fits a cell: by `n_minibatches` steps of Adam, or by least squares over all states since the
-    last reset, from running sums without a buffer. The fields of minibatches and of Adam have no effect then."""
+    last reset. Least squares uses running sums and no buffer; the settings of minibatches and Adam have no effect."""
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self)).items():
@@ -115,16 +120,16 @@ class Config:
 
     @property
     def n_iterations(self) -> int:
-        """Iterations that are played: `n_epochs`, and one more if `inclusive`."""
+        """Number of iterations that run: `n_epochs`, and one more if `inclusive`."""
         return self.n_epochs + self.inclusive
 
     def settings(self) -> dict:
-        """All fields by name; extensions only where they are used, so that results made before them keep their id."""
+        """Return all fields by name. Extensions appear only if used, so that earlier results keep their id."""
         own = dataclasses.asdict(self)
         return {name: value for name, value in own.items() if name not in EXTENSIONS or value != EXTENSIONS[name]}
 
     def quick(self) -> Config:
-        """The same method in a tenth of the iterations: for a first look, not for results."""
+        """Return the same method with a tenth of the iterations: for a first look, not for results."""
         tenth = {name: max(1, getattr(self, name) // 10) for name in ("n_epochs", "n_freeze")}
         return dataclasses.replace(self, **tenth)
 
@@ -167,13 +172,13 @@ _PRESETS = {
     ),
 }
 
-PAPER_TASKS = tuple(_PRESETS)  # that the paper treats
+PAPER_TASKS = tuple(_PRESETS)  # the tasks of the paper
 
 
 def paper_preset(task: str | Task) -> Config:
-    """The paper's settings for `task`: table T2 and the default answers to R1 to R15.
+    """Return the paper's settings for `task`: table T2 and the default answers to R1 to R15.
 
-    Raises ValueError for a task that the paper does not treat.
+    Raises ValueError for a task that is not in the paper.
     """
     name = get_task(task).name
     if name not in _PRESETS:

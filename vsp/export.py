@@ -1,7 +1,7 @@
-"""A policy as text that runs or reads without vsp: `VoronoiPolicy.to_json`, `to_python`, `to_c`, `to_latex`, `to_text`.
+"""Export a policy as text that needs no vsp: `VoronoiPolicy.to_json`, `to_python`, `to_c`, `to_latex`, `to_text`.
 
-Numbers are written so that they read back as the same float64. Codewords are written already divided by the scale of
-the distance, states are divided where distances are taken, as `VoronoiPolicy` does.
+Numbers are written so that they read back as the same float64. In code, as in `VoronoiPolicy`, codewords are already
+divided by the scale of the distance, and states are divided before distances are taken.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SYMBOLS = {
 
 
 def to_json(policy: VoronoiPolicy) -> str:
-    """All numbers of the policy by name."""
+    """Return all numbers of the policy by name, as JSON."""
     task = policy.task
     about = {
         "task": task.name,
@@ -43,9 +43,10 @@ def to_json(policy: VoronoiPolicy) -> str:
 
 
 def to_python(policy: VoronoiPolicy) -> str:
-    """A module that imports only the standard library: `cell(state)` and `act(state)`, which returns a list of actions.
+    """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
 
-    For a state that is not finite they give -1 and nan. Raises ValueError for features that are not plain arithmetic.
+    It imports only the standard library. For a state that is not finite the functions return -1 and nan.
+    Raises ValueError for features that are not plain arithmetic.
     """
     task = policy.task
     distance = {
@@ -91,10 +92,10 @@ def to_python(policy: VoronoiPolicy) -> str:
 
 
 def to_c(policy: VoronoiPolicy) -> str:
-    """C99 with nothing but the standard library: `int vsp_cell(const double *state)` and
-    `void vsp_act(const double *state, double *action)`.
+    """Return C99 code with `int vsp_cell(const double *state)` and `void vsp_act(const double *state, double *action)`.
 
-    For a state that is not finite they give -1 and NAN. Raises ValueError for features that are not plain arithmetic.
+    It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
+    Raises ValueError for features that are not plain arithmetic.
     """
     (k, p, m), d, inputs = policy.coefficients.shape, len(policy.task.low), len(policy.policy_class.code) + 1
     add = {
@@ -145,7 +146,7 @@ void vsp_act(const double *state, double *action) {{
 
 
 def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """The whole policy in words: the distance, and the equations of every codeword."""
+    """Return the whole policy in words: the distance, and the equations of every codeword."""
     lines = [_headline(policy)]
     if len(policy) > 1:
         lines.append(f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}.")
@@ -159,7 +160,7 @@ def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 
 def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
-    """The scale of the distance in words; nothing for raw states."""
+    """Return the scale of the distance in words; an empty text for raw states."""
     if (policy.scale == 1).all():
         return ""
     units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
@@ -167,7 +168,7 @@ def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
 
 
 def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """A table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
+    """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
     outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
     rows = [
         " & ".join([codeword_latex(policy, i, digits), *equations_latex(policy, i, digits)]) for i in range(len(policy))
@@ -183,7 +184,7 @@ def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 
 def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
-    """The distance to the codewords, as a caption for their table."""
+    """Describe the distance to the codewords, as a caption for their table."""
     if len(policy) == 1:
         return "One cell, wherever its codeword is"
     if (policy.scale == 1).all():
@@ -193,19 +194,19 @@ def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
 
 
 def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> str:
-    """The codeword of a cell between dollars."""
+    """Return the codeword of a cell between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return "$[" + ",\\ ".join(number(c, digits) for c in policy.codewords[cell]) + "]$"
 
 
 def equations_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> list[str]:
-    """The right-hand sides of the equations of a cell between dollars, one per action."""
+    """Return the right-hand sides of the equations of a cell, one per action, between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return [f"${policy.policy_class.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
 
 
 def symbol(name: str) -> str:
-    """The name of a variable, or of a product or square of variables, in LaTeX's mathematics."""
+    """Return a variable's name, or that of a product or square of variables, in LaTeX's math mode."""
     if "·" in name:
         return " ".join(symbol(factor) for factor in name.split("·"))
     if name.endswith("²"):
@@ -229,7 +230,7 @@ def _names(symbols: tuple[str, ...]) -> str:
 
 
 def _escaped(text: str) -> str:
-    """`text` for a docstring and a comment of C: a name can neither end them nor begin a line."""
+    """Escape `text` for a docstring and a C comment: a name can neither end them nor start a new line."""
     return json.dumps(text, ensure_ascii=False)[1:-1].replace("*/", "* /").replace("/*", "/ *")
 
 

@@ -1,8 +1,8 @@
 """Distances, nearest codewords, and neighbouring cells.
 
-A metric is a name that `scipy.spatial.distance.cdist` knows; `METRICS` maps the names used here to SciPy's and to the
-order p of the kd-tree. All functions take codewords (k, d) already divided by the scale of the distance, and raise
-ValueError for arrays of a wrong shape, numbers that are not finite, no codewords, or a metric of another name.
+`METRICS` maps the names of metrics used here to the names in `scipy.spatial.distance.cdist` and to the order p of the
+kd-tree. All functions take codewords (k, d) that are already divided by the scale of the distance. They raise
+ValueError for arrays of a wrong shape, numbers that are not finite, no codewords, or an unknown metric.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from .checks import check_array, check_choice
 
 METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
 LOOKUP = "manhattan"  # the distance that finds a state's cell
-KDTREE_FROM = 512  # codewords from which the kd-tree is faster in a few dimensions; see `vsp.beyond.benchmarks.lookup`
-WITNESSES = 4096  # points that look for touching cells
+KDTREE_FROM = 512  # codewords from which the kd-tree is faster in low dimensions; see `vsp.beyond.benchmarks.lookup`
+WITNESSES = 4096  # number of points that test which cells touch
 
 
 def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
@@ -28,10 +28,10 @@ def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -
 def nearest(
     codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
 ) -> np.ndarray:
-    """Index of the nearest codeword (k, d) of each state (n, d); of equally near ones the lowest. (n,)
+    """Index of the nearest codeword (k, d) of each state (n, d); the lowest index if several are equally near. (n,)
 
-    Paper, Algorithm 1 line 6: kd-tree(C, s_t). Comparing with all codewords gives the same indices and is faster for
-    the few dozen of the paper; `kdtree` says which way to take, None: the faster one.
+    Paper, Algorithm 1 line 6: kd-tree(C, s_t). Brute force gives the same indices and is faster for the few dozen
+    codewords of the paper. `kdtree` selects the kd-tree (True), brute force (False), or the faster one (None).
     """
     codewords, states = _checked(codewords, states, metric)
     return look_up(codewords, states, metric, kdtree=kdtree)
@@ -40,13 +40,13 @@ def nearest(
 def look_up(
     codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
 ) -> np.ndarray:
-    """`nearest` for arrays that were checked before: a distillation and a policy ask thousands of times."""
+    """`nearest` without checks, for arrays checked before: a distillation and a policy call it thousands of times."""
     kind, order = METRICS[metric]
     if len(codewords) == 1 or not (len(codewords) >= KDTREE_FROM if kdtree is None else kdtree):
         return cdist(states, codewords, kind).argmin(axis=1)
     gaps, index = cKDTree(codewords).query(states, k=2, p=order)
     index = index[:, 0]
-    tied = np.isclose(gaps[:, 0], gaps[:, 1], rtol=1e-12, atol=0)  # the tree answers ties in any order
+    tied = np.isclose(gaps[:, 0], gaps[:, 1], rtol=1e-12, atol=0)  # the tree returns ties in any order
     index[tied] = cdist(states[tied], codewords, kind).argmin(axis=1)
     return index
 
@@ -59,8 +59,9 @@ def all_differ(points: np.ndarray) -> bool:
 def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
     """Which codewords share an edge of the Euclidean Delaunay triangulation. (k, k) bool, symmetric, diagonal False.
 
-    Qhull refuses points in a line or plane, so they are first projected onto the flat they span; up to r + 1 points in
-    r dimensions are all neighbours. Raises ValueError for duplicate codewords: Qhull leaves them without neighbours.
+    Qhull rejects points on a line or plane, so they are first projected onto the affine subspace that they span. Up to
+    r + 1 points in r dimensions are all neighbours. Raises ValueError for duplicate codewords, because Qhull
+    leaves them without neighbours.
     """
     codewords = check_codewords(codewords)
     k = len(codewords)
@@ -81,8 +82,8 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
 def lookup_neighbours(codewords: np.ndarray, low: np.ndarray, high: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Which cells touch inside the box [low, high] under the look-up's metric. (k, k) bool, symmetric.
 
-    The witnesses are an unscrambled Halton sequence, so the answer is always the same. They fill the box, where a task
-    may hardly ever be: see `visited_neighbours`.
+    The witnesses are an unscrambled Halton sequence, so the result is deterministic. They fill the box, much of which a
+    task may never visit: see `visited_neighbours`.
     """
     from scipy.stats import qmc
 
@@ -98,11 +99,11 @@ def visited_neighbours(codewords: np.ndarray, witnesses: np.ndarray, metric: str
     """Which cells touch where `witnesses` (n, d) are, under the look-up's metric. (k, k) bool, symmetric.
 
     Two cells are neighbours when some witness has their codewords as its two nearest (Martinetz & Schulten 1994), for
-    any metric and dimension. Of a box's points some lie where no state ever is, off the circle that the cosine and
-    sine of an angle fill, off the curves that episodes follow, and there cells meet that have nothing to do with each
-    other; the more dimensions, the more such points, and some boxes have no limits. States that a teacher visited say
-    which cells touch where the policy is asked to act. A border that none of them is near is missed; up to two
-    codewords are neighbours.
+    any metric and dimension. Witnesses that fill the state box would add unrelated neighbours, for two reasons. Some
+    points of the box are never states, such as those off the circle of an angle's cosine and sine. Others lie far from
+    the curves that episodes follow. Both kinds grow more frequent with the dimension, and some boxes have no limits.
+    States that a teacher visited show which cells touch where the policy acts. A border without a witness near it is
+    missed. One or two codewords need no witness.
     """
     codewords, witnesses = _checked(codewords, witnesses, metric)
     k = len(codewords)
@@ -126,7 +127,7 @@ def _checked(codewords: np.ndarray, states: np.ndarray, metric: str) -> tuple[np
 
 
 def _flatten(points: np.ndarray) -> np.ndarray:
-    """Coordinates of `points` (k, d) in the flat of rank r that they span. (k, r)"""
+    """Coordinates of `points` (k, d) in the affine subspace of rank r that they span. (k, r)"""
     centred = points - points.mean(axis=0)
     _, singular, axes = np.linalg.svd(centred, full_matrices=False)
     rank = max(1, int((singular > 1e-9 * max(singular[0], 1e-300)).sum()))
@@ -136,8 +137,8 @@ def _flatten(points: np.ndarray) -> np.ndarray:
 def _triangulated(points: np.ndarray) -> np.ndarray:
     """Pairs of `points` (k, r) that share an edge. (e, 2)
 
-    What Qhull leaves out because of rounding is looked at again from the middle, where there is less of it; what then
-    still lies on another point is the neighbour of that one.
+    If Qhull leaves points out because of rounding, the points are centred, which reduces rounding, and triangulated
+    again. A point that is still left out becomes a neighbour of its nearest vertex.
     """
     found = Delaunay(points)
     if len(found.coplanar):

@@ -1,4 +1,4 @@
-"""What happened during one distillation, so that a notebook can replay it."""
+"""Record one distillation, so that a notebook can replay it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .partition import Partition
 from .policy import VoronoiPolicy
 
 SNAPSHOT_EVERY = 10  # iterations between two stored copies of the parameters
-SNAPSHOTS = 500  # of a longer run, where more iterations lie between two of them: memory is bounded
+SNAPSHOTS = 500  # approximate maximum; in long runs snapshots are further apart, which bounds memory
 
 
 class Event(NamedTuple):
-    """A codeword that came by a split or went by a merge."""
+    """A codeword that a split added or a merge removed."""
 
     iteration: int
     kind: str  # "split" or "merge"
@@ -25,10 +25,10 @@ class Event(NamedTuple):
 
 
 class History:
-    """Cells, losses and events over the iterations of one run, and snapshots of the policy on the way.
+    """Cells, losses and events over the iterations of one run, and snapshots of the policy.
 
-    Snapshots are about `SNAPSHOTS` at most, and one per change of the codewords. What grows with the iterations is two
-    numbers for each, 40 bytes.
+    There are at most about `SNAPSHOTS` snapshots, and one more per change of the codewords. Two numbers are kept per
+    iteration, 40 bytes.
     """
 
     def __init__(self, n_iterations: int = 0) -> None:
@@ -39,11 +39,11 @@ class History:
         self._snapshots: list[tuple[int, VoronoiPolicy]] = []
 
     def add_events(self, n: int, kind: str, codewords: list[np.ndarray]) -> None:
-        """Note the codewords that a pass of iteration n added or removed."""
+        """Record the codewords that a pass of iteration n added or removed."""
         self.events += [Event(n, kind, codeword) for codeword in codewords]
 
     def observe(self, n: int, loss: float, partition: Partition) -> None:
-        """Note how iteration n left the partition."""
+        """Record the partition after iteration n."""
         self.cells.append(len(partition.codewords))
         self.losses.append(loss)
         changed = self.events and self.events[-1].iteration == n
@@ -51,7 +51,10 @@ class History:
             self._snapshots.append((n, partition.policy()))
 
     def policy_at(self, n: int) -> VoronoiPolicy:
-        """The policy after iteration n, fewer than `every` iterations old. Raises ValueError outside the run."""
+        """Return the policy after iteration n, or less than `every` iterations before it.
+
+        Raises ValueError outside the run.
+        """
         check_count("iteration", n, least=0, most=len(self.cells) - 1)
         return self._snapshots[bisect_right(self._snapshots, n, key=lambda snapshot: snapshot[0]) - 1][1]
 

@@ -1,4 +1,4 @@
-"""`Partition`: what a distillation changes as it goes, the codewords, the cells' models and their buffers."""
+"""`Partition`: the state of a distillation, which consists of codewords, the cells' models and their buffers."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .tasks import Task
 class Partition:
     """The state of a distillation: codewords, the cells' models, their buffers.
 
-    `add`, `observe` and `locate` check what comes in: they raise ValueError for states that do not fit the task. The
-    rest works on what is there, thousands of times a run.
+    `add`, `observe` and `locate` check their arguments: they raise ValueError for states that do not fit the task. The
+    other methods do not check, because a run calls them thousands of times.
     """
 
     def __init__(self, task: Task, config: Config):
@@ -44,7 +44,7 @@ class Partition:
         self.recent.append(episode.states)
 
     def train(self, rng: np.random.Generator) -> float:
-        """Train every cell that has data; returns the mean loss over cells."""
+        """Train every cell that has data. Returns the mean loss over cells."""
         cells = np.flatnonzero(self.buffers.counts)
         if isinstance(self.buffers, SufficientStatistics):
             losses = self.buffers.losses(cells, self.models.parameters[cells])
@@ -56,9 +56,9 @@ class Partition:
         return float(losses.mean())
 
     def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
-        """Make `state` (d,) the codeword of a new, untrained cell; returns its index.
+        """Make `state` (d,) the codeword of a new, untrained cell. Returns its index.
 
-        Raises ValueError for one that is a codeword already.
+        Raises ValueError if `state` is a codeword already.
         """
         state = check_array("state", state, (len(self.task.low),))
         if (self.codewords == state).all(axis=1).any():
@@ -69,7 +69,7 @@ class Partition:
         return len(self.codewords) - 1
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop all cells but those of the mask `kept` (k,)."""
+        """Keep only the cells of the mask `kept` (k,)."""
         self.codewords = self.codewords[kept]
         self.models.keep(kept)
         self.buffers.keep(kept)
@@ -81,7 +81,7 @@ class Partition:
             self.models.restart_adam(cells)
 
     def clear(self) -> None:
-        """Empty all buffers and use their memory again."""
+        """Empty all buffers and reuse their memory."""
         self.buffers.clear()
         if self.config.adam_on_reset == "restart":  # R7
             self.models.restart_adam(slice(None))
@@ -95,7 +95,7 @@ class Partition:
         return states if self.config.scale == "raw" else states / self.scale
 
     def locate(self, state: np.ndarray) -> int:
-        """Cell of one state (d,). Raises ValueError for one that does not fit the task."""
+        """Cell of one state (d,). Raises ValueError if it does not fit the task."""
         return int(self.cells(check_array("state", state, (len(self.task.low),))[None])[0])
 
     def far(self, i: int, state: np.ndarray) -> bool:
@@ -103,7 +103,7 @@ class Partition:
         gap = geometry.distances(
             self.scaled(state[None]), self.scaled(self.codewords[i][None]), self.config.split_metric
         )
-        # A teacher pushing against the border stands still; with split_lookup="kept" it could offer one state twice.
+        # A teacher that pushes against the border stands still: with split_lookup="kept" a state could be added twice.
         return gap[0, 0] > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
 
     def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
@@ -123,14 +123,14 @@ class Partition:
         return geometry.delaunay_neighbours(codewords)
 
     def comparable_parameters(self) -> np.ndarray:
-        """What a merge compares (R12), one row per cell. (k, p)"""
+        """Return the parameters that a merge compares (R12), one row per cell. (k, p)"""
         parameters = self.models.comparable()
         if self.config.merge_parameters == "weights":
             parameters = parameters[:, :-1]
         return parameters.reshape(len(self.codewords), -1)
 
     def policy(self) -> VoronoiPolicy:
-        """The partition as a policy of its own."""
+        """Return the partition as a policy that later changes do not affect."""
         scale = None if self.config.scale == "raw" else self.scale
         parameters, name = self.models.parameters, self.config.sub_policy
         return VoronoiPolicy(self.codewords, parameters, task=self.task, scale=scale, sub_policy=name)

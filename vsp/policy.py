@@ -1,4 +1,4 @@
-"""`VoronoiPolicy`: codewords and sub-policies that act, explain themselves, and go to disk and back."""
+"""`VoronoiPolicy`: codewords and sub-policies. It acts, explains its actions, and can be saved and loaded."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .subpolicies.registry import policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
 
-_STEPS = 200  # points of an axis that are tried at once for a border
-MOST, LEAST_SCALE = 1e50, 1e-50  # of a policy's numbers: squared distances and products stay below 1e308
+_STEPS = 200  # points on an axis in one pass of the search for a border
+MOST, LEAST_SCALE = 1e50, 1e-50  # limits of a policy's numbers, which keep squared distances and products below 1e308
 
 
 @dataclass(frozen=True)
@@ -31,17 +31,17 @@ class Explanation:
     raw: np.ndarray  # (m,) output of the sub-policy
     action: np.ndarray  # (m,) `raw` limited to the action box
     next_cell: int | None  # the cell with the second nearest codeword; None if there is one cell
-    margin: float  # how much nearer the own codeword is than the second nearest, in units of the look-up distance
-    borders: pd.DataFrame  # a row per input: the least change of it alone that leads to another cell, and that cell
+    margin: float  # distance to the second nearest codeword minus that to the nearest, in the look-up metric
+    borders: pd.DataFrame  # a row per input: the least change of it alone that reaches another cell, and that cell
 
 
 class VoronoiPolicy:
     """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
 
-    `codewords` (k, d); `coefficients` (k, p, m), rows as `policy_class.rows` names them: for linear sub-policies d
-    weights, then the bias; `sub_policy`: one of `subpolicies.POLICY_CLASSES`; `scale` (d,): distances are taken between
-    states divided by it (None: raw states). Everything is float64. Raises ValueError for wrong shapes, equal codewords,
-    and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`.
+    `codewords` are (k, d). `coefficients` are (k, p, m); `policy_class.rows` names the p rows: for linear sub-policies
+    d weights, then the bias. `sub_policy` is one of `subpolicies.POLICY_CLASSES`. Distances are taken between states
+    divided by `scale` (d,); None: raw states. All arrays are float64. Raises ValueError for wrong shapes, equal
+    codewords, and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class VoronoiPolicy:
         """Raise ValueError unless the sub-policies are linear, for callers that support no others."""
         if self.policy_class.name != "linear":
             raise ValueError(
-                f"the policy has sub_policy {self.policy_class.name!r}, expected 'linear': distil one of these"
+                f"the policy has sub_policy {self.policy_class.name!r}, expected 'linear': distil a linear policy"
             )
 
     def cells(self, obs: np.ndarray) -> np.ndarray:
@@ -83,22 +83,22 @@ class VoronoiPolicy:
         return self._cells(self._states(obs))
 
     def linear(self, obs: np.ndarray) -> np.ndarray:
-        """Output of the sub-policies before it is limited to the action box: (n, m), or (m,) for one observation."""
+        """Output of the sub-policies before it is clipped to the action box: (n, m), or (m,) for one observation."""
         states = self._states(obs)
         return self.policy_class.outputs(self.policy_class.features(states), self.coefficients[self._cells(states)])
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions within the task's limits, in Stable-Baselines3's convention.
+        """Return actions within the task's limits, in Stable-Baselines3's convention.
 
-        `obs` is one observation (d,) or a batch (n, d); returns actions (m,) or (n, m) in float64, and None for the
-        recurrent state that this policy does not have. Raises ValueError for a wrong shape or numbers not finite.
+        `obs` is one observation (d,) or a batch (n, d). Returns actions (m,) or (n, m) in float64, and None in place of
+        a recurrent state. Raises ValueError for a wrong shape or numbers that are not finite.
         """
         return np.minimum(np.maximum(self.linear(obs), self.task.action_low), self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
-        """Cell, equation, contribution of each feature, and distance to the borders, for one observation (d,).
+        """Explain the action at one observation (d,): cell, equations, contributions of features, and nearest borders.
 
-        Raises ValueError for a batch, as `predict` does for bad numbers.
+        Raises ValueError for a batch, and for bad numbers as `predict` does.
         """
         state = self._states(obs)
         if state.ndim != 1:
@@ -119,10 +119,10 @@ class VoronoiPolicy:
         )
 
     def _borders(self, state: np.ndarray, cell: int) -> pd.DataFrame:
-        """Columns change (in units of the input; NaN where no change within the box leads to another cell) and cell
-        (-1 there).
+        """Return the columns change (in units of the input; NaN where no change within the box leads to another cell)
+        and cell (-1 there).
 
-        Tries `_STEPS` points of each axis, then refines between two of them: a sliver of a cell may be missed.
+        Tries `_STEPS` points on each axis, then refines between two of them. A very thin cell may be missed.
         """
         rows = []
         for axis in range(len(state)):
@@ -132,7 +132,7 @@ class VoronoiPolicy:
         return pd.DataFrame(rows, index=list(self.task.inputs), columns=["change", "cell"])
 
     def _border(self, state: np.ndarray, cell: int, axis: int, end: float) -> tuple[float, int]:
-        """The change along one axis towards `end` at which another cell begins, and that cell."""
+        """Return the change along one axis towards `end` at which another cell begins, and that cell."""
         inside, outside = state[axis], end
         for _ in range(5):  # each time on a finer grid
             line = np.tile(state, (_STEPS, 1))
@@ -144,9 +144,10 @@ class VoronoiPolicy:
         return float(outside - state[axis]), found
 
     def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
-        """The sub-policy of one cell in words, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
+        """Return the equations of one cell, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
 
-        `digits` are decimals; None: each number exactly, without terms that are zero, as for policies of `simplify`.
+        `digits` is the number of decimals. None prints each number exactly and leaves out terms that are zero, which
+        suits policies of `simplify`.
         Raises ValueError for a cell that does not exist.
         """
         check_count("cell", cell, least=0, most=len(self) - 1)
@@ -156,7 +157,7 @@ class VoronoiPolicy:
         )
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
+        """Return one row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
         columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
         for j, output in enumerate(self.task.outputs):
             for i, name in enumerate(self.policy_class.rows):
@@ -164,23 +165,23 @@ class VoronoiPolicy:
         return pd.DataFrame(columns).rename_axis("cell")
 
     def to_json(self) -> str:
-        """All numbers of the policy by name, as JSON."""
+        """Return all numbers of the policy by name, as JSON."""
         return export.to_json(self)
 
     def to_python(self) -> str:
-        """Source of a Python module with a function `act(state)` that needs no package."""
+        """Return the source of a Python module with a function `act(state)` that needs no package."""
         return export.to_python(self)
 
     def to_c(self) -> str:
-        """Source in C99 without dependencies: `void vsp_act(const double *state, double *action)`."""
+        """Return C99 source without dependencies: `void vsp_act(const double *state, double *action)`."""
         return export.to_c(self)
 
     def to_latex(self, digits: int | None = 3) -> str:
-        """A LaTeX table of codewords and equations, with `digits` as `equations` has them."""
+        """Return a LaTeX table of codewords and equations; `digits` as in `equations`."""
         return export.to_latex(self, digits)
 
     def to_text(self, digits: int | None = 3) -> str:
-        """The whole policy in plain words, with `digits` as `equations` has them."""
+        """Return the whole policy in plain words; `digits` as in `equations`."""
         return export.to_text(self, digits)
 
     def save(self, path: str | os.PathLike) -> None:
@@ -193,20 +194,22 @@ class VoronoiPolicy:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> VoronoiPolicy:
-        """Read a policy that `save` wrote, with the names and the box of its task. It acts also where the task is not
-        registered. Raises FileNotFoundError, and `run.atomic.DamagedFile` where a bit is missing or altered, or the
-        file holds no policy."""
+        """Read a policy that `save` wrote, with the names and the box of its task.
+
+        It can act even if the task is not registered. Raises FileNotFoundError, and `run.atomic.DamagedFile` if a bit
+        is missing or altered, or if the file holds no policy.
+        """
         arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
         try:
             box = {limit: arrays.pop(limit) for limit in BOX}
             task = saved_task(about["task"], about["inputs"], about["outputs"], box)
             return cls(**arrays, task=task, metric=about["metric"], sub_policy=about["sub_policy"])
         except (KeyError, TypeError, ValueError) as error:
-            raise DamagedFile(f"{path}: sealed, but no policy that can act: {error}") from error
+            raise DamagedFile(f"{path}: the checksum is right, but the file holds no valid policy: {error}") from error
 
     def _cells(self, states: np.ndarray) -> np.ndarray:
         found = geometry.look_up(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
-        return found.reshape(states.shape[:-1])[()]  # a number for one state: quicker to index with
+        return found.reshape(states.shape[:-1])[()]  # a scalar for one state: faster to index with
 
     def _states(self, obs: np.ndarray) -> np.ndarray:
         return check_observations(obs, len(self.task.low), self.task.name)

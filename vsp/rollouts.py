@@ -12,20 +12,20 @@ import numpy as np
 from .checks import check_array, check_data, check_finite
 from .tasks import GOAL, RUNNING, TRUNCATED, Task, get_task
 
-Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # episodes (a,) that go on, what they see (a, d), what they do (a, m)
+Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # running episodes (a,), observations (a, d), actions (a, m)
 
 
 class Policy(Protocol):
-    """Anything with Stable-Baselines3's `predict`: observations (n, d) to clipped actions (n, m) and no state."""
+    """Any object with Stable-Baselines3's `predict`: observations (n, d) to clipped actions (n, m), and no state."""
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]: ...
 
 
 @dataclass(frozen=True)
 class Episode:
-    """One recorded episode of T steps: the states acted in and the actions taken there.
+    """One recorded episode of T steps: the states, and the actions taken in them.
 
-    Raises ValueError unless both are finite and as many, at least one. `checked`: they are known to be.
+    Raises ValueError unless all numbers are finite and T is the same for both and at least 1. `checked` skips this.
     """
 
     states: np.ndarray  # (T, d) float64, as the policy observed them
@@ -48,7 +48,7 @@ class Outcomes:
 
 
 def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
-    """Play one episode of `policy` from each start state (n, s).
+    """Run one episode of `policy` from each start state (n, s).
 
     Raises ValueError for starts that are not finite or lie outside the box, and for a policy that does not fit the
     task or whose actions are not finite.
@@ -58,7 +58,7 @@ def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
 
 
 def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
-    """Play one episode from each start state (n, s) and keep every state and action, in the order of `starts`.
+    """Run one episode from each start state (n, s) and keep every state and action, in the order of `starts`.
 
     Raises ValueError as `rollout` does.
     """
@@ -75,9 +75,9 @@ def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> li
 
 
 def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:
-    """All states (t, d) on the way from the start states (n, s), episode by episode.
+    """Return all states (t, d) that are visited from the start states (n, s), episode by episode.
 
-    Raises ValueError as `rollout` does, and for no starts.
+    Raises ValueError as `rollout` does, and if there are no start states.
     """
     episodes = collect_episodes(policy, task, starts)
     if not episodes:
@@ -86,7 +86,7 @@ def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.n
 
 
 def warn_outside(task: Task, states: np.ndarray) -> None:
-    """Warn where observations (t, d) leave the box that the task declares: how many, and which variable how far."""
+    """Warn if observations (t, d) leave the box that the task declares: how many, and which variable leaves it most."""
     beyond = np.maximum(task.low - states, states - task.high)
     outside = (beyond > 1e-6 * (1.0 + np.abs(states))).any(axis=1)  # float32 rounds
     if outside.any():
@@ -94,21 +94,22 @@ def warn_outside(task: Task, states: np.ndarray) -> None:
         warnings.warn(
             f"{outside.sum():,} of {len(states):,} observations leave the box of {task.name}, such as "
             f"{task.inputs[j]} = {states[row, j]:.6g}, declared from {task.low[j]:g} to {task.high[j]:g}",
-            stacklevel=5,  # of whoever calls `vsp.distill`
+            stacklevel=5,  # the caller of `vsp.distill`
         )
 
 
 def score(result: Outcomes, failure_penalty: float) -> float:
-    """Mean return, less the penalty for every failed episode; where none can succeed this changes no comparison."""
+    """Return the mean return minus `failure_penalty` times the share of failed episodes.
+
+    In a task without a goal the penalty is the same for all policies, so it changes no comparison.
+    """
     return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))
 
 
 def _begin(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
-    """The states that episodes from `starts` (n, s) begin in."""
+    """Return the first states of episodes from `starts` (n, s)."""
     if not callable(getattr(policy, "predict", None)):
-        raise ValueError(
-            f"the policy is {policy!r}, expected something with `predict`, which `vsp.agent` makes of others"
-        )
+        raise ValueError(f"the policy is {policy!r}, expected something with `predict`: `vsp.agent` wraps other agents")
     starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
     states = task.begin(starts)
     seen = task.see(states)
@@ -120,13 +121,13 @@ def _begin(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
 
 
 def _advance(policy: Policy, task: Task, states: np.ndarray, steps: list[Step] | None = None) -> Outcomes:
-    """Play episodes from `states` to their ends, all together; finished ones leave the batch.
+    """Run episodes from `states` to their ends, all together; finished ones leave the batch.
 
-    What was seen and done in each step is appended to `steps`, if there is such a list.
+    If `steps` is a list, the observations and actions of each step are appended to it.
     """
     n = len(states)
     returns, lengths, outcomes = np.zeros(n), np.zeros(n, dtype=np.int64), np.full(n, TRUNCATED)
-    active = np.arange(n)  # the episodes that go on
+    active = np.arange(n)  # indices of the running episodes
     for t in range(task.max_steps):
         observations = task.observe(states)
         actions = _act(policy, task, observations)
@@ -144,7 +145,7 @@ def _advance(policy: Policy, task: Task, states: np.ndarray, steps: list[Step] |
 
 
 def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:
-    """The policy's actions (n, m) in float64. Raises ValueError unless it fits the task and they are finite."""
+    """Return the policy's actions (n, m) in float64. Raises ValueError unless they fit the task and are finite."""
     (n, d), m = observations.shape, len(task.action_low)
     try:
         actions = np.asarray(policy.predict(observations)[0])

@@ -119,7 +119,7 @@ def test_a_missing_file_and_a_link_to_nothing(tmp_path):
     for read in (read_bytes, read_sealed, read_listed, read_table):
         with pytest.raises(MissingFile) as found:
             read(path)
-        assert str(found.value) == f"{path}: no such file: `git checkout '{path}'` brings back a committed one"
+        assert str(found.value) == f"{path}: no such file: `git checkout '{path}'` restores a committed file"
     path.symlink_to(tmp_path / "nothing")
     with pytest.raises(MissingFile, match="a file: no such file, but a link to .*nothing: "):
         read_bytes(path)
@@ -158,7 +158,7 @@ def test_something_else_in_the_place_of_an_output_is_told(tmp_path):
         with pytest.raises(OSError) as error:
             write_text(path, "new")
         said = atomic.one_line(error.value)
-        assert said.endswith(": something else stands in its place: move that away") and "\n" not in said
+        assert said.endswith(": something else has this name: move it away") and "\n" not in said
 
 
 def test_an_error_without_a_hint_is_raised_again():

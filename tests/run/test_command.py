@@ -26,7 +26,7 @@ from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied
         (MissingFile("x.run: no such file"), "error: work: x.run: no such file"),
         (OSError(errno.ENOSPC, "No space", "a.run"), "error: work: a.run: No space: free some space, "),
         (FileExistsError(errno.EEXIST, "File exists", "build"), "error: work: build: File exists: something else "),
-        (KeyboardInterrupt(), "error: work: interrupted. What is on disk stays"),
+        (KeyboardInterrupt(), "error: work: interrupted. Finished files stay on disk"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
 )

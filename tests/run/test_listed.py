@@ -71,8 +71,8 @@ def test_an_altered_file_is_named_with_the_ways_out(table, tmp_path):
     with pytest.raises(DamagedFile) as found:
         read_listed(table)
     assert str(found.value) == (
-        f"{table}: SHA-256 is {sha256(table)}, MANIFEST.sha256 beside it has {expected}: `git checkout {table}` brings "
-        f"back a committed one; if it is as it should be, `python -m vsp.run.manifest {table.parent}` accepts it"
+        f"{table}: SHA-256 is {sha256(table)}, MANIFEST.sha256 beside it has {expected}: `git checkout {table}` "
+        f"restores a committed file; if the file is correct, `python -m vsp.run.manifest {table.parent}` accepts it"
     )
     (tmp_path / "c.csv").write_text("x\n")
     with pytest.raises(DamagedFile, match=r"c.csv: .*MANIFEST.sha256 beside it has no such file"):

@@ -76,5 +76,5 @@ def safetensors(about: str) -> bytes:
 def test_a_seal_alone_does_not_make_a_file_ours(tmp_path, payload):
     write_sealed(tmp_path / "x", payload)
     assert read_sealed(tmp_path / "x") == payload
-    with pytest.raises(DamagedFile, match="x: sealed, but not what `save_arrays` writes"):
+    with pytest.raises(DamagedFile, match="x: right checksum, but `save_arrays` did not write it"):
         load_arrays(tmp_path / "x", kind="Thing")

@@ -60,8 +60,8 @@ def test_an_error_of_a_job_is_that_of_the_call(jobs):
 
 
 def test_a_killed_worker_is_named():
-    """Nothing waits for it in vain; the message says how far the work came and that it goes on from there."""
-    told = r"a study: a worker process was killed \(.*SIGKILL.*\) with [345] of 6 rows done.*goes on from there"
+    """Nothing waits for it in vain; the message says how much was done and that the same command resumes."""
+    told = r"a study: a worker process was killed \(.*SIGKILL.*\) with [345] of 6 rows done.*same command to resume"
     with pytest.raises(WorkerDied, match=told):
         ask(die, [(n,) for n in range(3)], 2, done=3)
     assert ask(die, [(3,), (4,)], 2) == {0: 3, 1: 4}  # and the pool is as good as new

@@ -141,7 +141,7 @@ def test_a_damaged_checkpoint_is_not_resumed(short, tmp_path, monkeypatch):
         with pytest.raises(atomic.DamagedFile):
             train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
     sealed.write_sealed(path, b"no tensors")
-    with pytest.raises(atomic.DamagedFile, match="sealed, but no checkpoint"):
+    with pytest.raises(atomic.DamagedFile, match="the checksum is right, but the file is no checkpoint"):
         read_checkpoint(path)
 
 
@@ -208,7 +208,7 @@ def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatc
     monkeypatch.setattr(train, "MOST_SEEDS", 2)
     out = tmp_path / "out"
     monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out), "--task", SIMPLEGOAL])
-    with pytest.raises(SystemExit, match="none of the seeds 0 to 1 reached the bar"):
+    with pytest.raises(SystemExit, match="none of the seeds 0 to 1 met the requirements"):
         main()
     assert not out.exists() and len(list((tmp_path / "cache").iterdir())) == 2
 

@@ -1,7 +1,7 @@
-"""Linear maps in cells that ask the teacher's critics, after two published methods.
+"""Linear maps in cells, fitted with the teacher's critics, after two published methods.
 
 Both are fitted to states (n, d) and actions (n, m) of a teacher. They raise ValueError for a teacher without critics,
-arrays of a wrong shape, numbers that are not finite, less than one cell, and a bad seed.
+arrays of a wrong shape, numbers that are not finite, fewer than one cell, and a bad seed.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from ..teachers.teacher import Teacher
 from .simple import kmeans_cells
 from .trees import standard
 
-N_STEPS, BATCH, RATE = 1000, 256, 0.03  # of Adam: steps per added cell, states per step, first step in half ranges
-WORST = 0.01  # share of a cell's states, those that lose the most value, around which a codeword is added
+N_STEPS, BATCH, RATE = 1000, 256, 0.03  # Adam: steps per added cell, states per step, initial step size in half ranges
+WORST = 0.01  # share of a cell's states whose mean becomes a codeword: those that lose the most value
 
 
 def critic_driven(
     states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
 ) -> VoronoiPolicy:
-    """Cells that are added where the critics value the distilled action too little, after arXiv 2605.14897.
+    """Add cells where the critics value the distilled action too low, after arXiv 2605.14897.
 
-    Written from its abstract alone, which says: linear maps are trained by gradient descent, cells are added where the
-    value is insufficient by the teacher's critic, and each state belongs to its nearest codeword. The rest is our
-    guess. The first codeword is the mean of the states; distances are Euclidean, of standardised states; maps are
-    trained by `trained`. A state loses the value of the teacher's action minus that of the distilled action, at least
-    0. The cell that loses most in sum gets a second codeword, at the mean of the hundredth of its states that lose
-    most, with a copy of its map. Codewords never move. There are fewer than `cells` where no value is lost.
+    We know only its abstract. It says: linear maps are trained by gradient descent, cells are added where the teacher's
+    critic finds the value insufficient, and each state belongs to its nearest codeword. The rest is our guess. The
+    first codeword is the mean of the states. Distances are Euclidean, between standardised states. `trained` trains the
+    maps. The loss of a state is the value of the teacher's action minus that of the distilled action, at least 0. The
+    cell with the largest total loss gets a second codeword, at the mean of the 1 % of its states that lose most, with a
+    copy of its map. Codewords never move. The result has fewer than `cells` cells if no state loses value any more.
     """
     check_seed(seed)
     check_count("cells", cells)
@@ -58,7 +58,7 @@ def critic_driven(
 
 
 def where_lost(points: np.ndarray, own: np.ndarray, lost: np.ndarray) -> tuple[int, np.ndarray]:
-    """The cell that loses most in sum, and the mean (d,) of the points in it that lose most, `WORST` of them.
+    """Return the cell with the largest total loss, and the mean (d,) of the share `WORST` of its points that lose most.
 
     `points` (n, d) belong to the cells `own` (n,) and lose `lost` (n,).
     """
@@ -71,10 +71,10 @@ def where_lost(points: np.ndarray, own: np.ndarray, lost: np.ndarray) -> tuple[i
 def trained(
     maps: np.ndarray, own: np.ndarray, points: np.ndarray, actions: np.ndarray, task: Task, rng: np.random.Generator
 ) -> np.ndarray:
-    """`maps` (k, d + 1, m) of the cells `own` (n,) after Adam on the squared error of the limited action.
+    """Return `maps` (k, d + 1, m) of the cells `own` (n,) after Adam on the squared error of the clipped action.
 
-    `points` (n, d) are standardised, `actions` (n, m) in the units of the task. Batches are drawn with `rng`, steps
-    fall to 0. The gradient passes through the limit as if there were none, or maps beyond it would learn no more.
+    `points` (n, d) are standardised, `actions` (n, m) in the units of the task. `rng` draws the batches; the step size
+    falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box would stop learning.
     """
     half, mean, square = 0.5 * (task.action_high - task.action_low), np.zeros_like(maps), np.zeros_like(maps)
     inputs = np.column_stack([points, np.ones(len(points))])
@@ -94,11 +94,11 @@ def trained(
 def advantage_weighted(
     states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
 ) -> VoronoiPolicy:
-    """`kmeans_cells` whose maps err least where a wrong action costs most, after the idea of arXiv 2507.07848.
+    """Fit maps in `kmeans_cells` that err least where a wrong action costs most, after the idea of arXiv 2507.07848.
 
-    Dispoto et al. (2025) weight the fit of an interpretable policy by the advantage. Here the maps are least squares
-    weighted by the teacher's criticality, relative to the largest of the cell. A cell where no action costs anything
-    keeps its unweighted map. With one cell, this is one weighted linear map.
+    Dispoto et al. (2025) weight the fit of an interpretable policy by the advantage. Here the maps are fitted by least
+    squares, weighted by the teacher's criticality relative to its largest value in the cell. A cell where no action
+    costs anything keeps its unweighted map. With one cell, this is one weighted linear map.
     """
     _check_critics(teacher)
     policy = kmeans_cells(states, actions, cells=cells, task=task, seed=seed)
@@ -116,4 +116,4 @@ def advantage_weighted(
 def _check_critics(teacher: Teacher) -> None:
     if not hasattr(teacher, "value"):
         name = type(teacher).__name__
-        raise ValueError(f"the teacher is a {name} without critics, expected one with, such as vsp.load_teacher gives")
+        raise ValueError(f"the teacher is a {name} without critics, expected one with, as from vsp.load_teacher")

@@ -16,21 +16,21 @@ from ..tasks.registry import get_task
 class Rounds(Protocol):
     """The settings that `dagger` reads; a `Refinement` has them."""
 
-    n_episodes: int  # of the teacher, for the first fit
-    n_corrections: int  # rounds
-    n_correction_episodes: int  # of the fitted policy, per round
+    n_episodes: int  # episodes of the teacher for the first fit
+    n_corrections: int  # rounds of correction
+    n_correction_episodes: int  # episodes of the fitted policy per round
     n_validation: int  # episodes that decide between fits
-    failure_penalty: float  # return that a failed episode costs on top, where fits are compared
+    failure_penalty: float  # subtracted from the mean return per failed episode when fits are compared
 
 
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 
 
 def dagger(fits: Sequence[Fit], teacher: Policy, task: str, *, rounds: Rounds, seed: int) -> Policy:
-    """The best of the policies fitted to the teacher's states, then also to those that each fitted policy visits.
+    """Return the best of the policies fitted to the teacher's states, then also to states that fitted policies visit.
 
-    `rounds` sets episodes, corrections and validation. `fits` are tried side by side, which pays where they differ in
-    their random numbers; only the one with the best first policy is corrected. Raises ValueError for a bad
+    `rounds` sets episodes, corrections and validation. All `fits` are tried in the first round, which helps if they
+    differ in their random numbers; only the one with the best first policy is corrected. Raises ValueError for a bad
     seed or bad `rounds`.
     """
     check_seed(seed)

@@ -1,7 +1,7 @@
-"""Policies that one would try first: one linear map, k-means cells, rules of thumb, hand-written controllers.
+"""Simple baselines: one linear map, k-means cells, rules of thumb, hand-written controllers.
 
 A partition that does not beat them gains nothing from its cells. All act through the same `predict` as `VoronoiPolicy`,
-and raise ValueError for arrays of a wrong shape, numbers that are not finite, and a seed that is no integer from 0 on.
+and raise ValueError for arrays of a wrong shape, numbers that are not finite, and a seed below 0 or not an integer.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPol
 
 
 def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> VoronoiPolicy:
-    """The cells of `policy` with new maps, by least squares on the states (n, d) and actions (n, m) in each cell.
+    """Return `policy` with new maps, by least squares on the states (n, d) and actions (n, m) in each cell.
 
     These are the maps that training would converge to. `constant` fits a constant action per cell instead. A cell
     without states keeps its map. Raises ValueError unless the maps are linear.
@@ -51,7 +51,7 @@ def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, con
 
 
 def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:
-    """The name and the policy that a person would write down for `task` without a teacher.
+    """Return the name and the policy that a person would write for `task` without a teacher.
 
     SimpleGoal: walk diagonally towards the goal and ignore the pit. MountainCarContinuous: push in the direction of
     motion, 12 times the velocity, limited to [-1, 1]. Raises ValueError for another task.
@@ -74,7 +74,7 @@ class Heuristic:
     COST = 12, 20.0  # numbers in the formulas of `predict`; operations and comparisons, without the action limits
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, 2), main and side engine, for observations (n, 8)."""
+        """Return actions (n, 2), main and side engine, for observations (n, 8)."""
         x, y, vx, vy, angle, spin, left, right = check_array("observations", obs, (-1, 8)).T
         down = (left != 0) | (right != 0)
         lean = np.clip(0.5 * x + 1.0 * vx, -0.4, 0.4)
@@ -89,7 +89,7 @@ class PumpAndBalance:
     COST = 6, 9.0  # numbers; operations of the longer branch
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Torques (n, 1) for cosine and sine of the angle and angular velocity (n, 3)."""
+        """Return torques (n, 1) for cosine and sine of the angle and angular velocity (n, 3)."""
         cosine, sine, velocity = check_array("observations", obs, (-1, 3)).T
         missing = velocity**2 / 6 + 5.0 * (cosine - 1.0)  # energy of the rod, minus that of standing upright
         torque = np.where(cosine > 0.8, -10.0 * sine - 2.0 * velocity, -2.0 * missing * np.sign(velocity))
@@ -97,11 +97,11 @@ class PumpAndBalance:
 
 
 class ZeroPolicy:
-    """A stand-in for a teacher that always does nothing."""
+    """A stand-in for a teacher, whose action is always zero."""
 
     def __init__(self, task: Task):
         self._d, self._action = len(task.low), np.zeros(len(task.action_low))
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Zeros (n, m) for observations (n, d)."""
+        """Return zeros (n, m) for observations (n, d)."""
         return np.tile(self._action, (len(check_array("observations", obs, (-1, self._d))), 1)), None

@@ -1,4 +1,4 @@
-"""A network with one hidden layer, as small as a distilled policy: what so many numbers buy without cells."""
+"""A network with one hidden layer and as few parameters as a distilled policy: a baseline without cells."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .trees import standard
 class SmallNetwork:
     """One hidden layer of tanh units on standardised states, fitted by scikit-learn's L-BFGS.
 
-    Raises ValueError for arrays of a wrong shape, numbers that are not finite, less than one unit, and a bad seed.
+    Raises ValueError for arrays of a wrong shape, numbers that are not finite, fewer than one unit, and a bad seed.
     """
 
     ITERATIONS = 500
@@ -32,7 +32,7 @@ class SmallNetwork:
         model = MLPRegressor(hidden_layer_sizes=(units,), random_state=seed, **how)
         self.centre, self.scale = standard(states)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # the limit is meant
+            warnings.simplefilter("ignore", ConvergenceWarning)  # the limit of iterations is intended
             model.fit((states - self.centre) / self.scale, actions if actions.shape[1] > 1 else actions[:, 0])
         self.layers = list(zip(model.coefs_, model.intercepts_))  # (d, units), (units,), then (units, m), (m,)
 
@@ -45,6 +45,6 @@ class SmallNetwork:
 
 
 def units_for(numbers: int, task: Task) -> int:
-    """The most units with which a network has at most so many numbers; at least one."""
+    """Return the largest number of units whose network has at most `numbers` parameters; at least one."""
     d, m = len(task.low), len(task.action_low)
     return max(1, (numbers - m) // (d + 1 + m))

@@ -13,8 +13,8 @@ class SoftTree:
 
     An inner node sends a state to the right with a probability that is the sigmoid of a linear function. Training
     weights the squared error of every leaf by the probability of its path, and penalises nodes that use one branch.
-    The trained tree acts as its most probable leaf. To make this cost little, nodes harden during training, and each
-    leaf ends with the mean action of its states. `leaves` is rounded down to a power of two.
+    The trained tree acts as its most probable leaf. To keep this loss small, the temperature of the nodes falls during
+    training, and each leaf finally gets the mean action of its states. `leaves` is rounded down to a power of two.
     """
 
     N_STEPS, BATCH, RATE = 1000, 256, 0.04
@@ -64,7 +64,7 @@ class SoftTree:
         for done in np.linspace(0, 1, self.N_STEPS, endpoint=False):
             rows = torch.from_numpy(rng.integers(len(inputs), size=self.BATCH))
             logits = self.HARDEST ** min(1.0, done / 0.9) * (x[rows] @ nodes.T)
-            paths = torch.exp(logsigmoid(logits) @ right.T + logsigmoid(-logits) @ left.T)  # to every node and leaf
+            paths = torch.exp(logsigmoid(logits) @ right.T + logsigmoid(-logits) @ left.T)  # of every node and leaf
             errors = (a[rows][:, None] - values).square().mean(dim=2)
             loss = (paths[:, len(nodes) :] * errors).sum(dim=1).mean()
             reach = paths[:, : len(nodes)]
@@ -80,9 +80,10 @@ class SoftTree:
 
 
 def _turns(depth: int) -> np.ndarray:
-    """The path to every node of a full binary tree, breadth first, inner nodes before leaves.
+    """Return the path to every node of a full binary tree, breadth first, inner nodes before leaves.
 
-    -1 where it turns left at an inner node, 1 where right, 0 where it does not pass. (2^(depth + 1) - 1, 2^depth - 1)
+    An entry is -1 if the path turns left at an inner node, 1 if right, 0 if it does not pass the node.
+    (2^(depth + 1) - 1, 2^depth - 1)
     """
     signs = np.zeros((2 ** (depth + 1) - 1, 2**depth - 1))
     for node in range(1, len(signs)):

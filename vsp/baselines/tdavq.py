@@ -2,7 +2,7 @@
 
 The paper extends this method and compares its own with it in table T1. We know the article ("Adaptive state space
 partitioning for reinforcement learning", Engineering Applications of Artificial Intelligence 17) from its abstract and
-from the paper. From there: online temporal-difference learning of the values of discrete actions in Voronoi cells; a
+from the paper. They state: online temporal-difference learning of the values of discrete actions in Voronoi cells; a
 state becomes a codeword if the reward collected from it differs from the value of its cell by more than a threshold,
 and if it is far enough from all codewords; at intervals, neighbours with similar values are merged. Our choices:
 one-step Q-learning, so that this difference is the TD error; a grid of actions; parallel episodes; all constants.
@@ -30,7 +30,7 @@ COARSE = {"min_distance": 0.15, "likeness": 1.0, "discount": 0.95}  # settings o
 
 
 class DiscretePolicy:
-    """The best of a few actions in every cell: `codewords` (k, d), `values` (k, a) of the `actions` (a, m)."""
+    """Takes the best of a few actions in every cell: `codewords` (k, d), `values` (k, a) of the `actions` (a, m)."""
 
     def __init__(self, codewords: np.ndarray, values: np.ndarray, actions: np.ndarray):
         self.codewords, self.values, self.actions = codewords, values, actions
@@ -43,7 +43,7 @@ class DiscretePolicy:
         return geometry.nearest(self.codewords, states, METRIC)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d)."""
+        """Return actions (n, m) for observations (n, d)."""
         return self.actions[self.values.argmax(axis=1)[self.cells(obs)]], None
 
 
@@ -56,9 +56,9 @@ def learn(
     likeness: float = 0.3,
     discount: float = 0.97,
 ) -> DiscretePolicy:
-    """A policy learned from `n_steps` steps of `N_PARALLEL` episodes. Same arguments, same policy.
+    """Learn a policy from `n_steps` steps of `N_PARALLEL` episodes. The same arguments give the same policy.
 
-    No two codewords are nearer to each other than `min_distance` (in units of the state). Neighbours with the same best
+    No two codewords are closer to each other than `min_distance` (in units of the state). Neighbours with the same best
     action are merged where no value differs by more than `likeness` (in units of the reward). A `discount` near 1 gives
     policies that circle between cells. Raises ValueError for a task that cannot be stepped in parallel.
     """
@@ -88,7 +88,7 @@ def learn(
 
 
 class ParallelEpisodes:
-    """Episodes that advance together; where one ends, another begins."""
+    """Episodes that advance together; when one ends, a new one begins."""
 
     def __init__(self, task: Task, rng: np.random.Generator):
         self.task, self._rng = task, rng
@@ -99,11 +99,11 @@ class ParallelEpisodes:
 
     @property
     def observations(self) -> np.ndarray:
-        """What is observed now. (N_PARALLEL, d)"""
+        """Current observations. (N_PARALLEL, d)"""
         return self.task.see(self.states)
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rewards, which episodes go on (truncated ones count as such), and the observations on arrival."""
+        """Return rewards, which episodes continue (truncated ones count as continuing), and the next observations."""
         self.states, rewards, ended = self.task.step(self.states, actions)
         arrived, running, self._age = self.observations.copy(), ended == RUNNING, self._age + 1
         over = ~running | (self._age >= self.task.max_steps)
@@ -112,13 +112,13 @@ class ParallelEpisodes:
 
 
 def _actions(task: Task) -> np.ndarray:
-    """The lowest, the middle and the highest of every action, in all combinations. (3^m, m)"""
+    """Return all combinations of the lowest, middle and highest value of each action. (3^m, m)"""
     middle = 0.5 * (task.action_low + task.action_high)
     return np.array(list(product(*zip(task.action_low, middle, task.action_high))))
 
 
 def _epsilon_greedy(values: np.ndarray, epsilon: float, rng: np.random.Generator) -> np.ndarray:
-    """For every row of `values` (n, a) the best action, or any of them in a share `epsilon` of the rows. (n,)"""
+    """Return the best action for every row of `values` (n, a), or with probability `epsilon` a random one. (n,)"""
     n, a = values.shape
     return np.where(rng.random(n) < epsilon, rng.integers(a, size=n), values.argmax(axis=1))
 
@@ -134,9 +134,10 @@ def update(values: np.ndarray, cells: np.ndarray, chosen: np.ndarray, errors: np
 def split(
     policy: DiscretePolicy, states: np.ndarray, chosen: np.ndarray, targets: np.ndarray, min_distance: float
 ) -> None:
-    """Make codewords of those `states` (n, d), one after the other, that are far enough from all others.
+    """Add those `states` (n, d) as codewords, one after the other, that are far enough from all codewords.
 
-    A new cell copies the values of the cell that its state was in, but for the action (n,) whose target (n,) is known.
+    A new cell copies the values of the cell that contained its state, except for the action (n,) whose target (n,) is
+    known.
     """
     for state, action, value in zip(states, chosen, targets):
         gaps = geometry.distances(state[None], policy.codewords, METRIC)[0]

@@ -1,7 +1,7 @@
 """Trees to compare with the Voronoi partition: CART, and model trees with axis-aligned or oblique splits.
 
 All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
-They raise ValueError for arrays of a wrong shape, numbers that are not finite, and less than one leaf.
+They raise ValueError for arrays of a wrong shape, numbers that are not finite, and fewer than one leaf.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..tasks.registry import get_task
 class Tree:
     """A regression tree (CART, Breiman et al. 1984) with at most `leaves` leaves, each with one constant action.
 
-    Grown best split first on the mean squared error of `actions` (n, m) at `states` (n, d), by scikit-learn.
+    scikit-learn grows it, best split first, on the mean squared error of `actions` (n, m) at `states` (n, d).
     """
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int):
@@ -27,7 +27,7 @@ class Tree:
 
         states, actions = check_data(states, actions)
         check_count("leaves", leaves)
-        # scikit-learn asks for two leaves or more; a node of so few states is not split, so the root stays whole
+        # scikit-learn requires two leaves or more; for one leaf, `min_samples_split` is too large to split the root
         options = {"max_leaf_nodes": max(2, leaves), "min_samples_split": 2 if leaves > 1 else len(states) + 1}
         self.model = DecisionTreeRegressor(**options, random_state=0).fit(states, actions)
         self._d, self._m = states.shape[1], actions.shape[1]
@@ -36,21 +36,21 @@ class Tree:
         return self.model.get_n_leaves()
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d): means of the teacher's actions, so inside the action box."""
+        """Actions (n, m) for observations (n, d): means of the teacher's actions, hence inside the action box."""
         obs = check_array("observations", obs, (-1, self._d))
         return (self.model.predict(obs) if len(obs) else np.zeros(0)).reshape(len(obs), self._m), None
 
 
 @dataclass(frozen=True)
 class Split:
-    """A hyperplane, and by how much it lowers the squared error of its node."""
+    """A hyperplane, and the reduction of its node's squared error."""
 
     gain: float
     direction: np.ndarray  # (d,)
     threshold: float
 
     def right(self, inputs: np.ndarray) -> np.ndarray:
-        """Which of the inputs (n, d) lie beyond the hyperplane. (n,)"""
+        """Tell which of the inputs (n, d) lie beyond the hyperplane. (n,)"""
         return inputs @ self.direction > self.threshold
 
 
@@ -67,9 +67,9 @@ class Node:
 class LinearTree:
     """A model tree: splits along the axes and a least-squares map in each leaf (RETIS, Karalič 1992).
 
-    At most `leaves` leaves, grown best split first on standardised states. A split is judged by the error of a map on
-    either side, not of two constants. It lies at one of 255 quantiles of its node, and leaves on each side at least
-    twice as many states as a map has rows. `constant`: one action per leaf instead of a map.
+    It has at most `leaves` leaves and is grown best split first on standardised states. A split is judged by the error
+    of a map on each side, not of a constant. It lies at one of 255 quantiles of its node. Each side keeps at least
+    twice as many states as a map has rows. `constant` fits one action per leaf instead of a map.
     """
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, constant: bool = False):
@@ -101,7 +101,7 @@ class LinearTree:
         return [node for node in self.nodes if not node.children]
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
-        """The best split of a node along an axis."""
+        """Find the best split of a node along an axis."""
         return _stump(inputs, actions, np.eye(inputs.shape[1]), cuts=255, constant=self.constant)
 
     def inputs(self, states: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ class LinearTree:
 def _stump(
     inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int = 31, constant: bool = False
 ) -> Split:
-    """The best split along one of `directions` (c, d) for a map on each side, from the moments between the cuts."""
+    """Find the best split along one of `directions` (c, d), with a map on each side, from the moments between cuts."""
     features = np.column_stack([inputs[:, : 0 if constant else None], np.ones(len(inputs))])
     m, rows = actions.shape[1], np.column_stack([features, actions])
     (whole,), best = _squared_errors((rows.T @ rows)[None], m), Split(0.0, directions[0], 0.0)
@@ -147,19 +147,19 @@ def _stump(
 
 
 def _squared_errors(moments: np.ndarray, m: int) -> np.ndarray:
-    """Squared error of the best linear map, from sums of products of inputs and m actions (c, p, p). (c,)"""
+    """Return the squared error of the best linear map, from sums of products of inputs and m actions (c, p, p). (c,)"""
     q = moments.shape[1] - m
-    # A slight ridge, for variables that are constant in a node
+    # A small ridge term, for variables that are constant in a node
     inputs = moments[:, :q, :q] + 1e-9 * np.maximum(moments[:, q - 1, q - 1, None, None], 1) * np.eye(q)
     maps = np.linalg.solve(inputs, moments[:, :q, q:])
     return np.trace(moments[:, q:, q:], axis1=1, axis2=2) - (maps * moments[:, :q, q:]).sum(axis=(1, 2))
 
 
 class ObliqueLinearTree(LinearTree):
-    """A model tree with oblique splits: of all trees here the most similar to linear maps in Voronoi cells.
+    """A model tree with oblique splits: the tree here that is most similar to linear maps in Voronoi cells.
 
     Engelhardt et al. (2023) extract rules from samples of a teacher by CART and by oblique predictive clustering trees
-    (SPYCT, Stepišnik & Kocev 2021). As in the latter, a hyperplane separates two clusters of a node's actions, here by
+    (SPYCT, Stepišnik & Kocev 2021). As in SPYCT, a hyperplane separates two clusters of a node's actions, here by
     k-means and discriminant analysis. The axes, the principal components and the directions of least squares compete
     with it. The best direction is perturbed at random (OC1, Murthy et al. 1994). Splits are judged by the maps on both
     sides.
@@ -173,7 +173,7 @@ class ObliqueLinearTree(LinearTree):
         super().__init__(states, actions, leaves=leaves, task=task, constant=constant)
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
-        """The best split of a node for two maps."""
+        """Find the best oblique split of a node, with a map on each side."""
         return _oblique(inputs, actions, self._rng, constant=self.constant)
 
 
@@ -181,7 +181,7 @@ _SEARCHED, _TRIED, _ROUNDS = 2000, 12, 4  # states for comparing directions; dir
 
 
 def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, constant: bool) -> Split:
-    """The best split of a node among directions of several kinds, perturbed in rounds, by less in each."""
+    """Find the best split among directions of several kinds; perturb the best one in rounds, by less in each."""
     some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, constant=constant)
     found = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
     for size in np.geomspace(1.0, 0.1, _ROUNDS):
@@ -191,7 +191,7 @@ def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, 
 
 
 def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Directions of unit length across which a node may be split. (c, d)"""
+    """Return directions of unit length along which a node may be split. (c, d)"""
     from sklearn.cluster import KMeans
 
     centred, d = inputs - inputs.mean(axis=0), inputs.shape[1]
@@ -206,13 +206,13 @@ def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generato
 
 
 def _unit(directions: np.ndarray) -> np.ndarray:
-    """The directions with length 1; a zero vector becomes the first axis."""
+    """Scale directions to length 1; a zero vector becomes the first axis."""
     length = np.linalg.norm(directions, axis=1, keepdims=True)
     return np.where(length > 0, directions / np.where(length > 0, length, 1.0), np.eye(directions.shape[1])[0])
 
 
 def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and deviation of `states` (n, d); a variable that never varies keeps its unit."""
+    """Return the mean and standard deviation of `states` (n, d); a variable that never varies gets deviation 1."""
     states = check_array("states", states, (-1, -1))
     if not states.size:
         raise ValueError(f"states have shape {states.shape}, expected at least one state")

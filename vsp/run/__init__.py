@@ -1,3 +1,3 @@
-"""Machinery: files that are whole or absent, workers with progress, and notebooks run as a whole or not at all."""
+"""Infrastructure: atomic files, parallel workers with progress, and notebooks that run completely or change nothing."""
 
 from .atomic import ROOT

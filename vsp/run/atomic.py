@@ -1,4 +1,4 @@
-"""Whole files or none: atomic writes, reads of regular files only, and errors of the disk in one line."""
+"""Atomic writes, reads of regular files only, and one-line messages for disk errors."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import IO
 
 ROOT = Path(__file__).resolve().parents[2]  # the checkout: data/ lies beside vsp/
-TEMPORARY = ".?*-????????.*"  # the names under which `atomic_path` writes
+TEMPORARY = ".?*-????????.*"  # names of the temporary files of `atomic_path`
 
 _NO_ROOM = "free some space, make it writable or raise `ulimit -f`, or name another folder: OUT=folder"
-_OCCUPIED = "something else stands in its place: move that away"
+_OCCUPIED = "something else has this name: move it away"
 _HINTS = dict.fromkeys(
     (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM), _NO_ROOM
 ) | dict.fromkeys((errno.EEXIST, errno.EISDIR, errno.ENOTDIR), _OCCUPIED)
@@ -29,19 +29,19 @@ class DamagedFile(ValueError):
 
 
 class MissingFile(FileNotFoundError):
-    """A file of this project that is not there; the message names it and says how it comes back."""
+    """A file of this project that does not exist; the message names it and says how to restore it."""
 
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it takes the place of `path` only if the block succeeds.
+    """Yield a temporary path beside `path`; it replaces `path` only if the block succeeds.
 
-    A reader (or a run after a crash) sees the old file or the whole new one, never a torn one.
+    A reader (or a run after a crash) sees the old file or the complete new one, never a partial one.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
-    temporary.touch(exist_ok=False)  # with the permissions that the umask leaves
+    temporary.touch(exist_ok=False)  # with the permissions that the umask allows
     try:
         yield temporary
         with open(temporary, "rb") as written:
@@ -56,32 +56,32 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def remove_leftovers(path: str | os.PathLike) -> None:
-    """Remove what killed writers of `path` left beside it. Call only while no other process writes `path`."""
+    """Remove temporary files that killed writers of `path` left. Call only while no other process writes `path`."""
     path = Path(path)
     for left in path.parent.glob(f".{glob.escape(path.stem)}-????????{glob.escape(path.suffix)}"):
         left.unlink(missing_ok=True)
 
 
 def disk_hint(number: int | None) -> str | None:
-    """A hint for a system's error of this number, if a user can mend it: a full or closed disk, an occupied place."""
+    """Return a hint for a system error of this number if a user can fix it: no space, no access, name in use."""
     return _HINTS.get(number)
 
 
 def one_line(error: OSError) -> str:
-    """The file, the system's words and a hint, in one line. An error without a hint is raised again."""
+    """Return the file, the system's message and a hint in one line. Raises an error without a hint again."""
     if not (hint := disk_hint(error.errno)):
         raise error
     return f"{error.filename2 or error.filename or 'a file'}: {error.strerror}: {hint}"
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:
-    """Write `text` to `path` atomically, as UTF-8 with Unix line ends on every system."""
+    """Write `text` to `path` atomically, as UTF-8 with Unix line endings on every system."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
 def open_regular(path: str | os.PathLike, mode: str = "rb", **options) -> IO:
-    """`open` for regular files. Raises `DamagedFile` for a folder, a FIFO or a device, without waiting for it."""
+    """`open` for regular files. Raises `DamagedFile` for a folder, a FIFO or a device, and does not wait for it."""
     try:
         file = open(path, mode, opener=_open_at_once, **options)
     except OSError as error:
@@ -103,13 +103,13 @@ def _not_regular(path: str | os.PathLike) -> str:
 
 
 def sha256(path: str | os.PathLike) -> str:
-    """SHA-256 of the file at `path`, as 64 hexadecimal digits."""
+    """Return the SHA-256 of the file at `path`, as 64 hexadecimal digits."""
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """All bytes of a regular file. Raises `MissingFile` and `DamagedFile`."""
+    """Return all bytes of a regular file. Raises `MissingFile` and `DamagedFile`."""
     try:
         with open_regular(path) as file:
             return file.read()
@@ -119,5 +119,5 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 
 
 def remedy(path: str | os.PathLike) -> str:
-    """How a missing or damaged file comes back."""
-    return f"`git checkout {shlex.quote(str(path))}` brings back a committed one"
+    """Say how to restore a missing or damaged file."""
+    return f"`git checkout {shlex.quote(str(path))}` restores a committed file"

@@ -1,4 +1,4 @@
-"""What commands share: the value of --jobs, and errors that end them in one line."""
+"""Shared parts of commands: the value of --jobs, and errors in one line."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from .atomic import DamagedFile, MissingFile, one_line
 from .locks import sigterm_as_interrupt
 
-JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # words for --jobs
+JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # help text of --jobs
 
 
 class CommandError(RuntimeError):
-    """An error whose message is all that the user of a command needs."""
+    """An error whose message is enough for the user of a command, without a traceback."""
 
 
 def jobs(text: str) -> int | str:
-    """The value of --jobs: a number of processes, or an address as it is."""
+    """Parse the value of --jobs: a number of processes, or an address, which is returned as it is."""
     if re.fullmatch(r"-1|0*[1-9][0-9]{0,5}", text):
         return int(text)
     if re.fullmatch(r"[a-z]+://.+:[0-9]+", text):
@@ -31,17 +31,17 @@ def jobs(text: str) -> int | str:
 
 @contextlib.contextmanager
 def in_one_line(what: str = "") -> Iterator[None]:
-    """End a command, and its workers, with one line and no traceback for what its user can mend.
+    """End a command and its workers with a one-line message, without traceback, for errors that its user can fix.
 
-    That is a damaged or missing file, a full or closed disk, an interrupt or SIGTERM, and every `CommandError`. `what`
-    names the work in front of messages that do not.
+    These are a damaged or missing file, a full or read-only disk, an interrupt or SIGTERM, and every `CommandError`.
+    `what` names the work, and precedes messages that do not name it.
     """
     sigterm_as_interrupt()
     begin = f"error: {what}: " if what else "error: "
     try:
         yield
     except KeyboardInterrupt:
-        sys.exit(f"{begin}interrupted. What is on disk stays: the same command goes on from there.")
+        sys.exit(f"{begin}interrupted. Finished files stay on disk: run the same command to resume.")
     except CommandError as error:
         sys.exit(f"error: {error}")
     except (DamagedFile, MissingFile) as error:

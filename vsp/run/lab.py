@@ -1,4 +1,4 @@
-"""`make lab`: JupyterLab on the notebooks, without a grader's buttons, and in three lines."""
+"""`make lab`: open JupyterLab on the notebooks, without nbgrader's buttons, with three lines of output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FIRST = ROOT / "notebooks" / "01_teacher.ipynb"
 
 
 def main() -> None:
-    """Open the first notebook. Further arguments are those of `jupyter lab`."""
+    """Open the first notebook. Further arguments are passed to `jupyter lab`."""
     os.environ["JUPYTER_CONFIG_PATH"] = str(ROOT / ".jupyter")  # read when jupyterlab is imported
     from jupyterlab.labapp import LabApp
 
@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def _free_port(wanted: int = 8888) -> int:
-    """The port `wanted`, or one that is free if another program has it."""
+    """Return the port `wanted`, or another free one if a program uses it."""
     for port in (wanted, 0):
         with socket.socket() as trial:
             try:
@@ -34,7 +34,7 @@ def _free_port(wanted: int = 8888) -> int:
                 return trial.getsockname()[1]
             except OSError:
                 continue
-    raise OSError("no port is free on this machine: close a program that serves one")
+    raise OSError("no port is free on this machine: close a program that uses one")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Listed files: files in their own formats, such as CSV, whose checksums stand in `MANIFEST.sha256` of their folder.
+"""Listed files: files in common formats, such as CSV, whose checksums are in `MANIFEST.sha256` of their folder.
 
-`sha256sum -c` reads the manifests too; `python -m vsp.run.manifest` accepts files as they are.
+`sha256sum -c` can check the manifests. `python -m vsp.run.manifest` writes them again for the files as they are.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ _LINE = re.compile(rb"([0-9a-f]{64})  ([^/\n]+)\n")
 
 
 def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
-    """Write `content` (a string as UTF-8), atomically, then the file's line in the manifest of its folder.
+    """Write `content` (a string as UTF-8) atomically, then the file's line in the manifest of its folder.
 
-    Of several writers none loses another's line. A writer that is killed between the two leaves a file that readers
-    refuse until it is written again.
+    Concurrent writers keep each other's lines. If a writer is killed between the two steps, readers refuse the file
+    until it is written again.
     """
     path, content = Path(path), content.encode() if isinstance(content, str) else content
     with _locked(path.parent):
@@ -52,14 +52,14 @@ def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
 
 
 def list_file(path: str | os.PathLike) -> None:
-    """Put the file at `path`, as it is, into the manifest of its folder."""
+    """Add the file at `path`, as it is, to the manifest of its folder."""
     path = Path(path)
     with _locked(path.parent):
         _write_manifest(path.parent, {**_listed(path.parent), path.name: sha256(path)})
 
 
 def list_folder(folder: str | os.PathLike) -> int:
-    """Write the manifest of `folder` anew, with every file there but hidden ones, as it is; returns their number."""
+    """Write a new manifest of `folder` with all its files, as they are, except hidden ones. Returns their number."""
     folder = Path(folder)
     with _locked(folder):
         names = [path.name for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")]
@@ -68,36 +68,36 @@ def list_folder(folder: str | os.PathLike) -> int:
 
 
 def read_listed(path: str | os.PathLike) -> bytes:
-    """The content of a file that the manifest of its folder lists. Raises `MissingFile` or `DamagedFile`."""
+    """Return the content of a file that the manifest of its folder lists. Raises `MissingFile` or `DamagedFile`."""
     path = Path(path)
     content = read_bytes(path)
     found, expected = hashlib.sha256(content).hexdigest(), _listed(path.parent).get(path.name)
     if found != expected:
         raise DamagedFile(
             f"{path}: SHA-256 is {found}, {MANIFEST} beside it has {expected or 'no such file'}: {remedy(path)}; if "
-            f"it is as it should be, `python -m vsp.run.manifest {shlex.quote(str(path.parent))}` accepts it"
+            f"the file is correct, `python -m vsp.run.manifest {shlex.quote(str(path.parent))}` accepts it"
         )
     return content
 
 
 def read_table(path: str | os.PathLike, **options) -> pd.DataFrame:
-    """The table in a listed CSV file, `options` as `pandas.read_csv` has them. Raises as `read_listed` does."""
+    """Return the table in a listed CSV file; `options` are those of `pandas.read_csv`. Raises as `read_listed` does."""
     import pandas as pd
 
     return pd.read_csv(io.BytesIO(read_listed(path)), **options)
 
 
 def write_carded(path: str | os.PathLike, content: bytes, card: dict) -> None:
-    """Write `content` and, beside it as `.json`, its card with the SHA-256 added; both listed. The card comes last."""
+    """Write `content`, then beside it its card as `.json`, with the SHA-256 added. Both files are listed."""
     text = json.dumps({**card, "sha256": hashlib.sha256(content).hexdigest()}, indent=2, allow_nan=False) + "\n"
     write_listed(path, content)
     write_listed(Path(path).with_suffix(".json"), text)
 
 
 def read_carded(path: str | os.PathLike) -> tuple[bytes, dict]:
-    """A file that `write_carded` wrote and its card. Raises `MissingFile` or `DamagedFile`.
+    """Return a file that `write_carded` wrote, and its card. Raises `MissingFile` or `DamagedFile`.
 
-    Both are compared with the manifest of their folder; where it has none, as a reader's own folder may, the file is
+    Both are compared with the manifest of their folder. Without a manifest, as in a user's own folder, the file is
     compared with the checksum on its card.
     """
     path, card_path = Path(path), Path(path).with_suffix(".json")
@@ -112,12 +112,12 @@ def read_carded(path: str | os.PathLike) -> tuple[bytes, dict]:
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DamagedFile(f"{card_path}: not a card with a sha256: {error!r:.300}") from error
     if not listed and (found := hashlib.sha256(content).hexdigest()) != expected:
-        raise DamagedFile(f"{path}: SHA-256 is {found}, its card says {expected}: fetch the file again")
+        raise DamagedFile(f"{path}: SHA-256 is {found}, its card says {expected}: get the file again")
     return content, card
 
 
 def _listed(folder: Path) -> dict[str, str]:
-    """The SHA-256 of every file that the manifest of `folder` lists; none if there is no manifest."""
+    """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest."""
     manifest = folder / MANIFEST
     content = read_bytes(manifest) if os.path.lexists(manifest) else b""
     lines = _LINE.findall(content)
@@ -138,7 +138,7 @@ def _write_manifest(folder: Path, listed: dict[str, str]) -> None:
 
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Hold the manifest of `folder`, which is made if need be, against other writers."""
+    """Lock the manifest of `folder` against other writers. Creates it if it does not exist."""
     import fcntl
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -147,6 +147,6 @@ def _locked(folder: Path) -> Iterator[None]:
         with open_regular(manifest, "ab") as file:
             fcntl.flock(file, fcntl.LOCK_EX)
             held = manifest.exists() and os.path.samestat(os.fstat(file.fileno()), manifest.stat())
-            if held:  # else another writer put a new one in its place while we waited
+            if held:  # else another writer replaced it while we waited
                 remove_leftovers(manifest)
                 yield

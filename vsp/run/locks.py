@@ -1,4 +1,4 @@
-"""Locks between processes, and what SIGTERM does."""
+"""Locks between processes, and the handling of SIGTERM."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from pathlib import Path
 
 from .atomic import open_regular
 
-SEMAPHORES = Path("/dev/shm")  # where Linux keeps them, joblib's under the number of the process
+SEMAPHORES = Path("/dev/shm")  # Linux keeps semaphores here; names of joblib's hold the process number
 
 
 @contextlib.contextmanager
 def file_lock(lock: str | os.PathLike, what: str) -> Iterator[None]:
-    """Hold `lock`, or wait and say that another process does `what`; the system frees it however this process ends."""
-    import fcntl  # here, since Windows, where students read files, has none
+    """Hold `lock`. If another process holds it, print that another run does `what`, and wait.
+
+    The system frees the lock however this process ends.
+    """
+    import fcntl  # imported here: Windows, where students read files, has no fcntl
 
     Path(lock).parent.mkdir(parents=True, exist_ok=True)
     with open_regular(lock, "a+b", buffering=0) as file:
@@ -35,7 +38,7 @@ def file_lock(lock: str | os.PathLike, what: str) -> Iterator[None]:
 
 
 def _remove_semaphores(holder: bytes) -> None:
-    """Remove what the workers of an earlier holder of a lock left, if it was killed together with them."""
+    """Remove semaphores that the workers of an earlier holder of a lock left, if all of them were killed."""
     if holder.isdigit() and not Path("/proc", holder.decode()).exists():
         for left in SEMAPHORES.glob(f"sem.loky-{holder.decode()}-*"):
             with contextlib.suppress(OSError):
@@ -43,16 +46,16 @@ def _remove_semaphores(holder: bytes) -> None:
 
 
 def terminate_peers(locks: str | os.PathLike) -> None:
-    """SIGTERM to the processes that hold locks in the folder `locks`, if they are of our process group.
+    """Send SIGTERM to the processes of our process group that hold locks in the folder `locks`.
 
-    Those are mostly the processes of the same make. One that has no lock yet goes on.
+    These are mostly the processes of the same make. A process that holds no lock yet continues.
     """
     import fcntl
 
     for lock in Path(locks).iterdir():
         with contextlib.suppress(OSError, ValueError), open_regular(lock) as file:
             try:
-                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # its holder has ended, whatever is written there
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # on success, the holder has ended: nothing to do
             except BlockingIOError:
                 holder = int(file.read())
                 if holder != os.getpid() and os.getpgid(holder) == os.getpgrp():
@@ -60,7 +63,7 @@ def terminate_peers(locks: str | os.PathLike) -> None:
 
 
 def sigterm_as_interrupt() -> None:
-    """Let SIGTERM raise KeyboardInterrupt, which unwinds through whatever has kernels or workers to end."""
+    """Let SIGTERM raise KeyboardInterrupt, so that all code that started kernels or workers ends them."""
     signal.signal(signal.SIGTERM, _interrupt)
 
 

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_info
 
 
 def cpu_type() -> str:
-    """System, processor family, and the instructions that BLAS and NumPy use: they determine how sums are rounded.
+    """Return the system, processor family, and instructions of BLAS and NumPy: they determine how sums are rounded.
 
     On one type the same command gives the same bytes; on another, runs may diverge.
     """

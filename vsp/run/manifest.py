@@ -1,4 +1,4 @@
-"""Accept files as they are, for somebody who changed one on purpose: `python -m vsp.run.manifest [FOLDER ...]`."""
+"""Update manifests after files were changed on purpose: `python -m vsp.run.manifest [FOLDER ...]`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ FOLDERS = tuple(ROOT / "data" / name for name in ("paper", "teachers", "teachers
 
 
 def main() -> None:
-    """Write the manifests of the folders anew: every file there, as it is."""
+    """Write new manifests of the folders, with all their files as they are."""
     parser = argparse.ArgumentParser(prog="python -m vsp.run.manifest", description=main.__doc__)
-    parser.add_argument("folders", nargs="*", type=Path, help="if none is given, those of data/")
+    parser.add_argument("folders", nargs="*", type=Path, help="folders with manifests (default: those of data/)")
     for folder in parser.parse_args().folders or FOLDERS:
         if not folder.is_dir():
             parser.error(f"{folder}: no such folder")

@@ -1,4 +1,4 @@
-"""How far long work has come: a bar in a notebook and on a terminal, a plain line now and then in a log."""
+"""Show the progress of long work: a bar in a notebook and on a terminal, a plain line every few seconds in a log."""
 
 from __future__ import annotations
 
@@ -35,6 +35,6 @@ def _in_lines(items: Iterable, name: str, total: int, unit: str, done: int) -> I
 
 
 def _words(seconds: float) -> str:
-    """A time in hours and minutes, minutes, or seconds."""
+    """Format a time in hours and minutes, in minutes, or in seconds."""
     hours, minutes = divmod(round(seconds / 60), 60)
     return f"{hours} h {minutes} min" if hours else f"{minutes} min" if minutes > 1 else f"{seconds:.0f} s"

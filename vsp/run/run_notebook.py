@@ -1,10 +1,11 @@
-"""Run one notebook headless and strictly: it succeeds as a whole, or nothing that lies in `out` changes.
+"""Run one notebook headless: either all of it succeeds, or nothing in `out` changes.
 
     python -m vsp.run.run_notebook notebooks/01_teacher.ipynb --out . -p quick true --expect figures/environments.pdf
 
-A notebook has a cell tagged `parameters` that holds nothing but `name = literal` lines, one of them `out`: the folder
-that it writes `figures/` and `data/results/` into. It gets a staging folder there, and what it wrote is moved to the
-real `out` only after every cell ran without an error. `runs`, if it has one, is set to the real `out`/data/runs.
+A notebook has a cell tagged `parameters` that holds only `name = literal` lines. One of them is `out`, the folder into
+which it writes `figures/` and `data/results/`. The run sets `out` to a staging folder, and moves the files to the real
+`out` only after every cell ran without an error. A parameter `runs`, if there is one, is set to the real
+`out`/data/runs.
 """
 
 from __future__ import annotations
@@ -31,10 +32,10 @@ from .locks import file_lock, terminate_peers
 from .notebook import NotebookNode, nbformat
 
 KERNEL = "python3"
-KERNEL_FOLDERS = {  # where a kernel writes, by variable; the next run removes what a killed one left there
+KERNEL_FOLDERS = {  # folders a kernel writes to, by variable; the next run removes what a killed one left
     "TMPDIR": "tmp",
     "JOBLIB_TEMP_FOLDER": "tmp",
-    "IPYTHONDIR": "ipython",  # nobody's start-up files
+    "IPYTHONDIR": "ipython",  # without the user's start-up files
     "JUPYTER_RUNTIME_DIR": "jupyter",
     "MPLCONFIGDIR": "matplotlib",
 }
@@ -43,19 +44,19 @@ KERNEL_SETTINGS = {
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
-    "SDL_VIDEODRIVER": "dummy",  # no search for a screen, nor words about it on standard error
-    "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no note of the debugger's on standard error
+    "SDL_VIDEODRIVER": "dummy",  # no search for a screen, and no message about it on standard error
+    "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no debugger message on standard error
 }
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
 _SYSTEM_ERROR = re.compile(r"\[Errno (\d+)\] ")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-_MENDABLE = ("DamagedFile", "MissingFile", "WorkerDied", "UnlikeWorker", "NoScheduler")  # errors of `vsp.run`
+_MENDABLE = ("DamagedFile", "MissingFile", "WorkerDied", "UnlikeWorker", "NoScheduler")  # a user can fix these
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 _WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
 
 
 class NotebookError(CommandError):
-    """A notebook that did not run as a whole; the message names it and the cell."""
+    """A notebook that did not run to its end without an error; the message names it and the cell."""
 
 
 class KernelDied(NotebookError):
@@ -70,12 +71,12 @@ def run_notebook(
     expect: Sequence[str] = (),
     timeout: int = 1800,
 ) -> list[str]:
-    """Run `notebook` with `parameters` and move what it made to `out`; returns the files that changed there.
+    """Run `notebook` with `parameters` and move the files that it made to `out`. Returns those that changed there.
 
-    `expect` names files, relative to `out`, that the notebook must make; `timeout` is in seconds, for each cell. An
-    executed copy without anything that varies from run to run goes to figures/executed. Runs of one notebook into one
-    `out` wait for each other. Raises NotebookError, DamagedFile, MissingFile, or OSError for a disk that is full or
-    closed; the earlier files of `out` stay.
+    `expect` names files, relative to `out`, that the notebook must make. `timeout` is in seconds per cell. An executed
+    copy, without anything that varies between runs, goes to figures/executed. Runs of the same notebook into the same
+    `out` wait for each other. Raises NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk;
+    the earlier files of `out` then stay.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
@@ -86,9 +87,10 @@ def run_notebook(
     running = out / "build" / "running"
     with file_lock(out / "build" / "locks" / notebook.stem, f"of {notebook.stem} writes into {out}"):
         for left in running.glob(f"{notebook.stem}-*"):
-            shutil.rmtree(left, ignore_errors=True)  # of a run that was killed
+            shutil.rmtree(left, ignore_errors=True)  # left by a killed run
         running.mkdir(exist_ok=True)
-        work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))  # not where an orphaned kernel may write
+        # A new name each time: an orphaned kernel may still write to an old folder
+        work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))
         staging = work / "out"
         try:
             staging.mkdir()
@@ -101,7 +103,7 @@ def run_notebook(
 
 
 def _read(notebook: Path) -> tuple[NotebookNode, dict[str, object]]:
-    """The notebook and the defaults of its parameters."""
+    """Return the notebook and the defaults of its parameters."""
     content = read_bytes(notebook)
     try:
         cells = json.loads(content)["cells"]
@@ -132,11 +134,11 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
 
 
 def _execute(notebook: Path, source: NotebookNode, values: dict, work: Path, timeout: int) -> list[NotebookNode]:
-    """The code cells after papermill ran them with `values` for the parameters, but `work`/out for `out`."""
+    """Run the notebook by papermill with the parameters `values`, but with `work`/out as `out`. Returns code cells."""
     import papermill
     from papermill.engines import papermill_engines
 
-    seen: list[NotebookNode] = []  # the notebook under way, which tells how far it came
+    seen: list[NotebookNode] = []  # the running notebook, which shows how far it came
     papermill_engines.register("vsp", _engine(seen, work, timeout))
     stopped: Exception | None = None
     try:
@@ -151,7 +153,7 @@ def _execute(notebook: Path, source: NotebookNode, values: dict, work: Path, tim
             progress_bar=sys.stderr.isatty(),
         )
     except papermill.PapermillExecutionError:
-        pass  # a cell failed, as its outputs say
+        pass  # a cell failed: its outputs hold the error
     except Exception as error:
         if disk_hint(getattr(error, "errno", None)):
             raise
@@ -168,13 +170,13 @@ def _execute(notebook: Path, source: NotebookNode, values: dict, work: Path, tim
     for name, cell in zip(names, cells):
         _check_cell(name, cell, values["out"])
     widgets = seen[0].metadata.get("widgets", {}).get(_WIDGET_STATE, {}).get("state", {})
-    for widget in widgets.values():  # an `Output` widget keeps the errors of its block to itself
+    for widget in widgets.values():  # an `Output` widget captures the errors of its block
         _check_errors(f"{notebook.name}: a widget", widget["state"].get("outputs", []))
     return cells
 
 
 def _engine(seen: list[NotebookNode], work: Path, timeout: int) -> type:
-    """An engine of papermill with a kernel of this Python; it puts the notebook under way into `seen`."""
+    """Return an engine for papermill with a kernel of this Python. It appends the running notebook to `seen`."""
     from papermill.clientwrap import PapermillNotebookClient
     from papermill.engines import NBClientEngine
 
@@ -182,29 +184,29 @@ def _engine(seen: list[NotebookNode], work: Path, timeout: int) -> type:
         @classmethod
         def execute_managed_notebook(cls, nb_man, kernel_name, **_):
             seen.append(nb_man.nb)
-            quiet = ["--log-level=CRITICAL"]  # the kernel's own chatter on standard error
+            quiet = ["--log-level=CRITICAL"]  # no log messages of the kernel on standard error
             client = PapermillNotebookClient(nb_man, kernel_name=kernel_name, timeout=timeout, extra_arguments=quiet)
             manager = client.create_kernel_manager()
             manager.connection_file = str(work / "kernel.json")
-            manager.kernel_spec_manager.kernel_dirs = []  # no other Python's, whatever else is installed
+            manager.kernel_spec_manager.kernel_dirs = []  # no kernel of another Python, whatever is installed
             return client.execute(env=_environment(work))
 
     return Engine
 
 
 def _environment(work: Path) -> dict[str, str]:
-    """The kernel's variables: nobody's settings, and nothing is written outside `work`."""
-    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # pictures are outputs
+    """Return the kernel's environment variables: no settings of the user, and nothing is written outside `work`."""
+    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # figures are outputs
     for name, folder in KERNEL_FOLDERS.items():
         (work / folder).mkdir(exist_ok=True)
         environment[name] = str(work / folder)
-    for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # which the set-up made
+    for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # made by the set-up
         shutil.copy(fonts, work / "matplotlib")
     return environment | KERNEL_SETTINGS
 
 
 def _check_cell(where: str, cell: NotebookNode, out: str) -> None:
-    """It ran without an error, and shows nothing that differs between two runs or two machines."""
+    """Raise NotebookError if the cell failed or shows something that differs between runs or machines."""
     _check_errors(where, cell.outputs)
     if cell.source.strip() and cell.execution_count is None:
         raise NotebookError(f"{where} never ran")
@@ -212,7 +214,7 @@ def _check_cell(where: str, cell: NotebookNode, out: str) -> None:
         shown = output.get("text") or json.dumps(output.get("data", {}))
         if found := _VARIES.search(shown):
             raise NotebookError(
-                f"{where} shows {found[0]!r}, which differs between runs: heed the warning, or end with `;`"
+                f"{where} shows {found[0]!r}, which differs between runs: fix the warning, or end with `;`"
             )
         for folder in (out, str(ROOT), sys.prefix):
             if folder in shown:
@@ -226,7 +228,7 @@ def _check_errors(where: str, outputs: list[NotebookNode]) -> None:
 
 
 def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookError:
-    """In one line what a user can mend, such as a damaged file; else with the traceback."""
+    """Return the error in one line if a user can fix it, such as a damaged file, else with the traceback."""
     number = _SYSTEM_ERROR.match(message)
     if kind in _MENDABLE:
         end = ""
@@ -238,7 +240,7 @@ def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookErr
 
 
 def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> None:
-    """The source with the outputs of its run: whatever else a run leaves in a notebook varies."""
+    """Write the source with the outputs of its run. Other parts of a notebook that a run changes vary between runs."""
     result = copy.deepcopy(source)
     result.metadata = {
         "kernelspec": {"name": KERNEL, "display_name": "Python 3", "language": "python"},
@@ -251,9 +253,10 @@ def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> 
 
 
 def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode]:
-    """The outputs of code cell `number`, the same for every run: text in one piece, widgets as static images.
+    """Return the outputs of code cell `number` in a form that is the same for every run.
 
-    A widget without a static image, such as a progress bar, leaves nothing.
+    Text is joined into one piece. Widgets are replaced by their static image; a widget without one, such as a progress
+    bar, is removed.
     """
     result: list[NotebookNode] = []
     for output in outputs:
@@ -285,7 +288,7 @@ def _publish(staging: Path, out: Path) -> list[str]:
     names = sorted(name for name in found if Path(name).name != MANIFEST)
     same = {name for name in names if (out / name).is_file() and filecmp.cmp(staging / name, out / name, shallow=False)}
     changed = [name for name in names if name not in same]
-    for folder in {(out / name).parent for name in changed}:  # all of them before the first file: all or nothing
+    for folder in {(out / name).parent for name in changed}:  # check all folders before moving any file: all or nothing
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
@@ -293,7 +296,7 @@ def _publish(staging: Path, out: Path) -> list[str]:
         _move(staging / name, out / name)
     for name in names:
         if name.startswith("data/results/"):
-            list_file(out / name)  # also one that stays: a run may have been killed before this line
+            list_file(out / name)  # unchanged files too: a run may have been killed before this line
     return changed
 
 
@@ -304,12 +307,12 @@ def _move(path: Path, target: Path) -> None:
         if error.errno != errno.EXDEV:
             raise
         remove_leftovers(target)
-        with atomic_path(target) as beside:  # figures/ or data/ lie on another disk
+        with atomic_path(target) as beside:  # figures/ or data/ are on another disk
             shutil.copyfile(path, beside)
 
 
 def _value(text: str) -> object:
-    """A parameter from the command line: JSON where it is JSON (true, 3, 0.5), else the text itself."""
+    """Parse a parameter from the command line as JSON (true, 3, 0.5); other text is returned as it is."""
     try:
         return json.loads(text)
     except ValueError:
@@ -317,13 +320,13 @@ def _value(text: str) -> object:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m vsp.run.run_notebook", description="Run one notebook, strictly.")
+    """Run the command line."""
+    parser = argparse.ArgumentParser(prog="python -m vsp.run.run_notebook", description="Run one notebook headless.")
     parser.add_argument("notebook")
     parser.add_argument("--out", default=".", help="folder for figures/ and data/results/ (%(default)s)")
     parser.add_argument("-p", dest="parameters", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"))
-    parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files, in OUT, that it must make")
-    parser.add_argument("--timeout", type=int, default=1800, help="seconds for each cell (%(default)s)")
+    parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files in OUT that it must make")
+    parser.add_argument("--timeout", type=int, default=1800, help="seconds per cell (%(default)s)")
     given = parser.parse_args(arguments)
     began, name = time.monotonic(), Path(given.notebook).name
     with in_one_line(name):
@@ -334,7 +337,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 given.notebook, given.out, parameters=parameters, expect=given.expect, timeout=given.timeout
             )
         except KernelDied:
-            terminate_peers(Path(given.out) / "build" / "locks")  # make would wait for the others, minutes
+            terminate_peers(Path(given.out) / "build" / "locks")  # else make would wait minutes for the others
             raise
         print(f"{name}: done in {time.monotonic() - began:.0f} s, {len(changed)} files changed", flush=True)
 

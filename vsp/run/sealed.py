@@ -1,4 +1,4 @@
-"""Sealed files: the first line is the checksum of the rest, which is compared before anything is parsed."""
+"""Sealed files: the first line is the checksum of the rest, which is verified before anything is parsed."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
 
 
 def read_sealed(path: str | os.PathLike) -> bytes:
-    """The payload of a file that `write_sealed` wrote. Raises `MissingFile` or `DamagedFile`."""
+    """Return the payload of a file that `write_sealed` wrote. Raises `MissingFile` or `DamagedFile`."""
     content = read_bytes(path)
     seal, payload = content[:65], content[65:]
     found = hashlib.sha256(payload).hexdigest()
     if seal != found.encode() + b"\n":
         raise DamagedFile(
-            f"{path}: SHA-256 is {found}, its first line says {seal!r}: delete it to have it made again; {remedy(path)}"
+            f"{path}: SHA-256 is {found}, its first line says {seal!r}: delete it, and it is made again; {remedy(path)}"
         )
     return payload
 
 
 def save_arrays(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: dict) -> None:
-    """Write `arrays` and the JSON-able `about` to one sealed file, as safetensors."""
+    """Write `arrays` and the JSON-serialisable `about` to one sealed file, as safetensors."""
     from safetensors.numpy import save
 
     about_text = json.dumps(about, sort_keys=True, allow_nan=False)
@@ -55,7 +55,7 @@ def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.nda
         found = about.get("kind")
     except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
         raise DamagedFile(
-            f"{path}: sealed, but not what `save_arrays` writes: {error!r:.300}: delete it; {remedy(path)}"
+            f"{path}: right checksum, but `save_arrays` did not write it: {error!r:.300}: delete it; {remedy(path)}"
         ) from error
     if found != kind:
         raise DamagedFile(f"{path}: holds a {found!r}, expected a {kind!r}: delete it; {remedy(path)}")

@@ -1,6 +1,6 @@
-"""Many jobs at once, in processes of this machine or by the workers of a Dask cluster. Results come as they end.
+"""Run many jobs in parallel, in processes of this machine or on a Dask cluster. Results come as jobs end.
 
-Workers write nothing: a cluster needs no shared folder, and every file on disk was written by one process.
+Workers write no files, so a cluster needs no shared folder, and one process writes all files.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from .listed import MANIFEST
 from .machine import cpu_type
 from .progress import progress
 
-ANSWER = 10  # seconds within which a scheduler answers
-IDLE = 20  # seconds after which a worker without work ends, whatever became of the process that started it
-PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma")  # whose versions may decide a result
+ANSWER = 10  # seconds to wait for the answer of a scheduler
+IDLE = 20  # seconds after which an idle worker ends, even if the process that started it is gone
+PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma")  # their versions may affect a result
 
 
 class UnlikeWorker(CommandError):
-    """A worker of a cluster whose code or libraries are not those of the one who asks."""
+    """A worker of a cluster whose code or libraries differ from those of the calling process."""
 
 
 class WorkerDied(CommandError):
-    """A worker process was killed; the message says how far the work had come."""
+    """A worker process was killed; the message says how much work was done."""
 
 
 class NoScheduler(CommandError):
@@ -44,9 +44,9 @@ class NoScheduler(CommandError):
 def results(
     work: Callable, arguments: Sequence[tuple], label: str, *, jobs: int | str, total: int, unit: str
 ) -> Iterator[tuple[int, object]]:
-    """Yield (i, work(*arguments[i])) for every i, in the order in which they end, and show how many are done.
+    """Yield (i, work(*arguments[i])) for every i, as jobs end, and show how many are done.
 
-    `total` counts those that were done before, too. `jobs` is the number of worker processes (-1: one per core) or the
+    `total` includes jobs that were done before. `jobs` is the number of worker processes (-1: one per core) or the
     address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; its owner can run code here and on the workers. Every
     job runs with one thread. Raises what `work` raises, WorkerDied (on a cluster, after one job killed four workers),
     UnlikeWorker and NoScheduler.
@@ -68,7 +68,7 @@ def results(
         how = re.search(r"\{(.*)\}", str(error))
         raise WorkerDied(
             f"{label}: a worker process was killed{f' ({how[1]})' if how else ''} with {done} of {total} {unit} done. "
-            "What is on disk stays: the same command goes on from there. If memory ran out, use fewer: JOBS=1"
+            "Finished files stay on disk: run the same command to resume. If memory ran out, use fewer workers: JOBS=1"
         ) from error
 
 
@@ -81,7 +81,7 @@ def _finished(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> It
             client = stack.enter_context(_client(jobs))
             stack.enter_context(parallel_config("dask", client=client, scatter=_shared(arguments), n_jobs=-1))
         else:
-            # No memory maps, hence no folders in /dev/shm that outlive a kill: jobs are given 1 MB or so
+            # No memory maps, so no folders in /dev/shm remain after a kill: the arguments of a job take about 1 MB
             options = {"max_nbytes": None, "temp_folder": tempfile.gettempdir(), "idle_worker_timeout": IDLE}
             stack.enter_context(parallel_config("loky", inner_max_num_threads=1, n_jobs=jobs, **options))
         yield from Parallel(return_as="generator_unordered")(calls)
@@ -98,7 +98,7 @@ def _call(expected: dict[str, str], work: Callable, i: int, *one) -> tuple[int, 
 
 @cache
 def identity() -> dict[str, str]:
-    """What decides a result beside its arguments: code, teachers, type of processor, and the versions of packages."""
+    """Return what determines a result besides its arguments: code, teachers, processor type, and package versions."""
     code = hashlib.sha256(b"".join(path.read_bytes() for path in _deciding_files())).hexdigest()[:10]
     found = {"code": code, "processor": cpu_type(), "python": platform.python_version()}
     for name in PACKAGES:
@@ -108,7 +108,7 @@ def identity() -> dict[str, str]:
 
 
 def _deciding_files() -> list[Path]:
-    """All code of the package, and the manifests of the teachers."""
+    """Return the paths of all code of the package and of the manifests of the teachers."""
     return [*sorted((ROOT / "vsp").rglob("*.py")), *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
 
 
@@ -126,7 +126,7 @@ def _client(address: str):
 
 
 def _shared(arguments: Sequence[tuple]) -> list:
-    """What several jobs share, such as a teacher: every worker gets it once."""
+    """Return the arguments that several jobs share, such as a teacher. Every worker gets them once."""
     objects = {id(part): part for one in arguments for part in one if not isinstance(part, int | str)}
     counts = Counter(id(part) for one in arguments for part in one)
     return [part for key, part in objects.items() if counts[key] > 1]

@@ -5,7 +5,6 @@ Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 
 import importlib
 
-from .animation import save_growth
 from .benchmarks import fit_times, kills, times_over_dimension
 from .captions import Caption, caption_of
 from .explanation import contributions, whereabouts

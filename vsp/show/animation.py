@@ -1,154 +1,79 @@
-"""Animation of a distillation: the partition grows over the map of the distilled policy.
-
-`Growth` draws a run at any iteration; `save_growth` writes it as a GIF, with a still image for readers who want no
-motion.
-"""
+"""Animations: a figure that is redrawn quickly many times, and GIFs with a still image for those who want no motion."""
 
 from __future__ import annotations
 
-import dataclasses
+import io
 import os
+from collections.abc import Callable
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ..history import History
-from ..policy import VoronoiPolicy
-from ..rollouts import Policy, rollout
 from ..run import atomic
-from ..tasks.base import Task
-from ..tasks.registry import get_task
-from . import state_space, style
+from . import style
 from .captions import Caption, caption_of
-from .stage import Stage, borders, cells_and_changes, changes, ground, moment, png, policy_map
 
-WIDTH, HEIGHT = 6.0, 2.6  # inches
-FINE = 301  # grid points per axis for the borders of cells
-MAPS = {"SimpleGoal-v0": 17, "MountainCarContinuous-v0": 101}  # grid points per axis of a policy map; few for arrows
-FRAMES = 24
+WIDTH = 6.0  # inches
 STEP, HOLD = 200, 2500  # milliseconds per frame, and for the last one
 DPI, COLOURS = 120, 64  # dots per inch of a GIF, and the size of its palette
 
 
-class Maps:
-    """Draw the policy maps of a task and the cells on them. Raises ValueError for a task without such a map."""
+class Stage:
+    """A figure that is drawn in full once. Each shot draws only its own artists over that image, then removes them.
 
-    def __init__(self, task: Task):
-        if task.name not in MAPS:
-            raise ValueError(f"task is {task.name}, expected one of {list(MAPS)}: a policy map needs two inputs")
-        self.task = task
-        self._fine = state_space.grid(task.low, task.high, FINE)
-        self._grid = state_space.grid(task.low, task.high, MAPS[task.name])
-
-    def panels(self, teacher: Policy, dpi: int) -> tuple[Figure, np.ndarray]:
-        """Return a figure and three axes: the teacher's map, an empty one for the distilled policy, and free axes."""
-        fig, axes = style.panels(3, width=WIDTH, height=HEIGHT, dpi=dpi)
-        fig.get_layout_engine().set(wspace=0.04)
-        for ax in axes[:2]:
-            ground(ax, self.task.name)
-        axes[1].set_ylabel("")
-        axes[1].tick_params(labelleft=False)
-        image = self.policy(axes[0], teacher, color=style.TEACHER)
-        if len(self.task.outputs) == 1:
-            state_space.force_bar(fig, image, axes[:2])
-            fig.axes[-1].set(ylabel="", title="force")  # a label beside the bar would seem to belong to the next panel
-        return fig, axes
-
-    def policy(self, ax: Axes, actor: Policy, *, color: str = style.DISTILLED) -> Artist:
-        """Draw the actions of `actor`: arrows in `color` for two actions, a force map for one. Return the artist."""
-        x, y, states = self._grid
-        return policy_map(ax, x, y, actor.predict(states)[0], color=color)
-
-    def cells(self, ax: Axes, policy: VoronoiPolicy) -> None:
-        """Draw the cells of `policy` with their codewords."""
-        x, y, states = self._fine
-        borders(ax, x, y, policy.cells(states))
-        state_space.codewords(ax, policy.codewords)
-
-
-def check_plays(policy: Policy, task: Task) -> None:
-    """Raise ValueError unless `policy` can take a step of `task`."""
-    rollout(policy, dataclasses.replace(task, max_steps=1), task.start(np.random.default_rng(0), 1))
-
-
-class Growth:
-    """Draw a run at any iteration: the teacher's map, the distilled policy's map and cells, and the number of cells.
-
-    Raises ValueError for a task without policy maps, for anything but a history of the paper's method on this task,
-    and for a teacher that cannot act in the task.
+    This skips axes, texts and legends, which take most of the time. The artists of a shot must lie above the figure.
     """
 
-    def __init__(self, history: History, teacher: Policy, task: str | Task, *, dpi: int = DPI):
-        if not isinstance(history, History):
-            kind = type(history).__name__
-            raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
-        self.history, self.maps = history, Maps(get_task(task))
-        if (found := history.policy_at(0).task.name) != self.maps.task.name:
-            raise ValueError(f"history is of a run on {found}, expected one on {self.maps.task.name}")
-        check_plays(teacher, self.maps.task)
-        self.stage, self._axes = self._set_stage(teacher, dpi)
+    def __init__(self, fig: Figure):
+        plt.close(fig)  # only pyplot drops it, so that no notebook displays it by itself
+        self.fig, self._canvas = fig, FigureCanvasAgg(fig)
+        self.stand()
 
-    def __len__(self) -> int:
-        return len(self.history.cells)
+    def stand(self) -> None:
+        """Draw the figure as it is now, as the background of all later shots."""
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(self.fig.bbox)
+        self._standing = {ax: set(ax.get_children()) for ax in self.fig.axes}
 
-    def _set_stage(self, teacher: Policy, dpi: int) -> tuple[Stage, np.ndarray]:
-        fig, axes = self.maps.panels(teacher, dpi)
-        passes = [[e.iteration for e in self.history.events if e.kind == kind] for kind in ("split", "merge")]
-        cells_and_changes(axes[2], np.array(self.history.cells), *passes)
-        style.letter(axes, ["teacher", "distilled", "cells"])
-        nothing = np.zeros((0, 2))
-        changes(state_space.codewords(axes[1], nothing), nothing, nothing)  # for the legend
-        style.legend_below(fig, axes[1], ncol=6)
-        return Stage(fig), axes
+    def watermark(self) -> None:
+        """Mark all shots as those of a quick run, as `save_figure` does."""
+        about = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
+        self.fig.text(0.5, 0.5, "quick run", animated=True, **about)  # drawn last, by each shot
 
-    def shoot(self, n: int, *, since: int | None = None) -> np.ndarray:
-        """Draw the run after iteration n, as uint8 (height, width, 3). Raises ValueError for n outside the run.
+    def shoot(self, paint: Callable[[], object]) -> np.ndarray:
+        """Return the figure with what `paint` draws into its axes, as uint8 (height, width, 3)."""
+        self._canvas.restore_region(self._still)
+        try:
+            paint()
+            for ax in self._standing:
+                for artist in sorted([*self._added(ax), *ax.spines.values()], key=lambda artist: artist.zorder):
+                    ax.draw_artist(artist)  # redraw the spines: a map would cover half their width
+        finally:  # also after an error: the next shot must not contain these artists
+            for ax in self._standing:
+                for artist in self._added(ax):
+                    artist.remove()
+        for mark in self.fig.texts:
+            self.fig.draw_artist(mark)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
-        Marks the codewords added or removed after iteration `since` (None: in the last iteration with a change).
-        """
-        policy = self.history.policy_at(n)
-        came, went, _ = self._changed(n, self.last_change(n) - 1 if since is None else since)
+    def _added(self, ax: Axes) -> list[Artist]:
+        return [artist for artist in ax.get_children() if artist not in self._standing[ax]]
 
-        def paint() -> None:
-            for ax in self._axes[:2]:
-                self.maps.cells(ax, policy)
-            self.maps.policy(self._axes[1], policy)
-            changes(self._axes[1], *(np.reshape(sorted(places), (-1, 2)) for places in (came, went)))
-            moment(self._axes[2], n, self.history.cells[n])
 
-        return self.stage.shoot(paint)
-
-    def _changed(self, n: int, since: int) -> tuple[set[tuple], set[tuple], set[tuple]]:
-        """Return the codewords that changed in the iterations `since` < i <= n: those added that remain, those removed,
-        and those both added and removed."""
-        recent = [(e.kind, tuple(e.codeword)) for e in self.history.events if since < e.iteration <= n]
-        there = set(map(tuple, self.history.policy_at(n).codewords))
-        split, merged = ({place for kind, place in recent if kind == one} for one in ("split", "merge"))
-        return split & there, merged - there, (merged - there) & split
-
-    def moments(self, number: int) -> list[int]:
-        """Return at most `number` iterations from first to last, denser early on, where most changes happen."""
-        return np.unique((np.linspace(0, 1, number) ** 2 * (len(self) - 1)).astype(int)).tolist()
-
-    def last_change(self, n: int) -> int:
-        """Return the last iteration up to n with a split or merge; 0 if there is none."""
-        return max((e.iteration for e in self.history.events if e.iteration <= n), default=0)
-
-    def words(self, n: int) -> str:
-        """Describe the run after iteration n."""
-        k, last = self.history.cells[n], self.last_change(n)
-        kinds = [e.kind for e in self.history.events if e.iteration == last]
-        text = f"After iteration {n} (0 to {len(self) - 1}): {k} {'cell' if k == 1 else 'cells'}."
-        if kinds:
-            text += f" Last change, iteration {last}: {kinds.count('split')} came by splits, "
-            text += f"{kinds.count('merge')} went by merges."
-        if brief := len(self._changed(n, last - 1)[2]):
-            text += f" Of these, {brief} came and went at once: a cross without a ring."
-        return text
+def png(pixels: np.ndarray, *, small: bool = False) -> bytes:
+    """Encode an image (height, width, 3) as PNG without dates; `small`: 256 colours, a third the size, but slower."""
+    picture, file = Image.fromarray(pixels), io.BytesIO()
+    if small:
+        picture.quantize(256, dither=Image.Dither.NONE).save(file, "png", optimize=True)
+    else:
+        picture.save(file, "png", compress_level=1)
+    return file.getvalue()
 
 
 class Animation:
@@ -168,24 +93,6 @@ class Animation:
         return self.about.alt
 
 
-def save_growth(
-    history: History, teacher: Policy, task: str | Task, name: str, *, out: str | os.PathLike, quick: bool = False,
-    alt: str | None = None,
-) -> Animation:  # fmt: skip
-    """Write OUT/figures/NAME.gif, and its last frame as NAME.png; return the animation to show.
-
-    Early iterations, where most changes happen, get more frames than late ones. `alt` describes the animation for
-    readers who cannot see it; `quick` adds a watermark. The files contain no dates, so the same run gives the same
-    bytes. Raises ValueError as `Growth` does.
-    """
-    growth = Growth(history, teacher, task)
-    if quick:
-        growth.stage.watermark()
-    moments = growth.moments(FRAMES)
-    images = [growth.shoot(n, since=before) for before, n in zip([-1, *moments], moments)]
-    return save_frames(images, name, out=out, alt=alt)
-
-
 def save_frames(
     images: list[np.ndarray], name: str, *, out: str | os.PathLike, alt: str | None = None, step: int = STEP,
     hold: int = HOLD,
@@ -196,14 +103,17 @@ def save_frames(
     """
     path, about = Path(out) / "figures" / name, caption_of("figures", name, alt=alt)
     with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
-        _write_gif(temporary, images, step, hold)
+        write_gif(temporary, images, step=step, hold=hold)
     with atomic.atomic_path(path.with_suffix(".png")) as temporary:
         temporary.write_bytes(png(images[-1], small=True))
     return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), about)
 
 
-def _write_gif(path: Path, images: list[np.ndarray], step: int, hold: int) -> None:
-    """Write the frames with one common palette, so that each stores only the pixels that changed."""
+def write_gif(path: Path, images: list[np.ndarray], *, step: int, hold: int) -> None:
+    """Write images (height, width, 3) with one common palette, so that each frame stores only the pixels that changed.
+
+    `step`: milliseconds per frame; `hold`: milliseconds of the last frame.
+    """
     some = Image.fromarray(np.concatenate([images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]))
     colours = np.reshape(some.quantize(COLOURS).getpalette(), (-1, 3))
     colours[(colours > 247).all(axis=1)] = 255  # the background stays white

@@ -11,8 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from . import style
-from .animation import DPI, WIDTH, Animation, save_frames
-from .stage import Stage
+from .animation import DPI, WIDTH, Animation, Stage, save_frames
 
 THICK = 3.0  # line width of the body, in points
 GAP = 1.1  # from one pose to the next in a strip, as a multiple of the widest pose

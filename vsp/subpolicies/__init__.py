@@ -1,6 +1,6 @@
-"""Sub-policies: the classes of local model by name, and those of all cells stacked in one array.
+"""Sub-policies: the classes of local models by name, and the sub-policies of all cells in one array.
 
-To add a class, write a function of the task that returns its `PolicyClass`, and enter it in `registry`.
+To add a class, write a function that takes a task and returns a `PolicyClass`, and enter it in `registry`.
 """
 
 from .base import PolicyClass, linear_outputs

@@ -1,5 +1,7 @@
-"""`PolicyClass`: what one sub-policy computes from a state and its parameters (p, m): a column per action, the last row
-the bias."""
+"""`PolicyClass`: how a sub-policy computes actions from a state and its parameters.
+
+Parameters (p, m) have a column per action; the last row is the bias.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from ..tasks.base import Task
 
 Pullback = Callable[[np.ndarray], np.ndarray]
 
-# Functions that `PolicyClass.code` may use: C and Python's math have them by the same names
+# Functions that `PolicyClass.code` may use: C and Python's math have them under the same names
 SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs")
 _CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d)|[-+*/(),. \d])+")
 
@@ -24,17 +26,17 @@ _CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d
 class PolicyClass:
     """A class of sub-policy that is linear in its parameters: output = features @ weights + bias.
 
-    Features are in the units of the task, so that equations are too. Training divides them by `sizes`, so that one step
-    size fits all.
+    Features are in the units of the task, and so are the equations. Training divides features by `sizes`, so that one
+    step size suits all of them.
     """
 
     name: str
     terms: tuple[str, ...]  # symbols of the q features
-    code: tuple[str, ...]  # the features, as C and Python compute them from an array `state`
+    code: tuple[str, ...]  # code of the features, valid in C and Python, from an array `state`
     sizes: np.ndarray  # (q,) largest absolute value of each feature in the state box; 1 for raw features
     features: Callable[[np.ndarray], np.ndarray]  # states (..., d) to features (..., q)
 
-    # One action from its parameters, `row`, and the features with a 1 at the end, INPUTS numbers
+    # Computes one action from its parameters `row` and from `features`: the features and a final 1, INPUTS numbers
     OUTPUT_IN_PYTHON = """
 def output(row, features):
     return sum(w * f for w, f in zip(row, features))
@@ -48,7 +50,7 @@ static double output(const double *row, const double *features) {
 """
 
     def feature_code(self) -> str:
-        """The features and a 1, as C and Python compute them. Raises ValueError for code that does anything else."""
+        """Return code of the features and a final 1, valid in C and Python. Raises ValueError for other code."""
         for code in self.code:
             if not _CODE.fullmatch(code):
                 raise ValueError(f"code {code!r}, expected arithmetic with state[0], ... and functions of {SHARED}")
@@ -61,12 +63,12 @@ static double output(const double *row, const double *features) {
 
     @property
     def units(self) -> np.ndarray:
-        """Factors from parameters to their values in training. (p, 1)"""
+        """Factors that convert parameters to their values in training. (p, 1)"""
         return np.append(self.sizes, 1.0)[:, None]
 
     @property
     def bounds(self) -> np.ndarray:
-        """Initial parameters are uniform in +- this / `units`: 1 / sqrt(inputs), as in torch.nn.Linear. (p, 1)"""
+        """Initial parameters are uniform in +- `bounds` / `units`: 1 / sqrt(inputs), as in torch.nn.Linear. (p, 1)"""
         return np.full((len(self.rows), 1), 1.0 / np.sqrt(max(1, len(self.terms))))
 
     def outputs(self, features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
@@ -74,17 +76,19 @@ static double output(const double *row, const double *features) {
         return linear_outputs(features, parameters)
 
     def batch(self, inputs: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        """Outputs (c, B, m) of c cells with parameters (c, p, m) at `inputs` (c, B, q + 1), features and a 1.
+        """Return outputs (c, B, m) of c cells with parameters (c, p, m) at `inputs` (c, B, q + 1): features and a 1.
 
-        Also returns the function from the gradient of the loss by these outputs to that by the parameters."""
+        Also returns a function that maps the gradient of the loss with respect to these outputs to the gradient with
+        respect to the parameters.
+        """
         return inputs @ parameters, lambda error: inputs.transpose(0, 2, 1) @ error
 
     def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
-        """Summands of the output at `state` (d,): a row per action (m,), a column per feature and the bias."""
+        """Return the terms of the output at `state` (d,): m rows, one per action; a column per feature and the bias."""
         return pd.DataFrame(parameters.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """One action's output as text, for parameters (p,); `symbol` prints a variable's name."""
+        """Return one action's output as text, for parameters (p,); `symbol` formats a variable's name."""
         return expression(column, tuple(symbol(term) for term in self.terms), digits)
 
 
@@ -94,7 +98,7 @@ def linear_outputs(features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
 
 
 def state_code(task: Task) -> tuple[str, ...]:
-    """The inputs, as C and Python read them."""
+    """Return code that reads the inputs, valid in C and Python."""
     return tuple(f"state[{i}]" for i in range(len(task.inputs)))
 
 
@@ -105,9 +109,10 @@ def reach(task: Task) -> np.ndarray:
 
 
 def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | None = 3) -> str:
-    """A linear expression as text: coefficients (q + 1,), the last one the bias, of the variables `names` (q,).
+    """Return a linear expression in the variables `names` (q,) as text; `coefficients` (q + 1,) end with the bias.
 
-    `digits` are decimals; None: each number exactly, as short as it can be written, and no term that is zero.
+    `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that are
+    zero.
     """
     coefficients = check_array("coefficients", coefficients, (len(names) + 1,))
     terms = [(c, name) for c, name in zip(coefficients, [*names, ""]) if c or digits is not None]
@@ -117,7 +122,7 @@ def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | N
 
 
 def number(value: float, digits: int | None) -> str:
-    """A number with `digits` decimals; None: exactly, as short as it can be written."""
+    """Format a number with `digits` decimals; None: exactly, in its shortest form."""
     if digits is not None:
         check_count("digits", digits, least=0)
     return np.format_float_positional(value, trim="-") if digits is None else f"{value:.{digits}f}"

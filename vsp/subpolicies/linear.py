@@ -1,4 +1,4 @@
-"""Classes of sub-policy that are linear in their parameters. The paper's is `linear`."""
+"""Classes of sub-policies that are linear in their parameters. The paper uses `linear`."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def quadratic(task: Task) -> PolicyClass:
 def pid(task: Task) -> PolicyClass:
     """A PID controller: linear in an error and its derivative, the task's `signals`.
 
-    A function of the state has no memory, hence no integral. Where the error settles, the integral settles too, at the
-    action that holds the state there: the bias of each cell takes its place. Raises ValueError for a task without
-    signals.
+    A function of the state has no memory, so it has no integral. The bias of each cell replaces the integral: where the
+    error settles, the integral settles too, at the action that keeps the state there. Raises ValueError for a task
+    without signals.
     """
     signals = task.signals
     if signals is None:
         raise ValueError(
-            f"{task.name} names no error and so has no sub_policy 'pid', expected a task with `signals`, such as "
+            f"{task.name} defines no error, which sub_policy 'pid' needs, expected a task with `signals`, such as "
             "MountainCarContinuous-v0 or Pendulum-v1: give the task signals or take another sub_policy"
         )
     return PolicyClass("pid", signals.names, signals.code, np.array(signals.sizes), signals.compute)

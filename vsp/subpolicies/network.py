@@ -1,4 +1,4 @@
-"""A class of sub-policy that is not linear: a small network."""
+"""A class of nonlinear sub-policies: small networks."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ HIDDEN = 4  # tanh units of a network
 class Network(PolicyClass):
     """A network per action with one hidden layer of `HIDDEN` tanh units. Its features are the inputs.
 
-    Parameters of an action: the weights from the first input to every unit, those from the next inputs, the units'
-    biases, the weights from the units to the output, the bias. A merge compares parameters as they are, so it misses
-    equal networks whose units stand in another order.
+    The parameters of an action are, in this order: the weights from the first input to every unit, the same for each
+    further input, the units' biases, the weights from the units to the output, the output's bias. A merge compares
+    parameters one by one, so it misses equal networks whose units are in a different order.
     """
 
     OUTPUT_IN_PYTHON = f"""
@@ -42,24 +42,24 @@ static double output(const double *row, const double *features) {
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the p rows of the parameters; numbers count the units."""
+        """Names of the p rows of the parameters; a number at the end is that of a unit."""
         units = range(1, HIDDEN + 1)
         return (*(f"{name}_{h}" for name in (*self.terms, "bias", "unit") for h in units), "bias")
 
     @property
     def units(self) -> np.ndarray:
-        """`sizes` for the weights of the inputs, else 1. (p, 1)"""
+        """Factors as in `PolicyClass`: `sizes` for the weights of the inputs, 1 for the others. (p, 1)"""
         return np.concatenate([np.repeat(self.sizes, HIDDEN), np.ones(2 * HIDDEN + 1)])[:, None]
 
     @property
     def bounds(self) -> np.ndarray:
-        """As in torch.nn.Linear, layer by layer. (p, 1)"""
+        """Bounds of initial parameters, as in torch.nn.Linear, layer by layer. (p, 1)"""
         hidden = (len(self.terms) + 1) * HIDDEN
         fan_in = np.repeat([len(self.terms), HIDDEN], [hidden, HIDDEN + 1])
         return 1.0 / np.sqrt(fan_in)[:, None]
 
     def _layers(self, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Weights of the units (..., q + 1, HIDDEN, m) and of the output (..., HIDDEN, m), its bias (..., m)."""
+        """Return weights of the units (..., q + 1, HIDDEN, m) and of the output (..., HIDDEN, m), its bias (..., m)."""
         *stack, _, m = parameters.shape
         hidden = parameters[..., : -HIDDEN - 1, :].reshape(*stack, len(self.terms) + 1, HIDDEN, m)
         return hidden, parameters[..., -HIDDEN - 1 : -1, :], parameters[..., -1, :]
@@ -71,7 +71,7 @@ static double output(const double *row, const double *features) {
         return (units * weights).sum(axis=-2) + bias
 
     def batch(self, inputs: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        """As `PolicyClass.batch`; the gradient is written out."""
+        """Do as `PolicyClass.batch`, with explicit formulas for the gradient."""
         c, size, _ = inputs.shape
         hidden, weights, bias = self._layers(parameters)
         units = np.tanh(inputs @ hidden.reshape(c, inputs.shape[2], -1)).reshape(c, size, *weights.shape[1:])
@@ -86,7 +86,7 @@ static double output(const double *row, const double *features) {
         return (units * weights[:, None]).sum(axis=2) + bias[:, None], pull_back
 
     def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
-        """To first order: each input times the output's slope along it, and the rest, which belongs to no input."""
+        """Return the output to first order: each input times the output's slope along it. The rest has no input."""
         hidden, weights, _ = self._layers(parameters)
         units = np.tanh(np.tensordot(state, hidden[:-1], 1) + hidden[-1])
         first = np.einsum("q,qhm,hm->mq", state, hidden[:-1], weights * (1.0 - units**2))
@@ -94,7 +94,7 @@ static double output(const double *row, const double *features) {
         return pd.DataFrame(np.column_stack([first, rest]), columns=[*self.terms, "rest"])
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """One action's output as text, such as "0.5 tanh(1.2 x - 0.3 v + 0.1) + ... + 0.2"."""
+        """Return one action's output as text, such as "0.5 tanh(1.2 x - 0.3 v + 0.1) + ... + 0.2"."""
         hidden, weights, bias = self._layers(column[:, None])
         inner = [super(Network, self).expression(one, digits, symbol) for one in hidden[..., 0].T]
         names = tuple(f"{symbol('tanh')}({text})" for text in inner)
@@ -102,5 +102,5 @@ static double output(const double *row, const double *features) {
 
 
 def network(task: Task) -> Network:
-    """A small network of the inputs."""
+    """A small network per action that takes the inputs."""
     return Network("network", task.inputs, state_code(task), reach(task), lambda states: states)

@@ -1,4 +1,4 @@
-"""The classes of sub-policy by name. To add one, write a function of the task that returns its `PolicyClass`."""
+"""The classes of sub-policies by name. To add one, write a function that takes a task and returns a `PolicyClass`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from .network import network
 
 
 def policy_class(sub_policy: str, task: Task) -> PolicyClass:
-    """The class of sub-policy of that name, for `task`. Raises ValueError for an unknown name, and for "pid" where
-    the task has no signals."""
+    """Return the class of sub-policies called `sub_policy`, for `task`. Raises ValueError for an unknown name, and for
+    "pid" if the task has no signals."""
     check_choice("sub_policy", sub_policy, POLICY_CLASSES)
     return POLICY_CLASSES[sub_policy](task)
 

@@ -7,11 +7,11 @@ import numpy as np
 from .base import PolicyClass
 
 BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam (Kingma & Ba 2015), its published constants
-RIDGE = 1e-6  # weight of the present parameters in a fit, in states
+RIDGE = 1e-6  # weight of the current parameters in a fit, as a number of states
 
 
 class SubPolicies:
-    """One sub-policy of a class per cell, trained on the mean squared error of its actions (m,)."""
+    """One sub-policy per cell, all of the same class, trained on the mean squared error of their actions (m,)."""
 
     def __init__(self, policy_class: PolicyClass, m: int, *, initial: str = "uniform"):
         self.policy_class, self.initial = policy_class, initial
@@ -31,12 +31,12 @@ class SubPolicies:
         self._steps = np.append(self._steps, 0)
 
     def keep(self, kept: np.ndarray) -> None:
-        """Drop all cells but those of the mask `kept` (k,)."""
+        """Keep only the cells of the mask `kept` (k,)."""
         self.parameters, self._steps = self.parameters[kept], self._steps[kept]
         self._mean, self._square = self._mean[kept], self._square[kept]
 
     def restart_adam(self, cells: np.ndarray | slice) -> None:
-        """Forget the moments of `cells` (c,)."""
+        """Set Adam's moments and step counts of `cells` (c,) to zero."""
         self._mean[cells] = self._square[cells] = 0.0
         self._steps[cells] = 0
 
@@ -45,16 +45,16 @@ class SubPolicies:
         return self.policy_class.outputs(self.policy_class.features(state), self.parameters[cell])
 
     def comparable(self) -> np.ndarray:
-        """The parameters in the units of the training, in which one limit on their distance fits all. (k, p, m)"""
+        """Return the parameters in the units of training, in which one distance limit suits all. (k, p, m)"""
         return self.parameters * self._units
 
     def train(self, cells: np.ndarray, inputs: np.ndarray, actions: np.ndarray, *, learning_rate: float) -> np.ndarray:
-        """One Adam step of each of `cells` (c,) on its own minibatch of B states.
+        """Take one Adam step for each of `cells` (c,) on its own minibatch of B states.
 
-        `inputs` (c, B, q + 1) are features and end in a column of ones, `actions` are (c, B, m). Returns the mean
+        `inputs` (c, B, q + 1) are features and a final column of ones; `actions` are (c, B, m). Returns the mean
         squared error of each minibatch before the step. (c,)
         """
-        chosen = slice(None) if len(cells) == len(self.parameters) else cells  # of all cells, views instead of copies
+        chosen = slice(None) if len(cells) == len(self.parameters) else cells  # all cells: views, no copies
         theta, mean, square = self.parameters[chosen], self._mean[chosen], self._square[chosen]
         outputs, pull_back = self.policy_class.batch(inputs, theta)
         error = outputs - actions
@@ -69,10 +69,10 @@ class SubPolicies:
         return np.square(error).sum(axis=(1, 2)) / error[0].size
 
     def solve(self, cells: np.ndarray, products: np.ndarray, targets: np.ndarray) -> None:
-        """Least squares for each of `cells` (c,) from `SufficientStatistics`: X'X (c, p, p) and X'y (c, p, m).
+        """Solve least squares for each of `cells` (c,) from `SufficientStatistics`: X'X (c, p, p) and X'y (c, p, m).
 
-        A slight ridge pulls towards the present parameters, so that parameters which the states do not determine keep
-        their values. Repeated for the same sums, the result converges to plain least squares.
+        A small ridge term pulls towards the current parameters, so parameters that the states do not determine keep
+        their values. Repeated solutions with the same sums converge to plain least squares.
         """
         theta, units = self.parameters[cells], self._units
         slope = (targets - products @ theta) / units

@@ -1,7 +1,7 @@
-"""Tasks: continuous control whose observations and actions are boxes, one file a task.
+"""Continuous-control tasks whose observations and actions are boxes, one file per task.
 
-To add one, write a module like `mountaincar.py` with its `TASK`, and enter it in `registry`. `base` defines what a task
-is; `gym_adapter` makes one of any Gymnasium environment.
+To add one, write a module like `mountaincar.py` with its `TASK`, and enter it in `registry`. `base` defines `Task`;
+`gym_adapter` makes a `Task` from any Gymnasium environment.
 """
 
 from .base import ENDED, GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Signals, Task

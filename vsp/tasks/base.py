@@ -1,6 +1,6 @@
-"""The protocol of a task: dynamics on arrays of states, so that a thousand episodes advance in one call.
+"""The interface of a task: dynamics on arrays of states, so that a thousand episodes advance in one call.
 
-Every function that moves states takes a batch of n and returns a batch. To add a task, write a module like
+Every function of states takes a batch of n and returns a batch. To add a task, write a module like
 `mountaincar.py` and enter its `TASK` in `registry.py`.
 """
 
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 RUNNING, GOAL, PIT, TRUNCATED, ENDED = range(5)
-OUTCOMES = ("running", "goal", "pit", "truncated", "ended")  # the last where nobody has said what a success is
+OUTCOMES = ("running", "goal", "pit", "truncated", "ended")  # "ended": the task defines no success
 
 Step = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
 def _unchanged(states: np.ndarray) -> np.ndarray:
-    """The same array: in most tasks starts, states and observations are the same."""
+    """Return the same array: in most tasks starts, states and observations are the same."""
     return states
 
 
@@ -28,7 +28,7 @@ class Signals:
 
     names: tuple[str, ...]  # symbols, "e" the error and "ė" its derivative
     compute: Callable[[np.ndarray], np.ndarray]  # observations (..., d) to signals (..., q)
-    code: tuple[str, ...]  # the same, as C and Python compute them from an array `state`
+    code: tuple[str, ...]  # code of the signals, valid in C and Python, from an array `state`
     sizes: tuple[float, ...]  # their largest absolute values in the box of the observations
 
 
@@ -37,8 +37,8 @@ class Task:
     """A continuous-control task whose observations and actions are boxes.
 
     `start(rng, n)` draws n starts (n, s) in float64. `begin` turns starts into states, a batch of n. `step(states,
-    actions)` takes actions (n, m) and returns the next states, the rewards (n,) and the outcomes (n,), codes of
-    `OUTCOMES`; the caller counts steps and truncates. `see` turns states into observations (n, d). In most tasks start,
+    actions)` takes actions (n, m) and returns the next states, the rewards (n,) and the outcomes (n,), indices of
+    `OUTCOMES`. The caller counts steps and truncates. `see` turns states into observations (n, d). In most tasks start,
     state and observation are the same array (n, d).
     """
 
@@ -55,7 +55,7 @@ class Task:
     step: Step
     see: Callable[[np.ndarray], np.ndarray] = _unchanged
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
-    start_size: int | None = None  # s, where it is not d
+    start_size: int | None = None  # s; None: s is d
     signals: Signals | None = None  # None: the task has no natural error
 
     @property
@@ -64,5 +64,5 @@ class Task:
         return self.begin is not _unchanged
 
     def observe(self, states: np.ndarray) -> np.ndarray:
-        """Observations of `states` in float32, as Gymnasium returns them. (n, d)"""
+        """Return observations of `states` in float32, as Gymnasium returns them. (n, d)"""
         return self.see(states).astype(np.float32)

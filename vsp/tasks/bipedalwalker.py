@@ -22,11 +22,11 @@ LABELS = (
 
 
 def walked(observation: np.ndarray, reward: float, info: dict) -> bool:
-    """Whether the episode ended at the end of the way, and not in a fall, for which the last reward is -100."""
+    """Whether the episode ended at the end of the track, and not in a fall, for which the last reward is -100."""
     return reward > -100.0
 
 
 def make() -> Task:
-    """The task. Opens an environment."""
+    """Return the task. Opens an environment."""
     torques = ("τh1", "τk1", "τh2", "τk2")
     return replace(gymnasium_task(NAME, walked), inputs=INPUTS, outputs=torques, input_labels=LABELS)

@@ -1,4 +1,7 @@
-"""Any Gymnasium environment as a `Task`, one copy per episode: for physics engines, which step one state at a time."""
+"""Make a `Task` from any Gymnasium environment, with one environment per episode.
+
+This suits physics engines, which step one state at a time.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ import numpy as np
 
 from .base import ENDED, GOAL, PIT, RUNNING, Task
 
-Outcome = Callable[[np.ndarray, float, dict], bool]  # of the last observation, reward and info: whether it succeeded
+Outcome = Callable[[np.ndarray, float, dict], bool]  # (last observation, reward, info) to success
 
-# The ways out for spaces that do not fit
-FLATTEN = "gymnasium.wrappers.FlattenObservation makes one of most"
+# Remedies for spaces that do not fit
+FLATTEN = "gymnasium.wrappers.FlattenObservation converts most of them"
 CONTINUOUS = "linear maps give continuous actions, so choose another environment"
 
 
@@ -27,15 +30,15 @@ class _Live:
 
 
 def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Seeds for `reset` as starts: whole numbers in float64. (n, 1)"""
+    """Draw seeds for `reset` as starts: integers in float64. (n, 1)"""
     return rng.integers(2**32, size=(n, 1)).astype(np.float64)
 
 
 def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
-    """A freshly reset environment per start. (n,) objects"""
+    """Return a freshly reset environment per start. (n,) objects"""
     live = np.empty(len(starts), dtype=object)
     for i, (seed,) in enumerate(starts):
-        env = gymnasium.make(name).unwrapped  # without the limit of steps: the caller counts
+        env = gymnasium.make(name).unwrapped  # without the step limit: the caller counts steps
         live[i] = _Live(env, env.reset(seed=int(seed))[0])
     return live
 
@@ -47,7 +50,7 @@ def _see_live(states: np.ndarray) -> np.ndarray:
 def _step_live(
     outcome: Outcome | None, states: np.ndarray, actions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A step of every environment. An episode that ended succeeded if `outcome` says so; None: nobody can say."""
+    """Step every environment. `outcome` tells whether an episode that ended succeeded; None: success is undefined."""
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (live, action) in enumerate(zip(states, actions)):
         live.observation, rewards[i], ended, _, info = live.env.step(action.astype(live.env.action_space.dtype))
@@ -60,10 +63,10 @@ def _step_live(
 
 @cache
 def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
-    """The `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
+    """Return the `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
 
-    `outcome` says of an episode that ended whether it succeeded; None: that is not defined. Raises ValueError for other
-    spaces, an action box without limits, or an environment without a limit of steps.
+    `outcome` tells whether an episode that ended succeeded; None: success is undefined. Raises ValueError for other
+    spaces, an action box without limits, or an environment without a step limit.
     """
     env = gymnasium.make(name)
     seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
@@ -72,9 +75,9 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
         if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
             raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension: {remedy}")
     if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()):
-        raise ValueError(f"actions of {name} are {acts}, expected limits: gymnasium.wrappers.RescaleAction sets some")
+        raise ValueError(f"actions of {name} are {acts}, expected limits: gymnasium.wrappers.RescaleAction sets them")
     if most is None:
-        raise ValueError(f"{name} has no limit of steps, expected one: give gymnasium.register max_episode_steps")
+        raise ValueError(f"{name} has no step limit, expected one: pass max_episode_steps to gymnasium.register")
     box = (np.asarray(limit, dtype=np.float64) for limit in (seen.low, seen.high, acts.low, acts.high))
     return live_task(name, *box, max_steps=most, outcome=outcome)
 
@@ -83,7 +86,10 @@ def live_task(
     name: str, low: np.ndarray, high: np.ndarray, action_low: np.ndarray, action_high: np.ndarray, *, max_steps: int,
     outcome: Outcome | None = None,
 ) -> Task:  # fmt: skip
-    """The `Task` of the environment `name`, which is opened when an episode begins; boxes (d,) and (m,) as given."""
+    """Return the `Task` of the environment `name` with the given boxes (d,) and (m,).
+
+    Each episode opens the environment when it begins.
+    """
     inputs = tuple(f"s{i}" for i in range(len(low)))
     return Task(
         name=name,

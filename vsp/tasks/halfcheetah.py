@@ -17,10 +17,10 @@ INPUTS = ("z", "θ", *JOINTS, "vx", "vz", "ω", *(f"v{joint}" for joint in JOINT
 
 
 def _begin(starts: np.ndarray) -> np.ndarray:
-    """A freshly reset environment per start. (n,) objects. Raises ValueError where MuJoCo is not installed."""
+    """Return a freshly reset environment per start. (n,) objects. Raises ValueError if MuJoCo is not installed."""
     if find_spec("mujoco") is None:
         advice = "run `make venv-mujoco`, or pip install 'gymnasium[mujoco]'"
-        raise ValueError(f"{NAME} is played by the package mujoco, which is not installed: {advice}")
+        raise ValueError(f"{NAME} needs the package mujoco, which is not installed: {advice}")
     import mujoco
 
     mujoco.set_mju_user_warning(_warn)
@@ -28,7 +28,7 @@ def _begin(starts: np.ndarray) -> np.ndarray:
 
 
 def make() -> Task:
-    """The task, whose episodes never end before the limit: nothing fails. Only to play it needs MuJoCo."""
+    """Return the task. Episodes never end before the step limit, so none fails. Only episodes need MuJoCo."""
     high, force = np.full(len(INPUTS), np.inf), np.ones(len(JOINTS))
     task = live_task(NAME, -high, high, -force, force, max_steps=1000)
     torques = tuple(f"τ{joint}" for joint in JOINTS)
@@ -36,6 +36,6 @@ def make() -> Task:
 
 
 def _warn(message: str) -> None:
-    """A warning of MuJoCo's as one of Python's; not the one that every environment gives for Gymnasium's model."""
+    """Turn a warning of MuJoCo into one of Python, except the one that Gymnasium's model always causes."""
     if "settotalmass" not in message:
         warnings.warn(message, RuntimeWarning, stacklevel=2)

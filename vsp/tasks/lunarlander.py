@@ -14,11 +14,11 @@ LABELS = ("x (half widths)", "height above the pad", "vx", "vy", "angle (rad)", 
 
 
 def landed(observation: np.ndarray, reward: float, info: dict) -> bool:
-    """Whether the episode ended at rest, for which the last reward is 100, and not in a crash, for which it is -100."""
+    """Whether the episode ended at rest (last reward 100) and not in a crash (last reward -100)."""
     return reward > 0
 
 
 def make() -> Task:
-    """The task. Opens an environment."""
+    """Return the task. Opens an environment."""
     inputs = ("x", "y", "vx", "vy", "θ", "ω", "l", "r")
     return replace(gymnasium_task(NAME, landed), inputs=inputs, outputs=("main", "side"), input_labels=LABELS)

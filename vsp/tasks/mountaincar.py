@@ -10,19 +10,19 @@ FLAG = 0.45  # position of the goal
 
 
 def start(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Position uniform in [-0.6, -0.4] (no unit), at rest. (n, 2)"""
+    """Draw starts: position uniform in [-0.6, -0.4] (no unit), at rest. (n, 2)"""
     return np.column_stack([rng.uniform(-0.6, -0.4, size=n), np.zeros(n)])
 
 
 def signals(states: np.ndarray) -> np.ndarray:
-    """Distance to the flag and its change per step. (..., 2)"""
+    """Return the distance to the flag and its change per step. (..., 2)"""
     return np.stack([FLAG - states[..., 0], -states[..., 1]], axis=-1)
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gymnasium's `Continuous_MountainCarEnv.step`, for a batch.
 
-    As in Gymnasium, the cost counts the action *before* it is limited to [-1, 1], and the state is float32 after the
+    As in Gymnasium, the cost uses the action *before* it is clipped to [-1, 1], and the state is float32 after the
     first step.
     """
     position, velocity = states.T

@@ -8,23 +8,23 @@ from .base import RUNNING, Signals, Task
 
 
 def start(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Angle (rad, 0 is upright) uniform over the circle, angular velocity (rad/s) uniform in [-1, 1]. (n, 2)"""
+    """Draw angle (rad, 0 is upright) uniform over the circle, angular velocity (rad/s) uniform in [-1, 1]. (n, 2)"""
     return rng.uniform([-np.pi, -1.0], [np.pi, 1.0], size=(n, 2))
 
 
 def see(states: np.ndarray) -> np.ndarray:
-    """Cosine and sine of the angle, and the angular velocity. (n, 3)"""
+    """Return the cosine and sine of the angle, and the angular velocity. (n, 3)"""
     angle, velocity = states.T
     return np.column_stack([np.cos(angle), np.sin(angle), velocity])
 
 
 def signals(seen: np.ndarray) -> np.ndarray:
-    """The angle to upright (rad) and its change (rad/s). (..., 2)"""
+    """Return the angle to upright (rad) and its change (rad/s). (..., 2)"""
     return np.stack([-np.arctan2(seen[..., 1], seen[..., 0]), -seen[..., 2]], axis=-1)
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gymnasium's `PendulumEnv.step`, for a batch: rod of 1 kg and 1 m, 10 m/s2, 0.05 s a step; no end of its own."""
+    """Gymnasium's `PendulumEnv.step`, for a batch: rod of 1 kg and 1 m, 10 m/s2, 0.05 s per step, no terminal state."""
     angle, velocity = states.T
     torque = np.clip(actions[:, 0], -2.0, 2.0)
     upright = (angle + np.pi) % (2 * np.pi) - np.pi

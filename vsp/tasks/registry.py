@@ -27,15 +27,15 @@ gymnasium.register("SimpleGoal-v0", entry_point="vsp.tasks.simplegoal:SimpleGoal
 
 
 def task_names() -> list[str]:
-    """Names of the tasks that vsp knows: its own, and those that `register` added."""
+    """Return the names of the tasks that vsp knows: its own, and those that `register` added."""
     return [*_TASKS, *_LATER, *_ADDED]
 
 
 def get_task(name: str | Task) -> Task:
-    """The `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry. A `Task` passes
-    through.
+    """Return the `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry.
 
-    Raises ValueError with the nearest name for a typo, and as `gymnasium_task` does.
+    A `Task` is returned as it is. Raises ValueError for an unknown name, with the most similar one, and as
+    `gymnasium_task` does.
     """
     if isinstance(name, Task):
         return name
@@ -46,8 +46,8 @@ def get_task(name: str | Task) -> Task:
 
 
 def _check_registered(name: str) -> None:
-    """Raise ValueError for what Gymnasium does not know, with the name that is most like it: one of ours if it is near,
-    else of all."""
+    """Raise ValueError for a name that Gymnasium does not know. The message suggests the most similar name: one of our
+    tasks if it is similar enough, else any."""
     if isinstance(name, str) and name in gymnasium.registry:
         return
     ours, every = task_names(), [*task_names(), *gymnasium.registry]
@@ -63,11 +63,11 @@ def register(
     outputs: Sequence[str] | None = None,
     outcome: Outcome | None = None,
 ) -> Task:
-    """Tell vsp about an environment in Gymnasium's registry, for this process; returns its `Task`.
+    """Add an environment of Gymnasium's registry to vsp's tasks, for this process. Returns its `Task`.
 
-    `inputs` and `outputs` are the names of its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
-    `outcome(observation, reward, info)` says of an episode that ended whether it succeeded; None: failures are not
-    defined. Raises ValueError for one of vsp's own tasks, names that are too few, too many or not distinct, and as
+    `inputs` and `outputs` name its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
+    `outcome(observation, reward, info)` tells whether an episode that ended succeeded; None: failures are undefined.
+    Raises ValueError for one of vsp's own tasks, for names that are too few, too many or not distinct, and as
     `get_task` does.
     """
     if name in (*_TASKS, *_LATER):
@@ -91,10 +91,10 @@ def _names(what: str, given: Sequence[str] | None, plain: tuple[str, ...]) -> tu
 
 
 def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: dict[str, np.ndarray]) -> Task:
-    """The task of a saved policy, with the names and the `BOX` it was saved with.
+    """Return the task of a saved policy, with the names and the `BOX` that were saved.
 
-    Where no such environment is registered, it has no dynamics: its policy acts, but cannot be played. Raises
-    ValueError for an environment of that name with another box.
+    If no such environment is registered, the task has no dynamics: its policy can act, but no episode can run. Raises
+    ValueError if the environment of that name has another box.
     """
     for names, low, high in ((inputs, box["low"], box["high"]), (outputs, box["action_low"], box["action_high"])):
         if not all(isinstance(one, str) for one in names) or not low.shape == high.shape == (len(names),):
@@ -102,24 +102,24 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
     try:
         known = get_task(name)
-    except (ValueError, gymnasium.error.Error):  # the latter where packages are missing that it needs
+    except (ValueError, gymnasium.error.Error):  # the latter if packages that it needs are missing
         absent = partial(_absent, name)
         return Task(name, **labels, **box, max_steps=1, start=absent, step=absent)
     for limit in BOX:
         if not np.array_equal(getattr(known, limit), box[limit]):
-            raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, and was {box[limit]}")
+            raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, but {box[limit]} in the file")
     same = (known.inputs, known.outputs) == (labels["inputs"], labels["outputs"])
     return known if same else replace(known, **labels)
 
 
 def _absent(name: str, *_) -> NoReturn:
     raise ValueError(
-        f"{name} is not registered here, so its policy acts but cannot be played: import what registers it"
+        f"{name} is not registered here, so its policy can act but no episode can run: import what registers it"
     )
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:
-    """A picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes"""
+    """Return a picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes"""
     state = check_array("state", state, (get_task(name).start_size or len(get_task(name).low),))
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # so that pygame needs no screen
     env = gymnasium.make(get_task(name).name, render_mode="rgb_array")
@@ -130,5 +130,5 @@ def render(name: str, state: np.ndarray) -> np.ndarray:
     return image
 
 
-# Tasks stepped by a physics engine: policies are evaluated on so many times fewer episodes
+# Tasks stepped by a physics engine: evaluations divide the number of episodes by this
 SLOW = {lunarlander.NAME: 10, bipedalwalker.NAME: 20, halfcheetah.NAME: 50}

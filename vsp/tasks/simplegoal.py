@@ -16,7 +16,7 @@ STRIDE = 0.1  # length of a step at full action, per axis
 
 
 def start(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Uniform over the whole unit square, pit and goal included. (n, 2)"""
+    """Draw starts uniformly over the whole unit square, pit and goal included. (n, 2)"""
     return rng.uniform(0.0, 1.0, size=(n, 2))
 
 
@@ -25,9 +25,9 @@ def step(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move by a tenth of the action; the reward is ten times the distance gained towards the origin.
 
-    Entering the goal pays +10, entering the pit -10. `goal_reward` says whether this replaces the progress term
-    ("replace", which fits the paper's numbers: its teacher's minimum is exactly -10.0) or is added to it ("add", as in
-    the paper's text). `margin`: by how much the goal is smaller, and the pit larger, on every side.
+    Entering the goal pays +10, entering the pit -10. `goal_reward` selects whether this replaces the progress
+    term ("replace", which fits the paper's numbers: its teacher's minimum is exactly -10.0) or is added to it ("add",
+    as in the paper's text). `margin` makes the goal smaller, and the pit larger, on every side.
     """
     moved = np.clip(states + STRIDE * np.clip(actions, -1.0, 1.0), 0.0, 1.0)
     progress = 10.0 * (np.hypot(states[:, 0], states[:, 1]) - np.hypot(moved[:, 0], moved[:, 1]))

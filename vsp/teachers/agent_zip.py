@@ -1,8 +1,8 @@
-"""Read the actor of a Stable-Baselines3 zip: tensors alone, within limits of memory and time, without torch.
+"""Read the actor of a Stable-Baselines3 zip: only tensors, within limits of memory and time, without torch.
 
-torch describes tensors in a pickle. No unpickler runs here, which the file could ask for code, for memory or for ever:
-`_state_dict` follows the few opcodes that describe a dictionary of tensors and refuses all others. What the tensors
-would take is known before the first of them is made.
+torch describes tensors in a pickle. No unpickler runs here, because a file could make it run code, exhaust memory or
+never end. Instead, `_state_dict` interprets the few opcodes that describe a dictionary of tensors and refuses all
+others. The memory that the tensors need is known before the first of them is made.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 
 from ..run import atomic
 
-LARGEST = 2**27  # bytes of a zip, of the policy in it, and of the actor's tensors in float64; TD3's take 2**22
+LARGEST = 2**27  # bytes of a zip, of the policy in it, and of the actor's tensors in float64; a TD3 actor takes 2**22
 LARGEST_DATA = 2**24  # bytes of the agent's settings, in JSON
-LARGEST_PICKLE = 2**18  # bytes that describe the tensors, some 150 for each
-MOST_MEMBERS = 10_000  # of a zip
+LARGEST_PICKLE = 2**18  # bytes that describe the tensors, about 150 per tensor
+MOST_MEMBERS = 10_000  # members of a zip
 
 _DTYPES = {"torch FloatStorage": "<f4", "torch DoubleStorage": "<f8"}
 
@@ -30,18 +30,18 @@ _DTYPES = {"torch FloatStorage": "<f4", "torch DoubleStorage": "<f8"}
 class _View(NamedTuple):
     """A tensor as a pickle of torch describes it. Offset, strides and sizes are in elements of its storage."""
 
-    kind: str  # of storage, which says the type of the elements
-    name: str  # of the zip's member that holds the storage
-    elements: int  # of the storage
+    kind: str  # class of the storage, which gives the type of the elements
+    name: str  # name of the zip's member that holds the storage
+    elements: int  # number of elements in the storage
     offset: int
     size: tuple[int, ...]
     stride: tuple[int, ...]
 
 
 def read_zip(path: Path) -> dict[str, np.ndarray]:
-    """The actor's tensors in a Stable-Baselines3 zip, by name; no code from the file runs.
+    """Return the actor's tensors in a Stable-Baselines3 zip, by name. No code from the file runs.
 
-    Raises FileNotFoundError, `atomic.DamagedFile` for all that is no such zip or larger than the limits above, and
+    Raises FileNotFoundError, `atomic.DamagedFile` for a file that is no such zip or exceeds the limits above, and
     ValueError for an actor whose activation is not ReLU.
     """
     if not path.exists():
@@ -53,8 +53,8 @@ def read_zip(path: Path) -> dict[str, np.ndarray]:
         about = json.loads(_member(archive, "data", LARGEST_DATA))
         activation = str(about.get("policy_kwargs", {}).get("activation_fn", "ReLU"))
         actor = _tensors(_archive(_member(archive, "policy.pth", LARGEST)), "actor")
-    except Exception as error:  # of whatever kind: the content is somebody else's
-        reason = f"not a zip of a Stable-Baselines3 agent with tensors alone: {error!r:.300}"
+    except Exception as error:  # of any kind: the content is not trusted
+        reason = f"not a zip of a Stable-Baselines3 agent with only tensors: {error!r:.300}"
         raise atomic.DamagedFile(f"{path}: {reason}") from error
     if "ReLU" not in activation:
         raise ValueError(f"{path}: the agent's activation is {activation:.100}, expected ReLU")
@@ -62,20 +62,21 @@ def read_zip(path: Path) -> dict[str, np.ndarray]:
 
 
 def part_of(tensors: dict, part: str) -> dict:
-    """The "actor" or the "critic" among the tensors of a whole agent, under the names that `Teacher` expects."""
+    """Return the tensors of an agent's "actor" or "critic", under the names that `Teacher` expects."""
     return {name.removeprefix(f"{part}."): value for name, value in tensors.items() if name.startswith(f"{part}.")}
 
 
 def _archive(content: bytes) -> zipfile.ZipFile:
-    if (members := content.count(b"PK\1\2")) > MOST_MEMBERS:  # before a list of them is made
-        raise ValueError(f"some {members} members, expected at most {MOST_MEMBERS}")
+    if (members := content.count(b"PK\1\2")) > MOST_MEMBERS:  # before zipfile makes a list of them
+        raise ValueError(f"about {members} members, expected at most {MOST_MEMBERS}")
     return zipfile.ZipFile(io.BytesIO(content))
 
 
 def _member(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
-    """A member of a zip, unless it is, or says it is, larger than `most` bytes."""
+    """Return a member of a zip. Raises ValueError if it is, or claims to be, larger than `most` bytes."""
     info = archive.getinfo(name)
-    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):  # others take memory as the file asks
+    # With other types of compression the file decides how much memory they take
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{name} has compression type {info.compress_type}, expected none or deflate")
     with archive.open(info) as file:
         content = file.read(most + 1)
@@ -85,7 +86,7 @@ def _member(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
 
 
 def _tensors(archive: zipfile.ZipFile, part: str) -> dict[str, np.ndarray]:
-    """The tensors of a part of the agent in an archive that `torch.save` wrote."""
+    """Return the tensors of a part of the agent in an archive that `torch.save` wrote."""
     (pickle,) = (name for name in archive.namelist() if name.endswith("/data.pkl"))
     views = part_of(_state_dict(_member(archive, pickle, LARGEST_PICKLE)), part)
     needed = sum(8 * max(view.elements, math.prod(view.size)) for view in views.values())
@@ -95,8 +96,8 @@ def _tensors(archive: zipfile.ZipFile, part: str) -> dict[str, np.ndarray]:
 
 
 def _tensor(archive: zipfile.ZipFile, folder: str, view: _View) -> np.ndarray:
-    """A tensor with memory of its own. Raises KeyError for elements that are not float32 or float64, ValueError where
-    the storage is longer than it says, or too short for the tensor."""
+    """Return a tensor that owns its memory. Raises KeyError for elements that are not float32 or float64, ValueError if
+    the storage is longer than declared or too short for the tensor."""
     dtype = np.dtype(_DTYPES[view.kind])
     storage = _member(archive, f"{folder}/{view.name}", view.elements * dtype.itemsize)
     strides = [step * dtype.itemsize for step in view.stride]
@@ -104,10 +105,10 @@ def _tensor(archive: zipfile.ZipFile, folder: str, view: _View) -> np.ndarray:
 
 
 def _state_dict(content: bytes) -> dict[str, _View]:
-    """The tensors that torch's pickle of a `state_dict` describes, by name. Raises ValueError for any other pickle.
+    """Return the tensors that torch's pickle of a `state_dict` describes, by name.
 
-    A stack machine in which classes and functions are their names. Only strings are hashed or printed: for nested
-    tuples this may take for ever.
+    This is a stack machine that represents classes and functions by their names. It hashes and prints only strings,
+    because hashing or printing nested tuples may never end. Raises ValueError for any other pickle.
     """
     stack: list[Any] = []
     marks: list[int] = []
@@ -133,7 +134,7 @@ def _state_dict(content: bytes) -> dict[str, _View]:
                 begin = marks.pop() if name == "SETITEMS" else len(stack) - 2
                 names = stack[begin::2]
                 if not all(isinstance(name, str) for name in names):
-                    raise ValueError("a dictionary in the pickle with names that are no strings")
+                    raise ValueError("a dictionary in the pickle has names that are not strings")
                 stack[begin - 1].update(zip(names, stack[begin + 1 :: 2]))
                 del stack[begin:]
             case "REDUCE":
@@ -149,7 +150,7 @@ def _state_dict(content: bytes) -> dict[str, _View]:
 
 
 def _called(function: Any, arguments: Any) -> dict | _View:
-    """What a call in the pickle stands for: an empty dictionary, or a tensor whose parts have the expected types."""
+    """Return the result of a call in the pickle: an empty dictionary, or a tensor with parts of the expected types."""
     match function, arguments:
         case "collections OrderedDict", ():
             return {}
@@ -162,4 +163,4 @@ def _called(function: Any, arguments: Any) -> dict | _View:
         ):
             if all(type(number) is int and number >= 0 for number in (n, start, *size, *stride)):
                 return _View(kind, name, n, start, tuple(size), tuple(stride))
-    raise ValueError("a call in the pickle that makes no tensor, expected a dictionary of tensors")
+    raise ValueError("a call in the pickle makes no tensor, expected a dictionary of tensors")

@@ -1,4 +1,4 @@
-"""A reader's own agent as a teacher: a function of states, or an agent of Stable-Baselines3 with continuous actions."""
+"""Use your own agent as a teacher: a function of states, or a Stable-Baselines3 agent with continuous actions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..rollouts import Policy
 
 
 class Agent:
-    """A function from observations (n, d) to actions (n, m), as a teacher."""
+    """A teacher made from a function of observations (n, d) that returns actions (n, m)."""
 
     def __init__(self, act: Callable[[np.ndarray], np.ndarray]):
         self._act = act
@@ -32,11 +32,11 @@ def _without_state(predicted: tuple[np.ndarray, object]) -> np.ndarray:
 
 
 def agent(source: Policy | Callable[[np.ndarray], np.ndarray]) -> Agent:
-    """`source` as a teacher for `vsp.distill` and the like.
+    """Turn `source` into a teacher for `vsp.distill` and similar functions.
 
-    Either something with `predict`, such as an agent of Stable-Baselines3, or a function of a batch of observations
-    (n, d) that returns actions (n, m). Stochastic agents (PPO, SAC, ...) are asked for their most probable actions:
-    sampling noise carries no information. Raises ValueError for anything else.
+    `source` is an object with `predict`, such as a Stable-Baselines3 agent, or a function of a batch of observations
+    (n, d) that returns actions (n, m). Stochastic agents (PPO, SAC, ...) give their most probable actions, because
+    sampling noise carries no information. Raises ValueError for any other `source`.
     """
     if isinstance(source, Agent):
         return source

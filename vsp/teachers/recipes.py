@@ -1,4 +1,4 @@
-"""How each teacher is trained, what was tried before, and what it has to reach."""
+"""How each teacher is trained, which trainings were rejected, and which score is required."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Recipe:
 
     @property
     def id(self) -> str:
-        """Eight hexadecimal digits of a hash: checkpoints are resumed by the same recipe only."""
+        """Eight hexadecimal digits of a hash: a checkpoint is resumed only with the same recipe."""
         return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
 
 
 RECIPES = {
-    # "500.000 steps using the standard parameters": the library's, with the exploration noise of the TD3 article
-    # (Fujimoto et al. 2018); without noise, training never discovers that a short last step pays
+    # "500.000 steps using the standard parameters": the library's defaults, with the exploration noise of the
+    # TD3 article (Fujimoto et al. 2018); without noise, training never discovers that a short last step pays
     "SimpleGoal-v0": Recipe(steps=500_000),
     # RL Zoo's recipe with the library defaults of that time (batch 100, one training phase per episode)
     "MountainCarContinuous-v0": Recipe(
@@ -40,12 +40,12 @@ RECIPES = {
     "Pendulum-v1": Recipe(steps=20_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
     # With RL Zoo's recipe the return rises and falls; a larger buffer, a higher gamma and smaller steps stabilise it
     "LunarLanderContinuous-v3": Recipe(steps=450_000, learning_rate=3e-4, learning_starts=10_000),
-    # RL Zoo's recipe, in fewer of its steps
+    # RL Zoo's recipe with fewer steps
     "BipedalWalker-v3": Recipe(steps=300_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
     "HalfCheetah-v5": Recipe(steps=350_000, learning_starts=10_000),
 }  # fmt: skip
 
-# Tasks whose teacher is the best snapshot of the learning curve; elsewhere it is the last
+# Tasks whose teacher is the best snapshot of the learning curve; for other tasks it is the last one
 BEST_OF_CURVE = ("LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5")
 
 # Trainings with another recipe, rejected for their score (over SCORE_EPISODES, or `episodes`)
@@ -57,19 +57,19 @@ EARLIER_TRIALS = {
         {**_ZOO, "steps": 290_000, "mean": 239.2406, "std": 48.4486},
         {**_ZOO, "steps": 350_000, "then_learning_rate": 1e-4, "mean": 210.4371, "std": 99.7109},
     ],
-    "BipedalWalker-v3": [  # stopped early: the same on another machine, and with smaller batches
+    "BipedalWalker-v3": [  # stopped early: the same recipe on another machine, and with smaller batches
         {"seed": 0, "episodes": 25, "steps": 100_000, "mean": -40.3250, "std": 4.5847},
         {"seed": 0, "episodes": 25, "batch_size": 100, "steps": 20_000, "mean": -106.1235, "std": 1.8941},
     ],
 }
 
-# Further trainings, to study the teacher's influence; shorter where the shipped one took long. SimpleGoal's seed 1 is
+# Further trainings, to study the influence of the teacher; shorter if the shipped one took long. SimpleGoal's seed 1 is
 # left out: its actor saturated within 10,000 steps at (-1, -1) for every state and stayed there.
 SHORT_STEPS = {"SimpleGoal-v0": 60_000, "MountainCarContinuous-v0": 120_000, "Pendulum-v1": 20_000}
 SHORT_SEEDS = {"SimpleGoal-v0": (2, 3), "MountainCarContinuous-v0": (1, 2), "Pendulum-v1": (1, 2)}
 
-# Requirements for a shipped teacher, over SCORE_EPISODES episodes: least mean return, largest share of episodes without
-# a goal (Pendulum and HalfCheetah have none; a walker that does not fall has reached it).
+# Requirements for a shipped teacher, over SCORE_EPISODES episodes: least mean return, largest share of episodes that do
+# not reach the goal (Pendulum and HalfCheetah have no goal; BipedalWalker reaches it unless it falls).
 BARS = {
     "SimpleGoal-v0": (16.3, 0.01),
     "MountainCarContinuous-v0": (93.3, 0.0),

@@ -1,4 +1,4 @@
-"""Teachers: load a trained TD3 actor and act with it in batches, in NumPy alone: three matrix products."""
+"""Load a trained TD3 actor as a teacher and act with it in batches. This needs only NumPy: three matrix products."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from ..tasks.registry import get_task, task_names
 from .agent_zip import part_of, read_zip
 
 SHIPPED = atomic.ROOT / "data" / "teachers"
-MOST_WEIGHT = 1e6  # size of a tensor's numbers: with it three layers of 1000 units stay far below float32's 3e38
+MOST_WEIGHT = 1e6  # largest absolute value in a tensor, so that 3 layers of 1000 units stay far below float32's 3e38
 
 
 class Teacher:
     """A deterministic TD3 actor as arrays: ReLU layers and a tanh, scaled to the action box.
 
-    `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays, `critic` likewise
-    ("qf0.0.weight", ...); only `criticality` and `value` need it. Raises ValueError when the actor does not fit the
-    task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
+    `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays. `critic` does the
+    same for the critics ("qf0.0.weight", ...); only `criticality` and `value` need it. Raises ValueError if the actor
+    does not fit the task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
 
     def __init__(
@@ -64,10 +64,10 @@ class Teacher:
         return self._centre + self._half * np.tanh(_forward(self.layers, states)), None
 
     def criticality(self, obs: np.ndarray) -> np.ndarray:
-        """Cost of a wrong action in the states (n, d), the weights of VIPER (Bastani et al. 2018). (n,)
+        """Return the cost of a wrong action in the states (n, d): the weights of VIPER (Bastani et al. 2018). (n,)
 
-        The value of the teacher's own action minus that of the worst corner of the action box, by the lower of its two
-        critics, in units of the discounted return; at least 0. Raises ValueError for a teacher without critics.
+        This is the value of the teacher's own action minus that of the worst corner of the action box, by the lower of
+        its two critics, in units of the discounted return; at least 0. Raises ValueError for a teacher without critics.
         """
         states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self._half))), dtype=np.float32)
@@ -76,7 +76,7 @@ class Teacher:
         return np.maximum(self._value(states, own) - worst, 0.0).astype(np.float64)
 
     def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)
+        """Return the value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)
 
         In units of the discounted return. Raises ValueError for a teacher without critics.
         """
@@ -85,8 +85,10 @@ class Teacher:
         return self._value(states, (actions - self._centre) / self._half).astype(np.float64)
 
     def critic_weights(self) -> dict[str, np.ndarray]:
-        """The tensors of both critics by Stable-Baselines3's names ("qf0.0.weight", ...). Raises ValueError for a
-        teacher without critics."""
+        """Return the tensors of both critics by Stable-Baselines3's names ("qf0.0.weight", ...).
+
+        Raises ValueError for a teacher without critics.
+        """
         self._check_critics()
         found = {}
         for i, layers in enumerate(self._critics):
@@ -99,7 +101,7 @@ class Teacher:
             raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: load a teacher with critics")
 
     def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """The lower of the critics' values of `actions` (n, m), scaled to [-1, 1]. (n,)"""
+        """Return the lower of the critics' values of `actions` (n, m), which are scaled to [-1, 1]. (n,)"""
         self._check_critics()
         inputs = np.column_stack([states, actions])
         return np.min([_forward(layers, inputs)[:, 0] for layers in self._critics], axis=0)
@@ -113,7 +115,7 @@ def _forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) ->
 
 
 def _layers(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Weight and bias of every layer of the network called `name`; none if there is no such network."""
+    """Return weight and bias of every layer of the network called `name`; an empty list if there is no such network."""
     found = (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors)
     indices = sorted(int(match[1]) for match in found if match)
     layers = [
@@ -136,11 +138,11 @@ def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
 
 
 def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
-    """A teacher ready to act: the shipped one of a task by its name, or one from a file.
+    """Load a teacher: the one shipped for a task, or one from a file.
 
     `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` that Stable-Baselines3
     saved; for a zip, `task` names the task. Only tensors are read: no code from the file runs. Raises ValueError for an
-    unknown task or a teacher that does not fit, FileNotFoundError, `run.atomic.DamagedFile`.
+    unknown task or a teacher that does not fit, FileNotFoundError, and `run.atomic.DamagedFile`.
     """
     path = Path(source)
     if path.suffix == ".zip":
@@ -164,6 +166,6 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
 
 
 def further_teachers(task: str) -> dict[str, Path]:
-    """The files of a task's other teachers, trained more briefly than the shipped one, by the seed of the training."""
+    """Return the files of a task's other teachers, from shorter trainings than the shipped one's, by training seed."""
     others = sorted((SHIPPED / "short").glob(f"{task}-*.safetensors"))
     return {f"seed {path.stem.split('-')[-1]}": path for path in others}

@@ -1,6 +1,6 @@
 """Train a TD3 teacher with Stable-Baselines3, resumably, and export it with its card.
 
-`python -m vsp.teachers.train --cache FOLDER` trains the shipped teachers anew. Only the functions that train import
+`python -m vsp.teachers.train --cache FOLDER` trains the shipped teachers again. Only the functions that train import
 torch and stable_baselines3.
 """
 
@@ -26,14 +26,14 @@ from .agent_zip import part_of
 from .recipes import BARS, BEST_OF_CURVE, EARLIER_TRIALS, RECIPES, SHORT_SEEDS, SHORT_STEPS, Recipe
 from .teacher import SHIPPED, Teacher
 
-PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # whose versions a card names
+PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # a card names their versions
 ENGINES = {"HalfCheetah-v5": ("mujoco",)}
 
-MOST_SEEDS = 5  # tried for one teacher
+MOST_SEEDS = 5  # seeds tried for one teacher
 CHUNK = 10_000  # steps between two checkpoints
 SCORE_EPISODES, CURVE_EPISODES = 10_000, 500
-OFTEN = {"BipedalWalker-v3": 4}  # times as many for a point of the curve, where a rare fall decides
-SELECTION_SEED, SCORE_SEED = 101, 102  # start states to choose a training seed on, and to report on
+OFTEN = {"BipedalWalker-v3": 4}  # factor on CURVE_EPISODES where a rare fall decides
+SELECTION_SEED, SCORE_SEED = 101, 102  # seeds of start states: to select a training seed, and to report scores
 
 
 def train(
@@ -47,10 +47,10 @@ def train(
 ) -> Path:
     """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint.
 
-    Training goes in chunks of `CHUNK` steps. Each chunk begins a fresh episode with fresh random streams from (seed,
+    Training proceeds in chunks of `CHUNK` steps. Each chunk begins a new episode with new random streams from (seed,
     steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one. The folder
-    `lean` is for moving to another machine: its checkpoints have no replay buffer. Where the cache has none, training
-    goes on from there, after the actor has filled the buffer again; the checkpoint says at which steps.
+    `lean` is for moving to another machine: its checkpoints have no replay buffer. If `cache` has no checkpoint,
+    training resumes from `lean`, after the actor has refilled the buffer; the checkpoint records the steps of refills.
     """
     import torch
 
@@ -98,7 +98,7 @@ def _write_checkpoint(path: Path, snapshot: dict) -> Path:
 
 
 def _refill(model) -> None:
-    """Fill the replay buffer with as many steps as training begins after, without training; they do not count."""
+    """Refill the replay buffer with as many steps as precede training, without training. These steps do not count."""
     steps, gradient_steps = model.num_timesteps, model.gradient_steps
     model.gradient_steps = 0
     model.learn(max(model.learning_starts, model.batch_size), reset_num_timesteps=False, log_interval=None)
@@ -106,7 +106,7 @@ def _refill(model) -> None:
 
 
 def read_checkpoint(path: str | os.PathLike) -> dict:
-    """A checkpoint that `train` wrote. Raises FileNotFoundError or `run.atomic.DamagedFile`.
+    """Read a checkpoint that `train` wrote. Raises FileNotFoundError or `run.atomic.DamagedFile`.
 
     torch's `weights_only` loading runs no code from the file.
     """
@@ -116,7 +116,7 @@ def read_checkpoint(path: str | os.PathLike) -> dict:
     try:
         return torch.load(content, weights_only=True)
     except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        raise atomic.DamagedFile(f"{path}: sealed, but no checkpoint of tensors and numbers: delete it") from error
+        raise atomic.DamagedFile(f"{path}: the checksum is right, but the file is no checkpoint: delete it") from error
 
 
 def _new_model(task: str, recipe: Recipe, seed: int):
@@ -136,7 +136,7 @@ _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "
 
 
 def _snapshot(model, curve: list[dict]) -> dict:
-    """The state of training between two chunks, in types that `weights_only` loading admits."""
+    """Return the state of training between two chunks, in types that `weights_only` loading accepts."""
     import torch
 
     buffer = model.replay_buffer
@@ -153,7 +153,7 @@ def _snapshot(model, curve: list[dict]) -> dict:
 
 
 def _restore(model, snapshot: dict) -> list[dict]:
-    """Restore a snapshot into a fresh model; returns the learning curve so far."""
+    """Restore a snapshot into a new model. Returns the learning curve so far."""
     model.policy.load_state_dict(snapshot["policy"])
     model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
     model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
@@ -165,16 +165,16 @@ def _restore(model, snapshot: dict) -> list[dict]:
 
 
 def _score(model, task: str) -> dict:
-    """One point of the learning curve, over `CURVE_EPISODES` (fewer for `SLOW` tasks) from fixed starts."""
+    """Return one point of the learning curve, over `CURVE_EPISODES` (fewer for `SLOW` tasks) from fixed starts."""
     n_episodes = CURVE_EPISODES * OFTEN.get(task, 1)
     weights = {name: tensor.numpy() for name, tensor in model.actor.state_dict().items()}
     return {"steps": model.num_timesteps, **score(Teacher(weights, task), task, n_episodes, seed=SELECTION_SEED)}
 
 
 def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed: int = SCORE_SEED) -> dict:
-    """Mean and standard deviation of the return, and the shares of episodes that end in the goal and in the pit.
+    """Return the mean and standard deviation of the return, and the shares of episodes that end in goal and pit.
 
-    `SLOW` tasks are played less often.
+    `SLOW` tasks are scored over fewer episodes.
     """
     result = rollout_from_seed(teacher, task, n_episodes // SLOW.get(task, 1), seed=seed)
     return {
@@ -189,7 +189,7 @@ def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed
 
 
 def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = SHIPPED) -> bool:
-    """Write the teacher of the last seed in `checkpoints` as safetensors with its card, if it reaches the bar.
+    """Write the teacher of the last seed in `checkpoints` as safetensors with its card, if it meets the requirements.
 
     Returns whether it does. The card lists all seeds in `checkpoints`. Actor and critics are written in float32.
     """
@@ -208,19 +208,19 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
 
 
 def export_short(task: str, seed: int, checkpoint: Path, folder: str | os.PathLike = SHIPPED) -> None:
-    """Write the actor of a shorter training with its card, whatever it scores."""
+    """Write the actor of a shorter training with its card, whatever its score."""
     snapshot = read_checkpoint(checkpoint)
     path = Path(folder) / "short" / f"{task}-{seed}.safetensors"
     _write(task, snapshot, short_recipe(task), seed, path, ("actor.",), {})
 
 
 def short_recipe(task: str) -> Recipe:
-    """The recipe of the shipped teacher with fewer steps."""
+    """Return the recipe of the shipped teacher with fewer steps."""
     return replace(RECIPES[task], steps=SHORT_STEPS[task])
 
 
 def _chosen(snapshot: dict) -> tuple[dict, dict]:
-    """The tensors to keep, the best or the last ones, and their point of the learning curve."""
+    """Return the tensors to keep, the best or the last ones, and their point of the learning curve."""
     if "best" in snapshot:
         return snapshot["best"]["policy"], snapshot["best"]["point"]
     return snapshot["policy"], snapshot["curve"][-1]
@@ -250,19 +250,22 @@ def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, par
 
 
 def reaches_bar(found: dict, task: str) -> bool:
-    """Whether a score reaches the bar of the task."""
+    """Whether a score meets the requirements of the task, `BARS`."""
     mean, failures = BARS[task]
     return found["mean"] >= mean and 1.0 - found["goal"] <= failures
 
 
 def main() -> None:
-    """Train each task's teacher with seeds 0, 1, ... until one reaches the bar, and export it; or the short ones."""
+    """Train each task's teacher with seeds 0, 1, ... until one meets the requirements, and export it.
+
+    With --short, run the shorter trainings instead.
+    """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--cache", required=True, help="folder for checkpoints; training resumes from there")
-    parser.add_argument("--lean", help="folder for checkpoints without replay buffers, to go on with elsewhere")
+    parser.add_argument("--lean", help="folder for checkpoints without replay buffers, to resume on another machine")
     parser.add_argument("--out", default=SHIPPED, help="folder for the exported teachers")
     parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
-    parser.add_argument("--short", action="store_true", help="the shorter trainings that a study compares")
+    parser.add_argument("--short", action="store_true", help="run the shorter trainings that a study compares")
     arguments = parser.parse_args()
     for task in arguments.task or (SHORT_SEEDS if arguments.short else RECIPES):
         if arguments.short:
@@ -276,7 +279,7 @@ def main() -> None:
             if export(task, checkpoints, arguments.out):
                 break
         else:
-            sys.exit(f"{task}: none of the seeds 0 to {MOST_SEEDS - 1} reached the bar {BARS[task]}")
+            sys.exit(f"{task}: none of the seeds 0 to {MOST_SEEDS - 1} met the requirements {BARS[task]}")
 
 
 if __name__ == "__main__":
