@@ -101,7 +101,7 @@ help:
 	  $(foreach r,$(RESULTS_$(n)),echo '    data/results/$(r)';)) true
 
 ## Start here
-quick: ## the paper's path with tiny runs, figures watermarked, into build/quick/: about a minute
+quick: ## all steps of the paper with few runs, figures watermarked, into build/quick/: about a minute
 	@OUT="$$OUT/build/quick" QUICK=1 $(MAKE) --no-print-directory paper-figures
 
 paper-figures: begin ## every figure and table of the paper, at the paper's scale: about 2 minutes
@@ -109,7 +109,7 @@ lab: venv ## opens JupyterLab on the notebooks
 	@$(PY) -m vsp.run.lab
 
 ## Reproduce
-all: begin venv ## the same and our own method beside it, notebooks 06 to 09: about 4 minutes
+all: begin venv ## the same and notebooks 06 to 09, our own method: about 4 minutes
 paper-figures all:
 	@: > "$$STATE/made"
 	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)
@@ -124,21 +124,21 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 	if ! state | cmp -s - "$$STATE/runs"; then \
 	  $(PY) -m vsp.paper.make_runs --out="$$OUT" --jobs="$${DASK:-$$JOBS}" $${QUICK:+--quick} && state > "$$STATE/runs"; fi
 
-study: begin venv ## the studies of the interpretations and of the teachers, into data/results/: 15 minutes, resumable
+study: begin venv ## studies of the readings and of the teachers, into data/results/: 15 minutes, resumable
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimensions, into data/results/: 4 minutes
 	$(PY) -m vsp.beyond.benchmarks.lookup --out="$$OUT"
 	$(PY) -m vsp.beyond.benchmarks.fits --out="$$OUT"
 
-proofs: begin venv ## what is certain of ten policies: certificates into data/proofs/, and tables: 20 minutes, resumable
+proofs: begin venv ## proofs for ten policies: certificates into data/proofs/, and tables: 10 minutes, resumable
 	$(PY) -m vsp.beyond.proofs.make_proofs --out="$$OUT"
 
-proofs-teacher: begin venv ## the same questions put to a network, for an HOUR at most, into data/results/
+proofs-teacher: begin venv ## proofs for a network, for at most an HOUR, into data/results/
 	$(PY) -m vsp.beyond.proofs.make_proofs --teacher --out="$$OUT"
 
 ## Study
-course: begin venv ## three lessons: hand-out for students, solutions, the lecturer's guide, into build/course/: 3 s
+course: begin venv ## three lessons: hand-out for students, solutions, slides, the lecturer's guide, into build/course/: 3 s
 	@$(PY) -m vsp.course.build --out="$$OUT"
 
 # The pages are laid out as the repository is, so that a link of the README leads to the same thing on the site. The old
@@ -160,16 +160,16 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 test: venv-test-train-dask ## runs the tests, several at a time: about 3 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs -n logical --maxprocesses 4 --dist worksteal tests
 
-test-long: venv-test-train-dask ## runs whole commands, kills some, and a cluster: about 2 minutes
+test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: about 2 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/long
 
-lint: venv-test ## ruff and mypy: what .pre-commit-config.yaml runs before a commit; `ruff format` mends the layout
+lint: venv-test ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
-test-site: site venv-site-test ## looks at site and JupyterLab in a browser, which needs Chromium: about 7 minutes
+test-site: site venv-site-test ## tests site and JupyterLab in a browser, which needs Chromium: about 7 minutes
 	@MPLBACKEND=Agg $(PY) -m pytest -q -rs tests/site
 
-manifest: venv ## lists the files of data/ as they are, for somebody who changed one on purpose: at once
+manifest: venv ## updates the checksums of data/ after you changed a file on purpose: at once
 	@$(PY) -m vsp.run.manifest
 
 clean: ## removes build/ (but build/course, where somebody may have written) and data/runs/: at once
@@ -177,7 +177,7 @@ clean: ## removes build/ (but build/course, where somebody may have written) and
 	@rm -rf "$$OUT/data/runs"
 	@for d in figures data; do test ! -d "$$OUT/$$d" || find "$$OUT/$$d" -type f -name '.?*-????????.*' -delete; done
 
-lock: venv ## resolves environment.lock anew, keeping versions that fit (UPGRADE=1: the newest): 20 s
+lock: venv ## resolves environment.lock again, keeping versions that fit (UPGRADE=1: the newest): 20 s
 	@.ci/lock $(if $(UPGRADE),--upgrade)
 
 ## Takes hours
@@ -185,19 +185,19 @@ lock: venv ## resolves environment.lock anew, keeping versions that fit (UPGRADE
 MEASURE = MPLBACKEND=Agg $(PY) -m pytest -q $(1) --record "$$OUT/build/measured"; status=$$?; test $$status -le 1
 PUBLISH = $(PY) tests/measured.py "$$OUT/build/measured" "$$OUT/data/results" && exit $$status
 
-bench: venv-test-train-dask ## measures speed and scale, into data/results/: an HOUR or more, on a machine at rest
+bench: venv-test-train-dask ## measures speed and scale, into data/results/: an HOUR or more, on an idle machine
 	@$(call MEASURE,tests/bench) && $(PUBLISH)
 
-faults: venv-test-train-dask ## breaks it in every way we know, into data/results/: 3 HOURS or more; kills resume
+faults: venv-test-train-dask ## runs the fault-injection tests, into data/results/: 3 HOURS or more, resumable
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
-beyond: begin venv-train ## our own method and others beside it, into data/results/: 5 to 6 HOURS, resumable
+beyond: begin venv-train ## compares our own method with others, into data/results/: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 11 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-short-teachers: venv-train ## the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
+short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m vsp.teachers.train --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
 teachers: venv-train-mujoco ## trains the TD3 teachers from scratch: 9 to 11 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
