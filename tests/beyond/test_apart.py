@@ -31,7 +31,7 @@ SMALL = Refinement(n_cells=2, n_episodes=10, n_corrections=1, n_correction_episo
 
 @pytest.fixture(autouse=True)
 def shorter(monkeypatch):
-    monkeypatch.setattr(apart, "beginnings", lambda size: 2)
+    monkeypatch.setattr(apart, "random_starts", lambda size: 2)
     monkeypatch.setattr(apart, "N_GREEDY", 1)
     monkeypatch.setattr(apart, "HOT", ((range(4, 6), 1),))
     monkeypatch.setattr(apart, "WARM", ((range(8, 9), 1),))

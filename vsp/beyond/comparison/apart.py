@@ -24,7 +24,7 @@ from ..refinement.units import Cells, Frame, LabelledStates, joined
 from .methods import Budget, alone
 from .tuning import TreeNumbers, Tunable, in_units
 
-N_BEGINNINGS = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
+N_RANDOM = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
 N_GREEDY = 4  # additional descents, which start from greedy trees
 HOT = ((range(0, 2), 12), (range(2, 6), 4))  # stages, and how many descents from random trees are kept after them
 WARM = ((range(6, 12), 3), (range(12, search.N_STAGES), 1))  # the same, for these and the greedy trees together
@@ -54,7 +54,7 @@ def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
     """Return the cells with the least error on states (n, d) and actions (n, m) that `search.least_error` finds."""
     frame = Frame.of(task, states)
     seen = LabelledStates(frame.inputs(states), frame.outputs(actions))
-    return frame.policy(search.least_error(seen, size, beginnings(size), np.random.default_rng(seed)))
+    return frame.policy(search.least_error(seen, size, random_starts(size), np.random.default_rng(seed)))
 
 
 @threadpool_limits.wrap(limits=1)
@@ -83,14 +83,14 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
         return trees
 
     greedy = grown(ObliqueLinearTree, N_GREEDY)
-    (best,) = kept(kept(grown(RandomTree, beginnings(size)), HOT) + greedy, WARM)
+    (best,) = kept(kept(grown(RandomTree, random_starts(size)), HOT) + greedy, WARM)
     last = descend(best, states, actions, search.LAST, n_iterations=search.N_LAST)
     return min([last, *greedy], key=error)
 
 
-def beginnings(size: int) -> int:
+def random_starts(size: int) -> int:
     """Return how many descents start at random, for a policy with `size` cells or leaves."""
-    return max(8, N_BEGINNINGS // size)
+    return max(8, N_RANDOM // size)
 
 
 class RandomTree(ObliqueLinearTree):
