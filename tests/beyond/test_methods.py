@@ -71,7 +71,7 @@ def test_every_method_has_the_same_budget_of_teacher_episodes(quick, name):
     assert sum(training) == 40
 
 
-def test_corrections_go_on_with_the_best_of_the_beginnings(quick):
+def test_corrections_go_on_with_the_best_restart(quick):
     asked = []
 
     def fit(states, actions, *, size, task, seed):

@@ -26,10 +26,10 @@ AT_ONCE = 60_000  # size of the largest arrays in a loss: they fit into the cach
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(seen: LabelledStates, n_cells: int, n_beginnings: int, rng: np.random.Generator) -> Cells:
-    """Return the cells with the least `squared_error` on `seen` that `n_beginnings` descents find."""
+def least_error(seen: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> Cells:
+    """Return the cells with the least `squared_error` on `seen` that `n_starts` descents find."""
     some = seen.rows(spread(seen.inputs[:, :-1], FEW, rng))
-    live = [local_maps(some, n_cells, rng) for _ in range(n_beginnings)]
+    live = [local_maps(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
         ends = [descend(some, cells, stages) for cells in live]
         live = sorted(ends, key=lambda cells: squared_error(seen, cells))[:n_kept]
