@@ -306,7 +306,7 @@ def test_a_click_keys_and_the_slider_choose_stored_states(lander):
     shown.canvas.focus()
     assert shown.changes(lambda: shown.page.keyboard.press("ArrowRight")) == (True, True)
     assert shown.changes(lambda: shown.page.keyboard.press("ArrowUp")) == (True, True)
-    assert shown.changes(lambda: shown.root.get_by_label("step").fill("5")) == (True, True)
+    assert shown.changes(lambda: shown.root.get_by_label("step", exact=True).fill("5")) == (True, True)
     assert "step 6 of" in shown.root.inner_text()
     shown.root.get_by_role("button", name="play").click()
     shown.page.wait_for_timeout(400)
