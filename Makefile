@@ -53,7 +53,7 @@ OUT ?= .
 # How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
 JOBS := $(or $(value JOBS),$(shell getconf _NPROCESSORS_ONLN || echo 1))
 ifeq ($(strip $(value OUT)),)
-$(error OUT is empty, expected a folder, as in `make paper-figures OUT=scratch`)
+$(error OUT is empty, expected a folder, as in OUT=scratch)
 endif
 override OUT := $(if $(filter /% .%,$(firstword $(value OUT))),,./)$(value OUT)
 $(foreach v,JOBS DASK PYTHON QUICK,$(eval override $(v) := $$(value $(v))))
@@ -104,12 +104,12 @@ help:
 quick: ## all steps of the paper with few runs, figures watermarked, into build/quick/: about a minute
 	@OUT="$$OUT/build/quick" QUICK=1 $(MAKE) --no-print-directory paper-figures
 
-paper-figures: begin ## every figure and table of the paper, at the paper's scale: about 2 minutes
+paper-figures: begin ## every figure and table of the paper, at the paper's scale: 1.5 minutes
 lab: venv ## opens JupyterLab on the notebooks
 	@$(PY) -m vsp.run.lab
 
 ## Reproduce
-all: begin venv ## the same and notebooks 06 to 09, our own method: about 4 minutes
+all: begin venv ## paper-figures and notebooks 06 to 09, our own method: about 4 minutes
 paper-figures all:
 	@: > "$$STATE/made"
 	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)
@@ -210,6 +210,8 @@ $(ENVIRONMENTS):
 
 begin:
 	@case $$JOBS in ''|0*|*[!0-9]*) printf 'error: JOBS is %s, expected a number from 1 on\n' "$$JOBS" >&2; exit 1;; esac
+	@case $$DASK in ''|*://*) ;; *) \
+	  printf 'error: DASK is %s, expected the address of a scheduler, as in tcp://host:8786\n' "$$DASK" >&2; exit 1;; esac
 	@printf %s "$$OUT" | iconv -f UTF-8 -t UTF-8 > /dev/null 2>&1 || { echo 'error: OUT is not UTF-8' >&2; exit 1; }
 	@mkdir -p "$$STATE" && test -w "$$STATE" || { \
 	  printf 'error: %s cannot be written: make it writable, or name another: `make OUT=folder`\n' "$$OUT" >&2; exit 1; }

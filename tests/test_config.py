@@ -88,9 +88,7 @@ def test_extensions_at_rest_are_no_part_of_the_settings():
 def test_an_unknown_task_and_an_unknown_field():
     with pytest.raises(ValueError, match="unknown task 'Pendulum', expected one of .*; did you mean 'Pendulum-v1'"):
         paper_preset("Pendulum")
-    with pytest.raises(
-        ValueError, match="no preset for task 'Pendulum-v1', expected one of .*: write a Config of your"
-    ):
+    with pytest.raises(ValueError, match="no settings for task 'Pendulum-v1', .*: take .*'faithful'.*write a Config"):
         paper_preset("Pendulum-v1")
     with pytest.raises(TypeError, match="n_spilt"):
         tiny(n_spilt=3)

@@ -105,6 +105,10 @@ def test_explain_by_hand():
     assert left.contributions.columns.tolist() == ["x", "y", "bias"] and len(left.contributions) == 2
     assert left.equations[0].endswith("= 1.000 x + 0.000 y + 0.250")
     assert left.equations[1].endswith("= 0.000 x + 2.000 y - 0.500")
+    assert repr(TWO) == "<VoronoiPolicy of SimpleGoal-v0: 2 cells, 2 inputs, 2 actions; to_text() shows it>"
+    first, *_, action, other = str(left).splitlines()
+    assert first == "cell 0" and action == "action within the limits: Δx = 0.5, Δy = 0"
+    assert other == "another cell, by changing one input: x +0.25 (cell 1)"
 
 
 @given(st.integers(1, 9), st.integers(0, 99), st.sampled_from([SIMPLEGOAL, MOUNTAINCAR]), st.booleans())

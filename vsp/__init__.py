@@ -32,6 +32,16 @@ from .rollouts import Policy, collect_episodes, rollout, visited_states
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
 
+__all__ = [
+    "Config", "Faithful", "History", "Partition", "Policy", "Refinement", "Task", "VoronoiPolicy", "agent",
+    "collect_episodes", "distances_latex", "distill", "evaluate", "explore", "get_task", "load_teacher",
+    "merge_regions", "nearest", "preset", "prove", "refine", "register", "rollout", "rollout_from_seed", "simplify",
+    "split_regions", "start_states", "task_names", "teacher_episodes", "visited_states",
+]  # fmt: skip
+
+_KINDS = ("paper", "faithful", "tuned")
+_LATER = ("baselines", "beyond", "course", "paper", "show")
+
 
 def distill(
     teacher: Policy, task: str | Task, config: Config | Refinement | Faithful | None = None, *, seed: int
@@ -61,8 +71,10 @@ def distill(
 
         return distill_faithfully(teacher, task, config, seed=seed)
     if config is not None and not isinstance(config, Config):
+        kind = config if isinstance(config, str) and config in _KINDS else "faithful"
         raise ValueError(
-            f"config is {config!r}, expected a Config, a Refinement or a Faithful, such as vsp.preset({task.name!r})"
+            f"config is {config!r:.40}, expected a Config, a Refinement or a Faithful, such as "
+            f"vsp.preset({task.name!r}, {kind!r})"
         )
     return algorithms.distill(teacher, task, config or paper_preset(task), seed=seed)
 
@@ -78,10 +90,11 @@ def preset(
 
     Ours are "faithful", for actions like the teacher's, in any task, and "tuned", for a high return alone. Two numbers
     constrain a faithful policy: `n_cells` is the largest number of cells, and `min_r2` is the least R² of its actions
-    against the teacher's. Given `min_r2`, the policy maximises the return. Raises ValueError for an unknown task or
-    kind, for a task without such settings, and for numbers that are out of range or belong to another kind.
+    against the teacher's. Given `min_r2`, the policy maximises the return. `distill` takes the settings of one task for
+    another too; they are tested for their own. Raises ValueError for an unknown task or kind, for a task without such
+    settings, and for numbers that are out of range or belong to another kind.
     """
-    check_choice("kind", kind, ("paper", "faithful", "tuned"))
+    check_choice("kind", kind, _KINDS)
     if kind == "faithful":
         return faithful_preset(task, n_cells=n_cells, min_r2=min_r2)
     if (n_cells, min_r2) != (None, None):
@@ -93,6 +106,11 @@ def __getattr__(name: str) -> ModuleType | Callable:
     """Import the other subpackages and `vsp.explore` on first use, as in `vsp.paper.published_policy`."""
     if name == "explore":
         return importlib.import_module("vsp.show.explorer").explore
-    if name in ("baselines", "beyond", "course", "paper", "show"):
+    if name in _LATER:
         return importlib.import_module(f"vsp.{name}")
     raise AttributeError(f"module 'vsp' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """List what this file offers, also what is imported on first use."""
+    return sorted({*__all__, *_LATER})

@@ -182,5 +182,8 @@ def paper_preset(task: str | Task) -> Config:
     """
     name = get_task(task).name
     if name not in _PRESETS:
-        raise ValueError(f"no preset for task {name!r}, expected one of {list(_PRESETS)}: write a Config of your own")
+        raise ValueError(
+            f"the paper has no settings for task {name!r}, expected one of {list(_PRESETS)}: take "
+            f"vsp.preset({name!r}, 'faithful'), or write a Config of your own"
+        )
     return _PRESETS[name]

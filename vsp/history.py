@@ -38,6 +38,9 @@ class History:
         self.losses: list[float] = []  # minibatch loss of each iteration before its step, averaged over cells
         self._snapshots: list[tuple[int, VoronoiPolicy]] = []
 
+    def __repr__(self) -> str:
+        return f"<History of {len(self.cells)} iterations, {len(self.events)} splits and merges; to_frame() shows it>"
+
     def add_events(self, n: int, kind: str, codewords: list[np.ndarray]) -> None:
         """Record the codewords that a pass of iteration n added or removed."""
         self.events += [Event(n, kind, codeword) for codeword in codewords]

@@ -22,17 +22,34 @@ MOST, LEAST_SCALE = 1e50, 1e-50  # limits of a policy's numbers, which keep squa
 
 @dataclass(frozen=True)
 class Explanation:
-    """Why a policy acts as it does in one state."""
+    """Why a policy acts as it does in one state; `print` shows it as text.
+
+    `cell` is its index. It has a `codeword` (d,) and `equations`, one per action, such as "F = 0.5 x - 1.2 v + 0.3".
+    `contributions` has a row per action and a column per feature and the bias (or rest). A row adds up to `raw` (m,),
+    the output of the sub-policy; `action` (m,) is `raw` limited to the action box. `next_cell` is the cell with the
+    second nearest codeword, None if there is one cell. `margin` is the distance to that codeword minus the distance to
+    the nearest, in the look-up metric. `borders` has a row per input: the least change of it alone that reaches another
+    cell, and that cell; NaN and -1 if no value in the box does.
+    """
 
     cell: int
-    codeword: np.ndarray  # (d,)
-    equations: tuple[str, ...]  # one per action, such as "F = 0.5 x - 1.2 v + 0.3"
-    contributions: pd.DataFrame  # a row per action, a column per feature and the bias (or rest); rows add up to `raw`
-    raw: np.ndarray  # (m,) output of the sub-policy
-    action: np.ndarray  # (m,) `raw` limited to the action box
-    next_cell: int | None  # the cell with the second nearest codeword; None if there is one cell
-    margin: float  # distance to the second nearest codeword minus that to the nearest, in the look-up metric
-    borders: pd.DataFrame  # a row per input: the least change of it alone that reaches another cell, and that cell
+    codeword: np.ndarray
+    equations: tuple[str, ...]
+    contributions: pd.DataFrame
+    raw: np.ndarray
+    action: np.ndarray
+    next_cell: int | None
+    margin: float
+    borders: pd.DataFrame
+
+    def __str__(self) -> str:
+        action = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.contributions.index, self.action))
+        there = [
+            f"{name} {row.change:+.3g} (cell {row.cell:.0f})" for name, row in self.borders.iterrows() if row.cell >= 0
+        ]
+        parts = f"cell {self.cell}", *self.equations, "what each input adds:", self.contributions.round(4).to_string()
+        others = f"another cell, by changing one input: {', '.join(there) or 'none in the box'}"
+        return "\n".join([*parts, f"action within the limits: {action}", others])
 
 
 class VoronoiPolicy:
@@ -70,6 +87,10 @@ class VoronoiPolicy:
 
     def __len__(self) -> int:
         return len(self.codewords)
+
+    def __repr__(self) -> str:
+        d, m = len(self.task.inputs), len(self.task.outputs)
+        return f"<VoronoiPolicy of {self.task.name}: {len(self)} cells, {d} inputs, {m} actions; to_text() shows it>"
 
     def check_linear(self) -> None:
         """Raise ValueError unless the sub-policies are linear, for callers that support no others."""

@@ -152,5 +152,8 @@ def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:
     except (ValueError, TypeError, IndexError) as error:
         raise ValueError(f"the policy fails on the {d} inputs of {task.name}: {error}") from error
     if actions.shape != (n, m):
-        raise ValueError(f"the policy's actions have shape {actions.shape}, expected {(n, m)} for {task.name}")
+        raise ValueError(
+            f"the policy's actions have shape {actions.shape}, expected {(n, m)} for {task.name}: a teacher or policy "
+            f"must be made for this task, and gets a batch of observations {(n, d)}"
+        )
     return check_finite("the policy's actions", actions)

@@ -45,9 +45,11 @@ class Shown(SphinxDirective):
     """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view.
 
     Option `axes`: two inputs, for a task with stored episodes. Option `guess`: a question about the paper's policy for
-    SimpleGoal, which the reader answers first and then has three cells to do better.
+    SimpleGoal, which the reader answers first and then has three cells to do better. The content is for readers of the
+    source, on GitHub.
     """
 
+    has_content = True
     required_arguments = 1
     option_spec = {"guess": directives.unchanged_required, "axes": directives.unchanged_required}
 

@@ -20,8 +20,9 @@ def markdown(frame: pd.DataFrame) -> str:
 
 
 class Measured(SphinxDirective):
-    """Shows the rows of the table that its argument names."""
+    """Shows the rows of the table that its argument names. The content is for readers of the source, on GitHub."""
 
+    has_content = True
     required_arguments = 1
 
     def run(self):

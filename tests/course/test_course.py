@@ -489,7 +489,10 @@ def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch):
     with pytest.raises(feedback.NotYet, match="question 'b': not 'no'"):
         quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions)
     assert quiz.ask(dict.fromkeys("abc", "yes"), questions) == " Of your first answers 1 of 3 were right."
-    assert feedback.Exercise("0.2", "quiz").ask(dict.fromkeys("abc", "yes"), questions) == ""
+    assert (
+        feedback.Exercise("0.2", "quiz").ask(dict.fromkeys("abc", "yes"), questions)
+        == " Of your first answers 3 of 3 were right."
+    )
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):

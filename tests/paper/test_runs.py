@@ -194,7 +194,7 @@ def test_a_damaged_run_is_named(made, tmp_path):
     content = path.read_bytes()
     for damaged in (content[:-1], b"", content[:300] + bytes([content[300] ^ 4]) + content[301:]):
         path.write_bytes(damaged)
-        with pytest.raises(atomic.DamagedFile, match="0001.run: SHA-256"):
+        with pytest.raises(atomic.DamagedFile, match="0001.run: damaged"):
             make_runs(SMALL, [0, 1], runs=tmp_path / "runs")
 
 
@@ -249,7 +249,7 @@ def test_the_papers_experiment(task):
     assert paper.config == config.paper_preset(task) and paper.n_episodes == 1000
     assert quick.config == paper.config.quick() and quick.n_episodes == 100 and quick.provenance != paper.provenance
     assert N_RUNS == {SIMPLEGOAL: 85, MOUNTAINCAR: 40}
-    with pytest.raises(ValueError, match="no preset for task 'Pendulum-v1', expected one of"):
+    with pytest.raises(ValueError, match="no settings for task 'Pendulum-v1', expected one of"):
         paper_results("Pendulum-v1", runs="unused")
 
 

@@ -230,9 +230,9 @@ def test_any_path_works(checkout, name):
 
 def test_any_path_reaches_the_makes_inside(checkout):
     make(checkout, "venv")
-    said, status = make(checkout, "quick", "OUT=$(HOME) `touch hit` 'x\"", "DASK=`touch hit`")
+    said, status = make(checkout, "quick", "OUT=$(HOME) `touch hit` 'x\"", "DASK=://`touch hit`")
     given = asked(checkout)
-    assert "<--out=./$(HOME) `touch hit` 'x\"/build/quick><--jobs=`touch hit`><--quick>" in given, said
+    assert "<--out=./$(HOME) `touch hit` 'x\"/build/quick><--jobs=://`touch hit`><--quick>" in given, said
     assert given.count("run_notebook") == 5 or status  # the results that one reads are not in this checkout
     assert not (checkout / "hit").exists()
 
@@ -243,6 +243,8 @@ def test_what_cannot_be_is_refused_in_one_line(checkout):
     for jobs in ("", "0", "03", "two", "2 3", "2`touch hit`"):
         said, status = make(checkout, "runs", f"JOBS={jobs}")
         assert status and said.startswith(f"error: JOBS is {jobs}, expected a number from 1 on\nmake: ***")
+    said, status = make(checkout, "runs", "DASK=host:8786")
+    assert status and said.startswith("error: DASK is host:8786, expected the address of a scheduler, as in tcp://")
     said, status = make(checkout, "runs", "OUT=file")
     assert status and "error: ./file cannot be written: make it writable, or name another" in said
     said, status = make(checkout, "runs", b"OUT=\xff")

@@ -163,8 +163,8 @@ def test_fault_leaves_previous_figures(tmp_path, fault):
 
 
 DAMAGE = {
-    "damaged": ("vsp.run.sealed.read_sealed(runs + '/1.run')", "1.run: SHA-256 is "),
-    "missing": ("vsp.run.sealed.read_sealed(runs + '/2.run')", "2.run: no such file: `git checkout "),
+    "damaged": ("vsp.run.sealed.read_sealed(runs + '/1.run')", "1.run: damaged, or no file of vsp (its SHA-256 is "),
+    "missing": ("vsp.run.sealed.read_sealed(runs + '/2.run')", "2.run: no such file"),
 }
 
 

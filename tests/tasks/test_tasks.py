@@ -323,7 +323,7 @@ def test_tasks_by_name():
 def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
     with pytest.raises(ValueError, match=f"unknown task '{typo}', expected one of .*did you mean '{near}'"):
         get_task(typo)
-    with pytest.raises(ValueError, match="unknown task None"):
+    with pytest.raises(ValueError, match="task is a NoneType, expected a name or a Task"):
         get_task(None)
 
 

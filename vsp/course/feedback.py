@@ -181,8 +181,8 @@ class Exercise:
     def ask(self, given: object, questions: dict[str, Question]) -> str:
         """Raise NotYet unless the dictionary `given` has the right answer to every question.
 
-        Returns a sentence for `passed` that says how many of the first answers were right, "" if all: who guesses sees
-        it in the result.
+        Returns a sentence for `passed` that says how many of the first answers were right: who guesses sees it in the
+        result.
         """
         self.answers(given, {key: question.options for key, question in questions.items()})
         first = self.first(given)
@@ -192,7 +192,7 @@ class Exercise:
                 words = f"not {given[key]!r}: {teaching}.{self._pointer(question.hint)}"
                 raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}")
         right = sum(self._right(question, key, first[key]) for key, question in questions.items())
-        return "" if right == len(questions) else f" Of your first answers {right} of {len(questions)} were right."
+        return f" Of your first answers {right} of {len(questions)} were right."
 
     def first(self, given: dict) -> dict:
         """The first answers that this was called with since the kernel started."""

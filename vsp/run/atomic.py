@@ -115,9 +115,14 @@ def read_bytes(path: str | os.PathLike) -> bytes:
             return file.read()
     except FileNotFoundError as error:
         link = f", but a link to {os.readlink(path)}" if os.path.islink(path) else ""
-        raise MissingFile(f"{path}: no such file{link}: {remedy(path)}") from error
+        raise MissingFile(": ".join(filter(None, (f"{path}: no such file{link}", remedies(path))))) from error
 
 
 def remedy(path: str | os.PathLike) -> str:
-    """Say how to restore a missing or damaged file."""
+    """Say how to restore a missing or damaged file that is committed."""
     return f"`git checkout {shlex.quote(str(path))}` restores a committed file"
+
+
+def remedies(path: str | os.PathLike, *others: str) -> str:
+    """Say how to restore a file that may be anybody's: by `others`, and by git if it lies in this checkout."""
+    return "; ".join([*others, *([remedy(path)] if Path(path).resolve().is_relative_to(ROOT) else [])])

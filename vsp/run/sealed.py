@@ -8,7 +8,7 @@ import os
 
 import numpy as np
 
-from .atomic import DamagedFile, atomic_path, read_bytes, remedy
+from .atomic import DamagedFile, atomic_path, read_bytes, remedies
 
 
 def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
@@ -25,7 +25,8 @@ def read_sealed(path: str | os.PathLike) -> bytes:
     found = hashlib.sha256(payload).hexdigest()
     if seal != found.encode() + b"\n":
         raise DamagedFile(
-            f"{path}: SHA-256 is {found}, its first line says {seal!r}: delete it, and it is made again; {remedy(path)}"
+            f"{path}: damaged, or no file of vsp (its SHA-256 is {found}, its first line says {seal!r}): "
+            + remedies(path, "delete it if `make` makes it, else save it again")
         )
     return payload
 
@@ -55,8 +56,10 @@ def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.nda
         found = about.get("kind")
     except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
         raise DamagedFile(
-            f"{path}: right checksum, but `save_arrays` did not write it: {error!r:.300}: delete it; {remedy(path)}"
+            f"{path}: right checksum, but `save_arrays` did not write it: {error!r:.300}: {remedies(path, 'delete it')}"
         ) from error
     if found != kind:
-        raise DamagedFile(f"{path}: holds a {found!r}, expected a {kind!r}: delete it; {remedy(path)}")
+        raise DamagedFile(
+            f"{path}: holds a {found!r}, expected a {kind!r}: {remedies(path, 'delete it or name another')}"
+        )
     return arrays, about

@@ -46,14 +46,15 @@ def get_task(name: str | Task) -> Task:
 
 
 def _check_registered(name: str) -> None:
-    """Raise ValueError for a name that Gymnasium does not know. The message suggests the most similar name: one of our
-    tasks if it is similar enough, else any."""
-    if isinstance(name, str) and name in gymnasium.registry:
+    """Raise ValueError for a name that Gymnasium does not know. The message suggests a similar name if there is one."""
+    if not isinstance(name, str):
+        raise ValueError(f"task is a {type(name).__name__}, expected a name or a Task: are the arguments in order?")
+    if name in gymnasium.registry:
         return
-    ours, every = task_names(), [*task_names(), *gymnasium.registry]
-    near = difflib.get_close_matches(str(name), ours) or difflib.get_close_matches(str(name), every, cutoff=0.0)
-    known = f"expected one of {ours} or of Gymnasium's registry"
-    raise ValueError(f"unknown task {name!r}, {known}; did you mean {near[0]!r}?")
+    ours = task_names()
+    near = difflib.get_close_matches(name, ours) or difflib.get_close_matches(name, gymnasium.registry, cutoff=0.75)
+    guess = f"did you mean {near[0]!r}?" if near else "if it is yours, import what registers it"
+    raise ValueError(f"unknown task {name!r}, expected one of {ours} or of Gymnasium's registry; {guess}")
 
 
 def register(

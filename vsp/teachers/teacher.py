@@ -150,7 +150,10 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
             raise ValueError(f'{path}: name the task of the agent: load_teacher("{path}", "{task_names()[0]}")')
         return Teacher(read_zip(path), task)
     if path.suffix and path.suffix != ".safetensors":
-        raise ValueError(f"{path}: expected a .safetensors file, a .zip, or the name of a task, one of {task_names()}")
+        raise ValueError(
+            f"{path}: expected a .safetensors file, a .zip, or the name of a task, one of {task_names()} (a "
+            "distilled policy: vsp.VoronoiPolicy.load)"
+        )
     if not path.suffix:
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
     from safetensors import SafetensorError

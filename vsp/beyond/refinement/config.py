@@ -183,7 +183,8 @@ def _by_size(task: Task) -> Faithful:
 def check_refinement(config: Refinement) -> None:
     """Raise ValueError unless `config` is a `Refinement`."""
     if not isinstance(config, Refinement):
-        raise ValueError(f"config is {config!r}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'tuned')")
+        found = f"a {type(config).__name__}"
+        raise ValueError(f"config is {found}, expected a Refinement, such as vsp.preset('SimpleGoal-v0', 'tuned')")
 
 
 _TUNED = {
@@ -207,5 +208,8 @@ def tuned_preset(task: str | Task) -> Refinement:
     preset."""
     name = get_task(task).name
     if name not in _TUNED:
-        raise ValueError(f"no preset for task {name!r}, expected one of {list(_TUNED)}: write a Refinement of your own")
+        raise ValueError(
+            f"no tuned settings for task {name!r}, expected one of {list(_TUNED)}: take "
+            f"vsp.preset({name!r}, 'faithful'), or write a Refinement of your own"
+        )
     return _TUNED[name]
