@@ -286,6 +286,8 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     )
     assert f"and sixteen {sixteen['mean']:.0f} ({100 * sixteen['share']:.0f} %; one seed)" in said
     assert f"random search, returns {cheetah['mean'][map_, 0]:.0f}." in said
+    assert f"in the same way, returns {cheetah['mean']['oblique tree, trained further', 8]:.0f} (two seeds)" in said
+    assert cheetah["high"][map_, 0] < eight["low"] and cheetah["policies"][map_, 0] == eight["policies"] == 5
     assert f"teacher returns {walker['mean'][teacher, 0]:.1f}. Eight" in said
     assert f"return {walker['mean'][ours, 8]:.1f}, at least {walker['low'][ours, 8]:.0f} with every seed" in said
     search = walker.loc[(map_, 0)]

@@ -34,7 +34,9 @@ _LIMIT = {
         "n_cells": 8, "n_episodes": 500, "n_correction_episodes": 300, "n_restarts": 6,
         "n_generations": 400, "n_tuning_episodes": 200, "n_validation": 2000,
     },
-    "LunarLanderContinuous-v3": {"n_cells": 3, "n_generations": 300},
+    "LunarLanderContinuous-v3": {
+        "n_cells": 3, "n_generations": 150, "n_tuning_episodes": 60, "failure_penalty": 100.0, "n_validation": 400,
+    },
 }  # fmt: skip
 
 
