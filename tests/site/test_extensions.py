@@ -91,9 +91,9 @@ def test_no_sign_of_a_docstring_is_taken_for_markup_but_a_backtick(docstrings):
 
 
 def test_comments_behind_fields_are_found(docstrings):
-    from vsp.policy import Explanation
+    from vsp.tasks import Task
 
-    assert ("raw", "(m,) output of the sub-policy") in docstrings._comments(Explanation)
+    assert ("outputs", "symbols of the m actions") in docstrings._comments(Task)
     assert docstrings._comments(int) == []
 
 
