@@ -14,22 +14,30 @@ from vsp.paper.printed import TASKS, published_policy
 from vsp.paper.results import read_results
 from vsp.show.explorer import SCRIPT, Explorer
 from vsp.show.explorer.scene import to_json
+from vsp.teachers.teacher import Teacher
 
 
 def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
     """The paper's policy, its method's best rerun with the run, ours, and one linear map: those that the task has."""
     teacher, policies, history = vsp.load_teacher(task), {}, None
     if task in TASKS:
-        best = int(read_results(task).set_index("seed")["mean"].idxmax())
+        best = int(read_results(task).set_index("seed")["validation_mean"].idxmax())
         policies["the paper's method, best rerun"], history = vsp.distill(teacher, task, vsp.preset(task), seed=best)
         policies["the paper's, as published"] = published_policy(task)
-    for name, kept in (("ours, faithful", "faithful"), ("ours, tuned for return", "limit")):
-        if (path := comparison.RESULTS / f"{kept}_{task}.policy").exists():
-            policies[name] = vsp.VoronoiPolicy.load(path)
+    policies |= {f"ours, {name}": policy for name, policy in _ours(task, teacher)}
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
     states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
     policies["one linear map"] = linear_map(states, actions, task)
     return vsp.explore(policies, teacher=teacher, history=history, axes=axes)
+
+
+def _ours(task: str, teacher: Teacher):
+    """Yield our policies with their names. Tuning takes seconds, but hours for a task whose tuned policy is kept."""
+    for name, table in (("faithful", "faithful"), ("tuned", "beyond"), ("at the limit", "limit")):
+        if (path := comparison.RESULTS / f"{table}_{task}.policy").exists():
+            yield name, vsp.VoronoiPolicy.load(path)
+        elif name == "tuned":
+            yield name, vsp.refine(teacher, task, vsp.preset(task, "tuned"), seed=0)[0]
 
 
 def challenge(task: str, guess: str) -> Explorer:

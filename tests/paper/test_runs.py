@@ -259,11 +259,11 @@ def test_overview_and_comparison_by_hand(results):
     assert table.loc["cells"].tolist() == [np.mean(cells), min(cells), max(cells)]
     facts = tables.teacher_beside_runs(results)
     means = results.returns.mean(axis=1)
-    assert facts["TD3, mean"] == results.teacher_returns.mean() and facts["lowest run"] == means.min()
+    assert facts["teacher, mean"] == results.teacher_returns.mean() and facts["lowest run"] == means.min()
     assert facts["95 % interval from"] <= facts["distilled, mean"] <= facts["to"]
-    gap = facts["distilled, mean"] - facts["TD3, mean"]
+    gap = facts["distilled, mean"] - facts["teacher, mean"]
     assert facts["difference, from"] <= gap <= facts["difference, to"]
-    assert facts["runs above TD3"] == np.mean([mean > facts["TD3, mean"] for mean in means])
+    assert facts["runs above the teacher"] == np.mean([mean > facts["teacher, mean"] for mean in means])
     independent = 1.96 * results.returns.std(ddof=1) / np.sqrt(60)
     assert facts["± if independent"] == pytest.approx(independent)
 

@@ -55,6 +55,20 @@ def test_rows_with_names_keep_them():
     assert cells(show_table(nested).data)[3:6] == ["one", "x", "1"]
 
 
+def test_counts_have_no_decimals_where_each_row_is_another_quantity():
+    frame = pd.DataFrame(
+        {"quantity": ["outliers", "mean"], "here": [24.0, 1.5], "low": [20.0, 1.25], "high": [30.0, 2.25]}
+    )
+    assert as_text(present(frame)).values.tolist() == [["outliers", "24", "20 to 30"], ["mean", "1.5", "1.25 to 2.25"]]
+    same = frame.rename(columns={"quantity": "task"})
+    assert as_text(present(same)).values.tolist()[0] == ["outliers", "24.0", "20.00 to 30.00"]
+
+
+def test_no_is_said_among_other_values_only():
+    found = present(pd.DataFrame({"wide": [True, False], "default": pd.Series([False, "raw"], dtype=object)}))
+    assert found.values.tolist() == [["yes", "no"], ["", "raw"]]
+
+
 def test_headings_are_words_and_shares_are_per_cent():
     found = present(
         pd.DataFrame({"mean": [1.0], "failing": [0.00025], "task": ["MountainCarContinuous-v0"], "wide": [True]})

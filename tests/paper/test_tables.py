@@ -136,10 +136,12 @@ def test_the_spread_table_stands_beside_the_papers(task):
     frame = tables.spread_table(task, teacher, runs).set_index("metric")
     printed = printed_spread(task)
     assert frame.index.tolist() == printed.index.tolist() and frame.shape == (9, 4)
-    assert frame["TD3, paper"].tolist() == printed["drl"].tolist()
+    assert frame["teacher, paper"].tolist() == printed["drl"].tolist()
     assert frame["distilled, paper"].tolist() == printed["ours"].tolist()
-    assert frame.at["Mean", "TD3, here"] == teacher.mean() and frame.at["Q1", "distilled, here"] == spread(runs)["q1"]
-    assert frame.at["Median/Q2", "TD3, here"] == np.median(teacher)
+    assert (
+        frame.at["Mean", "teacher, here"] == teacher.mean() and frame.at["Q1", "distilled, here"] == spread(runs)["q1"]
+    )
+    assert frame.at["Median/Q2", "teacher, here"] == np.median(teacher)
     assert frame.at["Coverage", "distilled, here"] == pytest.approx(100 * spread(runs)["coverage"]) != 100
 
 

@@ -244,7 +244,7 @@ def test_curves_and_histograms_show_their_numbers(ax):
     histogram(other, np.repeat([1.0, 2.0, 6.0], 10), bound=7.0)
     assert sum(bar.get_height() for bar in other.patches) == 30
     assert [line.get_xdata()[0] for line in other.lines] == [3.0]
-    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00\n(at most 7.00)"]
+    assert [t.get_text() for t in other.get_legend().get_texts()] == ["mean 3.00\n(at most\n7.00)"]
     plt.close(fig)
 
 
@@ -414,3 +414,9 @@ def test_a_legend_below_takes_its_place_from_the_panels(ax):
     ax.figure.canvas.draw()
     (legend,) = ax.figure.legends
     assert [t.get_text() for t in legend.get_texts()] == ["one"] and ax.get_position().y0 > before + 0.05
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "figures").glob("*.png")), ids=lambda path: path.stem)
+def test_nothing_of_a_committed_figure_is_cut_off(path):
+    pixels = np.asarray(Image.open(path).convert("L"))
+    assert min(edge.min() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1])) > 250

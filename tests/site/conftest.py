@@ -14,6 +14,8 @@ SITE = os.environ.get("SITE")
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 ON_A_MAC = "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome"
 
+sys.path.append(str(Path(__file__).resolve().parents[2] / "docs" / "extensions"))
+
 
 def pytest_collection_modifyitems(items):
     here = [item for item in items if Path(__file__).parent in item.path.parents]

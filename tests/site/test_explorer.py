@@ -1,6 +1,7 @@
 """The explorer in Chromium: it computes what Python computes, answers to every control, and is quick."""
 
 import base64
+import importlib
 import json
 
 import numpy as np
@@ -9,7 +10,6 @@ from visits import Visit
 
 import vsp
 from vsp.beyond import comparison
-from vsp.paper.printed import published_policy
 from vsp.show.explorer import SCRIPT
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
@@ -51,23 +51,28 @@ QUICK = f"""async ([scene, renewed]) => {{
 }}"""
 
 
-def policies_of(task):
-    kept = {name: f"{name}_{task}.policy" for name in ("faithful", "limit")}
-    found = {name: vsp.VoronoiPolicy.load(comparison.RESULTS / file) for name, file in kept.items()}
-    return found if task == PENDULUM else {"paper, as published": published_policy(task)} | found
+PLAYED = f"""async scene => {{
+  {LOADED}
+  const root = document.body.appendChild(document.createElement("div")), view = vsp.mount(root, scene)
+  await new Promise(resolve => setTimeout(resolve, 400))
+  const before = view.frames, begun = performance.now()
+  view.replay.start()
+  while (view.replay.playing && performance.now() - begun < 2000) await new Promise(requestAnimationFrame)
+  const seconds = (performance.now() - begun) / 1000
+  root.remove()
+  return [view.frames - before, seconds]
+}}"""
 
 
 @pytest.fixture(scope="module")
-def explorers():
-    """Each task's policies, and for SimpleGoal a replay."""
-    found = {}
-    for task in TASKS:
-        teacher, policies, history = vsp.load_teacher(task), policies_of(task), None
-        if task == SIMPLEGOAL:
-            run, history = vsp.distill(teacher, task, seed=0)
-            policies = {"rerun": run} | policies
-        found[task] = vsp.explore(policies, teacher=teacher, history=history)
-    return found
+def directive():
+    return importlib.import_module("explorer")  # it needs Sphinx
+
+
+@pytest.fixture(scope="module")
+def explorers(directive):
+    """The explorers of the site: each task's policies, and for the paper's tasks a replay."""
+    return {task: directive.of_task(task) for task in TASKS}
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +134,12 @@ def test_whole_episodes_return_what_pythons_do(desk, explorers, task):
 @pytest.mark.parametrize("task", TASKS)
 def test_a_picture_takes_less_than_33_ms(desk, explorers, task, renewed):
     assert desk[task].page.evaluate(QUICK, [explorers[task].scene, renewed]) < 33
+
+
+@pytest.mark.parametrize("task", TASKS[:2])
+def test_a_replay_shows_thirty_pictures_a_second(desk, explorers, task):
+    pictures, seconds = desk[task].page.evaluate(PLAYED, explorers[task].scene)
+    assert pictures > 20 and pictures / seconds >= 30
 
 
 class Shown:
@@ -333,8 +344,8 @@ def test_twenty_four_inputs_fit_on_a_phone(browser, tmp_path):
 # The reader guesses first
 
 
-def test_results_are_hidden_until_the_reader_has_guessed(browser, tmp_path):
-    vsp.explore(policies_of(SIMPLEGOAL), guess="How many are lost?").save(tmp_path / "guess.html")
+def test_results_are_hidden_until_the_reader_has_guessed(directive, browser, tmp_path):
+    directive.challenge(SIMPLEGOAL, "How many are lost?").save(tmp_path / "guess.html")
     visit = Visit(browser, tmp_path.as_uri() + "/", "guess.html", viewport={"width": 1200, "height": 900})
     root = visit.page.locator(".vsp-explorer")
     root.locator("canvas").wait_for()

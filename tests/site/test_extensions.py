@@ -3,14 +3,11 @@
 import base64
 import importlib
 import io
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-sys.path.append(str(Path(__file__).resolve().parents[2] / "docs" / "extensions"))
 TABLE = """<style scoped>td { color: red }</style><table border="1" class="dataframe"><thead>
 <tr style="text-align: right;"><th></th><th>mean</th><th>$\\Delta x$</th></tr>
 <tr><th>task</th><th></th><th></th></tr></thead>

@@ -277,6 +277,32 @@ def test_the_place_of_the_keyboard_is_seen_at_every_stop(browser, address, name,
     assert unseen == [] and stops > 30
 
 
+@pytest.mark.parametrize("name", ["index.html", "explore.html"])
+def test_every_explorer_answers(browser, address, name):
+    one = Visit(browser, address, name, viewport=DESK)
+    explorers = one.page.locator(".vsp-explorer[data-scene]").all()
+    for root in explorers:
+        assert len(set(_pictures_of(root))) == 4
+    one.close()
+    assert explorers and one.troubles == []
+
+
+def _pictures_of(root):
+    """What an explorer draws: at first, after a click, after a key, and of another policy."""
+    root.scroll_into_view_if_needed()
+    canvas = root.locator("canvas")
+    canvas.wait_for()
+    for act in (
+        lambda: None,
+        lambda: canvas.click(position={"x": 150, "y": 120}),
+        lambda: canvas.press("ArrowRight"),
+        lambda: root.get_by_label("policy", exact=True).select_option("1"),
+    ):
+        act()
+        root.page.wait_for_timeout(500)  # until the map is sharp
+        yield canvas.evaluate("canvas => canvas.toDataURL()")
+
+
 def test_the_explorer_that_loads_keeps_the_place_of_the_keyboard(browser, address):
     one = Visit(browser, address, "notebooks/02_distillation.html", viewport=DESK)
     scene = one.page.locator(".vsp-explorer[data-scene]").last

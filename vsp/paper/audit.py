@@ -145,7 +145,13 @@ def simplegoal_coverage() -> Finding:
     )
     wrong = [spread_id(SIMPLEGOAL, "ours", "coverage")]
     shown = _quote(*wrong, "sg_ours_outliers", "sg_total_episodes")
-    return _finding("SimpleGoal: coverage of Ours", shown, text, rounds_to(ours.coverage(), printed), wrong)
+    return _finding(
+        "SimpleGoal: coverage and outliers of the distilled policies",
+        shown,
+        text,
+        rounds_to(ours.coverage(), printed),
+        wrong,
+    )
 
 
 def other_columns() -> Finding:
@@ -179,7 +185,9 @@ def mountaincar_quartiles() -> Finding:
     wrong = [spread_id(MOUNTAINCAR, "ours", metric) for metric in ("q1", "median", "q3", "iqr")]
     shown = _quote(*wrong, *bounds) + "; a higher median and a larger spread than DRL (caption of the box plot)"
     agrees = possible and rounds_to(q3 - q1, ours["iqr"]) and ours["median"] > drl["median"]
-    return _finding("MountainCar: quartiles of Ours, and a higher median", shown, text, bool(agrees), wrong)
+    return _finding(
+        "MountainCar: quartiles of the distilled policies, in table and text", shown, text, bool(agrees), wrong
+    )
 
 
 def outlier_rules() -> Finding:
@@ -203,7 +211,7 @@ def outlier_rules() -> Finding:
         notes.append(f"{edge}, lower bound {bounds}: {' and '.join(sorted(fits)) or 'neither'}")
         common &= fits
     shown = _quote("sg_drl_outliers_max", "sg_ours_outliers_max", "mc_ours_whisker_low", "mc_drl_outliers")
-    return Finding("One rule for what an outlier is", shown, "; ".join(notes), HOLDS if common else OPEN)
+    return Finding("The same rule for outliers in every column", shown, "; ".join(notes), HOLDS if common else OPEN)
 
 
 def teacher_outliers() -> Finding:
@@ -222,7 +230,7 @@ def teacher_outliers() -> Finding:
         "if it is added: a mean so close to it speaks for the first"
     )
     shown = _quote(*(f"sg_drl_outliers{name}" for name in ("", "_mean", "_std", "_min", "_max")), "sg_goal_reward")
-    return Finding("SimpleGoal: what the outliers of DRL are", shown, text, HOLDS if len(found) == 1 else OPEN)
+    return Finding("SimpleGoal: what the teacher's outliers are", shown, text, HOLDS if len(found) == 1 else OPEN)
 
 
 def outlier_moments() -> Finding:
@@ -269,7 +277,7 @@ def simplegoal_wording() -> Finding:
         f"{100 * lost / drl['mean']:.1f} %, median lower by {drl['median'] - ours['median']:.3f}"
     )
     shown = "similar spread and performance (Navigation task, caption of the box plot), slight decrease (Performance)"
-    return Finding("SimpleGoal: how similar is similar", shown, text, OPEN)
+    return Finding("SimpleGoal: the similar spread and the slight decrease, by the table", shown, text, OPEN)
 
 
 def printed_digits() -> Finding:
@@ -284,7 +292,13 @@ def printed_digits() -> Finding:
     }
     notes = [f"{(n == digits).sum()} have {digits:g} {kind} (all {n.min()} to {n.max()})" for kind, n in counts.items()]
     agrees = any((n == digits).all() for n in counts.values())
-    return _finding("T3 and T4: digits", _quote(*ids), f"Of {len(numbers)} numbers {', '.join(notes)}", agrees, ids)
+    return _finding(
+        "T3 and T4: coefficients rounded to four digits",
+        _quote(*ids),
+        f"Of {len(numbers)} numbers {', '.join(notes)}",
+        agrees,
+        ids,
+    )
 
 
 def simplegoal_rows() -> Finding:
@@ -377,7 +391,9 @@ def thousands() -> Finding:
         f"not {steps:g}; other thousands have no separator"
     )
     shown = _quote("sg_training_steps", "sg_total_episodes", "mc_total_episodes")
-    return Finding("A dot that separates thousands", shown, text, HOLDS if decimal == steps else OPEN)
+    return Finding(
+        "Training steps: a dot for thousands, elsewhere for decimals", shown, text, HOLDS if decimal == steps else OPEN
+    )
 
 
 def return_limits() -> Finding:
@@ -417,7 +433,7 @@ def frozen_iterations() -> Finding:
     shown = "last n_freeze iterations frozen (Partitioning the state space); altered while n is below n_freeze "
     shown += f"(Algorithm 1); last n_split frozen (Learning subpolicies); {_quote(*ids)}"
     text = f"iterations that may alter the partition: {'; '.join(notes)}"
-    return _finding("When the partition stands still", shown, text, agrees)
+    return _finding("Which iterations may change the partition", shown, text, agrees)
 
 
 _CHECKS = (

@@ -99,6 +99,8 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
         here = outlier_numbers(returns) | spread(returns)
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
+        fewest, most = bounds["outliers"]
+        bounds["outliers"] = np.floor(fewest), np.ceil(most)
         for name in bounds.columns.intersection(list(here)):
             known = not np.isnan(here[name])  # an empty set of outliers has no mean
             row = (here[name], *bounds[name]) if known else (np.nan, np.nan, np.nan)
@@ -137,7 +139,7 @@ def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
     half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
     statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
     statistic = statistic.str.replace("whisker low", "lower bound").str.replace("whisker high", "upper bound")
-    name = rows["subject"].replace({"DRL": "TD3", "Ours": "distilled"}) + ": " + statistic
+    name = rows["subject"].replace({"DRL": "teacher", "Ours": "distilled"}) + ": " + statistic
     frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"], "wide": rows["wide"]})
     return frame.set_index(pd.Index(name, name="statistic"))
 
@@ -220,7 +222,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
     rows = {
         "interquartile mean of the runs": (means, middle, own.mean()),
-        "probability that an episode does": ((result.returns > own).mean(axis=1), np.mean, np.nan),
+        "probability that an episode beats the teacher's": ((result.returns > own).mean(axis=1), np.mean, np.nan),
     }
     for name, code in SHARES.items():
         ours, teacher = (result.outcomes == code).mean(axis=1), np.mean(result.teacher_outcomes.outcomes == code)

@@ -39,6 +39,7 @@ HEADINGS = {
     "untuned mean": "untuned: mean return",
     "untuned r2": "untuned: R²",
 }
+QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting", "hyperparameter"}
 PERCENT = {
     "failing": "failed (%)",
     "reached": "as good (%)",
@@ -54,13 +55,15 @@ PERCENT = {
 def present(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the frame for readers.
 
-    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing, and shares become
-    percentages. `low` and `high` become one column of text, and headings are in words.
+    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among other
+    values), and shares become percentages. `low` and `high` become one column of text, and headings are in words. Where
+    each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
     """
     index = frame.index
     if index.names != [None] or (len(index) and isinstance(index[0], str)):
         frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
-    frame = frame.reset_index(drop=True).map(_in_words)
+    frame = frame.reset_index(drop=True).apply(_in_words)
+    frame = _counts(frame) if QUANTITIES & {*frame} else frame
     for name in [name for name in frame if _about(name) in PERCENT]:
         frame[name] = [MISSING if value != value else f"{100 * value:.3g}" for value in frame[name].astype(float)]
     for low in [name for name in frame if re.search(r"(^|[_ ])low$", str(name))]:
@@ -72,10 +75,23 @@ def present(frame: pd.DataFrame) -> pd.DataFrame:
     return frame.rename(columns=_heading)
 
 
-def _in_words(value: object) -> object:
-    if isinstance(value, bool | np.bool_):
-        return "yes" if value else ""
-    return re.sub(r"^(\w+?)(Continuous)?-v\d$", r"\1", value) if isinstance(value, str) else value
+def _in_words(column: pd.Series) -> pd.Series:
+    no = "" if column.map(lambda value: isinstance(value, bool | np.bool_)).all() else "no"
+
+    def said(value: object) -> object:
+        if isinstance(value, bool | np.bool_):
+            return "yes" if value else no
+        return re.sub(r"^(\w+?)(Continuous)?-v\d$", r"\1", value) if isinstance(value, str) else value
+
+    return column.map(said)
+
+
+def _counts(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame with integers in the rows that have no other numbers."""
+    numbers = frame.map(lambda value: isinstance(value, float) and math.isfinite(value))
+    whole = (~numbers | frame.where(numbers, 0.0).map(lambda value: value == int(value))).all(axis=1)
+    counts = numbers.mul(whole, axis=0)
+    return frame.astype(object).mask(counts, frame.where(counts, 0).map(int))
 
 
 def _about(column: str) -> str:

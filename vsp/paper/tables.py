@@ -112,7 +112,7 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
     for name, values in (("drl", teacher), ("ours", runs)):
         here = spread(values) | {"median/q2": spread(values)["median"]}
         found = [here[metric.lower()] * (100 if metric == "Coverage" else 1) for metric in printed.index]
-        label = {"drl": "TD3", "ours": "distilled"}[name]
+        label = {"drl": "teacher", "ours": "distilled"}[name]
         columns |= {f"{label}, paper": printed[name].to_numpy(), f"{label}, here": found}
     return pd.DataFrame({"metric": printed.index, **columns})
 
@@ -176,8 +176,9 @@ def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
 
 def run_overview(results: Results) -> pd.DataFrame:
     """Return mean, lowest and highest value over the runs, one row per property of a run."""
-    frame = run_summary(results.runs, results.experiment)
-    return frame[["cells", "splits", "merges", "mean", *SHARES]].agg(["mean", "min", "max"]).T
+    frame = run_summary(results.runs, results.experiment).rename(columns={"mean": "mean return"})
+    found = frame[["cells", "splits", "merges", "mean return", *SHARES]].agg(["mean", "min", "max"]).T
+    return found.set_axis(["mean over runs", "lowest", "highest"], axis=1)
 
 
 def teacher_beside_runs(results: Results) -> dict[str, float]:
@@ -191,11 +192,11 @@ def teacher_beside_runs(results: Results) -> dict[str, float]:
     low, high = interval(means, np.mean, vectorized=True)
     gap_low, gap_high = interval((runs - teacher).mean(axis=1), np.mean, vectorized=True)
     return {
-        "TD3, mean": teacher.mean(), "distilled, mean": runs.mean(),
+        "teacher, mean": teacher.mean(), "distilled, mean": runs.mean(),
         "95 % interval from": low, "to": high, "± of it": (high - low) / 2,
         "± if independent": 1.96 * runs.std(ddof=1) / np.sqrt(runs.size),
         "difference, from": gap_low, "difference, to": gap_high,
-        "runs above TD3": np.mean(means > teacher.mean()),
+        "runs above the teacher": np.mean(means > teacher.mean()),
         "lowest run": means.min(), "median run": np.median(means), "highest run": means.max(),
     }  # fmt: skip
 

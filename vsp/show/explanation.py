@@ -67,7 +67,7 @@ def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, own: i
     shades = np.ones((*x.shape, 4))
     shades[index == behind] = mpl.colors.to_rgba("0.91")
     shades[index == own] = mpl.colors.to_rgba(_TINT)
-    image(ax, x, y, shades, aspect=ax.get_aspect(), interpolation="nearest", zorder=0)
+    image(ax, x, y, shades, interpolation="nearest", zorder=0)
     cells(ax, x, y, index)
 
 

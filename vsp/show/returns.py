@@ -62,7 +62,7 @@ def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: flo
 
     returns = check_array("returns", returns, (-1,))
     sns.histplot(returns, ax=ax, color=color, bins=40, edgecolor="white", linewidth=0.3)
-    most = "" if bound is None else f"\n(at most {bound:.2f})"
+    most = "" if bound is None else f"\n(at most\n{bound:.2f})"
     ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}{most}")
     ax.set(xlabel="return per episode", ylabel="episodes")
     ax.legend(frameon=False, loc="upper left")

@@ -73,9 +73,9 @@ def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TE
     return ax
 
 
-def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, *, aspect="auto", **look) -> AxesImage:
-    """Draw an image whose pixel centres are the points of a `grid`."""
-    return ax.imshow(pixels, origin="lower", extent=extent(x, y), aspect=aspect, **look)
+def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, **look) -> AxesImage:
+    """Draw an image whose pixel centres are the points of a `grid`. The axes keep their aspect."""
+    return ax.imshow(pixels, origin="lower", extent=extent(x, y), aspect=ax.get_aspect(), **look)
 
 
 def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray) -> AxesImage:
