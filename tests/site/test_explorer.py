@@ -58,9 +58,11 @@ PLAYED = f"""async scene => {{
   const before = view.frames, begun = performance.now()
   view.replay.start()
   while (view.replay.playing && performance.now() - begun < 2000) await new Promise(requestAnimationFrame)
-  const seconds = (performance.now() - begun) / 1000
+  const pictures = view.frames - before, seconds = (performance.now() - begun) / 1000
+  view.replay.stop()
+  await new Promise(resolve => setTimeout(resolve, 600))
   root.remove()
-  return [view.frames - before, seconds]
+  return [pictures, seconds, view.played]
 }}"""
 
 
@@ -138,8 +140,9 @@ def test_a_picture_takes_less_than_33_ms(desk, explorers, task, renewed):
 
 @pytest.mark.parametrize("task", TASKS[:2])
 def test_a_replay_shows_thirty_pictures_a_second(desk, explorers, task):
-    pictures, seconds = desk[task].page.evaluate(PLAYED, explorers[task].scene)
+    pictures, seconds, played = desk[task].page.evaluate(PLAYED, explorers[task].scene)
     assert pictures > 20 and pictures / seconds >= 30
+    assert played == 400  # once nothing moves; meanwhile only as many as there is time for
 
 
 class Shown:

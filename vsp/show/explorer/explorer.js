@@ -5,6 +5,8 @@
 const PALETTE = ["#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#56b4e9", "#949494", "#ece133"]
 const [GOAL, FAILED, HIDDEN, INK, PAPER] = ["#029e73", "#d55e00", "#777777", "#222222", "#ffffff"]
 const [COARSE, FINE] = [100, 240] // points per axis of the map: while something moves, and afterwards
+const IN_MOTION = 8 // milliseconds for episodes while something moves; afterwards all starts are played
+const STRIDE = 149 // a prime: the first starts played are spread over all
 const ARROWS = 14
 
 const clip = (value, low, high) => Math.min(Math.max(value, low), high)
@@ -273,13 +275,14 @@ function drawMap(view, n) {
   picture.map.getContext("2d").putImageData(image, 0, 0)
 }
 
-/** Draw the picture. An outdated map is drawn with few points at first, and with many once nothing moves. */
+/** Draw the picture. An outdated map has few points, and not all starts are played, until nothing moves. */
 function draw(view) {
   if (!view.stored && view.mapped !== view.cell) {
     drawMap(view, COARSE)
     view.mapped = view.cell
     clearTimeout(view.later)
     view.later = setTimeout(() => {
+      if (view.played < view.scene.starts.length) view.judge()
       drawMap(view, FINE)
       drawAll(view)
     }, 120)
@@ -305,8 +308,9 @@ function drawAll(view) {
     view.task.furniture(picture)
     if (scene.task.outputs.length === 2) drawArrows(view)
     scene.starts.forEach((start, i) => {
-      const lost = view.guessed && view.ends[i]
-      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : view.guessed ? GOAL : HIDDEN)
+      const lost = view.guessed && view.ends[i],
+        known = view.guessed && view.ends[i] !== undefined
+      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : known ? GOAL : HIDDEN)
     })
   }
   picture.line(view.path.map(view.place), PAPER, 4)
@@ -513,7 +517,7 @@ class Explorer {
     root.replaceChildren(element("style", {}, STYLE), this.canvas, panel)
     if (held) this.canvas.focus()
     this.listen()
-    new ResizeObserver(() => this.path && draw(this)).observe(this.canvas)
+    new ResizeObserver(() => this.waiting || draw(this)).observe(this.canvas)
     this.choose(0)
   }
 
@@ -600,16 +604,24 @@ class Explorer {
     const share = stored ? ` (${(100 * found.share).toPrecision(2)} % of its range)` : ""
     return `A change of ${gap} in ${labels[found.axis]}${share} leads to cell ${found.to + 1}.`
   }
-  /** Run an episode from every start, and describe the results. */
-  judge(policy = this.policy) {
-    const { scene } = this
-    const found = scene.starts.map(start => rollout(scene, policy, start))
-    this.ends = found.map(one => scene.lost.includes(one.outcome))
-    this.mean = found.reduce((sum, one) => sum + one.total, 0) / found.length
+  /** Run an episode from every start, or from as many as `budget` milliseconds allow, and describe the results. */
+  judge(policy = this.policy, budget = Infinity) {
+    const { scene } = this,
+      n = scene.starts.length,
+      begun = performance.now()
+    let sum = 0
+    this.ends = [] // of starts that were not played: undefined
+    for (this.played = 0; this.played < n && (!this.played || performance.now() - begun < budget); this.played++) {
+      const i = (this.played * STRIDE) % n,
+        { total, outcome } = rollout(scene, policy, scene.starts[i])
+      this.ends[i] = scene.lost.includes(outcome)
+      sum += total
+    }
+    this.mean = sum / this.played
     this.failures = this.ends.filter(Boolean).length
-    const fails = scene.lost.length ? ` ${this.failures} of ${found.length} fail.` : ""
+    const fails = scene.lost.length ? ` ${this.failures} of ${this.played} fail.` : ""
     const teacher = scene.teacher ? ` The teacher: ${scene.teacher.mean.toFixed(2)}.` : ""
-    const text = minus(`Mean return from ${found.length} starts: ${this.mean.toFixed(2)}.${fails}`)
+    const text = minus(`Mean return from ${this.played} starts: ${this.mean.toFixed(2)}.${fails}`)
     this.result.textContent = this.guessed ? text + minus(teacher) : ""
     return text
   }
@@ -693,7 +705,7 @@ class Explorer {
       ready(this.policy)
       this.mapped = null
       if (this.stored) this.cells = this.episodes.map(({ states }) => states.map(state => cellOf(this.policy, state)))
-      else this.judge()
+      else this.judge(this.policy, IN_MOTION)
     }
     this.ask()
     this.path = this.stored ? this.recent() : rollout(this.scene, this.policy, this.asked, true).states
