@@ -45,7 +45,7 @@ def committed(task: str) -> tuple[dict[str, float], dict[str, float]]:
     )
     text = pd.read_csv(TABLES / "text_numbers.csv", index_col="id")["here"].astype(float)
     both = []
-    for column, subject in (("TD3, here", "drl"), ("distilled, here", "ours")):
+    for column, subject in (("teacher, here", "drl"), ("distilled, here", "ours")):
         values = {name: table.at[metric, column] for metric, name in SPREAD.items()}
         both.append(values | {name: text[f"{PREFIX[task]}_{subject}_{name}"] for name in OUTLIERS})
     return both[0], both[1]
@@ -56,7 +56,7 @@ def implausible(made: Path, task: str) -> list[str]:
     results = runs.paper_results(task, runs=made / "data" / "runs")
     rng, wrong = np.random.default_rng(0), []
     made_returns = (results.teacher_returns, results.returns)
-    for subject, then, returns in zip(("TD3", "distilled"), committed(task), made_returns, strict=True):
+    for subject, then, returns in zip(("teacher", "distilled"), committed(task), made_returns, strict=True):
         draws = [statistics(returns[rng.integers(len(returns), size=len(returns))]) for _ in range(1000)]
         for name, value in statistics(returns).items():
             allowed = Z * np.sqrt(2) * np.std([draw[name] for draw in draws]) + (name == "outliers")

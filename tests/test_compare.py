@@ -13,11 +13,16 @@ FILES = ("a.png", "a.pdf", "tables/a.csv", "executed/a.ipynb")
 
 
 @pytest.fixture
-def compare(tmp_path, monkeypatch):
-    """`compare()` compares what lies in two folders that are the same at first, and returns what it says."""
+def module():
     spec = importlib.util.spec_from_file_location("compare", ROOT / ".ci" / "compare.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def compare(module, tmp_path, monkeypatch):
+    """`compare()` compares what lies in two folders that are the same at first, and returns what it says."""
     for name in FILES:
         path = tmp_path / "here" / "figures" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -28,6 +33,12 @@ def compare(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "save_kills", lambda out: None)
     monkeypatch.setattr("sys.argv", ["compare.py", "../made"])
     return module.main
+
+
+def test_another_cpu_type_finds_the_committed_statistics(module, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    teacher, distilled = module.committed("SimpleGoal-v0")
+    assert teacher["mean"] > distilled["mean"] and teacher["outliers"] < distilled["outliers"]
 
 
 def test_equal_files_pass(compare, capsys):
