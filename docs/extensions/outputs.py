@@ -15,7 +15,6 @@ from PIL import Image
 
 _IMAGE = re.compile(r"data:image/(?:png|gif);base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
-_MOST_ROWS = 50  # longer tables are folded
 _NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?|nan|NaN|inf|True|False|[–—]|")
 
 
@@ -96,11 +95,7 @@ def _table(soup: BeautifulSoup, table) -> None:
     for string in table.find_all(string=_MATH):
         markup = _MATH.sub(lambda found: mathml(found[1]), html.escape(string, quote=False))
         string.replace_with(BeautifulSoup(markup, "html.parser"))
-    box = table.wrap(soup.new_tag("div", attrs={"class": "pst-scrollable-table-container"}))
-    if (n := len(table.select("tbody > tr"))) > _MOST_ROWS:
-        fold, summary = soup.new_tag("details"), soup.new_tag("summary")
-        summary.string = f"table of {n} rows"
-        box.wrap(fold).insert(0, summary)
+    table.wrap(soup.new_tag("div", attrs={"class": "pst-scrollable-table-container"}))
 
 
 def _join_headers(table) -> None:
