@@ -65,14 +65,17 @@ def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one_o
     assert taught == [("best", MOUNTAINCAR, 3e-3), ("best", PENDULUM, None), ("shipped", LUNARLANDER), shipped]
 
 
-def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned(monkeypatch):
-    screened = []
+def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned_and_the_best_again(monkeypatch):
+    screened, tuned = [], []
     monkeypatch.setattr(limit, "N_SLOW", 1)
     monkeypatch.setattr(limit, "_screened", lambda *some, closest: screened.append(closest) or "policy")
     monkeypatch.setattr(limit, "rollout", lambda *some: None)
     monkeypatch.setattr(limit, "score", lambda *some: 0.0)
-    monkeypatch.setattr(limit, "_tuned", lambda policy, *rest: policy)
+    monkeypatch.setattr(limit, "_tuned", lambda policy, *rest: tuned.append(rest[-2:]) or policy)
     assert at_the_limit(LUNARLANDER, seed=0) == "policy" and screened == [True]
+    whole = limit_preset(LUNARLANDER).n_generations
+    assert [config.n_generations for config, _ in tuned] == [whole, 0.4 * whole]
+    assert len({seed for _, seed in tuned}) == 2
 
 
 def test_what_cannot_be_searched_is_refused():

@@ -116,13 +116,13 @@ def test_a_table_differs_by_task_where_rows_take_long():
 
 def test_of_tasks_that_take_long_fewer_rows_are_asked_and_their_tail():
     found = {table: jobs_of(LUNARLANDER, table) for table in tables_of(LUNARLANDER)}
-    assert list(found) == ["beyond", "tuned", "faithful"]
+    assert list(found) == ["beyond", "tuned", "faithful", "limit"]
     assert {job.size for table in ("tuned", "faithful") for job in found[table]} == {0, 1, 2, 4, 8}
     assert {table: {job.tail for job in jobs} for table, jobs in found.items()} == {
-        "beyond": {False}, "tuned": {True}, "faithful": {True}
+        "beyond": {False}, "tuned": {True}, "faithful": {True}, "limit": {False}
     }  # fmt: skip
     n_seeds = {table: len({job.seed for job in jobs}) for table, jobs in found.items()}
-    assert n_seeds == {"beyond": 5, "tuned": 3, "faithful": 10}
+    assert n_seeds == {"beyond": 5, "tuned": 3, "faithful": 10, "limit": 2}
     assert sum(job.size == faithful_preset(LUNARLANDER).n_cells for job in found["faithful"]) == 10
 
 
@@ -131,6 +131,19 @@ def test_a_row_with_its_tail_is_another_row(small):
     assert plain.path("") != tailed.path("") and plain.provenance["teacher"] == tailed.provenance["teacher"]
     row = make_row(tailed)[1]["row"]
     assert row.pop("worst") <= row["mean"] and row == make_row(plain)[1]["row"]
+
+
+def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
+    for module in (measure, method_rows):
+        small.setattr(module, "SLOW", {SIMPLEGOAL: 10})
+    policy, played = VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), []
+    small.setattr(measure, "rollout", lambda *given: played.append(len(given[2])) or rollout(*given))
+    for name, whole in (("at the limit", True), ("CART", False)):
+        job = Job(SIMPLEGOAL, name, 3, 0)
+        assert job.whole == whole
+        measure.measure(policy, policy, get_task(SIMPLEGOAL), whole=job.whole)
+    assert played == [measure.N_REPORTED, measure.N_REPORTED // 10]
+    assert measure.settings(whole=True) == measure.settings() | {"whole": True}
 
 
 def test_a_tuned_row_depends_on_the_settings_of_the_tuning(small):

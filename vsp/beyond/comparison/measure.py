@@ -23,10 +23,10 @@ N_COMMON = 10_000  # states on which actions and cells are compared
 TAIL = 0.01  # share of the episodes that count as the worst
 
 
-def settings(*, tail: bool = False) -> dict:
+def settings(*, tail: bool = False, whole: bool = False) -> dict:
     """Return the settings that determine the numbers of a policy, as JSON-able values."""
     about = {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
-    return about | ({"tail": TAIL} if tail else {})
+    return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
 
 
 def common() -> dict:
@@ -34,15 +34,18 @@ def common() -> dict:
     return {"states": N_COMMON}
 
 
-def measure(policy: Policy, teacher: Policy, task: Task, *, tail: bool = False) -> dict[str, float]:
+def measure(
+    policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False
+) -> dict[str, float]:
     """Measure a policy: returns, action errors, size and cost.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
     teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
-    `tail`, worst (mean return of the worst episodes). Tasks in `SLOW` are played fewer times.
+    `tail`, worst (mean return of the worst episodes). Tasks in `SLOW` are played from fewer starts; with
+    `whole`, their returns come from all report starts.
     """
     fewer = SLOW.get(task.name, 1)
-    result = rollout(policy, task, start_states(task, N_REPORTED // fewer, REPORT_SEED))
+    result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), REPORT_SEED))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
     parameters, operations = cost(policy)
     row = {

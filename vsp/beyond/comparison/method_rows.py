@@ -18,7 +18,7 @@ import pandas as pd
 from ...config import Config, paper_preset
 from ...paper.results import load_made, make_missing, provenance, provenance_folder
 from ...policy import VoronoiPolicy
-from ...tasks.registry import get_task
+from ...tasks.registry import SLOW, get_task
 from ...teachers.teacher import Teacher, further_teachers, load_teacher
 from ..optimum import limit
 from ..refinement.config import Faithful, Refinement, faithful_preset, tuned_preset
@@ -68,12 +68,18 @@ class Job:
         return replace(METHODS["refined"], settings=ABLATION[self.method.removeprefix("refined, ")])
 
     @property
+    def whole(self) -> bool:
+        """Whether a slow task is played from all report starts: at the limit, small differences count."""
+        return self.task in SLOW and self.how.preset == "limit"
+
+    @property
     def provenance(self) -> dict[str, str | int]:
         """What identifies the row besides its seed: settings (an id), teacher, version."""
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
-        about["measure"] = measure.settings(tail=self.tail) | (measure.common() if how.preset in ALIKE else {})
+        about["measure"] = measure.settings(tail=self.tail, whole=self.whole)
+        about["measure"] |= measure.common() if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
@@ -140,7 +146,7 @@ def make_row(job: Job) -> tuple[dict, dict]:
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
-    row = measure.measure(policy, teacher, budget.task, tail=job.tail)
+    row = measure.measure(policy, teacher, budget.task, tail=job.tail, whole=job.whole)
     row |= measure.fidelity(policy, teacher, budget.task) if job.how.preset in ALIKE else {}
     if not isinstance(policy, VoronoiPolicy):
         return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}

@@ -226,6 +226,7 @@ LONG_TABLES = {
         seeds=range(3), fewer=range(3), sizes=LONG_SIZES, tail=True,
     ),
     "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
+    "limit": Table(LIMIT, seeds=range(2), sizes=(3,)),
 }  # fmt: skip
 # Most sizes of HalfCheetah have one seed. One cell trained further is the control: it has a teacher too, as eight have
 _TREES = {name: replace(method, tasks=WALKERS[1:]) for name, method in ROBOTS.items() if "tree" in name}
