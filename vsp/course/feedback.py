@@ -75,7 +75,7 @@ class Exercise:
 
     number: str
     name: str
-    library: tuple[str, ...] = ()  # "module.name" of library functions that the answer must not call
+    refused: tuple[str, ...] = ()  # "module.name" of vsp functions that the answer must not call
     seconds: float = 30  # time limit of a check
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
@@ -128,7 +128,7 @@ class Exercise:
         self.refuse_if(not callable(function), f"{function!r}", "a function")
         given = arguments if keep else copy.deepcopy(arguments)
         try:
-            with calls_of(self.library) as called:
+            with calls_of(self.refused) as called:
                 result = function(*given)
         except NotImplementedError:
             raise self.unsolved() from None

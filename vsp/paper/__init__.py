@@ -5,6 +5,7 @@ from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison
 from .ledger import N_RESAMPLES, largest_gaps, ledger_table, left_out_by_quartiles, results_of, verdict_counts
 from .printed import (
     SHORT,
+    SUBJECTS,
     TASKS,
     printed_spread,
     printed_spread_values,

@@ -145,13 +145,8 @@ def simplegoal_coverage() -> Finding:
     )
     wrong = [spread_id(SIMPLEGOAL, "ours", "coverage")]
     shown = _quote(*wrong, "sg_ours_outliers", "sg_total_episodes")
-    return _finding(
-        "SimpleGoal: coverage and outliers of the distilled policies",
-        shown,
-        text,
-        rounds_to(ours.coverage(), printed),
-        wrong,
-    )
+    agrees = rounds_to(ours.coverage(), printed)
+    return _finding("SimpleGoal: coverage and outliers of the distilled policies", shown, text, agrees, wrong)
 
 
 def other_columns() -> Finding:
@@ -292,13 +287,8 @@ def printed_digits() -> Finding:
     }
     notes = [f"{(n == digits).sum()} have {digits:g} {kind} (all {n.min()} to {n.max()})" for kind, n in counts.items()]
     agrees = any((n == digits).all() for n in counts.values())
-    return _finding(
-        "T3 and T4: coefficients rounded to four digits",
-        _quote(*ids),
-        f"Of {len(numbers)} numbers {', '.join(notes)}",
-        agrees,
-        ids,
-    )
+    text = f"Of {len(numbers)} numbers {', '.join(notes)}"
+    return _finding("T3 and T4: coefficients rounded to four digits", _quote(*ids), text, agrees, ids)
 
 
 def simplegoal_rows() -> Finding:

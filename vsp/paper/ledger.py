@@ -139,7 +139,7 @@ def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
     half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
     statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
     statistic = statistic.str.replace("whisker low", "lower bound").str.replace("whisker high", "upper bound")
-    name = rows["subject"].replace({"DRL": "teacher", "Ours": "distilled"}) + ": " + statistic
+    name = rows["subject"].replace(printed.SUBJECTS) + ": " + statistic
     frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"], "wide": rows["wide"]})
     return frame.set_index(pd.Index(name, name="statistic"))
 

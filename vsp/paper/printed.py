@@ -22,6 +22,7 @@ from ..run.listed import read_listed
 FOLDER = ROOT / "data" / "paper"
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
 PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # prefixes of the ids of printed values
+SUBJECTS = {"DRL": "teacher", "Ours": "distilled"}  # the paper's names, and ours
 SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
 _POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))

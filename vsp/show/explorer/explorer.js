@@ -282,6 +282,7 @@ function draw(view) {
     view.mapped = view.cell
     clearTimeout(view.later)
     view.later = setTimeout(() => {
+      if (view.waiting) return // a change comes, and its own timer
       if (view.played < view.scene.starts.length) view.judge()
       drawMap(view, FINE)
       drawAll(view)
