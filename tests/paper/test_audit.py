@@ -189,14 +189,14 @@ def test_other_tables_other_verdicts(monkeypatch):
     cells = values["id"].str.contains("_cell_")
     values.loc[cells, "paper"] = values.loc[cells, "value"].map("{:.4f}".format)
     put("printed_values", values)
-    assert audit.printed_digits().verdict == HOLDS
+    assert audit.policies.printed_digits().verdict == HOLDS
     put("linear_policies", policies.assign(G_printed=policies["F_printed"]))
-    assert audit.dimensions().verdict == HOLDS
+    assert audit.policies.dimensions().verdict == HOLDS
     put("published_policy", published)
     put("linear_policies", policies.replace("LimeGreen", "Goldenrod"))
-    assert audit.mountaincar_colours().verdict == HOLDS
+    assert audit.policies.mountaincar_colours().verdict == HOLDS
     put("printed_hyperparameters", {"n_epochs": 8, "n_split": 4, "n_freeze": 4})
-    assert audit.frozen_iterations().verdict == HOLDS
+    assert audit.protocol.frozen_iterations().verdict == HOLDS
 
 
 # Rounding of the printed values decides nothing
