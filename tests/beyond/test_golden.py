@@ -80,6 +80,7 @@ AT_LENGTH = {  # numbers that decide on a policy and are made small here
     "soft tree, DAgger": SoftTree.N_STEPS,
     "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,
     "TD-AVQ, coarse": inspect.signature(tdavq.learn).parameters["n_steps"].default,
+    "at the limit": [limit.N_STARTS, limit.N_SLOW, limit.SCREENING, limit.SECOND, *limit.PRICE.values()],
 }
 
 
@@ -137,7 +138,8 @@ def by_best_policies():
 
 
 def by_limit():
-    return {SIMPLEGOAL: actions(at_the_limit(SIMPLEGOAL, SMALL, seed=0, teacher=TEACHERS[SIMPLEGOAL]), SIMPLEGOAL)}
+    policy = at_the_limit(SIMPLEGOAL, SMALL, seed=0, teacher=TEACHERS[SIMPLEGOAL])
+    return {"at length": AT_LENGTH["at the limit"], SIMPLEGOAL: actions(policy, SIMPLEGOAL)}
 
 
 CASES = {

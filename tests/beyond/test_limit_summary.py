@@ -2,7 +2,7 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
-from vsp.beyond.comparison import best_mean, limit_summary, near, references, starts_summary, walking
+from vsp.beyond.comparison import best_mean, limit_summary, near, references, robots_summary, starts_summary
 from vsp.paper.results import write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3, "parameters": 9, "operations": 9.0}
@@ -40,7 +40,7 @@ def test_robots_stand_beside_their_teacher(tmp_path):
     frame = rows(*found, ("robot's teacher", 0, 0, 100.0)).assign(r2=[0.8, 0.9, -1.0, 1.0])
     write_results(frame, f"robots_{CHEETAH}", out=tmp_path)
     write_results(rows(("oblique tree", 8, 0, 30.0)).assign(r2=0.7), f"trees_{CHEETAH}", out=tmp_path)
-    table = walking(CHEETAH, tmp_path / "data/results").set_index("method")
+    table = robots_summary(CHEETAH, tmp_path / "data/results").set_index("method")
     assert table.index[0] == "robot's teacher" and table.loc["cells", "share"] == 0.5
     assert table.loc["cells", "r2"] == pytest.approx(0.85) and table.loc["cells", "policies"] == 2
     assert table.loc["one map, random search", "share"] == 0.2 and table.loc["oblique tree", "share"] == 0.3

@@ -3,6 +3,7 @@ import pytest
 from support import PENDULUM
 
 from vsp.beyond.optimum import best_policy
+from vsp.beyond.optimum.losses import PENDULUM as REGIONS
 from vsp.beyond.optimum.losses import held, losses, swung
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
@@ -18,7 +19,7 @@ def test_held_by_hand():
 def test_losses_add_up_to_the_regret():
     task, teacher, best = get_task(PENDULUM), load_teacher(PENDULUM), best_policy(PENDULUM, finer=0.5)
     starts = task.start(np.random.default_rng(0), 300)
-    found = losses(teacher, best, task, starts)
+    found = losses(teacher, best, task, starts, REGIONS)
     regret = (rollout(best, task, starts).returns - rollout(teacher, task, starts).returns).mean()
     assert found.steps.sum() == pytest.approx(1) and found.steps["hold"] > 0.7
     assert found.lost.sum() == pytest.approx(regret, abs=1.0) and (found.lost > -0.5).all()
@@ -27,4 +28,5 @@ def test_losses_add_up_to_the_regret():
 
 def test_the_best_loses_nothing():
     task, best = get_task(PENDULUM), best_policy(PENDULUM, finer=0.5)
-    assert losses(best, best, task, task.start(np.random.default_rng(0), 50)).lost.sum() == pytest.approx(0, abs=1e-9)
+    starts = task.start(np.random.default_rng(0), 50)
+    assert losses(best, best, task, starts, REGIONS).lost.sum() == pytest.approx(0, abs=1e-9)

@@ -2,8 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 from support import PENDULUM, WALKER
 
+from vsp.baselines.simple import ZeroPolicy
 from vsp.beyond.robots.imitation import Pushed, imitate_pushed
 from vsp.beyond.robots.settings import Walking, walking_preset
 from vsp.rollouts import visited_states
@@ -34,15 +36,17 @@ def test_imitation_acts_and_repeats():
 
 
 def test_corrections_and_pushes_bring_states_that_the_teacher_never_sees():
-    counts = []
+    task, teacher, rounds = get_task(PENDULUM), load_teacher(PENDULUM), []
 
-    def counting(frame, seen, before, rng):
-        counts.append(len(seen.inputs))
-        return load_teacher(PENDULUM)
+    def idle(frame, seen, before, rng):
+        rounds.append(frame.states(seen.inputs))
+        return ZeroPolicy(task)
 
-    config = replace(FEW, n_states=10**6, n_corrections=2)
-    imitate_pushed(load_teacher(PENDULUM), PENDULUM, config, seed=0, fit=counting)
-    assert counts == [3 * 4 * 200, (3 * 4 + 2) * 200, (3 * 4 + 4) * 200]
+    imitate_pushed(teacher, PENDULUM, replace(FEW, n_states=10**6, n_corrections=2), seed=0, fit=idle)
+    assert [len(states) for states in rounds] == [3 * 4 * 200, (3 * 4 + 2) * 200, (3 * 4 + 4) * 200]
+    known = KDTree(visited_states(teacher, task, task.start(np.random.default_rng(9), 100)))
+    own, pushed, visited = (known.query(rounds[-1][part])[0].mean() for part in np.split(np.arange(3200), [800, 2400]))
+    assert pushed > 1.5 * own and visited > 3 * own
 
 
 def test_settings_out_of_range_are_refused():

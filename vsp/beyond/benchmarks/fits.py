@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from ...paper.results import settings_id, write_results
 from ...run.machine import cpu_type
 from ...run.progress import progress
-from ..refinement.search import LEAKS, TEMPERATURES, whole_loss
+from ..refinement.search import CLIP_SLOPES, TEMPERATURES, whole_loss
 from ..refinement.units import Cells, LabelledStates
 from .lookup import seconds
 
@@ -42,7 +42,7 @@ def evaluation(d: int, k: int, n: int, *, seed: int = 0):
     inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
     cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
     actions = np.clip(inputs @ cells.maps[0], -1.0, 1.0)
-    about = {"temperature": TEMPERATURES[_STAGE] * d, "clip_slope": LEAKS[_STAGE]}
+    about = {"temperature": TEMPERATURES[_STAGE] * d, "clip_slope": CLIP_SLOPES[_STAGE]}
     return partial(whole_loss, cells, LabelledStates(inputs, actions), **about)
 
 

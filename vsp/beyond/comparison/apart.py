@@ -135,7 +135,7 @@ def _cooler(seen: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_
         return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = expected_loss(move(step), seen, temperature=temperature, clip_slope=search.LEAKS[stage])
+        value, gradient = expected_loss(move(step), seen, temperature=temperature, clip_slope=search.CLIP_SLOPES[stage])
         by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
         return value, joined([slope * gradient[:cut], by_maps])
 

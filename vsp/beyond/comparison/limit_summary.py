@@ -85,7 +85,7 @@ def robot_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFra
     return pd.concat([read_rows(task, folder, table=name) for name in names], ignore_index=True)
 
 
-def walking(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Summarise the policies of a robot, one row per method and size, the teacher first.
 
     Columns: method, size, policies, mean, low, high (its 95 % interval), failing, share (mean divided by the teacher's

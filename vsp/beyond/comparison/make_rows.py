@@ -33,8 +33,11 @@ def main() -> None:
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), (*LONG, *WALKERS) if arguments.long else TASKS
     rows_in, results = out / "build" / "beyond", out / "data" / "results"
+    advice = "leave --long out" if arguments.long else "add --long"
     wanted = {(table, task): jobs_of(task, table) for task in tasks for table in tables_of(task)}
     wanted = {about: jobs for about, jobs in wanted.items() if not arguments.tables or about[0] in arguments.tables}
+    if not wanted:
+        parser.error(f"argument --tables: {arguments.tables}: no rows for {tasks}, {advice}")
     make_all(rows_in, [job for jobs in wanted.values() for job in jobs], jobs=arguments.jobs)
     seconds = {}
     for (table, task), jobs in wanted.items():

@@ -1,6 +1,8 @@
 """Measure what is reported of a policy beyond the paper: returns, failures, distance from its teacher, and cost.
 
-No method has seen these start states: nothing is fitted to them or selected with them.
+No run has seen these start states: nothing is fitted to them or selected with them. The methods for robots, and the
+search for the limit on LunarLander, were changed after first results from the report starts. So their policies are
+measured from new starts.
 """
 
 from __future__ import annotations
@@ -18,14 +20,15 @@ from ...tasks.registry import SLOW
 
 VERSION = 1  # raise it when the same policy gives different numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and for action errors
+NEW_SEED = 23  # seed of the start states from which nothing was measured before a method was final
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
 TAIL = 0.01  # share of the episodes that count as the worst
 
 
-def settings(*, tail: bool = False, whole: bool = False) -> dict:
+def settings(*, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED) -> dict:
     """Return the settings that determine the numbers of a policy, as JSON-able values."""
-    about = {"starts": [REPORT_SEED, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
+    about = {"starts": [seed, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
     return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
 
 
@@ -35,17 +38,18 @@ def common() -> dict:
 
 
 def measure(
-    policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False
+    policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
 ) -> dict[str, float]:
     """Measure a policy: returns, action errors, size and cost.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
     teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
     `tail`, worst (mean return of the worst episodes). Tasks in `SLOW` are played from fewer starts; with
-    `whole`, their returns come from all report starts.
+    `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
+    returns.
     """
     fewer = SLOW.get(task.name, 1)
-    result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), REPORT_SEED))
+    result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), seed))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
     parameters, operations = cost(policy)
     row = {

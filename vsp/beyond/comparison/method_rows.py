@@ -1,6 +1,7 @@
 """Make the rows of the comparison beyond the paper: every method at every size.
 
-All methods have the same teachers, budgets and start states. `make beyond` makes the missing rows.
+The methods of a table have the same budgets and start states, and, but for the table "limit", the same teacher. `make
+beyond` makes the missing rows.
 data/results/beyond_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
 to run, so they are in a separate file, beyond_seconds.csv.
 """
@@ -69,8 +70,13 @@ class Job:
 
     @property
     def whole(self) -> bool:
-        """Whether a slow task is played from all report starts: at the limit, small differences count."""
+        """Whether a slow task is played from as many starts as others: at the limit, small differences count."""
         return self.task in SLOW and self.how.preset == "limit"
+
+    @property
+    def start_seed(self) -> int:
+        """The seed of the start states: new ones where a method was changed after first results."""
+        return measure.NEW_SEED if self.whole or self.how.preset == "walking" else measure.REPORT_SEED
 
     @property
     def provenance(self) -> dict[str, str | int]:
@@ -78,7 +84,7 @@ class Job:
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
-        about["measure"] = measure.settings(tail=self.tail, whole=self.whole)
+        about["measure"] = measure.settings(tail=self.tail, whole=self.whole, seed=self.start_seed)
         about["measure"] |= measure.common() if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
@@ -108,7 +114,7 @@ def _teacher(task: str, agent: int) -> Teacher:
 
 
 def jobs_of(task: str, table: str = "beyond") -> list[Job]:
-    """List all rows of a task in `table`, a key of `TABLES`."""
+    """List all rows of a task in `table`, a key of `tables_of(task)`."""
     about, found = tables_of(task)[table], []
     for name, method in about.methods.items():
         if method.tasks is None or task in method.tasks:
@@ -146,7 +152,7 @@ def make_row(job: Job) -> tuple[dict, dict]:
     began = time.perf_counter()
     policy = job.how.make(budget, job.size, job.seed, **job.how.settings)
     seconds = time.perf_counter() - began
-    row = measure.measure(policy, teacher, budget.task, tail=job.tail, whole=job.whole)
+    row = measure.measure(policy, teacher, budget.task, tail=job.tail, whole=job.whole, seed=job.start_seed)
     row |= measure.fidelity(policy, teacher, budget.task) if job.how.preset in ALIKE else {}
     if not isinstance(policy, VoronoiPolicy):
         return {}, {"kind": "Row", **job.about(), "row": row, "seconds": seconds}

@@ -9,9 +9,10 @@ import os
 
 import numpy as np
 import pandas as pd
+from scipy.stats import sem
+from scipy.stats import t as student_t
 
 from ...paper.results import read_results
-from ...paper.statistics import interval
 from ..refinement.config import tuned_preset
 from .method_tables import ABLATION, METHODS
 
@@ -36,12 +37,23 @@ def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
     """
     found = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):
-        low, high = interval(rows["mean"].to_numpy(), np.mean, vectorized=True) if len(rows) > 1 else (np.nan, np.nan)
+        low, high = mean_interval(rows["mean"].to_numpy())
         scores = {"mean": rows["mean"].mean(), "low": low, "high": high, "median": rows["mean"].median()}
         means = {name: rows[name].mean() for name in MEASURED[1:]}
         found.append({"method": method, "size": size, "policies": len(rows), **scores, **means})
     order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
     return pd.DataFrame(found).sort_values(**order)
+
+
+def mean_interval(values: np.ndarray) -> tuple[float, float]:
+    """Return the 95 % interval (Student's t) of the mean of `values` (n,) over other seeds; NaN for a single value.
+
+    Seeds are few, and of three or five a bootstrap interval would be too narrow.
+    """
+    if len(values) < 2:
+        return np.nan, np.nan
+    half = student_t.ppf(0.975, len(values) - 1) * sem(values)
+    return values.mean() - half, values.mean() + half
 
 
 def rivals(table: pd.DataFrame) -> pd.DataFrame:

@@ -1,7 +1,7 @@
 """The methods that are compared beyond the paper, each a function of a budget, a size and a seed.
 
 The budget is the teacher and the episodes of a `Refinement`. A fit to the teacher's own episodes alone gets as many
-episodes as the other methods get in all rounds. Methods that find their own size ignore the budget: the paper's method
+episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. The paper's method
 uses the episodes of its own preset, and TD-AVQ has no teacher.
 """
 
@@ -12,8 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from ...algorithms import distill
 from ...baselines import tdavq
 from ...baselines.dagger import dagger
@@ -22,17 +20,15 @@ from ...baselines.small_network import SmallNetwork, units_for
 from ...baselines.soft_tree import SoftTree
 from ...baselines.trees import LinearTree, ObliqueLinearTree, Tree
 from ...config import Config
-from ...policy import VoronoiPolicy
-from ...rollouts import Policy, visited_states
+from ...rollouts import Policy
 from ...tasks.base import Task
 from ..optimum import at_the_limit
 from ..refinement.config import Faithful, Refinement
 from ..refinement.faithful import distill_faithfully
 from ..refinement.imitate import imitate
 from ..refinement.refine import refine
-from ..refinement.units import Frame, LabelledStates
-from ..robots import Walking, imitate_pushed, search_one_map
-from .tuning import in_units, tuned
+from ..robots import Walking
+from .tuning import tuned
 
 
 @dataclass(frozen=True)
@@ -61,7 +57,7 @@ def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
     return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
 
 
-def faithfully(budget: Budget, size: int, seed: int, **changes) -> Policy:
+def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
     """Call `distill_faithfully` with some settings of the faithful preset changed."""
     config = replace(budget.config, n_cells=size, **changes)
     with warnings.catch_warnings():
@@ -83,7 +79,7 @@ def imitated(budget: Budget, size: int, seed: int) -> Policy:
     return imitate(budget.teacher, budget.task, config, seed=seed)
 
 
-def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
+def gently(budget: Budget, size: int, seed: int, **changes) -> Policy:
     """Tune the policy of `imitated` gently, as long as the gain outweighs the distance from the teacher.
 
     Of the teacher's episodes, those of one round serve the tuning, and those of the other rounds the fit.
@@ -92,45 +88,6 @@ def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
     start = imitated(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
     changes |= {"n_restarts": 1, "n_corrections": 0, "n_episodes": config.n_correction_episodes}
     return refine(budget.teacher, budget.task, replace(config, n_cells=size, **changes), seed=seed, start=start)[0]
-
-
-# Of robots
-
-
-def robot(budget: Budget, size: int, seed: int) -> Policy:
-    """Call `imitate_pushed`: cells act like the teacher, also after a push or a mistake of their own."""
-    return imitate_pushed(budget.teacher, budget.task, replace(budget.config, n_cells=size), seed=seed)
-
-
-def robot_tree(budget: Budget, size: int, seed: int) -> Policy:
-    """Fit an oblique tree with linear leaves to states collected as in `robot`, in as many rounds."""
-
-    def fit(frame: Frame, seen: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
-        states, actions = frame.states(seen.inputs), frame.actions(seen.actions)
-        tree_seed = int(rng.integers(2**31))
-        return ObliqueLinearTree(states, actions, leaves=size, task=budget.task, seed=tree_seed)
-
-    return imitate_pushed(budget.teacher, budget.task, budget.config, seed=seed, fit=fit)
-
-
-def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy]) -> Policy:
-    """Continue the teacher's training with the policy of `imitation` as its actor."""
-    from ..robots.further_training import train_further  # imported here, since it imports torch
-
-    start, task = imitation(budget, size, seed), budget.task
-    states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
-    frame = Frame.of(task, states)
-    if isinstance(start, VoronoiPolicy):  # including a single cell
-        frame = replace(frame, scale=start.scale)
-        numbers = frame.cells(start)
-    else:
-        frame, numbers = in_units(start, frame)
-    return train_further(frame, numbers, budget.teacher, budget.config, seed=seed)
-
-
-def searched(budget: Budget, size: int, seed: int) -> Policy:
-    """Find one linear map by random search on the return alone."""
-    return search_one_map(budget.task, budget.config, seed=seed)
 
 
 # Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves

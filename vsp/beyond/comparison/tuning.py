@@ -151,6 +151,8 @@ def in_units(policy: Policy, frame: Frame) -> tuple[Frame, Numbers]:
     The frame has the policy's own scale, or that of `frame` if the policy has none. Raises TypeError for a kind of
     policy that has no numbers to tune.
     """
+    if isinstance(policy, Tunable):
+        return policy.frame, policy.numbers
     if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
         own = replace(frame, scale=policy.scale)  # the scale is part of its borders
         return own, own.cells(policy)

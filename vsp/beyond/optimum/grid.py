@@ -30,7 +30,7 @@ class Grid:
     periodic: tuple[bool, bool] = (False, False)
 
     def finer(self, times: float) -> Grid:
-        """Return a grid over the same box, with `times` as many steps between points in each variable."""
+        """Return a grid over the same box, with the spacing of the points divided by `times`."""
         return replace(self, shape=tuple(_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic)))
 
     def points(self) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Find how close a few cells come to the best return: distil the best policy, then tune on the return.
 
-The result of such a search depends on its start. So several starts are tuned briefly, and only the best is tuned to the
-end.
+The result of such a search depends on its initial policy. So several are tuned briefly, and only the best is tuned to
+the end.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from ..refinement.refine import refine
 from .references import TASKS, best_policy
 
 VERSION = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
-N_STARTS, N_SLOW = 12, 2  # starts, every second one a closest imitation; N_SLOW: for tasks with a physics engine
-SCREENING = 0.2  # share of the generations for which each start is tuned
-AGAIN = 0.4  # share of them for a second search from the result, for tasks with a physics engine
+# Initial policies, every second one a closest imitation; N_SLOW: for tasks with a physics engine
+N_STARTS, N_SLOW = 12, 2
+SCREENING = 0.2  # share of the generations for which each initial policy is tuned
+SECOND = 0.4  # share of them for a second search from the result, for tasks with a physics engine
 PRICE = {"MountainCarContinuous-v0": 3e-3}  # per step: a car that arrives sooner tolerates a less exact imitation
 
 _LIMIT = {
@@ -65,7 +66,7 @@ def at_the_limit(
     teacher = _best_teacher(task) if teacher is None else teacher
     n_starts = N_SLOW if task.one_by_one else N_STARTS
     last, *seeds, second = np.random.SeedSequence(seed).generate_state(2 + n_starts).tolist()
-    brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, AGAIN))
+    brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, SECOND))
     screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds)]
     validation = task.start(np.random.default_rng(last), config.n_validation)
     best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
@@ -78,13 +79,13 @@ def _best_teacher(task: Task) -> Policy:
 
 
 def _screened(teacher: Policy, task: Task, config: Refinement, seed: int, *, closest: bool) -> VoronoiPolicy:
-    """Return a briefly tuned start: the closest imitation by `distill_faithfully`, or the best policy of `refine`."""
+    """Return a briefly tuned initial policy: the closest imitation by `distill_faithfully`, or the best of `refine`."""
     if not closest:
         return refine(teacher, task, config, seed=seed)[0]
-    like = replace(faithful_preset(task, n_cells=config.n_cells), n_episodes=config.n_episodes, n_generations=0)
+    closest_fit = replace(faithful_preset(task, n_cells=config.n_cells), n_episodes=config.n_episodes, n_generations=0)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no policy of")  # the return of this imitation does not matter yet
-        policy, _ = distill_faithfully(teacher, task, like, seed=seed)
+        policy, _ = distill_faithfully(teacher, task, closest_fit, seed=seed)
     return _tuned(policy, teacher, task, config, seed)
 
 

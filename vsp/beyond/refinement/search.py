@@ -16,7 +16,7 @@ from .units import Cells, LabelledStates
 
 N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
-LEAKS = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
+CLIP_SLOPES = np.geomspace(0.2, 0.005, N_STAGES)  # slopes of the limited action beyond the limits
 N_ITERATIONS, N_LAST = 40, 60  # of L-BFGS in a stage, and in a stage of the last descent
 FEW = 8000  # states that the rounds use; with too few, the outcome depends on which rare states are drawn
 # Stages of a round, and how many descents go on: stopping sooner is quicker, but loses the best results of few cells
@@ -74,7 +74,7 @@ def _cooler(seen: LabelledStates, cells: Cells, unit: float, stage: int, n_itera
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=LEAKS[stage])
+        value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
         return value, pull_back(gradient)
 
     options = {"maxiter": n_iterations, "maxcor": 20}

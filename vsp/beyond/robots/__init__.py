@@ -1,4 +1,4 @@
-"""Methods for walking robots: many inputs, several actions, and a teacher whose every mistake adds up.
+"""Methods for walking robots: many inputs, several actions, and mistakes that add up.
 
 Imitation includes states after pushes and after the policy's own mistakes. Then the teacher's own training continues,
 with a few cells as its actor.

@@ -1,4 +1,5 @@
-"""Cells and trees as differentiable actors: soft borders while they learn, hard ones when they act. Imports torch."""
+"""Cells and trees as differentiable actors: soft borders while they learn and in the critics' targets, hard ones when
+they act. Imports torch."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import torch
 
 from ..refinement.units import Cells, Frame, parted
 
-LEAK = 0.02  # slope of the limited action beyond the limits in training: without it, a saturated map stays saturated
+CLIP_SLOPE = 0.02  # slope beyond the action limits in training: without it, a saturated map stays saturated
 
 
 class SoftActor(torch.nn.Module):
@@ -41,7 +42,7 @@ class SoftActor(torch.nn.Module):
         if not self.training:
             return limited[torch.arange(len(states)), closeness.argmax(dim=1)]
         shares = torch.softmax(closeness / self._temperature, dim=1)
-        return (shares[:, :, None] * (limited + LEAK * (raw - limited))).sum(dim=1).clamp(-1.0, 1.0)
+        return (shares[:, :, None] * (limited + CLIP_SLOPE * (raw - limited))).sum(dim=1).clamp(-1.0, 1.0)
 
 
 def _to_codewords(states: torch.Tensor, places: list[torch.Tensor], numbers: Cells) -> torch.Tensor:

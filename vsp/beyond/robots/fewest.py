@@ -12,7 +12,6 @@ from ...run.progress import progress
 from ..refinement.simplification import like, rounded
 
 DIGITS = (1, 2, 3, 4)  # significant digits to try, the fewest first
-N_HALVINGS = 6  # steps of the bisection for the number of zero coefficients
 
 
 def fewest_numbers(
@@ -21,7 +20,8 @@ def fewest_numbers(
     """Return `policy` with fewer cells, coefficients and digits, and at least `keep` of its mean return.
 
     Cells are removed one by one, the least visited first; their states then belong to the next codewords. Coefficients
-    are set to zero together, in order of increasing effect on the action where their cell acts. Every candidate plays
+    are set to zero together, in order of increasing effect on the action where their cell acts; a bisection finds how
+    many, as if more zeros never returned more. Every candidate plays
     `n_episodes` episodes from the same starts. Returns the policy, and a row per candidate: stage ("cells", "zeros",
     "digits"), cells, nonzero coefficients, digits (0: all), mean return, kept. Raises ValueError unless `policy` has
     linear cells and a positive mean return, and for a bad seed.
@@ -65,13 +65,15 @@ def _fewer_cells(policy: VoronoiPolicy, starts: np.ndarray, good) -> VoronoiPoli
 
 
 def _more_zeros(policy: VoronoiPolicy, starts: np.ndarray, good) -> VoronoiPolicy:
-    """Set as many coefficients to zero as keep the policy `good`, by bisection over their number."""
+    """Set coefficients to zero, by bisection over their number, as if the policy were `good` up to some number only."""
     states = visited_states(policy, policy.task, starts)
     effect = np.abs(policy.coefficients) * _spread(policy, states)
     order = np.argsort(effect, axis=None, kind="stable")
     least, most, best = 0, len(order), policy
-    for _ in progress(range(N_HALVINGS), "numbers of zeros tried", total=N_HALVINGS, unit="numbers"):
-        middle = (least + most) // 2
+    n = most.bit_length()
+    for _ in progress(range(n), "numbers of zeros tried", total=n, unit="numbers"):
+        if (middle := (least + most) // 2) == least:
+            break
         coefficients = policy.coefficients.copy()
         coefficients.flat[order[:middle]] = 0.0
         candidate = like(policy, policy.codewords, coefficients, policy.scale)

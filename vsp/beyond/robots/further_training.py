@@ -85,9 +85,9 @@ def _model(frame: Frame, numbers, teacher: Teacher, config: Walking, seed: int):
         action_noise=NormalActionNoise(np.zeros(m), NOISE * np.ones(m)),
         policy_kwargs={"net_arch": {"pi": [], "qf": hidden}, "optimizer_kwargs": {"fused": True}},
     )  # fmt: skip
-    for actor in (model.actor, model.actor_target):
+    for actor in (model.actor, model.actor_target):  # the target stays soft, like the actor whose gradient is used
         actor.mu = SoftActor(frame, numbers, config.temperature)
     model.actor.optimizer = torch.optim.Adam(model.actor.parameters(), lr=config.learning_rate, fused=True)
     for critic in (model.critic, model.critic_target):
-        critic.load_state_dict(critics, strict=False)  # the features are the observations and have no weights
+        critic.load_state_dict(critics)
     return model

@@ -15,15 +15,16 @@ from ...policy import VoronoiPolicy
 from ...tasks.base import RUNNING, Task
 from ...tasks.registry import get_task
 
-DIGITS = 4  # decimals of a position, in metres
+DIGITS = 4  # decimals of a position in metres, and of an input
 Body = tuple[dict[str, np.ndarray], tuple[bool, bool]]  # lines (4,): x, z of both ends; back foot down, front foot
 
 
 def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_steps: int) -> pd.DataFrame:
     """Record an episode from the seed `start`: one row per step with cell, feet, and the lines that make up the body.
 
-    Columns step, cell, back and front (whether this foot touches the ground), and for each line of the body x0, z0, x1
-    and z1 in metres, such as "torso x0". Raises ValueError for a robot whose body is not known here.
+    Columns step, cell, back and front (whether this foot touches the ground), for each line of the body x0, z0, x1
+    and z1 in metres, such as "torso x0", and for each input what the policy sees, such as "input θ".
+    Raises ValueError for a robot whose body is not known here.
     """
     task = get_task(task)
     check_count("n_steps", n_steps)
@@ -36,6 +37,7 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
         row = {"step": step, "cell": int(policy.cells(seen)[0]), "back": int(back), "front": int(front)}
         for name, ends in lines.items():
             row |= {f"{name} {end}": round(float(value), DIGITS) for end, value in zip(("x0", "z0", "x1", "z1"), ends)}
+        row |= {f"input {name}": round(float(value), DIGITS) for name, value in zip(task.inputs, seen[0], strict=True)}
         rows.append(row)
         states, _, outcomes = task.step(states, policy.predict(seen)[0])
         if outcomes[0] != RUNNING:

@@ -1,4 +1,4 @@
-"""Imitate on states that come after mistakes, too: from the teacher's episodes, from episodes in which it is pushed,
+"""Imitate also on states that follow a mistake: from the teacher's episodes, from episodes in which it is pushed,
 and from the policy's own."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..refinement.units import Frame, LabelledStates
 from .choice import most_rewarding
 from .settings import Walking
 
-AGAIN = range(N_STAGES // 2, N_STAGES)  # stages of a fit from the cells of the last round
+COOL = range(N_STAGES // 2, N_STAGES)  # stages of a fit from the cells of the last round
 
 # Makes a policy from labelled states; after the first round, it begins from the policy of the round before
 Fit = Callable[[Frame, LabelledStates, Policy | None, np.random.Generator], Policy]
@@ -69,7 +69,7 @@ def cells_fit(config: Walking) -> Fit:
         if before is None:
             cells = least_error(seen, config.n_cells, config.n_restarts, rng)
         else:
-            cells = descend(seen, frame.cells(before), AGAIN)
+            cells = descend(seen, frame.cells(before), COOL)
         return frame.policy(by_visits(cells, seen))
 
     return fit

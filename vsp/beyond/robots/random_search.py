@@ -17,7 +17,7 @@ from ..refinement.units import METRIC
 from .choice import most_rewarding
 from .settings import Walking
 
-EVERY = 8  # one observation out of so many counts for the mean and deviation
+EVERY = 8  # every 8th observation is used for the mean and deviation
 N_CHOICES = 20  # maps kept as candidates, evenly spread over the search
 LEAST_REWARD = -10.0  # per step, in the search: the penalty of a fall, 100, hides what a map did before it
 

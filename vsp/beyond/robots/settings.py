@@ -62,6 +62,8 @@ class Walking:
         for name in (field.name for field in fields(self) if field.type == "float"):
             check_number(name, getattr(self, name), least=0.0 if name in ("push", "gamma") else 1e-12)
         check_number("gamma", self.gamma, least=0.0, most=1.0)
+        check_count("n_best", self.n_best, most=self.n_directions)
+        check_count("n_filling", self.n_filling, most=self.n_steps)
 
 
 # The walker's engine takes three times as long for a step. So TD3 takes half the steps, and the search for one map has
