@@ -68,6 +68,16 @@ def test_an_empty_batch_and_a_list():
     assert TWO.predict([0.25, 0.5])[0].tolist() == [0.5, 0.5]
 
 
+def test_what_the_look_up_uses_cannot_be_edited_behind_its_back():
+    codewords, scale = np.array([[0.2, 0.5], [0.8, 0.5]]), np.ones(2)
+    policy = VoronoiPolicy(codewords, np.zeros((2, 3, 2)), task=SIMPLEGOAL, scale=scale)
+    codewords[0], scale[0] = 9.0, 9.0  # copies of the caller's
+    assert policy.cells([[0.3, 0.5], [0.7, 0.5]]).tolist() == [0, 1]
+    for array in (policy.codewords, policy.scale):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 9.0
+
+
 def test_metric_and_scale_decide_the_cell():
     codewords, maps = [[0.0, 0.75], [0.5, 0.5]], np.zeros((2, 3, 2))
     for metric, cell in (("manhattan", 0), ("euclidean", 1)):

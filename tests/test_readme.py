@@ -143,12 +143,12 @@ def test_faithful_policies_are_those_of_the_table():
 def test_who_leads_is_that_of_the_table():
     table = read_table("beyond_leaders").set_index(["task", "size"])
     two = table.loc[("MountainCar", 2)]
-    assert quoted(f"of a line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
-    assert f"{two['rival mean']:.2f} on average, two of our cells {two['mean']:.2f}" in " ".join(RESULTS.split())
+    assert quoted(f"of a line return {two['rival mean']:.2f}; our search ends at {two['mean']:.2f}")
+    said = f"{two['rival mean']:.2f} on average: a policy of two cells, too, but our search ends at {two['mean']:.2f}"
+    assert said in " ".join(RESULTS.split())
     assert two["rival"] == "oblique tree, constants"
     assert set(table.loc["SimpleGoal", "ahead"]) == set(table.loc["LunarLander", "ahead"]) == {"level"}
-    assert table.index[table["ahead"] == "ours"].tolist() == [("Pendulum", 2)]
-    assert "Our cells lead only on Pendulum, with two cells." in RESULTS
+    assert (table["ahead"] != "ours").all() and "our cells lead nowhere for certain" in " ".join(RESULTS.split())
     lander = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]["LunarLander"]
     said = f"one linear map returns {lander[1, 'one linear map']:.1f}, two of our cells {lander[2, 'our cells']:.1f}"
     assert said in " ".join(RESULTS.split())
@@ -175,9 +175,10 @@ def test_counts_of_the_readme_are_those_of_the_ledger():
         (found["reproduced"], found["reproduced"] + found["differs"])
         for found in (counts["results"], counts["settings"])
     )
-    assert quoted(
-        f"{results} of {of} checkable results reproduce**, and {settings} of {of_settings} checkable settings"
-    )
+    book = read_table("ledger")
+    wide = (book["wide"] & (book["verdict"] == "reproduced") & (book["part"] == "results")).sum()
+    assert quoted(f"{results} of {of} checkable results reproduce** ({wide} only because the interval is wide)")
+    assert quoted(f"and {settings} of {of_settings} settings. On")
     assert quoted(f"contradicts itself in {counts[:, 'contradicts itself'].sum()} values")
 
 

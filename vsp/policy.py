@@ -76,7 +76,7 @@ class VoronoiPolicy:
         d, p, m = len(self.task.low), len(self.policy_class.rows), len(self.task.action_low)
         self.codewords = check_array("codewords", codewords, (-1, d), most=MOST).copy()
         self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), p, m), most=MOST).copy()
-        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,), most=MOST)
+        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,), most=MOST).copy()
         check_choice("metric", metric, geometry.METRICS)
         if not len(self.codewords) or not geometry.all_differ(self.codewords):
             raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
@@ -84,6 +84,8 @@ class VoronoiPolicy:
             raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers of at least {LEAST_SCALE}")
         self.metric = metric
         self._scaled = self.codewords / self.scale
+        for array in (self.codewords, self.scale):  # an edit would not reach the look-up
+            array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.codewords)

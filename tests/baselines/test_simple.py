@@ -48,6 +48,8 @@ def test_cells_of_kmeans_stand_where_the_states_are():
     assert np.abs(near - groups).max() < 0.01 and np.allclose(policy.predict(states)[0], actions)
     again, other = (kmeans_cells(*examples(SIMPLEGOAL), cells=9, task=SIMPLEGOAL, seed=seed) for seed in (1, 2))
     assert not np.array_equal(again.codewords, other.codewords)
+    with pytest.raises(ValueError, match="cells is 3, expected an integer from 1 to 2"):  # two places, three cells
+        kmeans_cells(groups[[0, 1] * 20], np.zeros((40, 2)), cells=3, task=SIMPLEGOAL, seed=0)
 
 
 ROUNDS = types.SimpleNamespace(

@@ -7,6 +7,7 @@ from support import SIMPLEGOAL, CurvedTeacher
 from vsp.beyond.refinement import duration, faithful, search
 from vsp.beyond.refinement.config import Faithful
 from vsp.beyond.refinement.tune import candidates_per_generation, cma_es
+from vsp.beyond.refinement.units import Cells
 from vsp.tasks.registry import get_task
 
 SMALL = Faithful(n_cells=3, n_episodes=100, n_restarts=4, n_generations=10, n_tuning_episodes=50, n_validation=100)
@@ -41,7 +42,7 @@ def test_losses_are_counted_as_the_search_computes_them(monkeypatch):
     rng, counted = np.random.default_rng(0), []
     monkeypatch.setattr(search, "descend", lambda seen, cells, stages, **_: counted.append(len(stages)) or cells)
     monkeypatch.setattr(search, "squared_error", lambda *_: 0.0)
-    monkeypatch.setattr(search, "local_maps", lambda *_: None)
+    monkeypatch.setattr(search, "local_maps", lambda *_: Cells(np.eye(3, 2), np.zeros((3, 3, 1))))
     monkeypatch.setattr(search, "spread", lambda *_: None)
 
     class Seen:
@@ -53,6 +54,11 @@ def test_losses_are_counted_as_the_search_computes_them(monkeypatch):
     search.least_error(Seen(), 3, 20, rng)
     *rounds, last = counted
     assert duration._losses(20, search.FEW) == search.N_ITERATIONS * sum(rounds) + search.N_LAST * last
+
+
+def test_the_time_is_estimated_where_all_starts_are_alike():
+    fixed = replace(get_task(SIMPLEGOAL), name="fixed", start=lambda rng, n: np.tile([[0.9, 0.6]], (n, 1)))
+    assert duration.announcement(CurvedTeacher(), fixed, SMALL).startswith("about")
 
 
 def test_words_for_seconds():

@@ -3,7 +3,7 @@ import pytest
 from support import PENDULUM
 
 from vsp.beyond.optimum import best_policy
-from vsp.beyond.optimum.losses import PENDULUM as REGIONS
+from vsp.beyond.optimum.losses import PENDULUM_REGIONS as REGIONS
 from vsp.beyond.optimum.losses import held, losses, swung
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task

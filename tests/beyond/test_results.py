@@ -120,8 +120,9 @@ def spoil(path, change):
         ("teachers", lambda frame: frame.assign(checksum="0123456789"), "teacher"),
         ("teachers", lambda frame: frame.drop(columns="settings"), "settings"),
         ("teachers", lambda frame: frame.iloc[1:], "rows"),
+        ("teachers", lambda frame: pd.concat([frame, frame[:1]]), "rows"),
     ],
-    ids=["variant", "task", "more", "version", "teacher", "column", "row"],
+    ids=["variant", "task", "more", "version", "teacher", "column", "row", "twice"],
 )  # fmt: skip
 def test_other_rows_are_stale(results, name, change, what):
     spoil(results / f"{name}.csv", change)

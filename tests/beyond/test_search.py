@@ -72,6 +72,15 @@ def test_local_maps_by_hand():
     raise AssertionError("no seed has a codeword in each cluster")
 
 
+def test_equal_codewords_are_dropped_without_another_action():
+    """A teacher that stands still and that one map reproduces leaves no slope that could move them apart."""
+    inputs = np.array([[0.3, 0.4, 1.0]] * 20 + [[0.5, 0.1, 1.0]] * 20)
+    seen = LabelledStates(inputs, np.ones((40, 1)))
+    cells = least_error(seen, 4, 2, np.random.default_rng(0))
+    assert 1 <= len(cells.codewords) <= 2 and squared_error(seen, cells) < 1e-6
+    assert len(np.unique(cells.codewords, axis=0)) == len(cells.codewords)
+
+
 def test_with_fewer_states_than_cells_codewords_repeat():
     cells = local_maps(LabelledStates(np.ones((2, 2)), np.zeros((2, 1))), 4, np.random.default_rng(0))
     assert len(cells.codewords) == 4 and np.isfinite(cells.maps).all()

@@ -66,6 +66,12 @@ def test_where_borders_have_no_common_point_nothing_moves(policy):
     assert gathered(policy, np.random.default_rng(0).random((50, 2))) is policy
 
 
+def test_codewords_gather_around_a_single_state():
+    policy = VoronoiPolicy([[0.2, 0.5], [0.8, 0.5]], np.zeros((2, 3, 2)), task=SIMPLEGOAL)
+    states = np.random.default_rng(0).random((50, 2))
+    assert (gathered(policy, [[0.5, 0.5]]).cells(states) == policy.cells(states)).all()
+
+
 # Pruning
 
 

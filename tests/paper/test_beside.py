@@ -6,7 +6,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
 
 from vsp import algorithms, distill
-from vsp.baselines.simple import linear_map, refit, rule_of_thumb
+from vsp.baselines.simple import kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.baselines.trees import Tree
 from vsp.evaluation import evaluate, rollout_from_seed
 from vsp.paper import beside, printed
@@ -42,7 +42,8 @@ def test_baselines_see_what_a_distillation_sees(task, inclusive, monkeypatch):
 
 
 FITTED = [
-    "one linear map", "tree, 13 leaves", "tree, 32 leaves", "same cells, least squares", "same cells, constants"
+    "one linear map", "tree, 13 leaves", "tree, 32 leaves", "same cells, least squares", "same cells, constants",
+    "k-means cells",
 ]  # fmt: skip
 
 
@@ -53,6 +54,7 @@ def test_the_baselines_of_a_run_are_fitted_on_its_data(tmp_path):
     assert list(found) == FITTED and LEAVES == (13, 32)
     expected = [linear_map(states, actions, SIMPLEGOAL), *(Tree(states, actions, leaves=n) for n in LEAVES)]
     expected += [refit(run.policy, states, actions), refit(run.policy, states, actions, constant=True)]
+    expected += [kmeans_cells(states, actions, cells=len(run.policy), task=SIMPLEGOAL, seed=3)]
     for policy, same in zip(found.values(), expected, strict=True):
         assert np.array_equal(policy.predict(asked)[0], same.predict(asked)[0])
 

@@ -19,7 +19,7 @@ def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: s
     from sklearn.cluster import KMeans
 
     states, actions = check_data(states, actions)
-    check_count("cells", cells, most=len(states))
+    check_count("cells", cells, most=len(np.unique(states, axis=0)))
     check_seed(seed)
     scale = standard(states)[1]
     centres = KMeans(cells, n_init=4, random_state=seed).fit(states / scale).cluster_centers_ * scale

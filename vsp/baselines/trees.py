@@ -216,5 +216,5 @@ def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     states = check_array("states", states, (-1, -1))
     if not states.size:
         raise ValueError(f"states have shape {states.shape}, expected at least one state")
-    scale = states.std(axis=0)
-    return states.mean(axis=0), np.where(scale > 0, scale, 1.0)
+    varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
+    return states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0)

@@ -2,7 +2,7 @@
 
 Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
 fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
-are fitted together, and cells that are grown greedily. It also has our cells, fitted with the same effort.
+are fitted together, and cells that are grown greedily. It also has our cells, fitted from as many random starts.
 `ObliqueLinearTree` is the fourth combination. Each method is a function of a budget, a size and a seed, and is fitted
 to the teacher's own episodes, without corrections.
 """
@@ -200,7 +200,8 @@ def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
     The cell whose best oblique split lowers the squared error most is split. Its codeword is replaced by the best of
     `pairs`: two codewords, one on each side of the hyperplane. Then all states are assigned to their nearest codewords,
     and all maps are refitted by least squares. Codewords never move later. Distances are Euclidean, between
-    standardised states. There are fewer than `size` cells if no further split lowers the error.
+    standardised states. A split lowers the error of a tree; with Voronoi cells it may raise it, for it moves other
+    borders too. There are fewer than `size` cells if no split of a tree lowers the error.
     """
     frame, d, m = Frame.of(task, states), states.shape[1], actions.shape[1]
     points, least = frame.inputs(states)[:, :-1], 1e-9 * np.square(actions).sum()

@@ -102,15 +102,16 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
     """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1.
 
-    Columns: size; mean, low, high and policies of our cells; rival (the name of the best other method), "rival mean"
-    and so on; ahead: "ours" or "theirs" if the intervals do not overlap, else "level".
+    Columns: size; mean, low, high and policies of our cells; rival (the name of the other method with the highest
+    mean), "rival mean" and so on; ahead: "ours" if our interval is above those of all others, "theirs" if one of theirs
+    is above ours, else "level".
     """
     found = []
     for size, rows in table[table["size"] > 1].groupby("size"):
-        own, best = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS].iloc[0]
-        row = {"size": size, **own[["mean", "low", "high", "policies"]], "rival": best["method"]}
-        row |= {f"rival {column}": best[column] for column in ("mean", "low", "high", "policies")}
-        found.append(row | {"ahead": ahead(own, best)})
+        own, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
+        row = {"size": size, **own[["mean", "low", "high", "policies"]], "rival": others["method"].iloc[0]}
+        row |= {f"rival {column}": others[column].iloc[0] for column in ("mean", "low", "high", "policies")}
+        found.append(row | {"ahead": ahead(own, {"low": others["low"].max(), "high": others["high"].max()})})
     return pd.DataFrame(found)
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ...paper.results import read_results
 from ...paper.statistics import percentile_interval
-from .method_summary import AS_GOOD, read_rows
+from .method_summary import AS_GOOD, mean_interval, read_rows
 
 LEAST_R2 = {
     "SimpleGoal-v0": 0.95,
@@ -74,9 +74,9 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     """Compare the methods across all teachers of a task: for each method a row per teacher, then one over all teachers.
 
     Columns: teacher (0: the shipped one; "all"), own (the teacher's mean return), method, size, policies, gap (mean
-    return minus the teacher's, the mean over seeds), low and high (95 % interval of the gap by `over_groups`), r2
-    (median; NaN where it was not measured), good (share of the policies that match their teacher), good_low and
-    good_high (interval of this share for one teacher, by `share_interval`).
+    return minus the teacher's, the mean over seeds), low and high (95 % interval of the gap by `mean_interval`, over
+    all teachers by `over_groups`), r2 (median; NaN where it was not measured), good (share of the policies that match
+    their teacher), good_low and good_high (interval of this share for one teacher, by `share_interval`).
     """
     others = read_rows(task, folder, table="teachers")
     asked = others[["method", "size"]].drop_duplicates()
@@ -101,7 +101,8 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
 
 def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
     """Summarise the rows of some teachers, each group with equal weight."""
-    low, high = over_groups([rows["gap"].to_numpy() for rows in groups])
+    gaps = [rows["gap"].to_numpy() for rows in groups]
+    low, high = over_groups(gaps) if len(gaps) > 1 else mean_interval(gaps[0])
     r2 = pd.concat(groups)["r2"]
     return {
         "policies": len(r2),

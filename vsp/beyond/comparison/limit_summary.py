@@ -13,7 +13,7 @@ import pandas as pd
 from ...paper.results import read_results
 from ..optimum.limit import limit_preset
 from .faithful_summary import share_interval
-from .method_summary import method_summary, read_rows
+from .method_summary import INTERVAL, method_summary, read_rows
 from .method_tables import LIMIT, ROBOT_TABLES, STARTS
 from .regret import best_mean
 
@@ -88,14 +88,14 @@ def robot_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFra
 def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Summarise the policies of a robot, one row per method and size, the teacher first.
 
-    Columns: method, size, policies, mean, low, high (its 95 % interval), failing, share (mean divided by the teacher's
-    mean return), r2 (the median) and parameters.
+    Columns: method, size, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return
+    of a seed), failing, share (mean divided by the teacher's mean return), r2 (the median) and parameters.
     """
     rows = robot_rows(task, folder)
     teacher = rows.loc[rows["method"] == "robot's teacher", "mean"].iloc[0]
     table = method_summary(rows)
-    r2 = rows.groupby(["method", "size"])["r2"].median()
-    table["share"] = table["mean"] / teacher
-    table["r2"] = [r2[about] for about in zip(table["method"], table["size"])]
-    columns = ["method", "size", "policies", "mean", "low", "high", "failing", "share", "r2", "parameters"]
+    by_kind = rows.groupby(["method", "size"])
+    found = by_kind.agg(least=("mean", "min"), most=("mean", "max"), r2=("r2", "median"))
+    table = table.join(found, on=["method", "size"]).assign(share=table["mean"] / teacher)
+    columns = ["method", "size", "policies", *INTERVAL, "least", "most", "failing", "share", "r2", "parameters"]
     return table.loc[(table["method"] != "robot's teacher").sort_values(kind="stable").index, columns]

@@ -14,7 +14,7 @@ from scipy.stats import t as student_t
 
 from ...paper.results import read_results
 from ..refinement.config import tuned_preset
-from .method_tables import ABLATION, METHODS
+from .method_tables import ABLATION, METHODS, UNTUNED
 
 MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameters", "operations")
 INTERVAL = ("mean", "low", "high")
@@ -121,18 +121,18 @@ def seeds_as_good(task: str, frame: pd.DataFrame, method: str = "refined") -> pd
     return parts.assign(gap=parts["gap"] - teacher["mean"]).reset_index()
 
 
-def headline(frames: dict[str, pd.DataFrame], summaries: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Summarise `refined` at the size of the preset, one row per task.
-
-    `frames` holds the rows of `read_rows` by task, and `summaries` their `method_summary` by task.
+def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """Summarise `refined` at the size of the preset, one row per task. `frames` holds the rows by task.
 
     Columns: task, teacher (its mean return), cells, mean, low, high, reached and failing (as in `seeds_as_good`), rival
-    (the best other method with as many cells or leaves), rival mean, and rival reached.
+    (the best other method with as many cells or leaves that is not tuned), rival mean, and rival reached.
     """
     columns = ["cells", *INTERVAL, "reached", "failing", "rival", "rival mean"]
     found = []
     for task, frame in frames.items():
-        table = rivals(summaries[task]).merge(seeds_as_good(task, frame), on="size").rename(columns={"size": "cells"})
+        frame = frame[frame["method"].isin([*METHODS, *UNTUNED])]
+        table = rivals(method_summary(frame)).merge(seeds_as_good(task, frame), on="size")
+        table = table.rename(columns={"size": "cells"})
         (row,) = table.loc[table["cells"] == tuned_preset(task).n_cells, columns].to_dict("records")
         theirs = seeds_as_good(task, frame, row["rival"]).set_index("size")
         teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]

@@ -228,13 +228,13 @@ LONG_TABLES = {
     "faithful": Table(LIKE, seeds=range(10), fewer=range(3), sizes=LONG_SIZES, tail=True),
     "limit": Table(LIMIT, seeds=range(2), sizes=(3,)),
 }  # fmt: skip
-# Most sizes of HalfCheetah have one seed. One cell trained further is the control: it has a teacher too, as eight have
+# One cell trained further is the control: it has a teacher too, as eight have
 _TREES = {name: replace(method, tasks=WALKERS[1:]) for name, method in ROBOTS.items() if "tree" in name}
 ROBOT_TABLES = {
     "robots": Table(
         {name: method for name, method in ROBOTS.items() if name not in _TREES},
         seeds=range(3), fewer=range(3), sizes=(*OWN, 1, 8),
-        by_task={"HalfCheetah-v5": {"seeds": FEW_SEEDS, "fewer": range(1), "sizes": (*OWN, 1, 2, 4, 8, 16)}},
+        by_task={"HalfCheetah-v5": {"seeds": FEW_SEEDS, "fewer": range(3), "sizes": (*OWN, 1, 2, 4, 8, 16)}},
     ),
-    "trees": Table(_TREES, seeds=range(2), fewer=range(2), sizes=(8,)),
+    "trees": Table(_TREES, seeds=range(3), fewer=range(3), sizes=(8,)),
 }  # fmt: skip

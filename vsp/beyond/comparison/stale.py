@@ -7,9 +7,11 @@ rewrites each time are not checked.
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 
 import pandas as pd
@@ -53,7 +55,7 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
         for table in tables_of(task):
             yield f"{table}_{task}.csv", target, partial(_rows, task, table)
             if table == "faithful":
-                yield f"same_{task}.csv", target, lambda _, task=task: [j.provenance for j in jobs_of(task, "faithful")]
+                yield f"same_{task}.csv", target, partial(_pairs, task)
             if table in KEPT:
                 yield f"{table}_{task}.policy", target, lambda _, about=(task, table): [kept_job(*about).provenance]
     yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
@@ -70,9 +72,10 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
 def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dict]]) -> list[str]:
     """Return the columns in which the provenance of the rows differs from today's; none if it is up to date."""
     now = pd.DataFrame(list(today(frame)))
-    columns = [name for name in (*results.PROVENANCE, "seed") if name in now]
+    columns = [name for name in (*results.PROVENANCE, "seed", "other") if name in now]
     now, then = now[columns].astype(str), frame.reindex(columns=columns).dropna(how="all").astype(str)
-    if set(map(tuple, now.to_numpy())) == set(map(tuple, then.to_numpy())):
+    count = Counter if "seed" in now else set  # with a seed, each row stands for one job
+    if count(map(tuple, now.to_numpy())) == count(map(tuple, then.to_numpy())):
         return []
     return [name for name in columns if set(now[name]) != set(then[name])] or ["rows"]
 
@@ -106,6 +109,16 @@ def _rows(task: str, table: str, frame: pd.DataFrame) -> Iterable[dict]:
         if kind not in made_with:
             made_with[kind] = kind.provenance
         yield {"seed": job.seed, **made_with[kind]}
+
+
+def _pairs(task: str, frame: pd.DataFrame) -> Iterable[dict]:
+    """Yield today's provenance of each pair of seeds whose faithful policies are compared."""
+    seeds: dict[Job, list[int]] = {}
+    for job in jobs_of(task, "faithful"):
+        seeds.setdefault(replace(job, seed=0), []).append(job.seed)
+    for kind, found in seeds.items():
+        made_with = kind.provenance
+        yield from ({**made_with, "seed": one, "other": other} for one, other in combinations(found, 2))
 
 
 def main() -> None:

@@ -28,13 +28,13 @@ def swung(obs: np.ndarray) -> np.ndarray:
     return ~held(obs)
 
 
-PENDULUM: dict[str, Region] = {"swing-up": swung, "hold": held}
+PENDULUM_REGIONS: dict[str, Region] = {"swing-up": swung, "hold": held}
 
 
 def losses(
     policy: Policy, best: GridPolicy, task: str | Task, starts: np.ndarray, regions: dict[str, Region]
 ) -> pd.DataFrame:
-    """Return what `policy` loses in each of the `regions`, such as `PENDULUM`, one row per region.
+    """Return what `policy` loses in each of the `regions`, such as `PENDULUM_REGIONS`, one row per region.
 
     Columns: steps (share of the policy's steps that are in the region) and lost (return lost there per episode). The
     sum of all losses of an episode is its regret, up to the grid's error, if no more return is possible after its end.

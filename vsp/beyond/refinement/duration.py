@@ -46,7 +46,8 @@ def _of_an_episode(teacher: Policy, task: Task, config: Faithful, starts: np.nda
     states, m = task.begin(starts), len(task.action_low)
     seen = task.observe(states)
     k, d = config.n_cells, seen.shape[1]
-    cells = VoronoiPolicy(np.resize(seen, (k, d)), np.zeros((k, d + 1, m)), task=task, metric=METRIC)
+    codewords = np.resize(seen, (k, d)) + np.arange(k)[:, None]  # different ones, wherever they are
+    cells = VoronoiPolicy(codewords, np.zeros((k, d + 1, m)), task=task, metric=METRIC)
     step = _seconds(lambda: [task.step(states, cells.predict(task.observe(states))[0]) for _ in range(STEPS)]) / STEPS
     return seconds, step * result.lengths.mean() / len(starts)
 

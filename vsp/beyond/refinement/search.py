@@ -33,7 +33,15 @@ def least_error(seen: LabelledStates, n_cells: int, n_starts: int, rng: np.rando
     for stages, n_kept in ROUNDS:
         ends = [descend(some, cells, stages) for cells in live]
         live = sorted(ends, key=lambda cells: squared_error(seen, cells))[:n_kept]
-    return descend(seen, live[0], LAST, n_iterations=N_LAST)
+    return distinct(descend(seen, live[0], LAST, n_iterations=N_LAST))
+
+
+def distinct(cells: Cells) -> Cells:
+    """Drop codewords that are equal to an earlier one: of equally near codewords the first counts, so no state is in
+    their cells."""
+    _, first = np.unique(cells.codewords, axis=0, return_index=True)
+    first.sort()
+    return Cells(cells.codewords[first], cells.maps[first])
 
 
 def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:

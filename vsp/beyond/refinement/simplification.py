@@ -74,7 +74,7 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
     k, d = points.shape
     if policy.metric != "euclidean" or not 1 < k <= d + 1:
         return policy
-    middle, unit = states.mean(axis=0) / policy.scale, (states / policy.scale).std(axis=0).mean()
+    middle, unit = states.mean(axis=0) / policy.scale, (states / policy.scale).std(axis=0).mean() or 1.0
     points = points - middle
     gaps = points[1:] - points[0]
     if np.linalg.matrix_rank(gaps) < k - 1:

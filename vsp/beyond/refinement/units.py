@@ -26,8 +26,8 @@ class Frame:
     @classmethod
     def of(cls, task: Task, states: np.ndarray) -> Frame:
         """Return the frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
-        scale = states.std(axis=0)
-        return cls(task, states.mean(axis=0), np.where(scale > 0, scale, 1.0))
+        varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
+        return cls(task, states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0))
 
     @property
     def _middle(self) -> np.ndarray:

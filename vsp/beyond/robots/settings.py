@@ -76,5 +76,6 @@ _WALKING = {
 
 
 def walking_preset(task: str | Task) -> Walking:
-    """Return the settings for a robot: eight cells. Raises ValueError as `get_task` does."""
+    """Return the settings for a robot, eight cells; other tasks get those of HalfCheetah. Raises ValueError as
+    `get_task` does."""
     return _WALKING.get(get_task(task).name, Walking(n_cells=8))
