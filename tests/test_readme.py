@@ -283,18 +283,18 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     assert f"generations reach {starts['mean'][1]:.3f}" in block
     robots, said = robots.set_index(["task", "method", "size"]), " ".join(block.split())
     walker, cheetah, ours = robots.loc["BipedalWalker"], robots.loc["HalfCheetah"], "cells, trained further"
-    one, map_, teacher = cheetah["mean"][ours, 1], "one map, random search", "robot's teacher"
-    eight, sixteen = (cheetah.loc[(ours, k)] for k in (8, 16))
-    assert (
-        f"training returns {one:.0f}, eight return {eight['mean']:.0f}, which is {100 * eight['share']:.0f} %" in said
-    )
-    assert f"and sixteen {sixteen['mean']:.0f} ({100 * sixteen['share']:.0f} %; one seed)" in said
-    assert f"random search, returns {cheetah['mean'][map_, 0]:.0f}." in said
-    assert f"in the same way, returns {cheetah['mean']['oblique tree, trained further', 8]:.0f} (two seeds)" in said
-    assert cheetah["high"][map_, 0] < eight["low"] and cheetah["policies"][map_, 0] == eight["policies"] == 5
+    map_, teacher, tree = "one map, random search", "robot's teacher", cheetah.loc[("oblique tree, trained further", 8)]
+    one, eight, sixteen = (cheetah.loc[(ours, k)] for k in (1, 8, 16))
+    share = f"{100 * tree['share']:.0f} % of its teacher's return"
+    assert f"are, returns {tree['mean']:.0f} (three seeds), {share}" in said and tree["policies"] == 3
+    assert f"eight cells {eight['mean']:.0f} ({100 * eight['share']:.0f} %; five seeds)" in said
+    assert f"one cell returns {one['mean']:.0f} and sixteen {sixteen['mean']:.0f} (two seeds each)" in said
+    assert f"random search, returns {cheetah['mean'][map_, 0]:.0f} (five seeds)." in said
+    assert eight["most"] < tree["least"] and cheetah["high"][map_, 0] < eight["low"]
+    assert cheetah["policies"][map_, 0] == eight["policies"] == 5 and one["policies"] == sixteen["policies"] == 2
     assert f"teacher returns {walker['mean'][teacher, 0]:.1f}. Eight" in said
-    assert f"return {walker['mean'][ours, 8]:.1f}, at least {walker['low'][ours, 8]:.0f} with every seed" in said
+    assert f"return {walker['mean'][ours, 8]:.1f}, at least {walker['least'][ours, 8]:.0f} with every seed" in said
     search = walker.loc[(map_, 0)]
-    assert f"returns {search['high']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
+    assert f"returns {search['most']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
     likeness = f"to {eight['r2']:.2f} on HalfCheetah and {walker['r2'][ours, 8]:.2f} on BipedalWalker."
     assert f"lowers R²: with eight cells {likeness}" in said
