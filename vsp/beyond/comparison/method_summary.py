@@ -9,8 +9,7 @@ import os
 
 import numpy as np
 import pandas as pd
-from scipy.stats import sem
-from scipy.stats import t as student_t
+from scipy import stats
 
 from ...paper.results import read_results
 from ..refinement.config import tuned_preset
@@ -52,7 +51,7 @@ def mean_interval(values: np.ndarray) -> tuple[float, float]:
     """
     if len(values) < 2:
         return np.nan, np.nan
-    half = student_t.ppf(0.975, len(values) - 1) * sem(values)
+    half = stats.t.ppf(0.975, len(values) - 1) * stats.sem(values)
     return values.mean() - half, values.mean() + half
 
 
