@@ -288,10 +288,10 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     share = f"{100 * tree['share']:.0f} % of its teacher's return"
     assert f"are, returns {tree['mean']:.0f} (three seeds), {share}" in said and tree["policies"] == 3
     assert f"eight cells {eight['mean']:.0f} ({100 * eight['share']:.0f} %; five seeds)" in said
-    assert f"one cell returns {one['mean']:.0f} and sixteen {sixteen['mean']:.0f} (two seeds each)" in said
+    assert f"one cell returns {one['mean']:.0f} and sixteen {sixteen['mean']:.0f} (three seeds each)" in said
     assert f"random search, returns {cheetah['mean'][map_, 0]:.0f} (five seeds)." in said
     assert eight["most"] < tree["least"] and cheetah["high"][map_, 0] < eight["low"]
-    assert cheetah["policies"][map_, 0] == eight["policies"] == 5 and one["policies"] == sixteen["policies"] == 2
+    assert cheetah["policies"][map_, 0] == eight["policies"] == 5 and one["policies"] == sixteen["policies"] == 3
     assert f"teacher returns {walker['mean'][teacher, 0]:.1f}. Eight" in said
     assert f"return {walker['mean'][ours, 8]:.1f}, at least {walker['least'][ours, 8]:.0f} with every seed" in said
     search = walker.loc[(map_, 0)]
