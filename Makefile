@@ -194,7 +194,7 @@ faults: venv-test-train-dask ## runs the fault-injection tests, into data/result
 beyond: begin venv-train ## compares our own method with others, into data/results/: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 18 HOURS, resumable
+beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 20 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

@@ -233,8 +233,8 @@ _TREES = {name: replace(method, tasks=WALKERS[1:]) for name, method in ROBOTS.it
 ROBOT_TABLES = {
     "robots": Table(
         {name: method for name, method in ROBOTS.items() if name not in _TREES},
-        seeds=range(3), fewer=range(3), sizes=(*OWN, 1, 8),
+        seeds=range(3), fewer=range(3), sizes=LONG_SIZES,
         by_task={"HalfCheetah-v5": {"seeds": FEW_SEEDS, "sizes": None}},
     ),
-    "trees": Table(_TREES, seeds=range(3), fewer=range(3), sizes=(4, 8)),
+    "trees": Table(_TREES, seeds=range(3), fewer=range(3)),
 }  # fmt: skip
