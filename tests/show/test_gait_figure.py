@@ -9,7 +9,7 @@ from vsp.show import style
 from vsp.show.gait import THICK, body_lines, cell_colors, footfall, gait_strip, save_gait
 
 LEG = {"leg x0": np.arange(6.0), "leg z0": 0.0, "leg x1": np.arange(6.0) + 0.5, "leg z1": 1.0}
-FEET = {"back": [1, 0, 0, 0, 0, 1], "front": 0}
+FEET = {"back": [1, 0, 0, 1, 0, 1], "front": [0, 0, 0, 1, 1, 0]}
 GAIT = pd.DataFrame({"step": range(6), "cell": [2, 2, 2, 0, 0, 5], **FEET, **LEG})
 
 
@@ -17,20 +17,20 @@ def test_lines_have_their_ends_in_every_step():
     assert np.array_equal(body_lines(GAIT)["leg"][3], [[3, 0], [3.5, 1]])
 
 
-def test_a_strip_has_a_pose_and_a_time_for_each_step_and_names_the_cells_that_act():
+def test_a_strip_has_a_pose_a_time_and_the_feet_for_each_step_and_names_the_cells_that_act():
     fig, (ax,) = style.panels(1)
     gait_strip(ax, GAIT, range(1, 5), step_seconds=0.05)
     lines = ax.collections
     assert len(lines) == 4 and all(line.get_linewidths()[0] == THICK for line in lines)
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["0.00", "0.05", "0.10", "0.15"]
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["cell 3", "cell 1"]  # the most visited first
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["0.00\n", "0.05\n", "0.10\nboth", "0.15\nfront"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["cell 1", "cell 3"]
     places = [line.get_segments()[0][:, 0].mean() for line in lines]
     assert np.allclose(np.diff(places), places[1] - places[0]) and places[0] == 0
     plt.close(fig)
 
 
 def test_each_cell_has_a_colour_of_its_own_and_steps_must_have_been_recorded():
-    assert len(set(cell_colors(GAIT).values())) == 3
+    assert len(set(cell_colors(GAIT).values())) == 3 and cell_colors(GAIT)[5] == cell_colors(GAIT[GAIT.cell == 5])[5]
     fig, (ax,) = style.panels(1)
     with pytest.raises(ValueError, match="steps are range.*expected some of the 6 recorded"):
         gait_strip(ax, GAIT, range(4, 7), step_seconds=0.05)
@@ -43,8 +43,9 @@ def test_bands_are_the_cells_and_bars_the_feet_on_the_ground():
     band, front, back = (list(bars) for bars in ax.containers)
     colors = cell_colors(GAIT)
     assert [bar.get_facecolor()[:3] for bar in band] == [to_rgb(colors[cell]) for cell in GAIT.cell]
-    assert [bar.get_height() > 0 for bar in back] == [True, False, False, False, False, True]
-    assert not any(bar.get_height() for bar in front) and ax.get_xlim() == (0, 3)
+    for foot, bars in (("back", back), ("front", front)):
+        assert [bar.get_height() > 0 for bar in bars] == [bool(down) for down in GAIT[foot]]
+    assert ax.get_xlim() == (0, 3)
     plt.close(fig)
 
 

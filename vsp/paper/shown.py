@@ -26,6 +26,7 @@ HEADINGS = {
     "index": "sameness",
     "index_least": "lowest sameness",
     "least": "lowest mean",
+    "most": "highest mean",
     "worst": "worst 1 %",
     "worst_least": "lowest worst 1 %",
     "error_teacher": "action error",

@@ -40,7 +40,7 @@ def fit_times(ax: Axes, frame: pd.DataFrame, varied: str) -> Axes:
     taken = 1000 * rows["seconds"]
     ax.plot(rows[varied], taken, marker=".", ms=4, color=DISTILLED, label="measured")
     ax.plot(rows[varied], taken.iloc[-1] * rows[varied] / rows[varied].iloc[-1], ":", color=OTHER, label="proportional")
-    ax.set(xscale="log", yscale="log", xlabel=varied)
+    ax.set(xscale="log", yscale="log", xlabel="inputs" if varied == "dimensions" else varied)
     return ticks_at(ax, rows[varied])
 
 

@@ -32,13 +32,12 @@ def draw_pose(ax: Axes, lines: dict[str, np.ndarray], step: int, *, color, shift
 
 
 def cell_colors(gait: pd.DataFrame) -> dict[int, str]:
-    """Return a colour for each cell, the most visited cell first."""
-    cells = gait.cell.value_counts(sort=True).index
-    return {int(cell): style.COLOURS[i % len(style.COLOURS)] for i, cell in enumerate(cells)}
+    """Return the colour of each cell that acts, in order of number; a number has the same colour in each figure."""
+    return {int(cell): style.COLOURS[int(cell) % len(style.COLOURS)] for cell in np.unique(gait.cell)}
 
 
 def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: float) -> None:
-    """Draw poses side by side, each in the colour of its cell, with the time below.
+    """Draw poses side by side, each in the colour of its cell, with the time and the feet on the ground below.
 
     Raises ValueError for steps that were not recorded.
     """
@@ -49,12 +48,18 @@ def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: floa
     gap = GAP * float(np.ptp(across, axis=1).max())
     for i, step in enumerate(steps):
         draw_pose(ax, lines, step, color=colors[int(gait.cell[step])], shift=i * gap)
-    times = [f"{step_seconds * (step - steps[0]):.2f}" for step in steps]
-    ax.set(xticks=np.arange(len(steps)) * gap, xticklabels=times, yticks=[], xlabel="time (s)", aspect="equal")
+    times = [f"{step_seconds * (step - steps[0]):.2f}\n{_feet_down(gait, step)}" for step in steps]
+    ax.set(xticks=np.arange(len(steps)) * gap, xticklabels=times, yticks=[], aspect="equal")
+    ax.set(xlabel="time (s); foot on the ground")
     ax.axhline(0.0, color="0.6", zorder=0)
     ax.set(xlim=(-gap / 2, (len(steps) - 0.5) * gap))
     ax.spines["left"].set_visible(False)
     _name_cells(ax, {cell: color for cell, color in colors.items() if cell in set(gait.cell[list(steps)])})
+
+
+def _feet_down(gait: pd.DataFrame, step: int) -> str:
+    back, front = bool(gait.back[step]), bool(gait.front[step])
+    return "both" if back and front else "back" if back else "front" if front else ""
 
 
 def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
