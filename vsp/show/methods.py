@@ -12,7 +12,8 @@ from .style import COLOURS, DISTILLED, OTHER, TEACHER
 IMITATIONS = {
     "refined": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, tuned on the return"},
     "refined, not tuned": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
-    "oblique tree, linear leaves, DAgger": {"color": COLOURS[2], "label": "oblique tree, linear leaves"},
+    "oblique tree, linear leaves, DAgger": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
+    "small network, DAgger": {"color": COLOURS[9], "label": "small network"},
     "CART, DAgger": {"color": OTHER, "label": "axis tree, constants"},
     "k-means cells, DAgger": {"color": "0.65", "ls": "--", "label": "k-means cells, linear maps"},
 }
@@ -147,7 +148,7 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
         }
         ax.errorbar(max(1, rows["cells"].median()), middle, [middle - low, high - middle], **look)
     ax.set_xlabel("cells or leaves")
-    return ticks_at(ax, frame.loc[frame["size"] > 0, "size"])
+    return ticks_at(ax, frame.loc[frame["method"].isin(looks) & (frame["size"] > 0), "size"])
 
 
 def ticks_at(ax: Axes, values: pd.Series) -> Axes:
