@@ -58,8 +58,8 @@ def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: floa
 
 
 def _feet_down(gait: pd.DataFrame, step: int) -> str:
-    back, front = bool(gait.back[step]), bool(gait.front[step])
-    return "both" if back and front else "back" if back else "front" if front else ""
+    feet = [foot for foot in ("back", "front") if gait[foot][step]]
+    return "both" if len(feet) == 2 else "".join(feet)
 
 
 def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
