@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from vsp.beyond.comparison import largest_alike
+from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
 
@@ -183,6 +184,11 @@ def test_counts_of_the_readme_are_those_of_the_ledger():
     assert quoted(f"and {settings} of {of_settings} settings. On")
     counted = f"{results} of {of} checkable results reproduce, {wide} of them with a wide interval"
     assert counted in " ".join(RESULTS.split())
+    checked = book[(book["part"] == "results") & book["verdict"].isin(["reproduced", "differs"])]
+    once = checked.drop_duplicates(["task", "subject", "value"])
+    again = f"{of - len(once)} of these results again, mostly in a table after the text; if each counts once, "
+    again += f"{(once['verdict'] == 'reproduced').sum()} of {len(once)} reproduce."
+    assert again in " ".join(RESULTS.split())
     assert quoted(f"contradicts itself in {counts[:, 'contradicts itself'].sum()} values")
 
 
@@ -308,3 +314,31 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     assert f"returns {search['most']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
     likeness = f"to {eight['r2']:.2f} on HalfCheetah and {walker['r2'][ours, 8]:.2f} on BipedalWalker."
     assert f"lowers R²: with eight cells {likeness}" in said
+
+
+def notebook(name):
+    """The text of a notebook in one line."""
+    (path,) = (ROOT / "notebooks").glob(f"{name}_*.ipynb")
+    cells = nbformat.read(path, as_version=4).cells
+    return " ".join(" ".join(cell.source for cell in cells if cell.cell_type == "markdown").split())
+
+
+def test_episodes_that_the_text_compares_are_those_of_the_table():
+    table = read_table("beyond_budgets").set_index(["task", "method"])
+    seen, tuning = table["teacher"].unstack("task"), table["tuning"].unstack("task")
+    times = seen.loc["our cells, faithful"] / seen.loc["our cells"]
+    said = f"{times.min():.0f} to {times.max():.0f} times as many episodes of the teacher"
+    for text in (" ".join(RESULTS.split()), notebook("06"), notebook("09")):
+        assert said in text
+    more = tuning.loc["our cells, tuned"] / tuning.filter(regex="axis tree.*tuned", axis=0).min()
+    assert f"our cells get up to {more.max():.1f} times as many as an axis tree" in notebook("06")
+
+
+def test_how_far_mountaincar_is_from_the_paper_is_that_of_the_ledger():
+    row, said = read_table("ledger", index_col="id"), notebook("05")
+    teacher = row["here"]["mc_drl_mean"] - row["value"]["mc_drl_mean"]
+    implied = quartiles_from_fences(row["value"]["mc_ours_whisker_low"], row["value"]["mc_ours_whisker_high"])
+    ours = [row["here"][f"mc_spread_ours_{name}"] for name in ("q1", "q3")]
+    below = [round(mine - theirs, 1) for mine, theirs in zip(ours, implied, strict=True)]
+    assert f"returns {teacher:.2f} more than the paper's." in said and 0.4 < teacher / below[0] < 0.55
+    assert below[0] == below[1] and f"lie {below[0]} below ours" in said
