@@ -339,7 +339,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         except KernelDied:
             terminate_peers(Path(given.out) / "build" / "locks")  # else make would wait minutes for the others
             raise
-        print(f"{name}: done in {time.monotonic() - began:.0f} s, {len(changed)} files changed", flush=True)
+        files = f"{len(changed)} file{'s' * (len(changed) != 1)}"
+        print(f"{name}: done in {time.monotonic() - began:.0f} s, {files} changed", flush=True)
 
 
 if __name__ == "__main__":
