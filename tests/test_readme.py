@@ -266,6 +266,9 @@ def test_what_is_said_to_be_certain_is_in_its_tables():
             "mountaincar_limit",
         )
     )
+    three, explore = rows.loc["simplegoal_simplified"], (ROOT / "docs/explore.md").read_text("utf-8")
+    told = f"fail from {100 * three['pit']:.2f} % of all starts, the paper's thirteen from {100 * paper['pit']:.2f} %"
+    assert told in " ".join(explore.split()) and three["cells"] == 3
     assert f"pit from {paper['pit']:.4%}".replace("%", " %") in block and f"map from {one['pit']:.4%}"[:-1] in block
     assert tuned["program"] == margin["program"] == 1.0 and (tuned["cells"], margin["cells"]) == (4, 3)
     assert f"goal within {tuned['program_steps']:.0f} steps" in block

@@ -657,7 +657,7 @@ MEANS = "returns.mean(axis=1)[rng.integers(p, size=(4000, p))].mean(axis=1)"
 LOW_HIGH = "np.percentile(means, [2.5, 97.5])"
 wrongs(
     "3.3",
-    ("every episode were a witness", MEANS, "[rng.choice(returns.ravel(), returns.size).mean() for _ in range(400)]"),
+    ("were an independent sample", MEANS, "[rng.choice(returns.ravel(), returns.size).mean() for _ in range(400)]"),
     ("*with* replacement", MEANS, "[rng.permutation(returns).mean() for _ in range(100)]"),
     ("for 90 %", "[2.5, 97.5]", "[5, 95]"),
     ("too few resamples", "4000", "100"),

@@ -13,7 +13,7 @@ from pathlib import Path
 from ..run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
-UNUSED = ("cma", "papermill")  # dependencies of the package that the lessons do not need
+UNUSED = ("papermill",)  # dependencies of the package that the course does not need
 FILES = ("LICENSE", "vsp/**/*.py", "vsp/show/**/*.js", "data/paper/*", "data/teachers/*.*")
 
 README = """# vsp: the course

@@ -166,7 +166,7 @@ def _unsteady(function: Callable, returns: np.ndarray, width: float) -> bool:
 def _other_widths(returns: np.ndarray, width: float) -> list[Mistake]:
     means = returns.mean(axis=1)
     single = 2 * 1.96 * returns.std() / np.sqrt(returns.size)
-    alone = "an interval as narrow as if every episode were a witness of its own"
+    alone = "an interval as narrow as if every episode were an independent sample"
     return [
         Mistake(single, alone, "one as wide as the policies differ", 3),
         Mistake(np.ptp(np.percentile(means, [2.5, 97.5])), "the range of single policies", "the range of *means*", 2),

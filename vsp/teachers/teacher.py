@@ -140,9 +140,10 @@ def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
 def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
     """Load a teacher: the one shipped for a task, or one from a file.
 
-    `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` that Stable-Baselines3
-    saved; for a zip, `task` names the task. Only tensors are read: no code from the file runs. Raises ValueError for an
-    unknown task or a teacher that does not fit, FileNotFoundError, and `run.atomic.DamagedFile`.
+    `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` of a TD3 or DDPG agent
+    with ReLU layers that Stable-Baselines3 saved; for a zip, `task` names the task. Only tensors are read: no code from
+    the file runs. Raises ValueError for an unknown task or a teacher that does not fit, FileNotFoundError, and
+    `run.atomic.DamagedFile`.
     """
     path = Path(source)
     if path.suffix == ".zip":
