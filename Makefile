@@ -35,7 +35,7 @@ READS_OURS := $(foreach n,$(ROWS) optimum \
   $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
 READS_06_few_equations := $(READS_OURS)
-READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL)) starts_MountainCarContinuous-v0 optimum fits \
+READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL) LunarLanderContinuous-v3) trees_HalfCheetah-v5 starts_MountainCarContinuous-v0 optimum fits \
   $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
   $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
   data/results/faithful_Pendulum-v1.policy data/results/robots_HalfCheetah-v5.policy
@@ -45,7 +45,9 @@ READS_08_proofs := $(foreach n,paper tuned,data/proofs/simplegoal_$(n).json) dat
 READS_09_methods := $(READS_OURS) $(foreach n,lookup $(foreach t,$(SMALL),teachers_$(t)) \
   $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
-READS_05_ledger := data/results/readings.csv data/results/teachers.csv $(wildcard $(filter %.csv,$(READS_09_methods)))
+# Notebook 5 lists stale results, so it reads all that are committed
+READS_05_ledger := $(sort data/results/readings.csv data/results/teachers.csv \
+  $(filter-out $(addprefix data/results/,$(RESULTS_03_evaluation)),$(wildcard data/results/*.csv data/results/*.policy)))
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -132,7 +134,7 @@ lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimen
 	$(PY) -m vsp.beyond.benchmarks.fits --out="$$OUT"
 
 proofs: begin venv ## proofs for ten policies: certificates into data/proofs/, and tables: 10 minutes, resumable
-	$(PY) -m vsp.beyond.proofs.make_proofs --out="$$OUT"
+	$(PY) -m vsp.beyond.proofs.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 proofs-teacher: begin venv ## proofs for a network, for at most an HOUR, into data/results/
 	$(PY) -m vsp.beyond.proofs.make_proofs --teacher --out="$$OUT"

@@ -37,6 +37,12 @@ def forgotten():
     registry._ADDED.update(before)
 
 
+def test_a_changed_environment_is_registered_anew():
+    for most in (30, 40):  # as when a cell of a notebook runs again
+        gymnasium.register("Changed-v0", entry_point=own_tasks.Dock, max_episode_steps=most)
+        assert vsp.register("Changed-v0").max_steps == vsp.get_task("Changed-v0").max_steps == most
+
+
 @pytest.fixture(scope="module", params=NAMES)
 def distilled(request):
     """The task, its pilot and the policy that is distilled quickly."""

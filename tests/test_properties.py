@@ -616,7 +616,7 @@ CASES = {
         {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()} | {"leaves": leaves},
     ),
     "baselines.trees.Tree.predict": (trees.Tree(STATES, ACTIONS, leaves=3).predict, {"obs": states}),
-    "baselines.trees.standard": (trees.standard, {"states": numbers(STATES, free=(0, 1), some=True)}),
+    "rollouts.standard": (rollouts.standard, {"states": numbers(STATES, free=(0, 1), some=True)}),
 }
 
 
@@ -682,12 +682,12 @@ EXEMPT = {
         export.to_json export.to_python export.to_c export.distances_latex baselines.simple.ZeroPolicy
         paper.tables.run_overview paper.tables.run_summary paper.tables.teacher_beside_runs
         paper.tables.write_summary""",
-    "any text will do": "export.symbol beyond.explain.rules.Rule.text beyond.explain.rules.rules_latex",
+    "any text will do": "export.symbol beyond.explain.rules.Rule.text",
     "arithmetic, tried below, and draws of `interval` and `resample`, which check": """
         evaluation.fences paper.statistics.bootstrap_draws paper.statistics.crossed_interval
         paper.statistics.greatest_std paper.statistics.least_std paper.statistics.mean_range
         paper.statistics.percentile_interval paper.statistics.quarters paper.statistics.quartiles_from_fences
-        paper.statistics.remaining_mean paper.statistics.remaining_std""",
+        paper.statistics.remaining_mean paper.statistics.remaining_std paper.statistics.share_interval""",
     "takes a frame, which pandas has checked, or parts of a figure": """
         paper.shown.present paper.shown.show_table paper.tables.save_table show.returns.again show.returns.boxes
         show.returns.by_group show.returns.intervals show.returns.ledger_gaps show.returns.margin show.returns.phase

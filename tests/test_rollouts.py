@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
-from vsp.rollouts import collect_episodes, rollout, visited_states
+from vsp.rollouts import collect_episodes, rollout, standard, visited_states
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 from vsp.tasks.registry import get_task
 
@@ -71,3 +71,9 @@ def test_finished_episodes_are_not_asked_again():
 
     rollout(Spy(-1.0, 0.0), get_task(SIMPLEGOAL), np.array([[0.25, 0.05], [0.65, 0.5], [0.15, 0.05]]))
     assert asked == [3, 1]
+
+
+def test_a_constant_variable_keeps_its_unit():
+    """The standard deviation of a thousand times 0.1 is a rounding error above 0."""
+    states = np.column_stack([np.full(1000, 0.1), np.arange(1000.0)])
+    assert states[:, 0].std() > 0 and standard(states)[1].tolist() == [1.0, states[:, 1].std()]

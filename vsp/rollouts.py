@@ -85,6 +85,15 @@ def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.n
     return np.concatenate([episode.states for episode in episodes])
 
 
+def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean and standard deviation of `states` (n, d); a variable that never varies gets deviation 1."""
+    states = check_array("states", states, (-1, -1))
+    if not states.size:
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
+    varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
+    return states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0)
+
+
 def warn_outside(task: Task, states: np.ndarray) -> None:
     """Warn if observations (t, d) leave the box that the task declares: how many, and which variable leaves it most."""
     beyond = np.maximum(task.low - states, states - task.high)

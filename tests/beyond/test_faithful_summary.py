@@ -4,7 +4,7 @@ import pytest
 from support import SIMPLEGOAL
 
 from vsp.beyond.comparison import faithful_summary
-from vsp.beyond.comparison.faithful_summary import largest_alike, likeness, other_teachers, over_groups, share_interval
+from vsp.beyond.comparison.faithful_summary import largest_alike, likeness, other_teachers, over_groups
 from vsp.run import listed
 
 
@@ -49,13 +49,6 @@ def test_the_largest_size_with_the_same_cells(results):
     assert largest_alike(table.assign(index=0.8)) is None
     more = pd.DataFrame({"size": [1, 2, 3, 4], "index": [None, 0.95, 0.8, 0.99]})
     assert largest_alike(more) == 2
-
-
-def test_a_share_has_exact_bounds():
-    """Five of five are at least 48 %: 0.025 ** (1 / 5)."""
-    assert share_interval(5, 5) == (pytest.approx(0.025**0.2), 1.0)
-    low, high = share_interval(2, 4)
-    assert low == pytest.approx(1 - high) and low < 0.5
 
 
 def test_every_teacher_is_compared_with_its_own_policies(results):

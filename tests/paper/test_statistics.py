@@ -9,7 +9,16 @@ from hypothesis.extra.numpy import arrays
 
 from vsp.evaluation import fences
 from vsp.paper import statistics
-from vsp.paper.statistics import crossed_interval, greatest_std, interval, outlier_numbers, resample, rounds_to, spread
+from vsp.paper.statistics import (
+    crossed_interval,
+    greatest_std,
+    interval,
+    outlier_numbers,
+    resample,
+    rounds_to,
+    share_interval,
+    spread,
+)
 
 HAND = np.array([-100.0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 100])  # quartiles 2.5, 5, 7.5: whiskers at -5 and 15
 RETURNS = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e3, 1e3))
@@ -213,3 +222,10 @@ def test_bounds_by_hand_and_reached():
 def test_rounds_to():
     assert rounds_to(92.175, 92.18) and rounds_to(97.6, 97.6) and rounds_to(100.4, 100.0)
     assert not rounds_to(86.98, 86.17) and not rounds_to(97.7, 97.6) and not rounds_to(100.6, 100.0)
+
+
+def test_a_share_has_exact_bounds():
+    """Five of five are at least 48 %: 0.025 ** (1 / 5)."""
+    assert share_interval(5, 5) == (pytest.approx(0.025**0.2), 1.0)
+    low, high = share_interval(2, 4)
+    assert low == pytest.approx(1 - high) and low < 0.5

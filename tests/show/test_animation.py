@@ -95,10 +95,10 @@ def test_a_quick_run_is_marked_on_every_shot():
 
 def test_a_png_has_the_pixels_and_no_date():
     image = np.random.default_rng(0).integers(256, size=(30, 40, 3), dtype=np.uint8)
-    large, small = png(image), png(image, small=True)
-    assert np.array_equal(np.asarray(Image.open(io.BytesIO(large))), image) and len(small) < len(large)
-    assert np.asarray(Image.open(io.BytesIO(small)).convert("RGB")).shape == image.shape
-    assert all(b"tIME" not in data and b"tEXt" not in data for data in (large, small))
+    image //= 128  # few colours: none is lost
+    found = png(image)
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(found)).convert("RGB")), image)
+    assert b"tIME" not in found and b"tEXt" not in found
 
 
 def frames():

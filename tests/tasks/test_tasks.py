@@ -5,12 +5,13 @@ from importlib.util import find_spec
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.classic_control import PendulumEnv
 from gymnasium.utils.env_checker import check_env
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER, RandomPolicy
 
 import vsp
 from vsp.rollouts import collect_episodes, rollout
-from vsp.tasks import halfcheetah, mountaincar, simplegoal
+from vsp.tasks import halfcheetah, mountaincar, registry, simplegoal
 from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import BOX, get_task, task_names
@@ -256,12 +257,37 @@ def test_a_task_of_gymnasiums_own_pendulum():
     task, own = gymnasium_task(PENDULUM), get_task(PENDULUM)
     assert (task.max_steps, task.low.tolist(), task.action_high.tolist()) == (200, own.low.tolist(), [2.0])
     live = task.begin(task.start(np.random.default_rng(0), 4))
-    states, actions = np.array([one.env.state for one in live]), np.array([[0.5], [-1], [2], [0]])
+    states, actions = np.array([one.env.unwrapped.state for one in live]), np.array([[0.5], [-1], [2], [0]])
     assert np.allclose(task.see(live), own.see(states), atol=1e-7)
     _, rewards, outcomes = task.step(live, actions)
     moved, expected, _ = own.step(states, actions)
     assert np.allclose(rewards, expected) and (outcomes == RUNNING).all()
     assert np.array_equal(task.observe(live), own.observe(moved))
+
+
+class Rescaled(gymnasium.wrappers.RescaleAction):
+    """Gymnasium's pendulum, pushed by -1 to 1, which gives up after ten steps."""
+
+    def __init__(self):
+        super().__init__(PendulumEnv(), np.float32(-1), np.float32(1))
+        self.steps = 0
+
+    def step(self, action):
+        self.steps += 1
+        seen, reward, ended, _, info = super().step(action)
+        return seen, reward, ended, self.steps == 10, info
+
+
+def test_wrappers_act_and_an_environment_may_cut_off_an_episode(monkeypatch):
+    monkeypatch.setattr(gymnasium.envs.registration, "registry", dict(gymnasium.registry))
+    gymnasium.register("Rescaled-v0", entry_point=Rescaled, max_episode_steps=100)
+    task, own = gymnasium_task("Rescaled-v0"), get_task(PENDULUM)
+    live = task.begin(task.start(np.random.default_rng(0), 1))
+    moved, expected, _ = own.step(np.array([live[0].env.unwrapped.state]), np.array([[2.0]]))
+    _, rewards, _ = task.step(live, np.array([[1.0]]))  # the wrapper makes 2 of it
+    assert np.allclose(rewards, expected) and np.allclose(task.observe(live), own.observe(moved))
+    found = rollout(RandomPolicy(1), task, task.start(np.random.default_rng(0), 3))
+    assert found.lengths.tolist() == [10] * 3 and (found.outcomes == TRUNCATED).all()
 
 
 def test_an_environment_without_a_limit_of_steps_is_refused(monkeypatch):
@@ -344,6 +370,11 @@ def test_without_mujoco_one_sentence_says_how_to_get_it(monkeypatch):
     assert teacher.predict(np.zeros(17))[0].shape == (6,)
     with pytest.raises(ValueError, match="HalfCheetah-v5 needs the package mujoco, which is not inst.*: run `make "):
         vsp.evaluate(teacher, CHEETAH, n_episodes=1, seed=0)
+
+
+def test_a_state_inside_an_engine_is_not_drawn():
+    with pytest.raises(ValueError, match="state of LunarLander.* is inside its environment, expected one of .*Simple"):
+        registry.render(LUNARLANDER, [1.0])
 
 
 @pytest.mark.skipif(not find_spec("mujoco"), reason="needs mujoco")

@@ -142,6 +142,7 @@ def agents(tmp_path_factory):
         "small": untrained(TD3, **small),
         "car": untrained(TD3, MOUNTAINCAR, **small),
         "tanh": untrained(TD3, **small, activation_fn=torch.nn.Tanh),
+        "leaky": untrained(TD3, **small, activation_fn=torch.nn.LeakyReLU),
         "sac": untrained(SAC, **small),
         "ppo": untrained(PPO, **small),
     }
@@ -168,6 +169,7 @@ def test_a_zip_predicts_as_stable_baselines_does(agents, name, task):
         ("td3", MOUNTAINCAR, "2 inputs and 2 outputs, MountainCarContinuous-v0 has 2 and 1"),
         ("td3", "SimpelGoal-v0", "did you mean"),
         ("tanh", SIMPLEGOAL, "activation is .*Tanh.*, expected ReLU"),
+        ("leaky", SIMPLEGOAL, "activation is .*LeakyReLU.*, expected ReLU"),
         ("ppo", SIMPLEGOAL, "expected the tensors of a TD3 or DDPG actor"),
         ("sac", SIMPLEGOAL, "expected the tensors of a TD3 or DDPG actor"),
     ],

@@ -213,6 +213,14 @@ def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatc
     assert not out.exists() and len(list((tmp_path / "cache").iterdir())) == 2
 
 
+@pytest.mark.parametrize("more", [["--lean", "x"], ["--task", "LunarLanderContinuous-v3"]])
+def test_short_trainings_refuse_what_they_cannot_use(monkeypatch, capsys, more):
+    monkeypatch.setattr("sys.argv", ["x", "--cache", "c", "--short", *more])
+    with pytest.raises(SystemExit):
+        main()
+    assert "argument --short: it takes no --lean, and a --task of ['SimpleGoal-v0'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("task", "mean", "goal", "reached"),
     [

@@ -11,13 +11,13 @@ import numpy as np
 from ..checks import check_count, check_data, check_seed
 from ..geometry import nearest
 from ..policy import VoronoiPolicy
+from ..rollouts import standard
 from ..subpolicies import linear_outputs
-from ..subpolicies.stacked import BETA1, BETA2, EPSILON
+from ..subpolicies.stacked import Adam
 from ..tasks.base import Task
 from ..tasks.registry import get_task
 from ..teachers.teacher import Teacher
 from .simple import kmeans_cells
-from .trees import standard
 
 N_STEPS, BATCH, RATE = 1000, 256, 0.03  # Adam: steps per added cell, states per step, initial step size in half ranges
 WORST = 0.01  # share of a cell's states whose mean becomes a codeword: those that lose the most value
@@ -76,7 +76,7 @@ def trained(
     `points` (n, d) are standardised, `actions` (n, m) in the units of the task. `rng` draws the batches; the step size
     falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box would stop learning.
     """
-    half, mean, square = 0.5 * (task.action_high - task.action_low), np.zeros_like(maps), np.zeros_like(maps)
+    half, adam = 0.5 * (task.action_high - task.action_low), Adam()
     inputs = np.column_stack([points, np.ones(len(points))])
     for i in range(N_STEPS):
         rows = rng.integers(len(points), size=BATCH)
@@ -84,10 +84,7 @@ def trained(
         error = (np.clip(raw, task.action_low, task.action_high) - actions[rows]) / half
         here = own[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
         gradient = 2 / BATCH * np.einsum("kn,np,nm->kpm", here, inputs[rows], error, optimize=True)
-        mean = BETA1 * mean + (1 - BETA1) * gradient
-        square = BETA2 * square + (1 - BETA2) * gradient**2
-        step = mean / (1 - BETA1 ** (i + 1)) / (np.sqrt(square / (1 - BETA2 ** (i + 1))) + EPSILON)
-        maps = maps - RATE * (1 - i / N_STEPS) * half * step
+        maps = maps - RATE * (1 - i / N_STEPS) * half * adam.step(gradient)
     return maps
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..checks import check_array, check_choice, check_count, check_data, check_seed
 from ..policy import VoronoiPolicy
+from ..rollouts import standard
 from ..tasks.base import Task
-from .trees import standard
 
 
 def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:

@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 
 from ..checks import check_array, check_count, check_data, check_seed
+from ..rollouts import standard
 from ..tasks.base import Task
 from ..tasks.registry import get_task
-from .trees import standard
 
 
 class SmallNetwork:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..checks import check_array, check_count, check_data, check_seed
-from .trees import standard
+from ..rollouts import standard
 
 
 class SoftTree:

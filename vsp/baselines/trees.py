@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from ..checks import check_array, check_count, check_data, check_seed
+from ..rollouts import standard
 from ..subpolicies import linear_outputs
 from ..tasks.registry import get_task
 
@@ -209,12 +210,3 @@ def _unit(directions: np.ndarray) -> np.ndarray:
     """Scale directions to length 1; a zero vector becomes the first axis."""
     length = np.linalg.norm(directions, axis=1, keepdims=True)
     return np.where(length > 0, directions / np.where(length > 0, length, 1.0), np.eye(directions.shape[1])[0])
-
-
-def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean and standard deviation of `states` (n, d); a variable that never varies gets deviation 1."""
-    states = check_array("states", states, (-1, -1))
-    if not states.size:
-        raise ValueError(f"states have shape {states.shape}, expected at least one state")
-    varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
-    return states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0)

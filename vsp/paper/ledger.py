@@ -28,7 +28,7 @@ from ..config import paper_preset
 from ..tasks import base, registry, simplegoal
 from . import audit, printed
 from .runs import SHARES, Results
-from .statistics import interval, outlier_numbers, resample, spread
+from .statistics import interval, outlier_numbers, resample, share_interval, spread
 
 VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "differs", "cannot be checked", "contradicts itself"
@@ -216,7 +216,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     teacher if its mean return from the same starts is higher; an episode does if its return is higher. The interval for
     runs is the exact one of Clopper and Pearson, which has a width even if all runs, or none, beat the teacher.
     """
-    from scipy.stats import binomtest, trim_mean  # here: it takes long to import
+    from scipy.stats import trim_mean  # here: it takes long to import
 
     own, means, middle = result.teacher_returns, result.returns.mean(axis=1), partial(trim_mean, proportiontocut=0.25)
     cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
@@ -234,7 +234,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     for name, (values, statistic, teacher) in rows.items():
         ends = interval(values, statistic, vectorized=True, n_resamples=n_resamples)
         found[name] = (statistic(values, axis=0), *ends, teacher)
-    beats = binomtest(int(np.sum(means > own.mean())), len(means))
-    found["probability that a run beats its teacher"] = (beats.statistic, *beats.proportion_ci(0.95), np.nan)
+    beats, n = int(np.sum(means > own.mean())), len(means)
+    found["probability that a run beats its teacher"] = (beats / n, *share_interval(beats, n), np.nan)
     frame = pd.DataFrame.from_dict(found, orient="index", columns=["here", "low", "high", "teacher"])
     return frame.astype(float).rename_axis("statistic")

@@ -102,6 +102,14 @@ def interval(
     )
 
 
+def share_interval(found: int, n: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share when `found` of `n` were observed (Clopper & Pearson 1934)."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(found, n).proportion_ci(method="exact")
+    return interval.low, interval.high
+
+
 def crossed_interval(values: np.ndarray) -> tuple[float, float]:
     """Return the percentile bootstrap interval (95 %) of the mean of `values` (p, n), over policies *and* start states.
 

@@ -26,7 +26,8 @@ from .progress import progress
 
 ANSWER = 10  # seconds to wait for the answer of a scheduler
 IDLE = 20  # seconds after which an idle worker ends, even if the process that started it is gone
-PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma")  # their versions may affect a result
+# Their versions may affect a result
+PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma", "torch", "stable-baselines3", "mujoco", "box2d")
 
 
 class UnlikeWorker(CommandError):
@@ -109,7 +110,8 @@ def identity() -> dict[str, str]:
 
 def _deciding_files() -> list[Path]:
     """Return the paths of all code of the package and of the manifests of the teachers."""
-    return [*sorted((ROOT / "vsp").rglob("*.py")), *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
+    code = [path for kind in ("*.py", "*.c") for path in sorted((ROOT / "vsp").rglob(kind))]
+    return [*code, *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
 
 
 def _client(address: str):

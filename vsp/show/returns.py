@@ -17,13 +17,13 @@ from .style import COLOURS, DISTILLED, GOAL, TEACHER
 _VERDICTS = {"reproduced": (GOAL, "o"), "differs": (COLOURS[3], "D"), "contradicts itself": (COLOURS[4], "X")}
 
 
-def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
+def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> Axes:
     """Draw box plots of the returns of the teacher and of the distilled policies, in this order."""
     import seaborn as sns
 
     returns = {name: check_finite(f"returns of {name}", values) for name, values in returns.items()}
     colours = dict(zip(returns, (TEACHER, DISTILLED)))
-    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=outliers, linewidth=0.8)
+    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=False, linewidth=0.8)
     ax.set(ylabel="return per episode")
     ax.set_xticks(range(len(returns)), [f"{name}\n(n = {values.size:,})" for name, values in returns.items()])
     return ax
@@ -56,12 +56,12 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
     return ax
 
 
-def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: float | None = None) -> Axes:
-    """Draw a histogram of one policy's returns (n,), and their mean as a line; `bound`: the highest possible mean."""
+def histogram(ax: Axes, returns: np.ndarray, *, bound: float | None = None) -> Axes:
+    """Draw a histogram of the teacher's returns (n,), and their mean as a line; `bound`: the highest possible mean."""
     import seaborn as sns
 
     returns = check_array("returns", returns, (-1,))
-    sns.histplot(returns, ax=ax, color=color, bins=40, edgecolor="white", linewidth=0.3)
+    sns.histplot(returns, ax=ax, color=TEACHER, bins=40, edgecolor="white", linewidth=0.3)
     most = "" if bound is None else f"\n(at most\n{bound:.2f})"
     ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}{most}")
     ax.set(xlabel="return per episode", ylabel="episodes")
@@ -69,12 +69,12 @@ def histogram(ax: Axes, returns: np.ndarray, *, color: str = TEACHER, bound: flo
     return ax
 
 
-def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray, *, ylabel: str = "mean return") -> Axes:
+def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray) -> Axes:
     """Plot the mean return of the teacher over its training steps."""
     steps = check_array("steps", steps, (-1,))
     means = check_array("means", means, steps.shape)
     ax.plot(steps / 1000, means, color=TEACHER)
-    ax.set(xlabel="training steps (thousands)", ylabel=ylabel)
+    ax.set(xlabel="training steps (thousands)", ylabel="mean return")
     return ax
 
 
@@ -150,11 +150,11 @@ def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours
     return ax
 
 
-def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str, color: str = DISTILLED) -> Axes:
+def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str) -> Axes:
     """Draw one dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
     import seaborn as sns
 
-    sns.swarmplot(frame, x=x, y=y, ax=ax, color=color, size=3)
+    sns.swarmplot(frame, x=x, y=y, ax=ax, color=DISTILLED, size=3)
     for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
         ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4, label="mean" if not place else None)
     return ax

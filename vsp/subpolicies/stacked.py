@@ -10,6 +10,22 @@ BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam (Kingma & Ba 2015), its publish
 RIDGE = 1e-6  # weight of the current parameters in a fit, as a number of states
 
 
+class Adam:
+    """The steps of Adam for one array, before they are multiplied by the learning rate."""
+
+    def __init__(self):
+        self._mean = self._square = 0.0
+        self._steps = 0
+
+    def step(self, gradient: np.ndarray) -> np.ndarray:
+        """Return the step against which to move, from the next gradient."""
+        self._steps += 1
+        self._mean = BETA1 * self._mean + (1 - BETA1) * gradient
+        self._square = BETA2 * self._square + (1 - BETA2) * gradient**2
+        spread = np.sqrt(self._square / (1 - BETA2**self._steps)) + EPSILON
+        return self._mean / (1 - BETA1**self._steps) / spread
+
+
 class SubPolicies:
     """One sub-policy per cell, all of the same class, trained on the mean squared error of their actions (m,)."""
 

@@ -12,7 +12,7 @@ from functools import cache, partial
 import gymnasium
 import numpy as np
 
-from .base import ENDED, GOAL, PIT, RUNNING, Task
+from .base import ENDED, GOAL, PIT, RUNNING, TRUNCATED, Task
 
 Outcome = Callable[[np.ndarray, float, dict], bool]  # (last observation, reward, info) to success
 
@@ -38,7 +38,7 @@ def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
     """Return a freshly reset environment per start. (n,) objects"""
     live = np.empty(len(starts), dtype=object)
     for i, (seed,) in enumerate(starts):
-        env = gymnasium.make(name).unwrapped  # without the step limit: the caller counts steps
+        env = gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)  # no step limit: the caller counts
         live[i] = _Live(env, env.reset(seed=int(seed))[0])
     return live
 
@@ -50,14 +50,19 @@ def _see_live(states: np.ndarray) -> np.ndarray:
 def _step_live(
     outcome: Outcome | None, states: np.ndarray, actions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Step every environment. `outcome` tells whether an episode that ended succeeded; None: success is undefined."""
+    """Step every environment. `outcome` tells whether an episode that ended succeeded; None: success is undefined.
+
+    An episode that the environment cuts off by itself counts as one that reached the step limit.
+    """
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (live, action) in enumerate(zip(states, actions)):
-        live.observation, rewards[i], ended, _, info = live.env.step(action.astype(live.env.action_space.dtype))
+        live.observation, rewards[i], ended, cut, info = live.env.step(action.astype(live.env.action_space.dtype))
         if ended and outcome is None:
             outcomes[i] = ENDED
         elif ended:
             outcomes[i] = GOAL if outcome(live.observation, rewards[i], info) else PIT
+        elif cut:
+            outcomes[i] = TRUNCATED
     return states, rewards, outcomes
 
 

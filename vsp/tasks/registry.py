@@ -76,7 +76,7 @@ def register(
     if outcome is not None and not callable(outcome):
         raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
     _check_registered(name)
-    plain = gymnasium_task(name, outcome)
+    plain = gymnasium_task.__wrapped__(name, outcome)  # not the cached one: the environment may be a new one
     inputs = _names("inputs", inputs, plain.inputs)
     _ADDED[name] = replace(plain, inputs=inputs, input_labels=inputs, outputs=_names("outputs", outputs, plain.outputs))
     return _ADDED[name]
@@ -120,10 +120,16 @@ def _absent(name: str, *_) -> NoReturn:
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:
-    """Return a picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes"""
-    state = check_array("state", state, (get_task(name).start_size or len(get_task(name).low),))
+    """Return a picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes
+
+    Raises ValueError for a task whose state is inside its environment, as that of a physics engine.
+    """
+    task = get_task(name)
+    if task.one_by_one:
+        raise ValueError(f"the state of {task.name} is inside its environment, expected one of {list(_TASKS)}")
+    state = check_array("state", state, (task.start_size or len(task.low),))
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # so that pygame needs no screen
-    env = gymnasium.make(get_task(name).name, render_mode="rgb_array")
+    env = gymnasium.make(task.name, render_mode="rgb_array")
     env.reset(seed=0)
     env.unwrapped.state = state
     image = env.render()

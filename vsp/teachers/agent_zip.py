@@ -11,6 +11,7 @@ import io
 import json
 import math
 import pickletools
+import re
 import zipfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -56,7 +57,7 @@ def read_zip(path: Path) -> dict[str, np.ndarray]:
     except Exception as error:  # of any kind: the content is not trusted
         reason = f"not a zip of a Stable-Baselines3 agent with only tensors: {error!r:.300}"
         raise atomic.DamagedFile(f"{path}: {reason}") from error
-    if "ReLU" not in activation:
+    if not re.search(r"\bReLU\b", activation):
         raise ValueError(f"{path}: the agent's activation is {activation:.100}, expected ReLU")
     return actor
 

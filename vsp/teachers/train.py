@@ -267,6 +267,8 @@ def main() -> None:
     parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
     parser.add_argument("--short", action="store_true", help="run the shorter trainings that a study compares")
     arguments = parser.parse_args()
+    if arguments.short and (arguments.lean or not set(arguments.task or ()) <= set(SHORT_SEEDS)):
+        parser.error(f"argument --short: it takes no --lean, and a --task of {list(SHORT_SEEDS)}")
     for task in arguments.task or (SHORT_SEEDS if arguments.short else RECIPES):
         if arguments.short:
             for seed in SHORT_SEEDS[task]:

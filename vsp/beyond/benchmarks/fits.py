@@ -33,12 +33,12 @@ VARIED = {
 _STAGE = len(TEMPERATURES) // 2
 
 
-def evaluation(d: int, k: int, n: int, *, seed: int = 0):
+def evaluation(d: int, k: int, n: int):
     """Return a function that evaluates the loss of k cells and its gradient.
 
     It uses n states with d inputs, and `N_ACTIONS` actions.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
     cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
     actions = np.clip(inputs @ cells.maps[0], -1.0, 1.0)

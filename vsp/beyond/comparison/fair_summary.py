@@ -5,8 +5,6 @@ Also count what each method costs: episodes of every kind, and seconds.
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pandas as pd
 
@@ -44,13 +42,13 @@ SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 
 
-def all_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+def all_rows(task: str) -> pd.DataFrame:
     """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`.
 
     Each method, size and seed occurs once: the last of `TABLES` that has it counts.
     """
     tables = [table for table in TABLES if table in tables_of(task)]
-    frame = pd.concat([read_rows(task, folder, table=table) for table in tables])
+    frame = pd.concat([read_rows(task, table=table) for table in tables])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
@@ -134,12 +132,12 @@ def tail(frame: pd.DataFrame) -> pd.DataFrame:
     return table.rename(index=names).sort_values("mean", ascending=False, kind="stable").reset_index()
 
 
-def fit_and_geometry(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+def fit_and_geometry(task: str) -> pd.DataFrame:
     """Return the table "apart", which separates fit from geometry and adds newer methods, one row per method.
 
     Columns: method; "r2 2" and so on (the median r2 at that size); "mean 2" and so on (the median mean return).
     """
-    rows = with_r2(read_rows(task, folder, table="apart"), task)
+    rows = with_r2(read_rows(task, table="apart"), task)
     table = rows.groupby(["method", "size"], sort=False)[["r2", "mean"]].median().unstack("size")
     table.columns = [f"{what} {size}" for what, size in table.columns]
     return table.reset_index()

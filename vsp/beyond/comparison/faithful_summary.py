@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ...paper.results import read_results
-from ...paper.statistics import percentile_interval
+from ...paper.statistics import percentile_interval, share_interval
 from .method_summary import AS_GOOD, mean_interval, read_rows
 
 LEAST_R2 = {
@@ -47,14 +47,6 @@ def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame
     table["index"], table["index_least"] = by_pair["index"].median(), by_pair["index"].min()
     table["ratio"], table["one_cell"] = by_pair["ratio"].median(), by_size["one_cell"].sum()
     return table.reset_index()
-
-
-def share_interval(found: int, n: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share when `found` of `n` were observed (Clopper & Pearson 1934)."""
-    from scipy.stats import binomtest
-
-    interval = binomtest(found, n).proportion_ci(method="exact")
-    return interval.low, interval.high
 
 
 def largest_alike(table: pd.DataFrame) -> int | None:

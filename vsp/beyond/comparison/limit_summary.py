@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from ...paper.results import read_results
+from ...paper.statistics import share_interval
 from ..optimum.limit import limit_preset
-from .faithful_summary import share_interval
 from .method_summary import INTERVAL, method_summary, read_rows
 from .method_tables import LIMIT, ROBOT_TABLES, STARTS
 from .regret import best_mean
@@ -61,7 +61,7 @@ def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     return table.assign(least=by_method["mean"].min(), failing=by_method["failing"].max()).loc[order].reset_index()
 
 
-def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:
+def references() -> pd.DataFrame:
     """Return the computed best returns beside the teacher's, one row per task.
 
     Columns: task; best (mean return of the best policy); error (difference of this mean between two grids; NaN where it
@@ -69,8 +69,8 @@ def references(folder: str | os.PathLike | None = None) -> pd.DataFrame:
     teacher (its mean return); regret (of the teacher).
     """
     found = []
-    for task, rows in read_results("optimum", folder).groupby("task", sort=False):
-        last, frame = rows.iloc[-1], read_rows(task, folder)
+    for task, rows in read_results("optimum").groupby("task", sort=False):
+        last, frame = rows.iloc[-1], read_rows(task)
         teacher = frame.loc[frame["method"] == "teacher", "mean"].iloc[0]
         error = abs(rows["mean"].diff().iloc[-1]) if len(rows) > 1 else np.nan
         about = {name: last[name] for name in ("found", "worst", "failing", "longest")}

@@ -1,9 +1,9 @@
 """Make the rows of the comparison beyond the paper: every method at every size.
 
-The methods of a table have the same budgets and start states, and, but for the table "limit", the same teacher. `make
-beyond` makes the missing rows.
-data/results/beyond_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
-to run, so they are in a separate file, beyond_seconds.csv.
+The methods of a table have the same budgets and start states, and, except in the tables "limit" and "teachers", the
+same teacher. `make beyond` makes the missing rows.
+data/results/<table>_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
+to run, so they are in a separate file, <table>_seconds.csv.
 """
 
 from __future__ import annotations

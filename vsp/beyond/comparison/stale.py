@@ -1,12 +1,11 @@
 """Find committed results that were made with other settings, another teacher or another version than today's.
 
-`python -m vsp.beyond.comparison.stale` prints them, or nothing if all are up to date. Tables that `make paper-figures`
-rewrites each time are not checked.
+`python -m vsp.beyond.comparison.stale` prints them, or nothing if all are up to date. Not checked are the
+tables that `make paper-figures` rewrites each time, and those of proofs, times, faults and speed.
 """
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -26,15 +25,15 @@ from .method_rows import Job, jobs_of, tables_of
 from .method_tables import LONG, TASKS, WALKERS
 
 
-def stale(folder: str | os.PathLike | None = None) -> list[str]:
-    """List the results in data/results, or in `folder`, that are missing, damaged or out of date, one message each.
+def stale() -> list[str]:
+    """List the results in data/results that are missing, damaged or out of date, one message each.
 
     The list is empty if all are up to date.
     """
-    found, folder = [], Path(folder or results.RESULTS)
+    found = []
     for name, target, today in committed():
         try:
-            differing = _differing(_provenance(folder / name), today)
+            differing = _differing(_provenance(results.RESULTS / name), today)
         except FileNotFoundError:
             found.append(f"data/results/{name} is missing: `make {target}` makes it")
         except atomic.DamagedFile as error:

@@ -1,4 +1,4 @@
 """Explanations in addition to the equations: rules over the inputs, and LIME for comparison."""
 
 from .lime import compare_maps
-from .rules import RulePolicy, describe_rules, find_rules, rules_latex
+from .rules import RulePolicy, describe_rules, find_rules

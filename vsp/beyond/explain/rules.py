@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 
 from ...checks import check_array, check_count, check_number
-from ...export import symbol
 from ...policy import VoronoiPolicy
 from ...subpolicies.base import linear_outputs, number
 
@@ -129,13 +128,6 @@ def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
         raise ValueError(f"rules are {rules!r}, expected at least one")
     held = np.array([rule.holds(states) for rule in rules])
     return np.array([rule.cell for rule in rules])[held.argmax(axis=0)]
-
-
-def rules_latex(rule: str) -> str:
-    """Return the text of a rule as LaTeX code."""
-    if "<" not in rule and ">" not in rule:
-        return rule
-    return " and ".join(f"${symbol(condition)}$".replace("<=", r"\leq") for condition in rule.split(" and "))
 
 
 def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:

@@ -28,6 +28,7 @@ from ..comparison.kept import simplest
 from ..refinement.config import tuned_preset
 from ..refinement.refine import refine
 from . import check
+from .mountaincar import prove_mountaincar
 from .mountaincar_reals import prove_reals
 from .network import teacher_steps_to_goal
 from .pendulum import prove_pendulum
@@ -45,18 +46,23 @@ HOUR = 3600.0
 
 def main() -> None:
     """Prove the policies that are not proved yet. Write a certificate of each to data/proofs/ and the results to
-    data/results/proofs.csv. Write the proof of MountainCar over the reals to proofs_reals.csv, and that of Pendulum
-    over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
+    data/results/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
+    that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
     parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
+    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     if arguments.teacher:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
-    certificates(Path(arguments.out))
-    write_results(pd.DataFrame([reals()]), "proofs_reals", out=arguments.out, float_format="%.17g")
-    write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
+    results = Path(arguments.out) / "data" / "results"
+    proved = certificates(Path(arguments.out), arguments.jobs)
+    if proved or not (results / "proofs_reals.csv").exists():
+        table = pd.DataFrame([reals(arguments.jobs)])
+        write_results(table, "proofs_reals", out=arguments.out, float_format="%.17g")
+    if proved or not (results / "proofs_grid.csv").exists():
+        write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
@@ -78,21 +84,22 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
     }
 
 
-def certificates(out: Path) -> None:
-    """Write the missing certificates and the table, row by row: an interrupted run can continue."""
+def certificates(out: Path, jobs: int | str) -> list[str]:
+    """Write the missing certificates and the table, row by row: an interrupted run can continue. Return their names."""
     table = out / "data" / "results" / "proofs.csv"
     rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
     makers = policies()
     missing = [name for name in makers if name not in {row["name"] for row in rows}]
     for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
-        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json"))
+        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json", jobs))
         write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
+    return missing
 
 
-def _proved(name: str, policy: VoronoiPolicy, path: Path) -> dict:
+def _proved(name: str, policy: VoronoiPolicy, path: Path, jobs: int | str) -> dict:
     """Prove one policy. Write its certificate to `path` and return its row of the table."""
     began = time.perf_counter()
-    proof = prove(policy)
+    proof = prove_mountaincar(policy, jobs=jobs) if policy.task.name == MOUNTAINCAR else prove(policy)
     seconds = time.perf_counter() - began
     path.parent.mkdir(parents=True, exist_ok=True)
     proof.save(path)
@@ -130,10 +137,10 @@ def _sampled(policy: VoronoiPolicy) -> dict:
     return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
 
 
-def reals() -> dict:
+def reals(jobs: int | str) -> dict:
     """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
     began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
-    parts = prove_reals(policy)
+    parts = prove_reals(policy, jobs=jobs)
     found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
     return found | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
 

@@ -8,7 +8,6 @@ cut in three. For two parts the side is certain. For the sliver between them, bo
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -87,15 +86,15 @@ class Part:
     least: float  # lower bound on the return from these starts
 
 
-def prove_reals(policy: VoronoiPolicy, *, jobs: int | str | None = None) -> list[Part]:
+def prove_reals(policy: VoronoiPolicy, *, jobs: int | str = -1) -> list[Part]:
     """Prove from which starts the car reaches the flag, in real numbers, for each part of the line. Takes minutes.
 
-    `jobs` as in `vsp.run.workers`, by default one per core. Raises ValueError for a policy that is not made of linear
+    `jobs` as in `vsp.run.workers`. Raises ValueError for a policy that is not made of linear
     maps and Euclidean cells for MountainCar.
     """
     check_runnable(policy)
     ends = np.linspace(LEFT, RIGHT, N_PARTS + 1).tolist()
-    work, jobs = [(policy, low, high) for low, high in zip(ends[:-1], ends[1:])], jobs or os.cpu_count() or 1
+    work = [(policy, low, high) for low, high in zip(ends[:-1], ends[1:])]
     found = dict(workers.results(prove_part, work, "all starts", jobs=jobs, total=len(work), unit="parts"))
     return [found[i] for i in range(len(work))]
 

@@ -23,12 +23,6 @@ class Polygon:
     corners: tuple[Corner, ...]
     edges: tuple[Line, ...]
 
-    def sign(self, line: Line) -> int:
-        """Return 1 or -1 if all of the inside lies on this side of the line; 0 if the line cuts it, or is no line at
-        all."""
-        signs = {_side(line, corner) for corner in self.corners} - {0}
-        return signs.pop() if len(signs) == 1 else 0
-
     def cut(self, line: Line) -> tuple[Polygon | None, Polygon | None]:
         """Return the parts on the negative and on the positive side; None for a part without area.
 

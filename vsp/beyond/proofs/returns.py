@@ -38,8 +38,8 @@ def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float,
         starts, ends, areas = _quarters(starts[~done]), _quarters(ends[~done]), np.repeat(areas[~done] / 4, 4)
 
 
-def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.ndarray, float]:
-    """Return a start (2,) with the lowest return, to `width`, and this return. The start lies inside its piece."""
+def worst_start(pieces: Sequence[Piece]) -> tuple[np.ndarray, float]:
+    """Return a start (2,) with the lowest return, to 1e-6, and this return. The start lies inside its piece."""
     starts, ends, last = _triangles(pieces)
     found, least = starts[0].mean(axis=0), np.inf
     while len(starts):
@@ -51,7 +51,7 @@ def worst_start(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[np.nda
         centre = starts.mean(axis=1, keepdims=True)
         tangent = (starts * centre).sum(axis=2) / np.maximum(_distance(centre), 1e-12)
         bound = (10.0 * (tangent - _distance(ends)) + last[:, None]).min(axis=1)
-        open_ = bound < least - width
+        open_ = bound < least - 1e-6
         starts, ends, last = _quarters(starts[open_]), _quarters(ends[open_]), np.repeat(last[open_], 4)
     return found, float(least)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...subpolicies.stacked import BETA1, BETA2, EPSILON
+from ...subpolicies.stacked import Adam
 from .config import Refinement
 from .units import Cells, LabelledStates
 
@@ -51,17 +51,14 @@ def anneal(seen: LabelledStates, cells: Cells, config: Refinement, rng: np.rando
     """
     unit = temperature_unit(seen, len(cells.codewords))
     first, n_steps = config.initial_temperature, config.n_steps
-    theta, mean, square, draw = cells.vector, 0.0, 0.0, seen.draw(config.batch_size, rng)
+    theta, adam, draw = cells.vector, Adam(), seen.draw(config.batch_size, rng)
     for i in range(n_steps):
         done = i / n_steps
         temperature = unit * first * (config.final_temperature / first) ** min(1.0, done / 0.9)
         rows = draw()
         batch = cells.like(theta), seen.inputs[rows], seen.actions[rows]
         _, gradient = expected_loss(*batch, temperature=temperature, clip_slope=config.clip_slope)
-        mean = BETA1 * mean + (1 - BETA1) * gradient
-        square = BETA2 * square + (1 - BETA2) * gradient**2
-        step = mean / (1 - BETA1 ** (i + 1)) / (np.sqrt(square / (1 - BETA2 ** (i + 1))) + EPSILON)
-        theta = theta - config.learning_rate * (1 - done) * step
+        theta = theta - config.learning_rate * (1 - done) * adam.step(gradient)
     return cells.like(theta)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...policy import VoronoiPolicy
-from ...rollouts import Policy
+from ...rollouts import Policy, standard
 from ...tasks.base import Task
 
 METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
@@ -26,8 +26,7 @@ class Frame:
     @classmethod
     def of(cls, task: Task, states: np.ndarray) -> Frame:
         """Return the frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
-        varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
-        return cls(task, states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0))
+        return cls(task, *standard(states))
 
     @property
     def _middle(self) -> np.ndarray:

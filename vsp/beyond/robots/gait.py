@@ -33,7 +33,7 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
     body, states, rows = _BODIES[task.name], task.begin(np.array([[float(start)]])), []
     for step in range(min(n_steps, task.max_steps)):
         seen = task.observe(states)
-        lines, (back, front) = body(states[0].env)
+        lines, (back, front) = body(states[0].env.unwrapped)
         row = {"step": step, "cell": int(policy.cells(seen)[0]), "back": int(back), "front": int(front)}
         for name, ends in lines.items():
             row |= {f"{name} {end}": round(float(value), DIGITS) for end, value in zip(("x0", "z0", "x1", "z1"), ends)}
