@@ -155,8 +155,9 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 	cp -R figures/*.* figures/tables "$$source/figures"; \
 	cp data/README.md "$$source/data"; \
 	cp "$$OUT"/build/course/pages/*.ipynb "$$source/notebooks/course"
-	@$(PY) -m sphinx -q -W -E -c docs -d "$$SITE-work/doctrees" "$$SITE-work/source" "$$SITE-work/pages"
-	@rm -rf "$$SITE"; mv "$$SITE-work/pages" "$$SITE"; rm -r "$$SITE-work"; printf 'made: open %s/index.html\n' "$$SITE"
+	@$(PY) -m sphinx -q -W -c docs -d "$$SITE-work/doctrees" "$$SITE-work/source" "$$SITE-work/pages"
+	@rm -rf "$$SITE"; mv "$$SITE-work/pages" "$$SITE"; rm -r "$$SITE-work"; \
+	printf 'made: run %s -m http.server -d %s and open http://localhost:8000\n' "$(PY)" "$$SITE"
 
 ## Develop
 test: venv-test-train-dask ## runs the tests, several at a time: about 3 minutes

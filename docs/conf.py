@@ -28,7 +28,7 @@ nb_execution_mode = "off"
 nb_ipywidgets_js = {}  # the default asks another host for its scripts
 nb_output_stderr = "show"
 copybutton_selector = "div.cell_input pre, section > div[class^=highlight-] pre"  # no outputs
-myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block"]
+myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 
 # API: docstrings are prose in which `name` is code, and a link where there is such a name

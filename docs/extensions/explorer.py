@@ -1,5 +1,6 @@
 """The directive `explorer`: the companion's policies for one task, to be replayed, asked and changed."""
 
+import functools
 import shutil
 
 import numpy as np
@@ -17,6 +18,7 @@ from vsp.show.explorer.scene import to_json
 from vsp.teachers.teacher import Teacher
 
 
+@functools.cache  # a run and a tuning each take seconds
 def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
     """The paper's policy, its method's best rerun with the run, ours, and one linear map: those that the task has."""
     teacher, policies, history = vsp.load_teacher(task), {}, None

@@ -126,6 +126,7 @@ def test_the_explorer_replays_and_answers(explorer):
     pictures = [_drawn(explorer)]
     for act in (
         lambda: explorer.get_by_label("iteration").press("Home"),
+        lambda: explorer.get_by_label("iteration").press("ArrowRight"),
         lambda: explorer.get_by_role("button", name="next change").click(),
         lambda: explorer.locator("canvas").click(position={"x": 100, "y": 100}),
         lambda: explorer.locator("canvas").press("ArrowRight"),

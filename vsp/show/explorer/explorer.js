@@ -454,8 +454,8 @@ class Player {
   start() {
     this.playing = true
     this.toggle.textContent = "pause"
-    if (this.at === this.last) this.slider.value = 0
-    let before = 0
+    if (this.at === this.last) this.to(0)
+    let before = performance.now()
     const frame = now => {
       if (!this.playing || !this.slider.isConnected) return
       if (now - before >= this.wait) {
@@ -482,7 +482,7 @@ const UNCHANGED = [
 class Explorer {
   constructor(root, scene) {
     const { low, high } = scene.plane
-    this.canvas = element("canvas", { tabindex: 0, role: "img" })
+    this.canvas = element("canvas", { tabindex: 0, role: "application" }) // so that screen readers leave it the arrow keys
     Object.assign(this, {
       scene,
       task: dynamics(scene.task.name) ?? UNKNOWN,
@@ -494,7 +494,8 @@ class Explorer {
     this.many = scene.task.inputs.length > 8 || scene.task.outputs.length > 3
     this.answer = this.answers()
     this.result = element("p", { "aria-live": "polite" })
-    this.form = element("div")
+    const left = ({ relatedTarget: to }) => this.form.contains(to) || this.changed()
+    this.form = element("div", { focusout: left }) // while a reader writes, the form stays as it is
     this.names = element(
       "select",
       { "aria-label": "policy", change: () => this.choose(+this.names.value) },
@@ -563,6 +564,8 @@ class Explorer {
     if (this.many) this.results.replaceChildren(table(["", ...outputs], results))
     this.added.replaceChildren(table(["", ...outputs], this.many ? adds : [...adds, ...results]))
     const keys = this.stored ? "Left and right step through the episode." : "Arrow keys move it."
+    const moving = this.replay.playing || this.steps.playing // nobody can listen to that much
+    for (const said of [this.where, this.result]) said.setAttribute("aria-live", moving ? "off" : "polite")
     this.canvas.setAttribute("aria-label", `Map of the policy. The chosen state is in cell ${cell + 1}. ${keys}`)
   }
   /** One row for what each input and the bias add; with many inputs, the largest first. */
@@ -583,7 +586,7 @@ class Explorer {
   answers() {
     const box = name =>
       element("div", this.many ? { class: "vsp-scroll", tabindex: 0, role: "region", "aria-label": name } : {})
-    Object.assign(this, { where: element("p"), written: element("div") })
+    Object.assign(this, { where: element("p", { "aria-live": "polite" }), written: element("div") })
     Object.assign(this, { results: box("sum and actions"), added: box("what each input adds") })
     if (!this.many) return element("div", {}, this.where, this.written, this.added)
     const folded = element("details", {}, element("summary", {}, "equations"), this.written)
@@ -599,7 +602,11 @@ class Explorer {
     const { stored, scene } = this,
       labels = stored ? scene.task.inputs : scene.plane.labels
     const cellAt = point => cellOf(this.policy, this.see(point))
-    const found = leastChange(stored ? this.seen : this.asked, this.cell, stored ?? scene.plane, cellAt)
+    const [angle] = this.asked,
+      { low, high } = scene.plane
+    const turn = { low: [angle - Math.PI, low[1]], high: [angle + Math.PI, high[1]] } // cells go on beyond the edge
+    const box = stored ?? (this.angular ? turn : scene.plane)
+    const found = leastChange(stored ? this.seen : this.asked, this.cell, box, cellAt)
     if (found.axis === undefined) return "No change of one input leads to another cell."
     const gap = Math.abs(found.gap) < 0.005 ? minus(found.gap.toPrecision(2)) : digits(found.gap)
     const share = stored ? ` (${(100 * found.share).toPrecision(2)} % of its range)` : ""
@@ -659,7 +666,7 @@ class Explorer {
       `Circles are codewords${this.angular ? "" : ": drag one"}. Click or drag elsewhere to choose a state; its episode is black.`,
       lost.length ? "Small dots are starts; orange ones fail." : "Small dots are starts.",
       teacher
-        ? `The teacher's action is interpolated on a grid: its error is at most ${teacher.usual.toFixed(3)} in 90 % of states and ${teacher.error.toFixed(2)} in all.`
+        ? `The teacher's action is interpolated on a grid: its error is about ${teacher.usual.toFixed(3)} or less in 90 % of states, and at most ${teacher.error.toFixed(2)} in all that were tried.`
         : "",
     ]
     return element("p", { class: "vsp-note" }, said.join(" "))
@@ -710,7 +717,8 @@ class Explorer {
     }
     this.ask()
     this.path = this.stored ? this.recent() : rollout(this.scene, this.policy, this.asked, true).states
-    if (!this.stored && (this.whole || this.cell !== before)) this.showForm()
+    const writing = this.form.contains(document.activeElement)
+    if (!this.stored && (this.whole || (this.cell !== before && !writing))) this.showForm()
     this.whole = false
     draw(this)
     this.frames += 1
@@ -780,7 +788,7 @@ class Explorer {
       return Math.hypot(x - px, y - py)
     }
     const move = event => {
-      if (dragged === null) return
+      if (dragged === null || (event.type === "pointermove" && !event.buttons)) return
       if (this.stored) return this.nearest(place => far(place, under(event)))
       const point = picture.point(...under(event))
       if (dragged >= 0) this.policy.codewords[dragged] = point
@@ -788,6 +796,7 @@ class Explorer {
       this.changed({ policy: dragged >= 0, whole: dragged >= 0 })
     }
     canvas.addEventListener("pointerdown", event => {
+      if (event.button || !event.isPrimary) return
       canvas.setPointerCapture(event.pointerId)
       const hit = codeword => far(this.placeSeen(codeword), under(event)) < 11
       dragged = this.stored || this.angular ? -1 : this.policy.codewords.findIndex(hit)
@@ -810,7 +819,7 @@ class Explorer {
   }
   key(event) {
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }[event.key]
-    if (!way) return
+    if (!way || event.altKey || event.ctrlKey || event.metaKey) return
     event.preventDefault()
     if (this.stored) return way[0] ? this.steps.to(this.steps.at + way[0]) : this.episodeTo(this.episode + way[1])
     const { low, high } = this.scene.plane,
@@ -883,6 +892,10 @@ export function teacherAt(scene, point) {
 /** For anywidget: the scene is JSON text. */
 export default {
   render({ model, el }) {
+    el.addEventListener("keydown", event => {
+      // JupyterLab would take the arrow keys from sliders and lists to select a cell
+      if (event.key.startsWith("Arrow") && !event.altKey && !event.ctrlKey && !event.metaKey) event.stopPropagation()
+    })
     el.classList.add("vsp-controls") // hides the still picture for readers without a kernel: vsp/show/page.py
     let view = mount(el, JSON.parse(model.get("scene")))
     model.on("change:scene", () => {

@@ -41,7 +41,7 @@ class Explorer:
 
     `policies`: policies with linear maps by name, all of one task. `history`: replays the first of them. The script
     simulates SimpleGoal, MountainCarContinuous and Pendulum itself; for other tasks it shows stored episodes, over the
-    two inputs `axes`. Raises ValueError for other policies, unknown inputs, and a history of another method or task.
+    two inputs `axes`. Raises ValueError for other policies, unknown inputs, and the history of another run.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Explorer:
         if len(tasks) != 1:
             raise ValueError(f"the policies play {sorted(tasks) or 'nothing'}, expected one task")
         self.policies, (self.task,) = policies, tasks.values()
-        _check_history(history, self.task.name)
+        _check_history(history, next(iter(policies.values())))
         if guess is not None and not (isinstance(guess, str) and guess and self.task.name in PLANES):
             raise ValueError(f"guess is {guess!r}, expected a question about one of {', '.join(PLANES)}, or None")
         self.scene = scene_of(policies, self.task, teacher, history, axes)
@@ -75,7 +75,7 @@ class Explorer:
         picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{said}</figure>"
         if source is not None:
             return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
-        scene = to_json(self.scene).replace("</", "<\\/")
+        scene = to_json(self.scene).replace("<", "\\u003c")  # no tag ends here
         return f'<div class="vsp-explorer">{picture}<script type="application/json">{scene}</script></div>'
 
     def _ipython_display_(self) -> None:
@@ -119,15 +119,18 @@ class Explorer:
             state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
 
 
-def _check_history(history: History | None, task: str) -> None:
-    """Raise ValueError unless `history` is None or the history of a run on the task."""
+def _check_history(history: History | None, policy: VoronoiPolicy) -> None:
+    """Raise ValueError unless `history` is None or that of the run that gave `policy`."""
     if history is None:
         return
     if not isinstance(history, History):
         kind = type(history).__name__
         raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
-    if (found := history.policy_at(0).task.name) != task:
-        raise ValueError(f"history is of a run on {found}, expected one on {task}")
+    last = history.policy_at(len(history.cells) - 1)
+    if last.task.name != policy.task.name:
+        raise ValueError(f"history is of a run on {last.task.name}, expected one on {policy.task.name}")
+    if last.policy_class.name != "linear" or not np.array_equal(last.codewords, policy.codewords):
+        raise ValueError("history is of another run than the first policy, expected the one that gave it")
 
 
 def explore(
