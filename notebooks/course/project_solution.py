@@ -69,6 +69,8 @@ def main() -> None:
     print(f"# {TASK}: who returns most?\n")
     print(f"{best['method']} returns {best['mean']:.2f} on average, from {N_STARTS} starts.\n")
     print(table.round(3).to_string(index=False))
+    print("\nmean, low, high: mean return and its 95 % interval over seeds; failing: the largest share of failed episodes of")
+    print("a seed; r2: median over seeds.")
     print(f"\nThe policy of seed 0:\n\n{policy.to_text()}")
     print(f"Of the states it visits, it differs most from the teacher in {state.tolist()}. There it is in")
     print(f"cell {policy.explain(state).cell}: {policy.explain(state).equations[0]};")

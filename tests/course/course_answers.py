@@ -351,7 +351,7 @@ wrongs(
     ("a codeword that came a moment ago", LOCATE, "", "for state, action in zip(", FOR_ALL_CELLS),
     ("no state far from its codeword", "partition.far(i, state)", "state.tolist() not in partition.codewords.tolist()"),
     ("a policy without any error", "np.mean(losses) > config.max_pol_loss and ", ""),
-    ("go on after a split", "losses = []\n    return", "break\n    return"),
+    ("go on after a split", "losses = []  # after a split the mean begins anew\n    return", "break\n    return"),
     ("all buffers empty", "affected[i] = True", "affected[:-1] = True"),
     ("full buffers beside a new cell", "partition.reset(affected)", "pass"),
     ("which has just lost states", "affected[i] = True", "affected[i] = False"),
@@ -369,7 +369,7 @@ wrongs(
 )
 wrong("2.3", "a call of vsp's `split_regions`")(vsp.split_regions)
 # The paper does not say whether the mean begins anew after a split
-right("2.3")(changed("2.3", "            losses = []\n    return", "    return"))
+right("2.3")(changed("2.3", "            losses = []  # after a split the mean begins anew\n    return", "    return"))
 OWN_LOCATE = "        i = int(np.abs(partition.codewords - state).sum(axis=1).argmin())\n"
 right("2.3")(changed("2.3", LOCATE, OWN_LOCATE, "return added", "return np.array(added)"))
 
@@ -414,7 +414,7 @@ def remove_each_other(partition, config):
     return removed
 
 
-@wrong("2.4", "what is gone removes no one")
+@wrong("2.4", "it removes no others")
 def the_gone_take_their_turn(partition, config):
     parameters, graph = partition.comparable_parameters(), partition.neighbours()
     alive = np.ones(len(parameters), dtype=bool)

@@ -445,7 +445,7 @@ def test_a_loop_without_end_is_stopped_and_told():
         exercise.call(function)
 
     before = signal.getsignal(signal.SIGALRM)
-    with pytest.raises(feedback.NotYet, match=r"^1.2 fit: found no result after 0.1 seconds, expected .* without end"):
+    with pytest.raises(feedback.NotYet, match=r"^1.2 fit: found no result after 0.1 seconds, expected .* endless loop"):
         fit(endless)
     assert signal.getsignal(signal.SIGALRM) is before and signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 

@@ -107,7 +107,10 @@ class Exercise:
             except NotYet:
                 raise
             except TooLong:
-                found, expected = f"no result after {self.seconds:g} seconds", "one sooner: look for a loop without end"
+                found, expected = (
+                    f"no result after {self.seconds:g} seconds",
+                    "a result in that time: look for an endless loop",
+                )
                 raise self.wrong(found, expected) from None
             except Exception as error:
                 found = f"an answer that raises an error ({type(error).__name__}: {error})"
@@ -130,7 +133,11 @@ class Exercise:
         try:
             with calls_of(self.refused) as called:
                 result = function(*given)
-        except NotImplementedError:
+        except NotImplementedError as error:
+            stub = traceback.extract_tb(error.__traceback__)[-1].name
+            if stub != getattr(function, "__name__", stub):
+                expected = "that one written first, or vsp's function if the text names it"
+                raise self.wrong(f"a call of your own `{stub}`, which is still a stub", expected) from None
             raise self.unsolved() from None
         except Exception as error:
             found = f"{type(error).__name__} ({error}) {_place(function, error)}"

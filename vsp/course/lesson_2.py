@@ -82,7 +82,7 @@ def running_mean(function: Callable) -> None:
         rng = np.random.default_rng(seed)
         cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
         _forgets(function, cells, rng.uniform(size=len(cells)))
-    RUNNING_MEAN.passed("it forgets whenever the episode enters another cell.")
+    RUNNING_MEAN.passed("it restarts whenever the episode enters another cell.")
 
 
 def _forgets(function: Callable, cells: np.ndarray, losses: np.ndarray) -> None:
@@ -206,9 +206,11 @@ def _one_round(n: int, done: list[str], config: Config, freeze: str) -> None:
             why = freeze if n >= frozen and n % every == 0 else "it is not due then"
             why = "a map that was trained once tells nothing yet" if n == 0 else why
             raise ALGORITHM_1.wrong(f"`{what}` in iteration {n}", f"none: {why}", hint)
-    order = [what for what in done if what in ("split", "merge")]
-    found = "a merge before a split in one iteration"
-    ALGORITHM_1.refuse_if(order == ["merge", "split"], found, "splits first, as the paper prints it", 2)
+    order = [what for what in done if what != "train"]
+    right = [what for what in ("split", "merge", "clear") if what in order]
+    ALGORITHM_1.refuse_if(
+        order != right, f"{', '.join(order)} in iteration {n}", "each once, splits first, as the paper prints it", 2
+    )
 
 
 def grown(

@@ -223,7 +223,7 @@ MERGES = (
     MergeCase([0, 5, 10], [[0, 1, 2]], "cells that are all different", 1),
     MergeCase([0, 0.1, 5], [[0, 2]], "two alike beside a third: the one whose turn comes first stays", 1),
     MergeCase([0, 5, 0, 5], [[0, 1, 2, 3]], "equal maps in cells that are not neighbours", 3),
-    MergeCase([0, 0.5, 1.0], [[0, 2]], "a removed cell between two that are not alike: what is gone removes no one", 2),
+    MergeCase([0, 0.5, 1.0], [[0, 2]], "a removed cell between two that are not alike: it removes no others", 2),
     MergeCase([5, 0, 0.1, 0.2, 9, 9.1], [[0, 1, 3, 4], [0, 3, 4], [0, 1, 4]],
               "three alike in the middle and two at the end: every cell that is left has its turn", 4),
     MergeCase([0, 0.1, 0.2], [[0]], "two cells alike on either side of the one whose turn it is: both go at once", 4,

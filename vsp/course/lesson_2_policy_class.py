@@ -42,7 +42,10 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     constant, own = _errors(policy_class("constant", task), teacher, task), _errors(own_class, teacher, task)
     share = f"{own / constant:.0%} of the error that constants have in the same cells"
     OWN_CLASS.refuse_if(own > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
-    OWN_CLASS.passed(f"{len(own_class.rows)} parameters per action, {share}.")
+    linear = _errors(policy_class("linear", task), teacher, task)
+    OWN_CLASS.passed(
+        f"{len(own_class.rows)} parameters per action, {share}; x and y alone have {linear / constant:.0%}."
+    )
 
 
 def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:

@@ -89,8 +89,8 @@ def _gap(function: Callable, ours: np.ndarray, theirs: np.ndarray) -> None:
     gap, error = PAIRED_GAP.array(values, (2,), hint=1, meaning="the gap and its standard error")
     right = (ours - theirs).mean()
     mistakes = [
-        Mistake(-right, "a gap with the sign turned", "the mean of ours less theirs", 1),
-        Mistake(None, f"a gap of {gap:.3g}", "the mean of ours less theirs", 1),
+        Mistake(-right, "a gap with the sign turned", "the mean of ours minus theirs", 1),
+        Mistake(None, f"a gap of {gap:.3g}", "the mean of ours minus theirs", 1),
     ]
     PAIRED_GAP.compare(gap, right, mistakes)
     right = (ours - theirs).std(ddof=1) / np.sqrt(len(ours))

@@ -152,7 +152,7 @@ def dagger_round(function: Callable) -> None:
         found = "the pair that `predict` returns, used as the actions"
         DAGGER.refuse_if(pair, found, "its first part, `predict(states)[0]`", 2)
         _labels(function, *case)
-    DAGGER.passed("the policy went there, the teacher said what is right there, and nothing was forgotten.")
+    DAGGER.passed("the policy's states, the teacher's actions, and the old data kept.")
 
 
 def _labels(
