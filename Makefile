@@ -35,7 +35,7 @@ READS_OURS := $(foreach n,$(ROWS) optimum \
   $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
 READS_06_few_equations := $(READS_OURS)
-READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL) LunarLanderContinuous-v3) trees_HalfCheetah-v5 starts_MountainCarContinuous-v0 optimum fits \
+READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL) LunarLanderContinuous-v3) starts_MountainCarContinuous-v0 optimum fits \
   $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
   $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
   data/results/faithful_Pendulum-v1.policy data/results/robots_HalfCheetah-v5.policy
@@ -197,7 +197,7 @@ faults: venv-test-train-dask ## runs the fault-injection tests, into data/result
 beyond: begin venv-train ## compares our own method with others, into data/results/: 5 to 6 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 20 HOURS, resumable
+beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 24 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

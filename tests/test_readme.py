@@ -307,8 +307,13 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     assert f"one cell returns {one['mean']:.0f}." in said and eight["most"] < tree["least"]
     assert f"random search, returns {cheetah['mean'][map_, 0]:.0f}." in said and sixteen["most"] < large["least"]
     assert cheetah["high"][map_, 0] < eight["low"] and cheetah["policies"][map_, 0] == eight["policies"] == 5
-    others = robots["policies"].drop([("HalfCheetah", map_, 0), ("HalfCheetah", ours, 8), ("HalfCheetah", "cells", 8)])
+    fives = [(map_, 0), *((kind + more, 8) for kind in ("cells", "oblique tree") for more in ("", ", trained further"))]
+    others = robots["policies"].drop([("HalfCheetah", *row) for row in fives])
     assert (others[others.index.get_level_values("method") != teacher] == 3).all()
+    assert eight["high"] < tree["low"] and tree["policies"] == 5
+    alone = walker.loc[("oblique tree", 4)]
+    assert f"by imitation alone it returns {alone['mean']:.1f}, and eight cells {walker['mean']['cells', 8]:.1f}." in said
+    assert alone["least"] > 300 and alone["share"] > 1
     two, played = walker.loc[(ours, 2)], walker["mean"][teacher, 0]
     least = math.floor(10 * two["least"]) / 10  # rounded down: "at least" must hold
     assert f"they return {two['mean']:.1f}, at least {least} with every seed; its teacher returns {played:.1f}." in said

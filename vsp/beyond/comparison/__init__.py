@@ -3,7 +3,7 @@
 from ...paper.results import RESULTS, read_results
 from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail
 from .faithful_summary import largest_alike, likeness, other_teachers
-from .limit_summary import limit_summary, near, references, robot_rows, robots_summary, starts_summary
+from .limit_summary import limit_summary, near, references, robots_summary, starts_summary
 from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good
 from .method_tables import TASKS
 from .regret import best_mean, with_regret

@@ -14,7 +14,7 @@ from ...paper.results import read_results
 from ...paper.statistics import share_interval
 from ..optimum.limit import limit_preset
 from .method_summary import INTERVAL, method_summary, read_rows
-from .method_tables import LIMIT, ROBOT_TABLES, STARTS
+from .method_tables import LIMIT, STARTS
 from .regret import best_mean
 
 # Least mean return of a policy at the limit; for SimpleGoal, its largest distance below the best mean return
@@ -79,19 +79,13 @@ def references() -> pd.DataFrame:
     return table.assign(regret=table["best"] - table["teacher"])
 
 
-def robot_rows(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Return all committed rows of a robot: cells, one linear map, its teacher, and oblique trees if there are any."""
-    names = [name for name, table in ROBOT_TABLES.items() if table.has(task)]
-    return pd.concat([read_rows(task, folder, table=name) for name in names], ignore_index=True)
-
-
 def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Summarise the policies of a robot, one row per method and size, the teacher first.
 
     Columns: method, size, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return
     of a seed), failing, share (mean divided by the teacher's mean return), r2 (the median) and parameters.
     """
-    rows = robot_rows(task, folder)
+    rows = read_rows(task, folder, table="robots")
     teacher = rows.loc[rows["method"] == "robot's teacher", "mean"].iloc[0]
     table = method_summary(rows)
     by_kind = rows.groupby(["method", "size"])

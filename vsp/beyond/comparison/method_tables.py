@@ -229,12 +229,9 @@ LONG_TABLES = {
     "limit": Table(LIMIT, seeds=range(2), sizes=(3,)),
 }  # fmt: skip
 # One cell trained further is the control: it has a teacher too, as eight have
-_TREES = {name: replace(method, tasks=WALKERS[1:]) for name, method in ROBOTS.items() if "tree" in name}
 ROBOT_TABLES = {
     "robots": Table(
-        {name: method for name, method in ROBOTS.items() if name not in _TREES},
-        seeds=range(3), fewer=range(3), sizes=LONG_SIZES,
-        by_task={"HalfCheetah-v5": {"seeds": FEW_SEEDS, "sizes": None}},
+        ROBOTS, seeds=range(3), fewer=range(3),
+        by_task={"HalfCheetah-v5": {"seeds": FEW_SEEDS}},  # eight cells against one map and against a tree
     ),
-    "trees": Table(_TREES, seeds=range(3), fewer=range(3)),
 }  # fmt: skip
