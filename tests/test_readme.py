@@ -312,7 +312,8 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     assert (others[others.index.get_level_values("method") != teacher] == 3).all()
     assert eight["high"] < tree["low"] and tree["policies"] == 5
     alone = walker.loc[("oblique tree", 4)]
-    assert f"by imitation alone it returns {alone['mean']:.1f}, and eight cells {walker['mean']['cells', 8]:.1f}." in said
+    cells_alone = walker["mean"]["cells", 8]
+    assert f"by imitation alone it returns {alone['mean']:.1f}, and eight cells {cells_alone:.1f}." in said
     assert alone["least"] > 300 and alone["share"] > 1
     two, played = walker.loc[(ours, 2)], walker["mean"][teacher, 0]
     least = math.floor(10 * two["least"]) / 10  # rounded down: "at least" must hold
