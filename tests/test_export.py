@@ -210,7 +210,8 @@ def test_what_is_printed_exactly_reads_back_as_the_same_policy(seed):
     ("name", "code"),
     [("x", "x"), ("Δx", r"\Delta x"), ("vx", "v_x"), ("main", r"\mathrm{main}"), ("ω", r"\omega"), ("F", "F"),
      ("cos θ", r"\cos \theta"), ("s0", "s0"), ("ė", r"\dot e"), ("x²", "x^2"), ("vx·vy", "v_x v_y"),
-     ("(sin θ)²", r"(\sin \theta)^2"), ("tanh", r"\tanh")],
+     ("(sin θ)²", r"(\sin \theta)^2"), ("tanh", r"\tanh"), ("load_%", r"load\_\%"), ("v east", r"\mathrm{v\ east}"),
+     ("a & b", r"\mathrm{a\ \&\ b}"), ("#1", r"\#1"), ("$x$", r"\$x\$"), ("\\x", r"\backslash x")],
 )  # fmt: skip
 def test_symbols_by_hand(name, code):
     assert symbol(name) == code

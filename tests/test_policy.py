@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
 import vsp
 from vsp.baselines.simple import refit
@@ -344,3 +344,17 @@ def test_rounding_keeps_the_class():
     short = rounded(policy_of("quadratic"), 2)
     assert short.policy_class.name == "quadratic"
     assert np.allclose(short.coefficients, policy_of("quadratic").coefficients, rtol=0.06)
+
+
+def test_borders_where_the_box_has_no_limits():
+    policy = VoronoiPolicy(np.eye(2, 17), np.zeros((2, 18, 6)), task=CHEETAH)
+    told = policy.explain(0.2 * np.eye(1, 17)[0])  # 0.8 from the first codeword, 1.2 from the other
+    assert told.borders["cell"].tolist() == [-1, 1] + [-1] * 15
+    assert told.borders["change"].iloc[1] == pytest.approx(0.2, abs=1e-9) and str(told).endswith("θ +0.2 (cell 1)")
+
+
+def test_an_explanation_in_words_names_cell_0_or_says_that_there_is_no_border():
+    two = VoronoiPolicy([[0.25, 0.25], [0.75, 0.25]], np.zeros((2, 3, 2)), task=SIMPLEGOAL)
+    assert str(two.explain([0.75, 0.25])).endswith("by changing one input: x -0.25 (cell 0)")
+    alone = VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task=SIMPLEGOAL)
+    assert str(alone.explain([0.1, 0.1])).endswith("by changing one input: none in the box")

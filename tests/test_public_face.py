@@ -54,18 +54,6 @@ def test_teacher_config_distill_evaluate(task, tmp_path):
     assert len(history.to_frame()) == 60
 
 
-def test_explain_has_what_is_promised(made):
-    told = made[2].explain(np.array([0.7, 0.3]))
-    assert told.cell >= 0 and told.equations and told.margin >= 0
-    assert np.allclose(told.contributions.sum(axis=1), told.raw)
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_a_published_policy_plays(task):
-    policy = printed.published_policy(task)
-    assert isinstance(policy, vsp.VoronoiPolicy) and len(vsp.evaluate(policy, task, n_episodes=5, seed=0)) == 5
-
-
 def test_the_whole_face_from_a_fresh_prompt():
     """In a process of its own, so that no other test has imported a part for it."""
     code = """

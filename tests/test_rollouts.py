@@ -1,7 +1,10 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
+import vsp
 from vsp.rollouts import collect_episodes, rollout, standard, visited_states
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 from vsp.tasks.registry import get_task
@@ -77,3 +80,17 @@ def test_a_constant_variable_keeps_its_unit():
     """The standard deviation of a thousand times 0.1 is a rounding error above 0."""
     states = np.column_stack([np.full(1000, 0.1), np.arange(1000.0)])
     assert states[:, 0].std() > 0 and standard(states)[1].tolist() == [1.0, states[:, 1].std()]
+
+
+def test_rewards_that_are_no_numbers_are_one_clear_error():
+    plain = get_task(SIMPLEGOAL)
+
+    def step(states, actions):
+        moved, rewards, outcomes = plain.step(states, actions)
+        return moved, np.full_like(rewards, np.nan), outcomes
+
+    task = dataclasses.replace(plain, name="Broken", step=step)
+    config = vsp.Faithful(n_cells=2, n_episodes=5, n_restarts=1, n_validation=5)
+    for call in (vsp.evaluate, lambda teacher, task, n, seed: vsp.distill(teacher, task, config, seed=seed)):
+        with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
+            call(Constant(-1.0, -1.0), task, 3, seed=0)

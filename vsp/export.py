@@ -17,6 +17,8 @@ from .subpolicies.base import SHARED, number
 if TYPE_CHECKING:
     from .policy import VoronoiPolicy
 
+# What LaTeX would take as a command
+_SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
 _SYMBOLS = {
     "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
     "cos ": r"\cos ", "sin ": r"\sin ", "tanh": r"\tanh",
@@ -211,6 +213,10 @@ def symbol(name: str) -> str:
         return " ".join(symbol(factor) for factor in name.split("·"))
     if name.endswith("²"):
         return symbol(name[:-1]) + "^2"
+    words = " " in name and name.isascii() and not name.strip("(").startswith(("cos ", "sin "))
+    name = "".join(_SPECIAL.get(one, one) for one in name)
+    if words:
+        return rf"\mathrm{{{name}}}".replace(" ", r"\ ")
     for plain, code in _SYMBOLS.items():
         name = name.replace(plain, code)
     if name.isascii() and name.isalpha() and len(name) == 2 and name.startswith("v"):

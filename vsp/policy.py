@@ -145,13 +145,16 @@ class VoronoiPolicy:
         """Return the columns change (in units of the input; NaN where no change within the box leads to another cell)
         and cell (-1 there).
 
-        Tries `_STEPS` points on each axis, then refines between two of them. A very thin cell may be missed.
+        Tries `_STEPS` points on each axis, then refines between two of them. A very thin cell may be missed. Where the
+        box has no limit, it looks as far as twice the range of the codewords.
         """
         rows = []
         for axis in range(len(state)):
             low, high = min(self.task.low[axis], state[axis]), max(self.task.high[axis], state[axis])
-            ways = [self._border(state, cell, axis, end) for end in (low, high) if np.isfinite(end)]
-            rows.append(min(ways, key=lambda way: np.nan_to_num(abs(way[0]), nan=np.inf), default=(np.nan, -1)))
+            far = 2 * np.ptp(np.append(self.codewords[:, axis], state[axis]))
+            ends = (end if np.isfinite(end) else state[axis] + way * far for way, end in ((-1, low), (1, high)))
+            ways = [self._border(state, cell, axis, end) for end in ends]
+            rows.append(min(ways, key=lambda way: np.nan_to_num(abs(way[0]), nan=np.inf)))
         return pd.DataFrame(rows, index=list(self.task.inputs), columns=["change", "cell"])
 
     def _border(self, state: np.ndarray, cell: int, axis: int, end: float) -> tuple[float, int]:

@@ -150,6 +150,7 @@ def _advance(policy: Policy, task: Task, states: np.ndarray, steps: list[Step] |
         active, states = active[~done], states[~done]
         if not len(active):
             break
+    check_finite(f"the summed rewards of {task.name}", returns)
     return Outcomes(returns, lengths, outcomes)
 
 

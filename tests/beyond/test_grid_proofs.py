@@ -235,3 +235,11 @@ def test_the_teacher_does_what_is_proved_of_it():
     assert (found.outcomes[promised > 0] == GOAL).all() and (found.lengths <= promised)[promised > 0].all()
     with pytest.raises(ValueError, match="expected a Teacher"):
         teacher_steps_to_goal("a name")
+
+
+def test_a_set_that_is_never_left_must_be_around_upright():
+    """All boxes together are never left, whatever the policy does."""
+    content = prove_pendulum(STILL, n=16).certificate()
+    claim = {**content["claim"], "proved": content["claim"]["starts"], "longest": -1}
+    with pytest.raises(check.Refused, match="more than 0.5 rad from upright"):
+        check.check_content({**content, "pieces": [[-1, 16]] * 16, "claim": claim})

@@ -1,4 +1,5 @@
 import copy
+import math
 import shutil
 from dataclasses import replace
 
@@ -74,6 +75,21 @@ def test_all_first_steps_are_among_those_found(policy, env, first):
     assert set(owner) == set(range(300)) and (returns <= 0).all()
 
 
+@pytest.mark.parametrize("push", [1.0, 40.0, -40.0])  # at the limits; up to the wall; never there
+def test_the_checker_plays_as_gymnasium_does(env, push):
+    codewords, maps = [[-0.5, -0.01], [-0.5, 0.01]], [[[0.0], [push], [-0.9]], [[0.3], [push], [0.9]]]
+    player = check.mountaincar.Policy(codewords, maps, [1.0, 0.02], "euclidean")
+    for start in np.random.default_rng(0).uniform(-0.6, -0.4, size=20):
+        env.state = state = np.array([start, 0.0])
+        seen, total, ended, steps = state.astype(np.float32), 0.0, False, 0
+        while not ended and steps < 999:
+            cell = np.abs(seen[1] - np.array([-0.01, 0.01])).argmin()
+            action = np.clip(np.append(seen.astype(float), 1.0) @ np.array(maps[cell])[:, 0], -1, 1)
+            seen, reward, ended, *_ = env.step(np.array([action]))
+            total, steps = total + reward, steps + 1
+        assert player.play(start) == (pytest.approx(total, abs=1e-9), steps, bool(ended))
+
+
 def test_a_block_is_what_the_checker_plays(policy):
     block = run_block(policy, 100_000, 200)
     low, high = (check.mountaincar.edge(100_000 + i, -1) for i in (0, 200))
@@ -144,14 +160,41 @@ def test_one_block_of_all_is_refused(policy):
         check.check_content({**content, "pieces": [one]})
 
 
+def claimed(blocks):
+    """What these blocks would prove if they were all."""
+    last = blocks[-1]
+    firsts = (*(block["first"] for block in blocks), last["first"] + last["n"])
+    edges = [check.mountaincar.edge(first, -1) for first in firsts]
+    found = {name: sum(block[name] for block in blocks) for name in ("n", "n_states", "n_left")}
+    found |= {"least": min(block["least"] for block in blocks), "longest": max(block["longest"] for block in blocks)}
+    means = {name: np.diff(edges) @ [block[name] for block in blocks] for name in ("mean_low", "mean_high")}
+    return found | {name: value / (edges[-1] - edges[0]) for name, value in means.items()}
+
+
 def mutants(content):
     """Certificates whose claim is false, or whose blocks do not prove it."""
-    for kind in ("drop", "swap", "shift", "claim", "least", "longest", "mean", "policy"):
+    for kind in ("drop", "end", "swap", "shift", "claim", "least", "longest", "mean", "policy", "stuck", "metric",
+                 "states", "nan", "left"):  # fmt: skip
         mutant = copy.deepcopy(content)
         blocks, claim = mutant["pieces"], mutant["claim"]
         worst = min(blocks, key=lambda block: block["least"])
         if kind == "drop":
             del blocks[7]
+        elif kind == "end":  # the last starts are left out, also of the claim
+            del blocks[-100:]
+            claim |= claimed(blocks)
+        elif kind == "stuck":  # a car that never moves is said to arrive
+            mutant["policy"]["coefficients"] = np.zeros_like(mutant["policy"]["coefficients"]).tolist()
+            for part in (*blocks, claim):
+                part |= {"least": -1.0, "longest": 999, "mean_low": 0.0, "mean_high": 0.0}
+        elif kind == "metric":
+            mutant["policy"]["metric"] = "manhattan"
+        elif kind == "states":
+            blocks[0]["n_states"], blocks[1]["n_states"] = 1, blocks[1]["n_states"] + blocks[0]["n_states"] - 1
+        elif kind == "nan":  # no comparison with it is true
+            blocks[0]["least"], claim["least"] = math.nan, 150.0
+        elif kind == "left":
+            blocks[0]["n_left"], blocks[1]["n_left"] = 5, -5
         elif kind == "swap":
             blocks[3], blocks[4] = blocks[4], blocks[3]
         elif kind == "shift":

@@ -230,3 +230,15 @@ def test_the_command_refuses_a_fifo_for_a_manifest_in_one_line(tmp_path):
     done = subprocess.run(command, cwd=atomic.ROOT, capture_output=True, text=True, timeout=60)
     (line,) = done.stderr.splitlines()
     assert done.returncode == 1 and line.startswith(f"error: {tmp_path / MANIFEST}: is a folder, a FIFO or a device")
+
+
+@pytest.mark.parametrize("change", ["twice", "rubbish", "one space"])
+def test_a_manifest_of_other_lines_is_refused(table, change):
+    """Though the line of the file that is read is right."""
+    manifest = table.parent / MANIFEST
+    first, second = manifest.read_text().splitlines(keepends=True)
+    lines = {"twice": (first, second, "0" * 64 + "  b.csv\n"), "rubbish": ("x\n", first, second),
+             "one space": (first.replace("  ", " "), second)}  # fmt: skip
+    manifest.write_text("".join(lines[change]))
+    with pytest.raises(DamagedFile, match="MANIFEST.sha256: expected lines of 64 hexadecimal digits"):
+        read_listed(table)

@@ -130,7 +130,7 @@ def agents(tmp_path_factory):
     """Untrained agents, by name, and the zips that Stable-Baselines3 saved."""
     import gymnasium
     import torch
-    from stable_baselines3 import PPO, SAC, TD3
+    from stable_baselines3 import DDPG, PPO, SAC, TD3
 
     def untrained(algorithm, task=SIMPLEGOAL, **network):
         memory = {} if algorithm is PPO else {"buffer_size": 10}
@@ -141,6 +141,7 @@ def agents(tmp_path_factory):
         "td3": untrained(TD3),
         "small": untrained(TD3, **small),
         "car": untrained(TD3, MOUNTAINCAR, **small),
+        "ddpg": untrained(DDPG, **small),
         "tanh": untrained(TD3, **small, activation_fn=torch.nn.Tanh),
         "leaky": untrained(TD3, **small, activation_fn=torch.nn.LeakyReLU),
         "sac": untrained(SAC, **small),
@@ -151,7 +152,9 @@ def agents(tmp_path_factory):
     return made, folder
 
 
-@pytest.mark.parametrize(("name", "task"), [("td3", SIMPLEGOAL), ("small", SIMPLEGOAL), ("car", MOUNTAINCAR)])
+@pytest.mark.parametrize(
+    ("name", "task"), [("td3", SIMPLEGOAL), ("small", SIMPLEGOAL), ("car", MOUNTAINCAR), ("ddpg", SIMPLEGOAL)]
+)
 def test_a_zip_predicts_as_stable_baselines_does(agents, name, task):
     made, folder = agents
     teacher = load_teacher(folder / f"{name}.zip", task)

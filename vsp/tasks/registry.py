@@ -88,6 +88,8 @@ def _names(what: str, given: Sequence[str] | None, plain: tuple[str, ...]) -> tu
     names = () if isinstance(given, str) else tuple(given)
     if len(names) != len(plain) or len({name for name in names if isinstance(name, str) and name}) != len(plain):
         raise ValueError(f"{what} are {given!r}, expected {len(plain)} different names")
+    if "bias" in names:
+        raise ValueError(f"{what} are {given!r}, expected none called 'bias', the name of the constant in tables")
     return names
 
 

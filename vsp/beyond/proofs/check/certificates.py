@@ -18,16 +18,21 @@ def check(path) -> dict:
         seal, _, payload = file.read().partition(b"\n")
     if hashlib.sha256(payload).hexdigest().encode() != seal:
         raise Refused(f"{path}: the checksum in its first line is not that of the rest")
-    return check_content(json.loads(payload))
+    try:
+        content = json.loads(payload)
+    except (ValueError, RecursionError) as error:
+        raise Refused(f"{path}: no certificate: {error!r:.300}") from error
+    return check_content(content)
 
 
 def check_content(content: dict) -> dict:
     """Return the claim of a certificate that was read. Raises `Refused` if it is not proved."""
-    if content["task"] not in CHECKS:
-        raise Refused(f"the task is {content['task']!r}, expected one of {sorted(CHECKS)}")
+    task = content.get("task") if isinstance(content, dict) else None
+    if not isinstance(task, str) or task not in CHECKS:
+        raise Refused(f"the task is {task!r}, expected one of {sorted(CHECKS)}")
     try:
         check_numbers(**content["policy"])
-        return CHECKS[content["task"]].check_content(content)
+        return CHECKS[task].check_content(content)
     except (ValueError, TypeError, LookupError, ArithmeticError) as error:
         raise Refused(f"the certificate is malformed: {error!r}") from error
 

@@ -21,9 +21,12 @@ ERRORS = 5  # standard errors by which the sample's mean may differ
 def check_content(content: dict) -> dict:
     """Return the claim of a certificate that was read. Raises `Refused` if the blocks or the sample contradict it."""
     claim, blocks, policy, n = content["claim"], content["pieces"], Policy(**content["policy"]), 0
+    if not all(math.isfinite(number) for part in (claim, *blocks) for number in part.values()):
+        raise Refused("the claim or a block has numbers that are not finite: no comparison would find them wrong")
     for block in blocks:
-        if block["first"] != n or not 1 <= block["n"] <= BLOCK or not block["n"] <= block["n_states"]:
-            found = {name: block[name] for name in ("first", "n", "n_states")}
+        counted = block["n"] <= block["n_states"] >= block["n_left"] >= 0
+        if block["first"] != n or not 1 <= block["n"] <= BLOCK or not counted:
+            found = {name: block[name] for name in ("first", "n", "n_states", "n_left")}
             raise Refused(f"a block is {found}, expected 1 to {BLOCK} observations from {n}, and as many states")
         n += block["n"]
     if n != magnitude(LOW) - magnitude(HIGH) + 1:
