@@ -17,8 +17,8 @@ def test_held_by_hand():
 
 
 def test_losses_add_up_to_the_regret():
-    task, teacher, best = get_task(PENDULUM), load_teacher(PENDULUM), best_policy(PENDULUM, finer=0.5)
-    starts = task.start(np.random.default_rng(0), 300)
+    task, teacher, best = get_task(PENDULUM), load_teacher(PENDULUM), best_policy(PENDULUM, finer=0.3)
+    starts = task.start(np.random.default_rng(0), 60)
     found = losses(teacher, best, task, starts, REGIONS)
     regret = (rollout(best, task, starts).returns - rollout(teacher, task, starts).returns).mean()
     assert found.steps.sum() == pytest.approx(1) and found.steps["hold"] > 0.7

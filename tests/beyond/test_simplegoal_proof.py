@@ -336,9 +336,12 @@ def test_outcomes_have_names():
 # The committed certificates
 
 
+LARGE = ("simplegoal_best_run", "simplegoal_limit", "simplegoal_margin", "simplegoal_paper")  # checked in tests/long
+
+
 @pytest.mark.parametrize("path", sorted(CERTIFICATES.glob("*.json")), ids=lambda path: path.stem)
 def test_committed_certificates_prove_what_the_table_says(path):
-    claim = check.check(path)
+    claim = json.loads(sealed.read_sealed(path))["claim"] if path.stem in LARGE else check.check(path)
     row = read_results("proofs").set_index("name").loc[path.stem]
     assert row["longest"] == claim["longest"] and path.stat().st_size < 2e6
     for name in ("goal", "pit", "left"):

@@ -537,7 +537,12 @@ def test_a_long_message_is_shown_in_lines():
 # What is written
 
 
-def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
+@pytest.fixture
+def no_slides(monkeypatch):
+    monkeypatch.setattr(build, "slides", lambda lesson: "their pictures take long")
+
+
+def test_what_somebody_wrote_into_a_copy_is_kept(no_slides, tmp_path, capsys):
     copy = tmp_path / "build/course/student" / list(LESSONS)[0]
     for n in (1, 2):
         build.build(tmp_path)
@@ -549,7 +554,7 @@ def test_what_somebody_wrote_into_a_copy_is_kept(tmp_path, capsys):
     assert nbformat.read(copy, as_version=4).cells
 
 
-def test_what_was_written_before_a_kill_is_nobodys_work(tmp_path):
+def test_what_was_written_before_a_kill_is_nobodys_work(no_slides, tmp_path):
     """The checksums of what was written come last: without them, a file as it is to be is not taken for edited."""
     copies = [*build.build(tmp_path)]
     before = {path: path.read_bytes() for path in copies}

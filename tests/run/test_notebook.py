@@ -37,7 +37,7 @@ async def seconds_for_a_reply(kind):
         widget.parent_header = {}
         widget.sync_state()
         sender, _ = session.feed_identities(kernel.recv_multipart())
-        reply = asyncio.ensure_future(client.shell_channel.get_msg(timeout=2))
+        reply = asyncio.ensure_future(client.shell_channel.get_msg(timeout=0.6))
         await asyncio.sleep(0.1)
         session.send(kernel, "execute_reply", {}, ident=sender)
         time.sleep(0.1)  # it is there, and nobody has looked
@@ -50,7 +50,7 @@ async def seconds_for_a_reply(kind):
 @pytest.mark.parametrize(("kind", "at_once"), [(notebook.OutputWidget, True), (OutputWidget, False)])
 def test_a_reply_is_seen_although_a_widget_sends(kind, at_once):
     """Where nbclient's own does so too, ours can go."""
-    assert (asyncio.run(seconds_for_a_reply(kind)) < 1) == at_once
+    assert (asyncio.run(seconds_for_a_reply(kind)) < 0.3) == at_once
 
 
 def test_notebooks_run_with_the_mended_widget():

@@ -156,7 +156,7 @@ def test_fault_leaves_previous_figures(tmp_path, fault):
     notebook = write(tmp_path, DRAW, *cells)
     before = tree(tmp_path)
     expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
-    error = refused(notebook, "--out", tmp_path, "--timeout", "3" if fault == "too slow" else "60", "--expect", *expect)
+    error = refused(notebook, "--out", tmp_path, "--timeout", "1" if fault == "too slow" else "60", "--expect", *expect)
     assert error.startswith("error: story.ipynb") and message in error
     assert fault != "failing cell" or "Traceback" in error
     assert tree(tmp_path) == before
