@@ -37,9 +37,11 @@ def forgotten():
     registry._ADDED.update(before)
 
 
-def test_a_changed_environment_is_registered_anew():
+def test_a_changed_environment_is_a_changed_task():
     for most in (30, 40):  # as when a cell of a notebook runs again
         gymnasium.register("Changed-v0", entry_point=own_tasks.Dock, max_episode_steps=most)
+        registry._ADDED.pop("Changed-v0", None)
+        assert vsp.get_task("Changed-v0").max_steps == most
         assert vsp.register("Changed-v0").max_steps == vsp.get_task("Changed-v0").max_steps == most
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -66,13 +66,23 @@ def _step_live(
     return states, rewards, outcomes
 
 
-@cache
+_KNOWN: dict[tuple[str, Outcome | None], tuple[object, Task]] = {}  # with the entry of Gymnasium's registry
+
+
 def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
     """Return the `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
 
     `outcome` tells whether an episode that ended succeeded; None: success is undefined. Raises ValueError for other
-    spaces, an action box without limits, or an environment without a step limit.
+    spaces, an action box without limits, or an environment without a step limit. An environment that is registered anew
+    gives a new task.
     """
+    entry, known = gymnasium.registry.get(name), _KNOWN.get((name, outcome))
+    if known is None or known[0] is not entry:
+        known = _KNOWN[name, outcome] = entry, _made(name, outcome)
+    return known[1]
+
+
+def _made(name: str, outcome: Outcome | None) -> Task:
     env = gymnasium.make(name)
     seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
     env.close()

@@ -76,7 +76,7 @@ def register(
     if outcome is not None and not callable(outcome):
         raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
     _check_registered(name)
-    plain = gymnasium_task.__wrapped__(name, outcome)  # not the cached one: the environment may be a new one
+    plain = gymnasium_task(name, outcome)
     inputs = _names("inputs", inputs, plain.inputs)
     _ADDED[name] = replace(plain, inputs=inputs, input_labels=inputs, outputs=_names("outputs", outputs, plain.outputs))
     return _ADDED[name]
