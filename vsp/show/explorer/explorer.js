@@ -494,8 +494,8 @@ class Explorer {
     this.many = scene.task.inputs.length > 8 || scene.task.outputs.length > 3
     this.answer = this.answers()
     this.result = element("p", { "aria-live": "polite" })
-    const left = ({ relatedTarget: to }) => this.form.contains(to) || this.changed()
-    this.form = element("div", { focusout: left }) // while a reader writes, the form stays as it is
+    const left = ({ relatedTarget: to }) => this.stale && !this.form.contains(to) && this.changed()
+    this.form = element("div", { focusout: left }) // while a reader writes, the form stays as it is, even if it is stale
     this.names = element(
       "select",
       { "aria-label": "policy", change: () => this.choose(+this.names.value) },
@@ -680,7 +680,7 @@ class Explorer {
       value: +value.toFixed(4),
       "aria-label": label,
       input: () => {
-        if (!Number.isFinite(input.valueAsNumber)) return
+        if (!Number.isFinite(input.valueAsNumber)) return (this.stale = true)
         put(input.valueAsNumber)
         this.changed({ policy: true, whole: false })
       },
@@ -703,6 +703,7 @@ class Explorer {
       ...outputs.map((_, k) => weight(i, name, k)),
     ])
     const legend = element("legend", {}, `Change cell ${cell + 1}`)
+    this.stale = false
     this.form.replaceChildren(element("fieldset", {}, legend, table(["", "codeword", ...outputs], rows)))
   }
 
@@ -719,6 +720,7 @@ class Explorer {
     this.path = this.stored ? this.recent() : rollout(this.scene, this.policy, this.asked, true).states
     const writing = this.form.contains(document.activeElement)
     if (!this.stored && (this.whole || (this.cell !== before && !writing))) this.showForm()
+    else this.stale ||= this.cell !== before
     this.whole = false
     draw(this)
     this.frames += 1
