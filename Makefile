@@ -35,8 +35,8 @@ READS_OURS := $(foreach n,$(ROWS) optimum \
   $(foreach table,beyond tuned faithful same,$(table)_LunarLanderContinuous-v3),data/results/$(n).csv) \
   data/results/faithful_SimpleGoal-v0.policy
 READS_06_few_equations := $(READS_OURS)
-READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL) LunarLanderContinuous-v3) starts_MountainCarContinuous-v0 optimum fits \
-  $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
+READS_07_limits := $(foreach n,$(ROWS) $(addprefix limit_,$(SMALL) LunarLanderContinuous-v3) \
+  starts_MountainCarContinuous-v0 optimum fits $(addsuffix _SimpleGoal-v0,tuned apart faithful demanded) \
   $(foreach r,BipedalWalker-v3 HalfCheetah-v5,robots_$(r) gait_$(r) fewest_$(r)),data/results/$(n).csv) \
   data/results/faithful_Pendulum-v1.policy data/results/robots_HalfCheetah-v5.policy
 READS_08_proofs := $(foreach n,paper tuned,data/proofs/simplegoal_$(n).json) data/proofs/mountaincar_limit.json \

@@ -298,6 +298,25 @@ def test_a_threshold_decides_where_the_guide_says():
         assert told in notes and [int(n) for n in re.findall(r"\d+", told)] == found
 
 
+def test_splits_merges_and_cells_are_as_the_text_says():
+    """Exact maps make as many splits and more merges; ten cells exist early; the loss decides about no split."""
+    texts = {cell.id: " ".join(cell.source.split()) for cell in LESSONS["lesson_2_algorithms.ipynb"].cells}
+    _, teacher, *_ = examples()
+    quick, full = vsp.preset(SIMPLEGOAL).quick(), vsp.preset(SIMPLEGOAL)
+    for config, told in (
+        (replace(quick, fit="closed_form"), {"split": "(15, 12 and 14 instead", "merge": "(6, 5 and 8 instead"}),
+        (quick, {"split": "of 13, 8 and 12)", "merge": "of 2, 0 and 1)"}),
+    ):
+        runs = [once(teacher, SIMPLEGOAL, config, seed=seed)[1] for seed in range(3)]
+        for kind, words in told.items():
+            found = [sum(event.kind == kind for event in run.events) for run in runs]
+            assert words in texts["predict-notes"] and [int(n) for n in re.findall(r"\d+", words)] == found
+    policy, history = once(teacher, SIMPLEGOAL, full, seed=0)
+    assert "Ten cells exist by iteration 40;" in texts["growth-see"] and history.cells[40] == 10
+    by_distance, _ = once(teacher, SIMPLEGOAL, replace(full, max_pol_loss=1e-12), seed=0)
+    assert np.array_equal(policy.codewords, by_distance.codewords)
+
+
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
     """And needs no package that the hand-out leaves out."""
     monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "pygame", "Box2D"))
