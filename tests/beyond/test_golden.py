@@ -80,7 +80,7 @@ AT_LENGTH = {  # numbers that decide on a policy and are made small here
     "soft tree, DAgger": SoftTree.N_STEPS,
     "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,
     "TD-AVQ, coarse": inspect.signature(tdavq.learn).parameters["n_steps"].default,
-    "at the limit": [limit.N_STARTS, limit.N_SLOW, limit.SCREENING, limit.SECOND, *limit.PRICE.values()],
+    "at the limit": [limit.N_STARTS, limit.N_SLOW, limit.SCREENING, limit.N_AGAIN, limit.AGAIN, *limit.PRICE.values()],
 }
 
 

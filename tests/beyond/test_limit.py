@@ -74,8 +74,8 @@ def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned_and_the_best_agai
     monkeypatch.setattr(limit, "_tuned", lambda policy, *rest: tuned.append(rest[-2:]) or policy)
     assert at_the_limit(LUNARLANDER, seed=0) == "policy" and screened == [True]
     whole = limit_preset(LUNARLANDER).n_generations
-    assert [config.n_generations for config, _ in tuned] == [whole, 0.4 * whole]
-    assert len({seed for _, seed in tuned}) == 2
+    assert [config.n_generations for config, _ in tuned] == [whole, 0.4 * whole, 0.4 * whole]
+    assert len({seed for _, seed in tuned}) == 3
 
 
 def test_what_cannot_be_searched_is_refused():

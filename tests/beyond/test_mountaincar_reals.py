@@ -4,6 +4,7 @@ from support import MOUNTAINCAR
 
 import vsp
 from vsp.beyond import comparison
+from vsp.beyond.proofs import mountaincar_reals
 from vsp.beyond.proofs.mountaincar_reals import Loop, prove_part, started
 from vsp.tasks.mountaincar import TASK
 
@@ -52,7 +53,33 @@ def test_a_part_of_the_starts_surely_arrives():
     assert part.share == 1.0 and found.lengths.max() <= part.longest + 1 and part.least <= found.returns.min() + 1e-3
 
 
-def test_where_the_car_never_moves_nothing_is_proved():
+def test_shorter_pieces_prove_what_long_ones_leave_open(monkeypatch):
+    monkeypatch.setattr(mountaincar_reals, "LOST", 3e-5)
+    whole = prove_part(CAR, -0.5, -0.49998, 2)
+    monkeypatch.setattr(mountaincar_reals, "N_TRIALS", 1)
+    once = prove_part(CAR, -0.5, -0.49998, 2)
+    assert once.share < 1.0 == whole.share
+
+
+def test_what_is_given_up_counts_however_short_it_is():
+    none = np.zeros(0, dtype=int)
+
+    class Hopeless:
+        @staticmethod
+        def step(pieces):
+            return pieces.at(none), pieces.at(none), pieces
+
+    lost, steps, _ = mountaincar_reals._followed(Hopeless, started(np.array([-0.5]), np.array([-0.5])))
+    assert lost[0, 0] < -0.5 < lost[0, 1] and steps == 0
+
+
+def test_a_car_that_just_passes_the_flag_has_arrived():
+    """Left of this start the car rolls back before the flag and swings once more."""
+    assert prove_part(CAR, -0.40513, -0.40512, 10).share == 1.0
+
+
+def test_where_the_car_never_moves_nothing_is_proved(monkeypatch):
+    monkeypatch.setattr(mountaincar_reals, "N_TRIALS", 1)
     still = policy_of([[-0.5, 0.0]], np.zeros((1, 3, 1)))
     assert prove_part(still, -0.53, -0.52, 10).share == 0.0
     slow = policy_of([[-0.5, 0.0]], [[[0.0], [12.0], [0.0]]])  # its dead point is at -π/6

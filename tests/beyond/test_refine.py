@@ -303,10 +303,13 @@ def test_the_start_is_a_candidate_and_never_lost(monkeypatch):
     still = Cells(np.arange(6.0).reshape(3, 2), np.zeros((3, 3, 2)))
     monkeypatch.setattr(refine_module, "anneal", lambda *_, **__: still)
     maps = np.random.default_rng(0).normal(-1, 0.1, size=(3, 3, 2)) * [[0.0], [0.0], [1.0]]
-    start = VoronoiPolicy(np.random.default_rng(1).random((3, 2)), maps, task=SIMPLEGOAL, metric="euclidean")
+    codewords = np.random.default_rng(1).random((3, 2))
+    start = VoronoiPolicy(codewords, maps, task=SIMPLEGOAL, metric="euclidean", scale=np.array([0.1, 2.0]))
     policy, rows = refine(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(SMALL, n_generations=0), seed=0, start=start)
     assert rows["stage"].tolist() == ["start", "fit", "fit", "correct"] and rows["mean"].idxmax() == 0
     assert np.allclose(policy.codewords, start.codewords) and np.allclose(policy.coefficients, start.coefficients)
+    states = np.random.default_rng(2).random((1000, 2))  # borders do not move either
+    assert (policy.cells(states) == start.cells(states)).all()
 
 
 def test_a_task_of_one_start_state_is_no_trouble():

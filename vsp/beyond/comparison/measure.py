@@ -20,7 +20,7 @@ from ...tasks.registry import SLOW
 
 VERSION = 1  # raise it when the same policy gives different numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and for action errors
-NEW_SEED = 23  # seed of the start states from which nothing was measured before a method was final
+NEW_SEED, LIMIT_SEED = 23, 24  # seeds of start states from which nothing was measured before a method was final
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
 TAIL = 0.01  # share of the episodes that count as the worst

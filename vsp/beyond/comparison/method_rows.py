@@ -76,7 +76,9 @@ class Job:
     @property
     def start_seed(self) -> int:
         """The seed of the start states: new ones where a method was changed after first results."""
-        return measure.NEW_SEED if self.whole or self.how.preset == "walking" else measure.REPORT_SEED
+        if self.whole:
+            return measure.LIMIT_SEED
+        return measure.NEW_SEED if self.how.preset == "walking" else measure.REPORT_SEED
 
     @property
     def provenance(self) -> dict[str, str | int]:

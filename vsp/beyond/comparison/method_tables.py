@@ -68,7 +68,9 @@ METHODS = {
     "refined, not tuned": Method(methods.refined, reads=ALL, settings={"n_generations": 0}),
     "refined, no teacher": Method(methods.no_teacher, reads=ALL, sizes=(3, 4)),  # sizes of presets
     "refined, closest": Method(methods.imitated, reads=ALL, sizes=(13,)),
-    "refined, faithful": Method(methods.gently, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]),
+    "refined, faithful": Method(
+        methods.gently, version=2, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]
+    ),
     "k-means cells, DAgger": _by_dagger("k-means", n_restarts=3),
     "CART": _by_teacher("tree"),
     "CART, DAgger": _by_dagger("tree"),

@@ -22,11 +22,11 @@ from ..refinement.faithful import distill_faithfully
 from ..refinement.refine import refine
 from .references import TASKS, best_policy
 
-VERSION = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
+VERSION = 2  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
 # Initial policies, every second one a closest imitation; N_SLOW: for tasks with a physics engine
 N_STARTS, N_SLOW = 12, 2
 SCREENING = 0.2  # share of the generations for which each initial policy is tuned
-SECOND = 0.4  # share of them for a second search from the result, for tasks with a physics engine
+N_AGAIN, AGAIN = 2, 0.4  # for such tasks: further searches, each from the last result, and their share of generations
 PRICE = {"MountainCarContinuous-v0": 3e-3}  # per step: a car that arrives sooner tolerates a less exact imitation
 
 _LIMIT = {
@@ -56,8 +56,8 @@ def at_the_limit(
     """Search for at most `config.n_cells` cells whose return is as high as possible. Same arguments, same policy.
 
     `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known, else the
-    shipped teacher. For a task with a physics engine, which is played in fewer episodes, a second search begins where
-    the first ended. Raises ValueError as `refine` does.
+    shipped teacher. For a task with a physics engine, which is played in fewer episodes, two shorter searches follow,
+    each from the result of the one before. Raises ValueError as `refine` does.
     """
     check_seed(seed)
     task = get_task(task)
@@ -65,13 +65,15 @@ def at_the_limit(
     check_refinement(config)
     teacher = _best_teacher(task) if teacher is None else teacher
     n_starts = N_SLOW if task.one_by_one else N_STARTS
-    last, *seeds, second = np.random.SeedSequence(seed).generate_state(2 + n_starts).tolist()
-    brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, SECOND))
-    screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds)]
+    last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts + N_AGAIN).tolist()
+    brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, AGAIN))
+    screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds[:n_starts])]
     validation = task.start(np.random.default_rng(last), config.n_validation)
     best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
     best = _tuned(best, teacher, task, config, last)
-    return _tuned(best, teacher, task, again, second) if task.one_by_one else best
+    for one in seeds[n_starts:] if task.one_by_one else ():
+        best = _tuned(best, teacher, task, again, one)
+    return best
 
 
 def _best_teacher(task: Task) -> Policy:

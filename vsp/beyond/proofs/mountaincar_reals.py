@@ -25,6 +25,10 @@ ROUNDING = 1e-15  # per coordinate and step: several times what float64 loses
 FASTEST, WALL = 0.07, -1.2
 LOST = 1e-3  # a piece with this remainder is given up
 N_PIECES, N_PARTS = 100_000, 100  # pieces of the line, and parts of it that are proved separately
+SHORTER, N_TRIALS = 4, 4  # pieces that are given up are cut in so many and tried again; trials in all
+MOST_AGAIN = 1000  # more short pieces are not tried: the car seems to fail there
+MARGIN = 1e-14  # by which ranges that are given up are widened: more than the ends of pieces are rounded
+SUMMED = 1e-12  # more than the costs of 999 steps lose in float64
 
 
 @dataclass(frozen=True)
@@ -93,27 +97,42 @@ def prove_reals(policy: VoronoiPolicy, *, jobs: int | str = -1) -> list[Part]:
     maps and Euclidean cells for MountainCar.
     """
     check_runnable(policy)
-    ends = np.linspace(LEFT, RIGHT, N_PARTS + 1).tolist()
-    work = [(policy, low, high) for low, high in zip(ends[:-1], ends[1:])]
+    work = [(policy, low, high) for low, high in _cut(np.array([[LEFT, RIGHT]]), N_PARTS).tolist()]
     found = dict(workers.results(prove_part, work, "all starts", jobs=jobs, total=len(work), unit="parts"))
     return [found[i] for i in range(len(work))]
 
 
 def prove_part(policy: VoronoiPolicy, low: float, high: float, n: int = N_PIECES // N_PARTS) -> Part:
     """Prove from which starts between `low` and `high` the car reaches the flag, by `n` pieces that are cut where
-    needed."""
-    ends = np.linspace(low, high, n + 1)
-    pieces, loop, lost = started(ends[:-1], ends[1:]), Loop(policy), []
-    longest, least = 0, np.inf
+    needed. Where this fails, shorter pieces are tried: their remainders grow more slowly."""
+    loop, longest, least, open_ranges = Loop(policy), 0, np.inf, _cut(np.array([[low, high]]), n)
+    for _ in range(N_TRIALS):
+        lost, steps, bound = _followed(loop, started(*open_ranges.T))
+        longest, least, open_ranges = max(longest, steps), min(least, bound), _cut(lost.clip(low, high), SHORTER)
+        if not 0 < len(open_ranges) <= MOST_AGAIN:
+            break
+    return Part(1.0 - _length(open_ranges) / (high - low), longest, least)
+
+
+def _cut(ranges: np.ndarray, n: int) -> np.ndarray:
+    """Cut each of `ranges` (m, 2) into `n` of the same length. (m n, 2)"""
+    ends = np.linspace(*ranges.T, n + 1)
+    return np.column_stack([ends[:-1].ravel(), ends[1:].ravel()])
+
+
+def _followed(loop: Loop, pieces: Pieces) -> tuple[np.ndarray, int, float]:
+    """Follow pieces to the flag. Return the ranges of starts that are given up (n, 2), the most steps of the others,
+    and the least return."""
+    lost, longest, least = [], 0, np.inf
     for t in range(1, TASK.max_steps + 1):
         pieces, arrived, failed = loop.step(pieces)
-        lost += list(zip(failed.low.tolist(), failed.high.tolist()))
+        lost.append(failed)
         if len(arrived):
-            longest, least = t, min(least, 100.0 - float(arrived.cost.max()))
+            longest, least = t, min(least, 100.0 - SUMMED - float(arrived.cost.max()))
         if not len(pieces):
             break
-    lost += list(zip(pieces.low.tolist(), pieces.high.tolist()))
-    return Part(1.0 - _length(lost) / (high - low), longest, least)
+    lost = joined([*lost, pieces])
+    return np.column_stack([lost.low - MARGIN, lost.high + MARGIN]), longest, least
 
 
 def started(low: np.ndarray, high: np.ndarray) -> Pieces:
@@ -130,7 +149,7 @@ class Loop:
         weights = 1.0 / policy.scale**2
         self.slopes, self.offsets = 2 * policy.codewords * weights, np.square(policy.codewords) @ weights
         self.maps = policy.coefficients[:, :, 0]
-        self.largest = float(np.abs(self.slopes).sum(axis=1).max() + self.offsets.max())  # before they cancel
+        self.largest = 4 * float(np.abs(self.slopes).sum(axis=1).max() + self.offsets.max())  # the terms that cancel
 
     def step(self, pieces: Pieces) -> tuple[Pieces, Pieces, Pieces]:
         """Advance pieces by one step. Return those that go on, those that arrived, and those that are given up."""
@@ -139,11 +158,8 @@ class Loop:
         sure = (np.abs(speed) + np.abs(change) + size < FASTEST) & (moved.rest < LOST)
         failed, (stopped, doubt, moved) = moved.at(~sure), _sides(moved.at(sure), WALL)
         moved = joined([moved, doubt, _at_wall(joined([stopped, doubt]))])
-        below, doubt, above = _sides(moved, FLAG)
-        arrived = joined([above, doubt])
-        speed, change, size = arrived.ranges(0.0, 1.0, 0.0)
-        forward = speed - np.abs(change) - size > 0  # to arrive, the car must not roll back
-        return joined([below, doubt]), arrived.at(forward), joined([failed, arrived.at(~forward)])
+        below, doubt, above = _sides(moved, FLAG)  # a car that passes the flag was left of it: it does not roll back
+        return joined([below, doubt]), joined([above, doubt]), failed
 
     def in_cells(self, pieces: Pieces) -> Pieces:
         """Return the parts of `pieces` with their cells; a sliver on a border is listed for each cell that it may be
@@ -239,9 +255,9 @@ def _norm(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndar
     return np.sqrt((first + second) / 2 + np.hypot((first - second) / 2, mixed))
 
 
-def _length(intervals: list[tuple[float, float]]) -> float:
-    """Return the length of the union of `intervals`."""
+def _length(ranges: np.ndarray) -> float:
+    """Return the length of the union of `ranges` (n, 2)."""
     total, end = 0.0, -np.inf
-    for low, high in sorted(intervals):
+    for low, high in sorted(ranges.tolist()):
         total, end = total + max(0.0, high - max(low, end)), max(end, high)
     return total

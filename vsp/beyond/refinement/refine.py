@@ -20,7 +20,7 @@ from ...tasks.registry import get_task
 from .anneal import anneal, linear_init, random_init, warm
 from .config import Refinement, check_refinement
 from .tune import Candidates, Objective, tune
-from .units import Frame
+from .units import METRIC, Frame
 
 
 @threadpool_limits.wrap(limits=1)
@@ -31,8 +31,8 @@ def refine(
 
     Returns the policy and its history, one row per candidate: stage ("line", one linear map, or "start"; "fit",
     "correct", "tune"), restart, mean return and share of failed episodes from the validation starts. Distances are
-    Euclidean, whatever those of `start` are. Raises ValueError as `distill` does, for a `start` of another size or
-    task, and for `criticality` with a teacher that has no critics.
+    Euclidean; the scale of a Euclidean `start` is kept. Raises ValueError as `distill` does, for a `start` of another
+    size or task, and for `criticality` with a teacher that has no critics.
     """
     check_seed(seed)
     check_refinement(config)
@@ -47,6 +47,8 @@ def refine(
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     warn_outside(task, states)
     frame = Frame.of(task, states)
+    if start is not None and start.metric == METRIC:
+        frame = replace(frame, scale=start.scale)  # with another one the borders of `start` would move
     seen = frame.labelled(teacher, states, criticality=config.criticality)
     objective = Objective(config.failure_penalty, config.error_penalty, seen)
     candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
