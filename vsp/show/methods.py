@@ -33,6 +33,7 @@ ROBOTS = {
     "cells, trained further": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, trained further"},
     "cells": {"color": DISTILLED, "ls": "--", "label": "our cells, imitation alone"},
     "one map, random search": {"color": "black", "marker": "s", "label": "one linear map, random search"},
+    "one map, longer search": {"color": "black", "marker": "D", "label": "one linear map, longer search"},
     "oblique tree, trained further": {"color": COLOURS[3], "label": "oblique tree, trained further"},
     "oblique tree": {"color": COLOURS[3], "ls": "--", "label": "oblique tree, imitation alone"},
 }

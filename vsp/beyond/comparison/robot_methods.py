@@ -53,6 +53,6 @@ def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable
     return train_further(frame, numbers, budget.teacher, budget.config, seed=seed)
 
 
-def searched(budget: Budget, size: int, seed: int) -> Policy:
-    """Find one linear map by random search on the return alone."""
-    return search_one_map(budget.task, budget.config, seed=seed)
+def searched(budget: Budget, size: int, seed: int, **settings: int) -> Policy:
+    """Find one linear map by random search on the return alone, with other `settings` than those of `budget`."""
+    return search_one_map(budget.task, replace(budget.config, **settings), seed=seed)
