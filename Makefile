@@ -194,10 +194,10 @@ bench: venv-test-train-dask ## measures speed and scale, into data/results/: an 
 faults: venv-test-train-dask ## runs the fault-injection tests, into data/results/: 3 HOURS or more, resumable
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
-beyond: begin venv-train ## compares our own method with others, into data/results/: 5 to 6 HOURS, resumable
+beyond: begin venv-train ## compares our own method with others, into data/results/: 6 to 7 HOURS, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
-beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 24 HOURS, resumable
+beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 27 HOURS or more, resumable
 	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE

@@ -323,8 +323,7 @@ def test_what_is_said_of_the_limit_is_in_its_tables():
     assert f"returns {search['most']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
     longer = walker.loc[("one map, longer search", 0)]
     others = (3 * longer["mean"] - longer["most"]) / 2
-    assert f"returns {longer['most']:.0f}, more than the teacher and than every tree" in said
-    assert f"the other two return {others:.0f}." in said and longer["most"] == walker["most"].max()
+    assert f"returns {longer['most']:.0f}, the other two {others:.0f}." in said and longer["most"] > played
     likeness = f"to {eight['r2']:.2f} on HalfCheetah and {walker['r2'][ours, 8]:.2f} on BipedalWalker."
     assert f"lowers R²: with eight cells {likeness}" in said
 

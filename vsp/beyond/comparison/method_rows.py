@@ -1,7 +1,7 @@
 """Make the rows of the comparison beyond the paper: every method at every size.
 
-The methods of a table have the same budgets and start states, and, except in the tables "limit" and "teachers", the
-same teacher. `make beyond` makes the missing rows.
+The methods of a table have the same start states and, unless their names say otherwise, the same teacher and budget.
+`make beyond` and `make beyond-long` make the missing rows.
 data/results/<table>_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
 to run, so they are in a separate file, <table>_seconds.csv.
 """
@@ -75,7 +75,7 @@ class Job:
 
     @property
     def start_seed(self) -> int:
-        """The seed of the start states: new ones where a method was changed after first results."""
+        """The seed of the start states; for robots, and at the limit on LunarLander, not that of earlier versions."""
         if self.whole:
             return measure.LIMIT_SEED
         return measure.NEW_SEED if self.how.preset == "walking" else measure.REPORT_SEED

@@ -16,8 +16,8 @@ from ..refinement.config import Faithful, Refinement
 from . import apart, methods, peers, robot_methods
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
-LONG = ("LunarLanderContinuous-v3",)  # rows take hours
-WALKERS = ("BipedalWalker-v3", "HalfCheetah-v5")  # robots; rows take hours too
+LONG = ("LunarLanderContinuous-v3",)  # rows take minutes to hours
+WALKERS = ("BipedalWalker-v3", "HalfCheetah-v5")  # robots; rows take up to an hour
 SEEDS, FEW_SEEDS = range(20), range(5)  # by default, and for rows that take long
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
@@ -210,7 +210,7 @@ TABLES = {
     ),
     "limit": Table(
         LIMIT, fewer=range(3),
-        by_task={  # rows of these tasks take 4 to 8 minutes
+        by_task={  # rows of these tasks take 3 to 17 minutes
             "MountainCarContinuous-v0": {"seeds": FEW_SEEDS, "sizes": (3, 4)},
             "Pendulum-v1": {"seeds": FEW_SEEDS, "sizes": (8, 12)},
         },
@@ -218,7 +218,7 @@ TABLES = {
     "starts": Table(STARTS, seeds=range(3), fewer=range(3)),
 }  # fmt: skip
 
-# Tables of the tasks whose rows take hours
+# Tables of the tasks whose rows take long
 REPEATED = ("teacher", "refined")  # repeated here so that their tail is measured too, like that of the rivals
 LONG_RIVALS = ("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP)
 LONG_SIZES = (0, 1, 2, 4, 8)

@@ -43,7 +43,8 @@ _LIMIT = {
 
 
 def limit_preset(task: str | Task) -> Refinement:
-    """Return the settings of `at_the_limit` for a task: those of `tuned_preset` with a longer search.
+    """Return the settings of `at_the_limit` for a task: those of `tuned_preset` with a longer search, and on some tasks
+    with other cells, steps and penalties.
 
     Raises ValueError as `tuned_preset` does.
     """
@@ -55,8 +56,8 @@ def at_the_limit(
 ) -> VoronoiPolicy:
     """Search for at most `config.n_cells` cells whose return is as high as possible. Same arguments, same policy.
 
-    `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known, else the
-    shipped teacher. For a task with a physics engine, which is played in fewer episodes, two shorter searches follow,
+    `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known (on MountainCar
+    for the price `PRICE`), else the shipped teacher. For a task with a physics engine, which is played in fewer episodes, two shorter searches follow,
     each from the result of the one before. Raises ValueError as `refine` does.
     """
     check_seed(seed)

@@ -1,9 +1,10 @@
 """Prove MountainCar over the reals: follow short pieces of the line of starts to the flag, with bounds on the error.
 
 The states of a piece are c + g t + r, with t from -1 to 1 along the piece. The remainder r is bounded in a norm in
-which the car's swing at the bottom of the valley is a rotation, so the bound hardly grows there. (This is a mean-value
-form; boxes would grow with every step.) A piece that crosses a border of cells, a limit of the action, or the flag is
-cut in three. For two parts the side is certain. For the sliver between them, both branches are followed.
+which the car's swing at the bottom of the valley is a rotation, so the bound hardly grows there. (Boxes would grow with
+every step.) A piece that crosses a border of cells, a limit of the action, the wall or the flag is cut in three. For
+two parts the side is certain. The sliver between them is followed in every way that it may go; at a limit of the action
+once, with a larger remainder.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ LOST = 1e-3  # a piece with this remainder is given up
 N_PIECES, N_PARTS = 100_000, 100  # pieces of the line, and parts of it that are proved separately
 SHORTER, N_TRIALS = 4, 4  # pieces that are given up are cut in so many and tried again; trials in all
 MOST_AGAIN = 1000  # more short pieces are not tried: the car seems to fail there
-MARGIN = 1e-14  # by which ranges that are given up are widened: more than the ends of pieces are rounded
-SUMMED = 1e-12  # more than the costs of 999 steps lose in float64
+MARGIN = 1e-12  # by which ranges that are given up are widened: more than thousands of cuts round the ends of a piece
+SUMMED = 1e-11  # more than the costs of 999 steps, at most 100, lose in float64
 
 
 @dataclass(frozen=True)

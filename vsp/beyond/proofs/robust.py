@@ -39,9 +39,9 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
 
 
 def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
-    """Return the largest disturbance of a step, to `tolerance`, under which every start outside the pit is proved to
-    reach the goal; NaN if this is not proved even without a disturbance. A coarse grid finds a smaller one, by about
-    1 / n."""
+    """Return the largest disturbance of a step, to `tolerance`, for which a grid proves that every start outside the
+    pit reaches the goal; NaN if this is not proved even without a disturbance. A coarse grid finds a smaller one, by
+    about 1 / n."""
     check_number("tolerance", tolerance, least=1e-6, most=0.1)
     low, high = 0.0, STRIDE
     if not proved(steps_to_goal(policy, n=n)):

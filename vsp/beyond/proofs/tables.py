@@ -33,7 +33,7 @@ def simplegoal_table() -> pd.DataFrame:
     Columns: policy; cells; failing, the exact area of starts that do not reach the goal; outside, the same for starts
     outside the pit; sampled, the share of 10^6 episodes that fail; steps, the most; mean, the lower bound on the mean
     return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
-    largest one under which all of these surely reach it.
+    largest one under which all of these are proved to reach it.
     """
     rows = read_results("proofs").set_index("name").loc[list(NAMES)]
     table = pd.DataFrame({"policy": rows.index.map(NAMES), "cells": rows["cells"].to_numpy()})
