@@ -57,8 +57,8 @@ def at_the_limit(
     """Search for at most `config.n_cells` cells whose return is as high as possible. Same arguments, same policy.
 
     `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known (on MountainCar
-    for the price `PRICE`), else the shipped teacher. For a task with a physics engine, which is played in fewer episodes, two shorter searches follow,
-    each from the result of the one before. Raises ValueError as `refine` does.
+    for the price `PRICE`), else the shipped teacher. For a task with a physics engine, which is played in fewer
+    episodes, two shorter searches follow, each from the result of the one before. Raises ValueError as `refine` does.
     """
     check_seed(seed)
     task = get_task(task)
