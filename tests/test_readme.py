@@ -274,7 +274,7 @@ def test_what_is_said_to_be_certain_is_in_its_tables():
     assert f"goal within {tuned['program_steps']:.0f} steps" in block
     assert f"same within {margin['program_steps']:.0f} steps" in block
     assert f"off by {margin['disturbance']:.4f}" in block
-    assert f"({car['n_states']:,.0f} states) and returns at least {car['least']:.3f}" in block
+    assert f"({car['n_states']:,.0f} states after the first step) and returns at least {car['least']:.3f}" in block
     assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0
     for name in ("grid", "teacher"):
         share = pd.read_csv(ROOT / f"data/results/proofs_{name}.csv")["share"].iloc[-1]
