@@ -10,7 +10,7 @@ import subprocess
 import pandas as pd
 import pytest
 
-from vsp.beyond.comparison import largest_alike
+from vsp.beyond.comparison import all_rows, largest_alike
 from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
@@ -152,9 +152,23 @@ def test_who_leads_is_that_of_the_table():
     assert quoted(f"Distilled from the best policy and tuned longer, three return {best:.2f}.")
     assert set(table.loc["SimpleGoal", "ahead"]) == set(table.loc["LunarLander", "ahead"]) == {"level"}
     assert (table["ahead"] != "ours").all() and "our cells have a certain lead on no task" in " ".join(RESULTS.split())
-    lander = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]["LunarLander"]
+    means = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]
+    lander, constants = means["LunarLander"], means["MountainCar", 4, "oblique tree, constants"]
     said = f"one linear map returns {lander[1, 'one linear map']:.1f}, two of our cells {lander[2, 'our cells']:.1f}"
-    assert said in " ".join(RESULTS.split())
+    assert said in " ".join(RESULTS.split()) and f"constant leaves returns {constants:.2f})" in notebook("09")
+    rows = all_rows("MountainCarContinuous-v0").set_index(["method", "size"])["mean"]
+    seeds = rows["oblique tree, constant leaves, DAgger, tuned", 2]
+    assert f"on average ({seeds.min():.1f} to {seeds.max():.1f} in seven seeds)" in notebook("06") and len(seeds) == 7
+
+
+def test_how_like_the_teacher_trees_are_is_that_of_the_rows():
+    apart = read_table("beyond_apart").query("task == 'SimpleGoal'").set_index("method")["r2 4"]
+    tree, cells = apart["oblique tree, greedy fit"], apart["our cells, greedy fit"]
+    assert f"a tree reaches {tree:.3f}, and cells {cells:.3f}, with four" in " ".join(RESULTS.split())
+    lander = all_rows("LunarLanderContinuous-v3").groupby(["method", "size"])["r2"].median().drop("teacher")
+    best = lander["oblique tree, linear leaves, DAgger", 32]
+    said = f"oblique tree with 32 linear leaves reproduces {100 * best:.0f} % (on fewer states), more than any other row"
+    assert said in " ".join(RESULTS.split()) and best == lander.max()
 
 
 def test_how_often_faithful_landers_fail_is_that_of_the_table():

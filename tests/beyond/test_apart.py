@@ -117,18 +117,16 @@ def test_a_tree_fitted_together_is_no_worse_than_the_greedy_one():
             error(ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=seed), states, actions)
             for seed in (0, 1)
         )
-        assert len(found) == 2 and error(found, states, actions) < 1.05 * greedy
+        assert len(found) == 2 and error(found, states, actions) < 1.05 * greedy + 1e-9
 
 
 def test_two_cells_are_a_tree_of_two_leaves():
     """Two codewords and one oblique cut are the same borders: both greedy fits take the same hyperplane."""
-    states, actions = kinked()
-    cells, tree = (
-        greedy_cells(states, actions, 2, TASK, 3),
-        ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=3),
-    )
-    assert isinstance(cells, VoronoiPolicy) and cells.metric == "euclidean" and len(cells) == 2
-    assert error(cells, states, actions) <= error(tree, states, actions) * (1 + 1e-9)
+    for states, actions in (kinked(), examples(SIMPLEGOAL)):
+        cells = greedy_cells(states, actions, 2, TASK, 3)
+        tree = ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=3)
+        assert isinstance(cells, VoronoiPolicy) and cells.metric == "euclidean" and len(cells) == 2
+        assert error(cells, states, actions) <= error(tree, states, actions) + 1e-12
 
 
 def test_pairs_by_hand():

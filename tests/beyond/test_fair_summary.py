@@ -107,9 +107,7 @@ def test_numbers_are_counted_as_they_are_tuned(name, task=PENDULUM):
     found, teacher = get_task(task), load_teacher(task)
     method, k = (METHODS | RIVALS)[PAIRS[name][0]], 4
     few = dataclasses.replace(SMALL, n_episodes=30, n_corrections=1, n_steps=5, n_restarts=1, n_generations=0)
-    settings = {part: value for part, value in method.settings.items() if part not in ("rounds", "n_restarts")}
-    if "rounds" in method.settings:
-        settings |= {"rounds": 1, "n_restarts": 1}
+    settings = method.settings | ({"rounds": 1} if "rounds" in method.settings else {})
     policy = method.make(Budget(teacher, found, few), k if method.sizes != (0,) else 0, 0, **settings)
     states = visited_states(teacher, found, start_states(found, 5, 1))
     assert len(in_units(policy, Frame.of(found, states))[1].vector) == fair_summary._tuned_numbers(name, k, task)

@@ -71,7 +71,8 @@ def test_every_method_has_the_same_budget_of_teacher_episodes(quick, name):
     assert sum(training) == 40
 
 
-def test_corrections_go_on_with_the_best_restart(quick):
+@pytest.mark.parametrize(("by_chance", "seeds"), [(True, [10, 11, 10, 10]), (False, [5, 5, 5])])
+def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_corrected(quick, by_chance, seeds):
     asked = []
 
     def fit(states, actions, *, size, task, seed):
@@ -79,10 +80,10 @@ def test_corrections_go_on_with_the_best_restart(quick):
         return printed.published_policy(SIMPLEGOAL)
 
     budget = Budget(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
-    corrected(budget, 3, 5, fit=fit, rounds=2, n_restarts=3)
-    assert [seed for seed, _ in asked] == [15, 16, 17, 15, 15]
-    sizes = [size for _, size in asked]
-    assert sizes[0] == sizes[1] == sizes[2] < sizes[3] < sizes[4]
+    corrected(budget, 3, 5, fit=fit, rounds=2, by_chance=by_chance)
+    assert [seed for seed, _ in asked] == seeds
+    *first, second, third = [size for _, size in asked]
+    assert len(set(first)) == 1 and first[0] < second < third
 
 
 def test_an_ablation_changes_settings_of_the_refinement(monkeypatch):

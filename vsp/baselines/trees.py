@@ -16,6 +16,8 @@ from ..rollouts import standard
 from ..subpolicies import linear_outputs
 from ..tasks.registry import get_task
 
+CUTS = 255  # quantiles of a node at which a split may lie
+
 
 class Tree:
     """A regression tree (CART, Breiman et al. 1984) with at most `leaves` leaves, each with one constant action.
@@ -69,7 +71,7 @@ class LinearTree:
     """A model tree: splits along the axes and a least-squares map in each leaf (RETIS, Karalič 1992).
 
     It has at most `leaves` leaves and is grown best split first on standardised states. A split is judged by the error
-    of a map on each side, not of a constant. It lies at one of 255 quantiles of its node. Each side keeps at least
+    of a map on each side, not of a constant. It lies at one of `CUTS` quantiles of its node. Each side keeps at least
     twice as many states as a map has rows. `constant` fits one action per leaf instead of a map.
     """
 
@@ -103,7 +105,7 @@ class LinearTree:
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
         """Find the best split of a node along an axis."""
-        return _stump(inputs, actions, np.eye(inputs.shape[1]), cuts=255, constant=self.constant)
+        return _stump(inputs, actions, np.eye(inputs.shape[1]), cuts=CUTS, constant=self.constant)
 
     def inputs(self, states: np.ndarray) -> np.ndarray:
         """Standardised states. (n, d)"""
@@ -125,9 +127,7 @@ class LinearTree:
         return np.clip(raw, self.task.action_low, self.task.action_high), None
 
 
-def _stump(
-    inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int = 31, constant: bool = False
-) -> Split:
+def _stump(inputs: np.ndarray, actions: np.ndarray, directions: np.ndarray, *, cuts: int, constant: bool) -> Split:
     """Find the best split along one of `directions` (c, d), with a map on each side, from the moments between cuts."""
     features = np.column_stack([inputs[:, : 0 if constant else None], np.ones(len(inputs))])
     m, rows = actions.shape[1], np.column_stack([features, actions])
@@ -163,32 +163,34 @@ class ObliqueLinearTree(LinearTree):
     (SPYCT, Stepišnik & Kocev 2021). As in SPYCT, a hyperplane separates two clusters of a node's actions, here by
     k-means and discriminant analysis. The axes, the principal components and the directions of least squares compete
     with it. The best direction is perturbed at random (OC1, Murthy et al. 1994). Splits are judged by the maps on both
-    sides.
+    sides. A split lies at one of `cuts` quantiles along the direction that is best at a few of them.
     """
 
     def __init__(
-        self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int, constant: bool = False
-    ):
+        self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int, constant: bool = False,
+        cuts: int = CUTS,
+    ):  # fmt: skip
         check_seed(seed)
-        self._rng = np.random.default_rng(seed)
+        self._rng, self._cuts = np.random.default_rng(seed), cuts
         super().__init__(states, actions, leaves=leaves, task=task, constant=constant)
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
         """Find the best oblique split of a node, with a map on each side."""
-        return _oblique(inputs, actions, self._rng, constant=self.constant)
+        return _oblique(inputs, actions, self._rng, cuts=self._cuts, constant=self.constant)
 
 
-_SEARCHED, _TRIED, _ROUNDS = 2000, 12, 4  # states for comparing directions; directions per round; rounds
+# States for comparing directions, and quantiles; directions per round; rounds
+_SEARCHED, _FEW_CUTS, _TRIED, _ROUNDS = 2000, 31, 12, 4
 
 
-def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, constant: bool) -> Split:
+def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, cuts: int, constant: bool) -> Split:
     """Find the best split among directions of several kinds; perturb the best one in rounds, by less in each."""
-    some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, constant=constant)
+    some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, cuts=_FEW_CUTS, constant=constant)
     found = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
     for size in np.geomspace(1.0, 0.1, _ROUNDS):
         moved = _unit(found.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
         found = stump(inputs[some], actions[some], np.vstack([found.direction, moved]))
-    return stump(inputs, actions, found.direction[None])
+    return _stump(inputs, actions, found.direction[None], cuts=cuts, constant=constant)
 
 
 def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:

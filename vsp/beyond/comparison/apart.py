@@ -28,6 +28,7 @@ N_RANDOM = 64  # random starts: divided by the size, but at least 8, since desce
 N_GREEDY = 4  # additional descents, which start from greedy trees
 HOT = ((range(0, 2), 12), (range(2, 6), 4))  # stages, and how many descents from random trees are kept after them
 WARM = ((range(6, 12), 3), (range(12, search.N_STAGES), 1))  # the same, for these and the greedy trees together
+FEW_CUTS = 31  # quantiles at which a greedy tree may be split: enough for a start, since descents move thresholds
 CERTAIN = 40.0  # larger logits give shares of exactly 0 and 1 in float64
 
 
@@ -70,7 +71,7 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
 
     def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
         seeds = rng.integers(2**31, size=n).tolist()
-        trees = [kind(states, actions, leaves=size, task=task, seed=one) for one in seeds]
+        trees = [kind(states, actions, leaves=size, task=task, seed=one, cuts=FEW_CUTS) for one in seeds]
         return [Tunable(*in_units(tree, frame), tree) for tree in trees]
 
     def error(tree: Tunable) -> float:

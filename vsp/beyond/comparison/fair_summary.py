@@ -180,9 +180,9 @@ def episodes(name: str, config: Refinement, task: str, *, tuned: bool) -> dict[s
     if name == OURS:  # the first candidate of `refine` is one linear map
         rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
     else:
-        settings = UNTUNED[PAIRS[name][0]].settings
-        rounds, restarts = settings.get("rounds", 0), settings.get("n_restarts", 1)
-        candidates = rounds + (config.n_restarts if tuned and restarts > 1 else restarts) + tuned
+        method = UNTUNED[PAIRS[name][0]]
+        rounds, restarts = method.settings.get("rounds", 0), config.n_restarts if "n_restarts" in method.reads else 1
+        candidates = rounds + restarts + tuned
     n = config.n_corrections * config.n_correction_episodes
     return {
         "teacher": config.n_episodes + (0 if rounds else n),

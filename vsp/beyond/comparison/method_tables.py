@@ -48,9 +48,9 @@ class Method:
     preset: str = "tuned"  # the kind of preset that gives the budget's settings
 
 
-def _by_dagger(fit: str, *, n_restarts: int = 1, rounds: int = 5, sizes=SIZES) -> Method:
-    settings, make = {"rounds": rounds, "n_restarts": n_restarts}, partial(methods.corrected, fit=methods.FITS[fit])
-    return Method(make, reads=EPISODES, settings=settings, sizes=sizes)
+def _by_dagger(fit: str, *, by_chance: bool = True, rounds: int = 5, sizes=SIZES, version: int = 1) -> Method:
+    make = partial(methods.corrected, fit=methods.FITS[fit], by_chance=by_chance)
+    return Method(make, version, EPISODES + ("n_restarts",) * by_chance, {"rounds": rounds}, sizes)
 
 
 def _by_teacher(fit: str, *, sizes: tuple[int, ...] = SIZES) -> Method:
@@ -71,11 +71,11 @@ METHODS = {
     "refined, faithful": Method(
         methods.gently, version=2, reads=ALL, settings=FAITHFUL, sizes=(13,), tasks=printed.TASKS[:1]
     ),
-    "k-means cells, DAgger": _by_dagger("k-means", n_restarts=3),
+    "k-means cells, DAgger": _by_dagger("k-means"),
     "CART": _by_teacher("tree"),
-    "CART, DAgger": _by_dagger("tree"),
-    "CART, linear leaves, DAgger": _by_dagger("linear tree"),
-    "oblique tree, linear leaves, DAgger": _by_dagger("oblique tree", n_restarts=2),
+    "CART, DAgger": _by_dagger("tree", by_chance=False),
+    "CART, linear leaves, DAgger": _by_dagger("linear tree", by_chance=False),
+    "oblique tree, linear leaves, DAgger": _by_dagger("oblique tree", version=2),
     "soft tree, DAgger": _by_dagger("soft tree", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
     "teacher": Method(methods.the_teacher, sizes=OWN, chance=False),
     "one linear map": _by_teacher("one map", sizes=OWN),
@@ -90,8 +90,8 @@ METHODS = {
 
 # Rivals, tuned in the same way as `refined`
 UNTUNED = {
-    "oblique tree, constant leaves, DAgger": _by_dagger("constant oblique tree", n_restarts=2, sizes=TUNED_SIZES),
-    "small network, DAgger": _by_dagger("small network", n_restarts=2, sizes=TUNED_SIZES),
+    "oblique tree, constant leaves, DAgger": _by_dagger("constant oblique tree", sizes=TUNED_SIZES, version=2),
+    "small network, DAgger": _by_dagger("small network", sizes=TUNED_SIZES),
 } | {
     name: METHODS[name]
     for name in ("CART, DAgger", "CART, linear leaves, DAgger", "oblique tree, linear leaves, DAgger",
@@ -117,7 +117,7 @@ LIKE = {"faithful": Method(methods.faithful, reads=OF_FAITHFUL, sizes=FAITHFUL_S
 
 # Fit and geometry separated, and newer methods: all imitate the teacher's own episodes
 APART = {
-    name: Method(make, reads=EPISODES, sizes=(2, 4, 8))
+    name: Method(make, version=2 if "greedy" in name else 1, reads=EPISODES, sizes=(2, 4, 8))
     for name, make in {
         "our cells, our fit": apart.cells_by_global_fit,
         "our cells, greedy fit": apart.cells_by_greedy_fit,

@@ -107,14 +107,14 @@ FITS: dict[str, Callable[..., Policy]] = {
 }
 
 
-def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy], rounds: int, n_restarts: int):
+def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy], rounds: int, by_chance: bool):
     """Run DAgger with `fit`, with as many corrected episodes as `refine`, in more rounds since these fits are quick.
 
-    Makes `n_restarts` fits with different seeds and keeps the best.
+    A fit that depends `by_chance` on its seed gets as many restarts as `refine` has; the best is corrected.
     """
     n = budget.config.n_corrections * budget.config.n_correction_episodes
     config = replace(budget.config, n_corrections=rounds, n_correction_episodes=n // rounds)
-    return _fitted(fit, config, budget, size, seed, n_restarts)
+    return _fitted(fit, config, budget, size, seed, config.n_restarts if by_chance else 1)
 
 
 def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -> Policy:
@@ -125,12 +125,7 @@ def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -
 
 
 def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:
-    """Tune the policy of `imitation` on the return as `refine` tunes its cells.
-
-    Fits that use several restarts get as many as `refine` has.
-    """
-    if settings.get("n_restarts", 1) > 1:
-        settings["n_restarts"] = budget.config.n_restarts
+    """Tune the policy of `imitation` on the return as `refine` tunes its cells."""
     start = imitation(budget, size, seed, **settings)
     return tuned(start, budget.teacher, budget.task, budget.config, seed)
 
