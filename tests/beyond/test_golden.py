@@ -32,8 +32,8 @@ from vsp.tasks.registry import get_task
 
 imitate = importlib.import_module("vsp.beyond.refinement.imitate")  # the module, not its function
 GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
-# Of actions on another type of processor, where sums are rounded differently, and a split or a long descent may go
-# elsewhere
+# Of actions on another type of processor, where sums are rounded differently. There a split or a long descent may go
+# elsewhere; so of the sensitive methods the median difference is compared
 TOLERANCE, LOOSE, SENSITIVE = 1e-6, 0.1, ("oblique tree", "small network", "greedy fit", "ROBOTS")
 SMALL = Refinement(
     n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
@@ -156,8 +156,10 @@ CASES = {
 }
 
 
-def close(found, kept, tolerance):
-    return found.keys() == kept.keys() and all(np.allclose(found[k], kept[k], rtol=0, atol=tolerance) for k in kept)
+def close(found, kept, tolerance, reduce=np.max):
+    return found.keys() == kept.keys() and all(
+        reduce(np.abs(np.subtract(found[k], kept[k]))) <= tolerance for k in kept
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -169,11 +171,14 @@ def test_results_are_those_of_the_version(name, request):
         lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
         GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     kept = every[name]
-    tolerance = (
-        0 if kept["made on"] == support.made_on() else (LOOSE if any(kind in name for kind in SENSITIVE) else TOLERANCE)
-    )
+    if any(kind in name for kind in SENSITIVE):
+        within = LOOSE, np.median
+    else:
+        within = TOLERANCE, np.max
+    if kept["made on"] == support.made_on() and "trained further" not in name:  # torch differs within a type
+        within = 0, np.max
     advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
-    assert version == kept["version"] and close(found, kept["found"], tolerance), advice
+    assert version == kept["version"] and close(found, kept["found"], *within), advice
 
 
 def test_the_papers_method_has_the_version_of_the_algorithms():
