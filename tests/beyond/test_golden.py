@@ -171,10 +171,7 @@ def test_results_are_those_of_the_version(name, request):
         lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
         GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     kept = every[name]
-    if any(kind in name for kind in SENSITIVE):
-        within = LOOSE, np.median
-    else:
-        within = TOLERANCE, np.max
+    within = (LOOSE, np.median) if any(kind in name for kind in SENSITIVE) else (TOLERANCE, np.max)
     if kept["made on"] == support.made_on() and "trained further" not in name:  # torch differs within a type
         within = 0, np.max
     advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
