@@ -64,7 +64,7 @@ export OUT JOBS DASK PYTHON QUICK STATE
 MAKEOVERRIDES :=
 
 PY := .venv/bin/python
-INPUTS := $(sort $(shell find vsp -name '*.py') $(wildcard data/paper/* data/teachers/*.* data/teachers/short/*)) \
+INPUTS := $(sort $(shell find vsp vsp_beyond studies -name '*.py') $(wildcard data/paper/* data/teachers/*.* data/teachers/short/*)) \
   environment.lock
 outputs = figures/executed/$(1).ipynb $(foreach f,$(FIGURES_$(1)),figures/$(f).pdf figures/$(f).png) \
   $(foreach a,$(ANIMATIONS_$(1)),figures/$(a).gif figures/$(a).png) \
@@ -116,7 +116,7 @@ paper-figures all:
 	@: > "$$STATE/made"
 	@$(MAKE) --no-print-directory -j "$$JOBS" runs $(if $(filter all,$@),$(OURS)) $(PAPER)
 	@if [ -s "$$STATE/made" ]; then printf 'made %s: see %s/figures\n' "$$(xargs < "$$STATE/made")" "$$OUT"; \
-	  $(PY) -m vsp.beyond.comparison.stale > "$$STATE/stale" || exit 1; \
+	  $(PY) -m studies.comparison.stale > "$$STATE/stale" || exit 1; \
 	else printf 'everything is up to date: see %s/figures\n' "$$OUT"; fi; test ! -s "$$STATE/stale" || cat "$$STATE/stale"
 
 runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/runs/: under a minute, resumable
@@ -130,24 +130,24 @@ study: begin venv ## studies of the readings and of the teachers, into data/resu
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimensions, into data/results/: 4 minutes
-	$(PY) -m vsp.beyond.benchmarks.lookup --out="$$OUT"
-	$(PY) -m vsp.beyond.benchmarks.fits --out="$$OUT"
+	$(PY) -m studies.benchmarks.lookup --out="$$OUT"
+	$(PY) -m studies.benchmarks.fits --out="$$OUT"
 
 proofs: begin venv ## proofs for ten policies: certificates into data/proofs/, and tables: 10 minutes, resumable
-	$(PY) -m vsp.beyond.proofs.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 proofs-teacher: begin venv ## proofs for a network, for at most an HOUR, into data/results/
-	$(PY) -m vsp.beyond.proofs.make_proofs --teacher --out="$$OUT"
+	$(PY) -m studies.make_proofs --teacher --out="$$OUT"
 
 ## Study
 course: begin venv ## three lessons: hand-out for students, solutions, slides, the lecturer's guide, into build/course/: 3 s
-	@$(PY) -m vsp.course.build --out="$$OUT"
+	@$(PY) -m vsp_course.build --out="$$OUT"
 
 # The pages are laid out as the repository is, so that a link of the README leads to the same thing on the site. The old
 # site stays until the new one is whole.
 site test-site: export SITE := $(OUT)/build/site
 site: begin venv-site ## the companion as pages for a browser, into build/site/: about a minute
-	@$(PY) -m vsp.course.pages --out="$$OUT"
+	@$(PY) -m vsp_course.pages --out="$$OUT"
 	@rm -rf "$$SITE-work"; source="$$SITE-work/source"; \
 	mkdir -p "$$source/notebooks/course" "$$source/figures" "$$source/data"; \
 	cp -R docs/*.md docs/api README.md CITATION.cff "$$source"; \
@@ -195,10 +195,10 @@ faults: venv-test-train-dask ## runs the fault-injection tests, into data/result
 	@$(call MEASURE,tests/faults) && $(PUBLISH)
 
 beyond: begin venv-train ## compares our own method with others, into data/results/: 6 to 7 HOURS, resumable
-	$(PY) -m vsp.beyond.comparison.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	$(PY) -m studies.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots, whose engines are slow: 27 HOURS or more, resumable
-	$(PY) -m vsp.beyond.comparison.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	$(PY) -m studies.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m vsp.teachers.train --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from vsp.beyond.benchmarks.trust import save_kills
+from studies.benchmarks.trust import save_kills
 from vsp.paper import runs
 from vsp.paper.printed import PREFIX
 from vsp.paper.statistics import outlier_numbers, spread

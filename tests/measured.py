@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vsp.beyond.benchmarks.trust import save_kills
+from studies.benchmarks.trust import save_kills
 from vsp.run import atomic, listed
 from vsp.run.machine import cpu_type
 

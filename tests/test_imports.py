@@ -1,31 +1,30 @@
-"""Who may import whom, and that no circle comes back."""
+"""Who may import whom, that no circle comes back, and what `import vsp` loads."""
 
 import ast
 import functools
 import importlib.util
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-import vsp
+ROOT = Path(__file__).resolve().parents[1]
+PARTS = {"vsp": set(), "vsp_beyond": {"vsp"}, "studies": {"vsp", "vsp_beyond"}, "vsp_course": {"vsp", "vsp_beyond"}}
 
-ROOT = Path(vsp.__file__).parent
-METHOD = {path.stem for path in ROOT.glob("[!_]*.py")}
+METHOD = {path.stem for path in (ROOT / "vsp").glob("[!_]*.py")}
 BASIS = {"tasks", "subpolicies", "run"}
-LAYERS = ["teachers", "baselines", "paper", "beyond", "course"]  # each may use those before it
-MAY = dict.fromkeys(METHOD, METHOD | BASIS)
-MAY |= {"tasks": {"checks"}, "subpolicies": {"checks", "tasks"}, "run": set()}
-MAY |= {layer: METHOD | BASIS | set(LAYERS[:i]) for i, layer in enumerate(LAYERS)}
-MAY |= {"show": METHOD | BASIS | {"teachers"}}
-for wing in ("paper", "beyond", "course"):
-    MAY[wing] |= {"show"}
-MAY["teachers"] -= {"subpolicies"}
+ROOMS = dict.fromkeys(METHOD, METHOD | BASIS)
+ROOMS |= {"tasks": {"checks"}, "subpolicies": {"checks", "tasks"}, "run": set()}
+ROOMS |= {"teachers": METHOD | BASIS - {"subpolicies"}, "show": METHOD | BASIS | {"teachers"}}
+ROOMS |= {"paper": METHOD | BASIS | {"teachers", "show"}}
 
 
 @functools.cache
 def modules():
-    return {".".join(("vsp", *path.relative_to(ROOT).with_suffix("").parts)): path for path in ROOT.rglob("*.py")}
+    files = [path for part in PARTS for path in (ROOT / part).rglob("*.py")]
+    return {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in files}
 
 
 def imported(name: str, path: Path) -> set[str]:
@@ -36,10 +35,10 @@ def imported(name: str, path: Path) -> set[str]:
         block.body = [ast.Pass()]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names if alias.name.partition(".")[0] == "vsp"}
+            found |= {alias.name for alias in node.names if alias.name.partition(".")[0] in PARTS}
         elif isinstance(node, ast.ImportFrom):
             origin = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
-            if origin.partition(".")[0] == "vsp":
+            if origin.partition(".")[0] in PARTS:
                 parts = {f"{origin}.{alias.name}" for alias in node.names}
                 found |= {part if part in modules() or f"{part}.__init__" in modules() else origin for part in parts}
     return {one if one in modules() else f"{one}.__init__" for one in found}
@@ -48,24 +47,29 @@ def imported(name: str, path: Path) -> set[str]:
 GRAPH = {name: imported(name, path) for name, path in modules().items()}
 
 
-def test_the_rooms_are_there():
-    assert len(METHOD) <= 11 and MAY.keys() - METHOD == {*BASIS, *LAYERS, "show"}
-    assert len(GRAPH) > 60 and sum(map(len, GRAPH.values())) > 200
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_imports_only_what_it_may(part):
+    own = {name: others for name, others in GRAPH.items() if name.partition(".")[0] == part}
+    assert own and not {
+        (name, other) for name, others in own.items() for other in others
+        if other.partition(".")[0] not in PARTS[part] | {part}
+    }  # fmt: skip
 
 
-@pytest.mark.parametrize("room", sorted(MAY))
-def test_a_room_imports_only_what_it_may(room):
+@pytest.mark.parametrize("room", sorted(ROOMS))
+def test_a_room_of_the_paper_imports_only_what_it_may(room):
     for name, others in GRAPH.items():
-        if name.split(".")[1] == room:
-            assert not {other for other in others if other.split(".")[1] not in MAY[room] | {room}}, name
-
-
-def test_baselines_and_refinement_do_not_know_each_other():
-    for one, other in (("vsp.baselines", "vsp.beyond"), ("vsp.beyond.refinement", "vsp.baselines")):
-        assert not [
-            name for name, others in GRAPH.items() if name.startswith(one) for o in others if o.startswith(other)
-        ]
+        if name.split(".")[:2] == ["vsp", room]:
+            assert not {other for other in others if other.split(".")[1] not in ROOMS[room] | {room}}, name
 
 
 def test_no_circle():
     list(TopologicalSorter(GRAPH).static_order())
+
+
+def test_importing_vsp_loads_the_method_alone():
+    code = "import sys, vsp; print(*[name for name in sys.modules])"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    tops = {name.partition(".")[0] for name in loaded.split()}
+    assert not tops & {"pandas", "sklearn", "matplotlib", "torch", "stable_baselines3", *PARTS.keys() - {"vsp"}}
+    assert len([name for name in loaded.split() if name.partition(".")[0] == "vsp"]) <= 35

@@ -11,9 +11,11 @@ import pytest
 from test_export import compiled
 
 import vsp
+import vsp_beyond
 from vsp.tasks import registry
+from vsp_beyond.few_cells.faithful import distill_faithfully
 
-LITTLE = vsp.Faithful(
+LITTLE = vsp_beyond.Faithful(
     n_cells=4, n_episodes=15, n_restarts=2, n_generations=3, n_tuning_episodes=5, n_validation=10, tolerance=1.0
 )
 NAMES = {
@@ -52,7 +54,7 @@ def distilled(request):
     outcome = docked if request.param == "Dock-v0" else None
     task = vsp.register(request.param, inputs=inputs, outputs=outputs, outcome=outcome)
     pilot = vsp.agent(PILOTS[request.param])
-    policy, history = vsp.distill(pilot, request.param, LITTLE, seed=0)
+    policy, history = distill_faithfully(pilot, request.param, LITTLE, seed=0)
     return task, pilot, policy, history
 
 
@@ -101,12 +103,15 @@ def test_without_an_outcome_an_episode_just_ends(monkeypatch):
     assert set(vsp.evaluate(vsp.agent(own_tasks.dock_pilot), "Dock-v0", n_episodes=5, seed=1)["outcome"]) == {"ended"}
 
 
-def test_faithful_is_the_default_and_one_sentence_says_so(monkeypatch, capsys):
-    monkeypatch.setattr(vsp, "faithful_preset", lambda task: LITTLE)
-    vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
+def test_one_line_says_how_long_it_will_take(capsys):
+    vsp_beyond.faithful(own_tasks.tank_pilot, "Tank-v0", LITTLE, seed=0)
     said = capsys.readouterr().out
-    assert said.startswith("Tank-v0 is not in the paper: distilling by vsp.preset('Tank-v0', 'faithful'), about ")
-    assert said.endswith(" seconds more where its return has to be raised\n") and said.count("\n") == 1
+    assert said.startswith("distilling for Tank-v0: about ") and said.count("\n") == 1
+
+
+def test_the_papers_method_needs_settings_for_a_task_of_ones_own():
+    with pytest.raises(ValueError, match=r"no settings for task 'Tank-v0'.*vsp_beyond\.faithful\(agent, 'Tank-v0'"):
+        vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
 
 
 def test_observations_beyond_the_declared_box_are_counted():
@@ -124,7 +129,7 @@ def test_observations_beyond_the_declared_box_are_counted():
     gymnasium.register("Overfull-v0", entry_point=Overfull, max_episode_steps=60)
     try:
         with pytest.warns(UserWarning, match=r"[\d,]+ of 900 observations leave the box of Overfull-v0, such as s0 = "):
-            vsp.distill(vsp.agent(own_tasks.tank_pilot), "Overfull-v0", LITTLE, seed=0)
+            vsp_beyond.faithful(vsp.agent(own_tasks.tank_pilot), "Overfull-v0", LITTLE, seed=0)
     finally:
         del gymnasium.registry["Overfull-v0"]
 
@@ -160,7 +165,7 @@ def test_an_agent_with_a_memory_is_refused():
             return np.zeros((len(obs), 1)), np.zeros(3)
 
     with pytest.raises(ValueError, match="the agent keeps a state between steps, .* train one without memory"):
-        vsp.distill(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
+        vsp_beyond.faithful(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
 
 
 @pytest.mark.parametrize(
@@ -173,13 +178,13 @@ def test_an_agent_with_a_memory_is_refused():
 )
 def test_a_pilot_that_does_not_fit_is_one_clear_error(act, why):
     with pytest.raises(ValueError, match=why):
-        vsp.distill(vsp.agent(act), "Tank-v0", LITTLE, seed=0)
+        vsp_beyond.faithful(vsp.agent(act), "Tank-v0", LITTLE, seed=0)
 
 
 def test_a_task_that_never_ends_is_refused():
     gymnasium.register("Endless-v0", entry_point="own_tasks:Tank")
     try:
         with pytest.raises(ValueError, match="Endless-v0 has no step limit, expected one: pass max_episode_steps"):
-            vsp.distill(vsp.agent(own_tasks.tank_pilot), "Endless-v0", seed=0)
+            vsp_beyond.faithful(vsp.agent(own_tasks.tank_pilot), "Endless-v0", seed=0)
     finally:
         del gymnasium.registry["Endless-v0"]

@@ -8,21 +8,21 @@ from hypothesis import strategies as st
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
 import vsp
-from vsp.baselines.simple import refit
-from vsp.beyond.comparison.measure import cost
-from vsp.beyond.explain.lime import compare_maps
-from vsp.beyond.explain.rules import RulePolicy
-from vsp.beyond.refinement.config import Refinement
-from vsp.beyond.refinement.population import PolicyBatch
-from vsp.beyond.refinement.refine import refine
-from vsp.beyond.refinement.simplification import prune, rounded
+from studies.comparison.measure import cost
 from vsp.geometry import distances
+from vsp.paper.baselines import refit
 from vsp.policy import VoronoiPolicy
 from vsp.run import sealed
 from vsp.run.atomic import DamagedFile
 from vsp.subpolicies.base import expression
 from vsp.subpolicies.registry import policy_class
 from vsp.tasks.registry import get_task
+from vsp_beyond.explain.lime import compare_maps
+from vsp_beyond.explain.rules import RulePolicy
+from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond.few_cells.population import PolicyBatch
+from vsp_beyond.few_cells.simplification import prune, rounded
+from vsp_beyond.few_cells.tuned import distill_tuned
 
 
 def random_policy(k=6, *, seed=0, task=SIMPLEGOAL, **options):
@@ -324,7 +324,7 @@ def test_a_sealed_file_that_holds_no_policy_is_refused(change, tmp_path):
 @pytest.mark.parametrize(
     "use",
     [
-        lambda policy: refine(None, MOUNTAINCAR, Refinement(n_cells=6), seed=0, start=policy),
+        lambda policy: distill_tuned(None, MOUNTAINCAR, Tuned(n_cells=6), seed=0, start=policy),
         lambda policy: PolicyBatch([policy]),
         lambda policy: prune(policy, lambda one: True),
         lambda policy: cost(policy),

@@ -4,6 +4,7 @@ import inspect
 import pkgutil
 import subprocess
 import sys
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -65,7 +66,8 @@ vsp.distill, vsp.evaluate, vsp.VoronoiPolicy, vsp.Config
 import sys
 print({"torch", "stable_baselines3", "matplotlib", "sklearn"} & set(sys.modules))
 vsp.paper.published_policy("SimpleGoal-v0").predict([0.5, 0.5])
-vsp.show.panels, vsp.baselines.linear_map, vsp.beyond.refinement, vsp.course
+vsp.show.panels, vsp.paper.baselines.linear_map
+import studies.comparison, vsp_beyond, vsp_course
 print({"torch", "stable_baselines3"} & set(sys.modules))
 """
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
@@ -80,7 +82,9 @@ def test_a_student_earns_most_of_what_its_teacher_does():
     assert own - 5 < student < own + 1  # standing still earns 0
 
 
-MODULES = sorted(one.name for one in pkgutil.walk_packages(vsp.__path__, "vsp."))
+PARTS = ("vsp", "vsp_beyond", "studies", "vsp_course")
+PATHS = [Path(vsp.__file__).parents[1] / part for part in PARTS]
+MODULES = sorted(one.name for part, path in zip(PARTS, PATHS) for one in pkgutil.walk_packages([str(path)], f"{part}."))
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -10,7 +10,7 @@ import subprocess
 import pandas as pd
 import pytest
 
-from vsp.beyond.comparison import all_rows, largest_alike, read_results
+from studies.comparison import all_rows, largest_alike, read_results
 from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
@@ -54,7 +54,9 @@ def test_targets_exist():
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_names_exist(page):
     text = page.read_text("utf-8")
-    assert [name for name in re.findall(r"`(vsp(?:\.\w+)+)", text) if pydoc.locate(name) is None] == []
+    assert [
+        name for name in re.findall(r"`((?:vsp|vsp_beyond|studies)(?:\.\w+)+)", text) if pydoc.locate(name) is None
+    ] == []
     assert [path for path in re.findall(r"`((?:vsp|tests|\.ci)/[\w/.]*)`", text) if not (ROOT / path).exists()] == []
 
 
@@ -76,8 +78,9 @@ def test_the_api_has_every_module():
     """But those of the course, which checks answers."""
     pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "api").glob("*.md"))
     shown = set(re.findall(r"automodule:: ([\w.]+)", pages))
-    paths = [path.relative_to(ROOT) for path in (ROOT / "vsp").rglob("*.py") if not path.name.startswith("_")]
-    assert shown == {".".join(path.with_suffix("").parts) for path in paths if "course" not in path.parts}
+    parts = ("vsp", "vsp_beyond", "studies")
+    paths = [path.relative_to(ROOT) for part in parts for path in (ROOT / part).rglob("*.py")]
+    assert shown == {".".join(path.with_suffix("").parts) for path in paths if not path.name.startswith("_")}
 
 
 # Quoted results

@@ -5,6 +5,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
 import vsp
+import vsp_beyond
 from vsp.rollouts import collect_episodes, rollout, standard, visited_states
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 from vsp.tasks.registry import get_task
@@ -90,7 +91,7 @@ def test_rewards_that_are_no_numbers_are_one_clear_error():
         return moved, np.full_like(rewards, np.nan), outcomes
 
     task = dataclasses.replace(plain, name="Broken", step=step)
-    config = vsp.Faithful(n_cells=2, n_episodes=5, n_restarts=1, n_validation=5)
-    for call in (vsp.evaluate, lambda teacher, task, n, seed: vsp.distill(teacher, task, config, seed=seed)):
+    config = vsp_beyond.Faithful(n_cells=2, n_episodes=5, n_restarts=1, n_validation=5)
+    for call in (vsp.evaluate, lambda teacher, task, n, seed: vsp_beyond.faithful(teacher, task, config, seed=seed)):
         with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
             call(Constant(-1.0, -1.0), task, 3, seed=0)

@@ -183,7 +183,7 @@ def paper_preset(task: str | Task) -> Config:
     name = get_task(task).name
     if name not in _PRESETS:
         raise ValueError(
-            f"the paper has no settings for task {name!r}, expected one of {list(_PRESETS)}: take "
-            f"vsp.preset({name!r}, 'faithful'), or write a Config of your own"
+            f"the paper has no settings for task {name!r}, expected one of {list(_PRESETS)}: write a "
+            f"Config of your own, or call vsp_beyond.faithful(agent, {name!r}, seed=0)"
         )
     return _PRESETS[name]

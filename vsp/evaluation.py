@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 
 from .checks import check_count, check_seed
 from .rollouts import Outcomes, Policy, rollout
 from .tasks.base import OUTCOMES, Task
 from .tasks.registry import get_task
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def start_states(task: str | Task, n_episodes: int, seed: int) -> np.ndarray:
@@ -26,6 +30,8 @@ def rollout_from_seed(policy: Policy, task: str | Task, n_episodes: int = 1000, 
 
 def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> pd.DataFrame:
     """Run `policy` from the start states of `seed`. Returns a row per episode with return, length and outcome."""
+    import pandas as pd  # here, because it takes long to import
+
     result = rollout_from_seed(policy, task, n_episodes, seed=seed)
     named = np.array(OUTCOMES)[result.outcomes]
     return pd.DataFrame({"return": result.returns, "length": result.lengths, "outcome": named}).rename_axis("episode")

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from .checks import check_count
 from .partition import Partition
 from .policy import VoronoiPolicy
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SNAPSHOT_EVERY = 10  # iterations between two stored copies of the parameters
 SNAPSHOTS = 500  # approximate maximum; in long runs snapshots are further apart, which bounds memory
@@ -63,6 +65,8 @@ class History:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per iteration: cells, loss, splits, merges."""
+        import pandas as pd  # here, because it takes long to import
+
         frame = pd.DataFrame({"cells": self.cells, "loss": self.losses}).rename_axis("iteration")
         for kind in ("split", "merge"):
             counts = pd.Series([e.iteration for e in self.events if e.kind == kind], dtype=int).value_counts()

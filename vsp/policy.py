@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from . import export, geometry
 from .checks import check_array, check_choice, check_count, check_observations
@@ -15,6 +15,9 @@ from .run.atomic import DamagedFile
 from .subpolicies.registry import policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _STEPS = 200  # points on an axis in one pass of the search for a border
 MOST, LEAST_SCALE = 1e50, 1e-50  # limits of a policy's numbers, which keep squared distances and products below 1e308
@@ -148,6 +151,8 @@ class VoronoiPolicy:
         Tries `_STEPS` points on each axis, then refines between two of them. A very thin cell may be missed. Where the
         box has no limit, it looks as far as twice the range of the codewords.
         """
+        import pandas as pd  # here, because it takes long to import
+
         rows = []
         for axis in range(len(state)):
             low, high = min(self.task.low[axis], state[axis]), max(self.task.high[axis], state[axis])
@@ -184,6 +189,8 @@ class VoronoiPolicy:
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
+        import pandas as pd  # here, because it takes long to import
+
         columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
         for j, output in enumerate(self.task.outputs):
             for i, name in enumerate(self.policy_class.rows):

@@ -9,8 +9,9 @@ from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
 import vsp
-from vsp.baselines import linear_map
-from vsp.beyond import comparison
+import vsp_beyond
+from studies import comparison
+from vsp.paper.baselines import linear_map
 from vsp.paper.printed import TASKS, published_policy
 from vsp.paper.results import read_results
 from vsp.show.explorer import SCRIPT, Explorer
@@ -39,7 +40,7 @@ def _ours(task: str, teacher: Teacher):
         if (path := comparison.RESULTS / f"{table}_{task}.policy").exists():
             yield name, vsp.VoronoiPolicy.load(path)
         elif name == "tuned":
-            yield name, vsp.refine(teacher, task, vsp.preset(task, "tuned"), seed=0)[0]
+            yield name, vsp_beyond.tuned(teacher, task, seed=0)
 
 
 def challenge(task: str, guess: str) -> Explorer:

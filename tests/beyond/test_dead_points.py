@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 from support import MOUNTAINCAR, SIMPLEGOAL
 
 import vsp
-from vsp.baselines import rule_of_thumb
-from vsp.beyond import comparison
-from vsp.beyond.proofs import at_rest
-from vsp.beyond.proofs.dead_points import acceleration
+from studies import comparison
+from vsp.paper.baselines import rule_of_thumb
 from vsp.tasks import GOAL, mountaincar
+from vsp_beyond.proofs import at_rest
+from vsp_beyond.proofs.dead_points import acceleration
 
 
 def policy_of(codewords, maps, **more):

@@ -4,11 +4,11 @@ from dataclasses import replace
 import numpy as np
 from support import SIMPLEGOAL, CurvedTeacher
 
-from vsp.beyond.refinement import duration, faithful, search
-from vsp.beyond.refinement.config import Faithful
-from vsp.beyond.refinement.tune import candidates_per_generation, cma_es
-from vsp.beyond.refinement.units import Cells
 from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells import duration, faithful, search
+from vsp_beyond.few_cells.config import Faithful
+from vsp_beyond.few_cells.tune import candidates_per_generation, cma_es
+from vsp_beyond.few_cells.units import Cells
 
 SMALL = Faithful(n_cells=3, n_episodes=100, n_restarts=4, n_generations=10, n_tuning_episodes=50, n_validation=100)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from support import SIMPLEGOAL, CurvedTeacher
 
-import vsp
-from vsp.beyond.refinement import faithful
-from vsp.beyond.refinement.anneal import squared_error
-from vsp.beyond.refinement.config import Faithful
-from vsp.beyond.refinement.faithful import among_states, by_visits, distill_faithfully, needed_only, variance
-from vsp.beyond.refinement.units import Cells, Frame, LabelledStates
+import vsp_beyond
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells import faithful
+from vsp_beyond.few_cells.anneal import squared_error
+from vsp_beyond.few_cells.config import Faithful
+from vsp_beyond.few_cells.faithful import among_states, by_visits, distill_faithfully, needed_only, variance
+from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
@@ -43,15 +43,15 @@ def test_it_acts_like_the_teacher_and_returns_what_it_returns(distilled):
 
 
 def test_it_is_closer_than_what_is_tuned_for_the_return(distilled):
-    config = vsp.Refinement(
+    config = vsp_beyond.Tuned(
         n_cells=3, n_episodes=200, n_steps=300, n_generations=8, n_tuning_episodes=60, n_validation=200
     )
-    tuned = vsp.distill(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[0]
+    tuned = vsp_beyond.tuned(CurvedTeacher(), SIMPLEGOAL, config, seed=1)
     assert r2(distilled[0], CurvedTeacher()) > r2(tuned, CurvedTeacher())
 
 
 def test_the_same_arguments_give_the_same_policy(distilled):
-    again, history = vsp.distill(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)
+    again, history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)
     assert again.to_json() == distilled[0].to_json() and history.equals(distilled[1])
     other = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL.quick(), seed=2)[0]
     assert other.to_json() != again.to_json()
@@ -116,7 +116,7 @@ def test_nothing_is_tuned_where_the_closest_cells_return_enough():
 
 
 def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():
-    frame, seen = Frame.of(get_task(SIMPLEGOAL), np.random.default_rng(0).random((50, 2))), None
+    frame, seen = Scaling.of(get_task(SIMPLEGOAL), np.random.default_rng(0).random((50, 2))), None
     starts = get_task(SIMPLEGOAL).start(np.random.default_rng(0), 200)
     judge = faithful._Judge(frame, CurvedTeacher(), seen, dataclasses.replace(SMALL, tolerance=None), starts)
     own = rollout(CurvedTeacher(), SIMPLEGOAL, starts).returns.mean()

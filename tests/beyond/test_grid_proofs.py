@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from support import PENDULUM, SIMPLEGOAL
 
 import vsp
-from vsp.beyond import comparison
-from vsp.beyond.proofs import check, teacher_steps_to_goal
-from vsp.beyond.proofs.grid import Way, around, invariant, steps_into
-from vsp.beyond.proofs.network import affine_outputs
-from vsp.beyond.proofs.pendulum import equilibria, prove_pendulum
-from vsp.beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
+from studies import comparison
 from vsp.tasks import GOAL
+from vsp_beyond.proofs import check, teacher_steps_to_goal
+from vsp_beyond.proofs.grid import Way, around, invariant, steps_into
+from vsp_beyond.proofs.network import affine_outputs
+from vsp_beyond.proofs.pendulum import equilibria, prove_pendulum
+from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 
 N = 400
 STILL = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher
 
-from vsp.beyond.explain import lime
-from vsp.beyond.explain.lime import compare_maps, gradient_map, local_map
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.registry import get_task
+from vsp_beyond.explain import lime
+from vsp_beyond.explain.lime import compare_maps, gradient_map, local_map
 
 SCALE = np.array([0.2, 0.3])
 STATE = np.array([0.6, 0.4])

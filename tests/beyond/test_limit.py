@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp.beyond.optimum import at_the_limit, best_returns, limit, limit_preset
-from vsp.beyond.refinement.config import Faithful, faithful_preset, tuned_preset
 from vsp.evaluation import start_states
 from vsp.rollouts import rollout
 from vsp.tasks.base import GOAL
 from vsp.teachers.teacher import load_teacher
+from vsp_beyond.few_cells import limit
+from vsp_beyond.few_cells.config import Faithful, faithful_preset, tuned_preset
+from vsp_beyond.few_cells.limit import at_the_limit, limit_preset
+from vsp_beyond.optimum import best_returns
 
 FEW = replace(
     limit_preset(SIMPLEGOAL), n_episodes=100, n_restarts=1, n_steps=300, n_correction_episodes=50, n_generations=30,
@@ -40,13 +42,13 @@ def test_the_same_seed_gives_the_same_policy():
 
 
 def test_each_start_is_tuned_briefly_and_the_best_to_the_end(monkeypatch):
-    called, refine, close = [], limit.refine, limit.distill_faithfully
+    called, tuned, close = [], limit.distill_tuned, limit.distill_faithfully
 
     def recorded(teacher, task, config, *, seed, start=None):
         called.append((config.n_generations, start is None))
-        return refine(teacher, task, config, seed=seed, start=start)
+        return tuned(teacher, task, config, seed=seed, start=start)
 
-    monkeypatch.setattr(limit, "refine", recorded)
+    monkeypatch.setattr(limit, "distill_tuned", recorded)
     monkeypatch.setattr(
         limit, "distill_faithfully", lambda *some, **more: called.append("close") or close(*some, **more)
     )
@@ -79,7 +81,7 @@ def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned_and_the_best_agai
 
 
 def test_what_cannot_be_searched_is_refused():
-    with pytest.raises(ValueError, match="expected a Refinement"):
+    with pytest.raises(ValueError, match="expected a Tuned"):
         at_the_limit(SIMPLEGOAL, faithful_preset(SIMPLEGOAL), seed=0)
     with pytest.raises(ValueError, match="seed is -1"):
         at_the_limit(SIMPLEGOAL, seed=-1)

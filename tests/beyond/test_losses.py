@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from support import PENDULUM
 
-from vsp.beyond.optimum import best_policy
-from vsp.beyond.optimum.losses import PENDULUM_REGIONS as REGIONS
-from vsp.beyond.optimum.losses import held, losses, swung
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import load_teacher
+from vsp_beyond.optimum import best_policy
+from vsp_beyond.optimum.losses import PENDULUM_REGIONS as REGIONS
+from vsp_beyond.optimum.losses import held, losses, swung
 
 
 def test_held_by_hand():

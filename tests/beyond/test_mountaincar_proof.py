@@ -9,9 +9,9 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL
 
 import vsp
-from vsp.beyond import comparison
-from vsp.beyond.proofs import check, load_certificate, mountaincar
-from vsp.beyond.proofs.mountaincar import MountainCarProof, Program, first_steps, prove_mountaincar, run_block, step
+from studies import comparison
+from vsp_beyond.proofs import check, load_certificate, mountaincar
+from vsp_beyond.proofs.mountaincar import MountainCarProof, Program, first_steps, prove_mountaincar, run_block, step
 
 
 def policy_of(codewords, maps):

@@ -3,10 +3,10 @@ import pytest
 from support import MOUNTAINCAR
 
 import vsp
-from vsp.beyond import comparison
-from vsp.beyond.proofs import mountaincar_reals
-from vsp.beyond.proofs.mountaincar_reals import Loop, prove_part, started
+from studies import comparison
 from vsp.tasks.mountaincar import TASK
+from vsp_beyond.proofs import mountaincar_reals
+from vsp_beyond.proofs.mountaincar_reals import Loop, prove_part, started
 
 CAR = vsp.VoronoiPolicy.load(comparison.RESULTS / f"limit_{MOUNTAINCAR}.policy")
 

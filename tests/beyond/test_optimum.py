@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp.beyond.optimum import best_policy, best_returns
-from vsp.beyond.optimum.grid import Grid, GridPolicy, best_values
-from vsp.beyond.optimum.references import TASKS
 from vsp.evaluation import start_states
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.base import GOAL, RUNNING
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import load_teacher
+from vsp_beyond.optimum import best_policy, best_returns
+from vsp_beyond.optimum.grid import Grid, GridPolicy, best_values
+from vsp_beyond.optimum.references import TASKS
 
 
 def test_between_points_values_are_interpolated():

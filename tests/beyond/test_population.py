@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp.beyond.refinement.population import PolicyBatch, rollout_population
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells.population import PolicyBatch, rollout_population
 
 
 def policies_of(task, p=4, k=3, seed=0):

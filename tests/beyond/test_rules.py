@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp.beyond.explain.rules import Rule, RulePolicy, _merged, _rounded, apply, describe_rules, find_rules
 from vsp.evaluation import start_states
 from vsp.paper.printed import published_policy
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import visited_states
 from vsp.tasks.registry import get_task
+from vsp_beyond.explain.rules import Rule, RulePolicy, _merged, _rounded, apply, describe_rules, find_rules
 
 
 def constants(codewords, values, task=SIMPLEGOAL, **options):

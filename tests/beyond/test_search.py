@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from vsp.beyond.refinement import search
-from vsp.beyond.refinement.anneal import expected_loss, squared_error
-from vsp.beyond.refinement.search import (
+from vsp_beyond.few_cells import search
+from vsp_beyond.few_cells.anneal import expected_loss, squared_error
+from vsp_beyond.few_cells.search import (
     LAST,
     N_STAGES,
     ROUNDS,
@@ -14,7 +14,7 @@ from vsp.beyond.refinement.search import (
     spread,
     uncorrelated,
 )
-from vsp.beyond.refinement.units import Cells, LabelledStates
+from vsp_beyond.few_cells.units import Cells, LabelledStates
 
 
 def planted(seed=0, n=1500):

@@ -14,24 +14,17 @@ from hypothesis import strategies as st
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
-from vsp.beyond import comparison
-from vsp.beyond.proofs import (
-    check,
-    largest_disturbance,
-    load_certificate,
-    make_proofs,
-    proved,
-    returns,
-    steps_to_goal,
-)
-from vsp.beyond.proofs.polygons import box, line_of, meet, total
-from vsp.beyond.proofs.proof import CERTIFICATES
-from vsp.beyond.proofs.simplegoal import follow
-from vsp.beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
+import vsp_beyond
+from studies import comparison, make_proofs
 from vsp.paper.results import read_results, write_results
 from vsp.run import sealed
 from vsp.run.atomic import ROOT
 from vsp.tasks import GOAL, PIT, TRUNCATED
+from vsp_beyond.proofs import check, largest_disturbance, load_certificate, proved, returns, steps_to_goal
+from vsp_beyond.proofs.polygons import box, line_of, meet, total
+from vsp_beyond.proofs.proof import CERTIFICATES
+from vsp_beyond.proofs.simplegoal import follow
+from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 HALF, ONE = Fraction(1, 2), Fraction(1)
 
@@ -112,7 +105,7 @@ def test_parts_add_up_to_the_whole(lines):
 
 
 def test_the_areas_by_hand():
-    proof = vsp.prove(STRAIGHT)
+    proof = vsp_beyond.prove(STRAIGHT)
     # After k steps the pit holds the starts of a square of 1/5 that lies k/10 further up the diagonal. Four of these
     # are within the square of starts; each overlaps with the next in a square of 1/10
     assert proof.areas == {"goal": Fraction(87, 100), "pit": 4 * Fraction(4, 100) - 3 * Fraction(1, 100), "left": 0}
@@ -120,7 +113,7 @@ def test_the_areas_by_hand():
 
 
 def test_a_policy_that_stands_still_gets_nowhere():
-    proof = vsp.prove(policy_of([[0.5, 0.5]], np.zeros((1, 3, 2))))
+    proof = vsp_beyond.prove(policy_of([[0.5, 0.5]], np.zeros((1, 3, 2))))
     # What starts in the goal or in the pit is there after a step: 1/100 and 1/25
     assert proof.areas == {"goal": Fraction(1, 100), "pit": Fraction(1, 25), "left": Fraction(95, 100)}
     assert proof.longest == 50
@@ -188,7 +181,7 @@ def closest(policy, starts):
 
 
 def test_returns_are_those_of_the_pieces():
-    proof = vsp.prove(TWO)
+    proof = vsp_beyond.prove(TWO)
     low, high = returns.mean_return(proof.pieces, width=1e-4)
     starts = np.random.default_rng(1).uniform(size=(200_000, 2))
     sampled = vsp.rollout(TWO, SIMPLEGOAL, starts).returns
@@ -220,7 +213,7 @@ def test_other_policies_get_one_clear_error(policy, match):
 
 def test_boxes_agree_with_pieces():
     steps = steps_to_goal(TWO, n=100)
-    assert 0 < (steps > 0).mean() <= vsp.prove(TWO).areas["goal"]
+    assert 0 < (steps > 0).mean() <= vsp_beyond.prove(TWO).areas["goal"]
     starts = np.random.default_rng(2).uniform(size=(20_000, 2))
     found, own = vsp.rollout(TWO, SIMPLEGOAL, starts), steps[tuple((starts * 100).astype(int).T)]
     assert (found.outcomes[own > 0] == GOAL).all() and (found.lengths[own > 0] <= own[own > 0]).all()
@@ -254,11 +247,11 @@ def test_what_boxes_prove_no_disturbance_breaks(policy, seed):
 
 @pytest.fixture(scope="module")
 def certificate():
-    return vsp.prove(TWO).certificate()
+    return vsp_beyond.prove(TWO).certificate()
 
 
 def test_a_certificate_is_written_sealed_and_checked(tmp_path, certificate):
-    vsp.prove(TWO).save(path := tmp_path / "two.json")
+    vsp_beyond.prove(TWO).save(path := tmp_path / "two.json")
     assert json.loads(sealed.read_sealed(path)) == certificate and check.check(path) == certificate["claim"]
     path.write_bytes(path.read_bytes().replace(b"goal", b"goat", 1))
     with pytest.raises(check.Refused, match="checksum"):
@@ -389,7 +382,7 @@ def test_a_sealed_file_that_is_no_certificate_is_refused(tmp_path, payload):
 def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path, monkeypatch, capsys):
     def run(*paths):
         monkeypatch.setattr("sys.argv", ["check", *map(str, paths)])
-        runpy.run_module("vsp.beyond.proofs.check", run_name="__main__")
+        runpy.run_module("vsp_beyond.proofs.check", run_name="__main__")
 
     run(good := ROOT / "data/proofs/simplegoal_one_map.json")
     assert capsys.readouterr().out.startswith(f"{good} proves {{'goal': ")
@@ -428,7 +421,7 @@ def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):
 )  # fmt: skip
 def test_prove_refuses_what_it_has_no_proof_for(policy, match):
     with pytest.raises(ValueError, match=match):
-        vsp.prove(policy)
+        vsp_beyond.prove(policy)
 
 
 PROVERS = {SIMPLEGOAL: "prove_simplegoal", MOUNTAINCAR: "prove_mountaincar", PENDULUM: "prove_pendulum"}
@@ -436,9 +429,9 @@ PROVERS = {SIMPLEGOAL: "prove_simplegoal", MOUNTAINCAR: "prove_mountaincar", PEN
 
 @pytest.mark.parametrize("task", PROVERS)
 def test_prove_asks_the_prover_of_the_task(monkeypatch, task):
-    module = importlib.import_module("vsp.beyond.proofs.prove")
+    module = importlib.import_module("vsp_beyond.proofs.prove")
     d, m = len(vsp.get_task(task).low), len(vsp.get_task(task).action_low)
     policy = vsp.VoronoiPolicy(np.zeros((1, d)), np.zeros((1, d + 1, m)), task=task)
     assert module.PROVERS[task].__name__ == PROVERS[task]
     monkeypatch.setitem(module.PROVERS, task, lambda given: ("proved", given))
-    assert vsp.prove(policy) == ("proved", policy)
+    assert vsp_beyond.prove(policy) == ("proved", policy)

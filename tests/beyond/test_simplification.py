@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, PumpingTeacher
 
-from vsp.beyond.refinement.config import Refinement
-from vsp.beyond.refinement.simplification import gathered, prune, rounded, simplify
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import rollout, score
 from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond.few_cells.simplification import gathered, prune, rounded, simplify
 
-module = importlib.import_module("vsp.beyond.refinement.simplification")
-CONFIG = Refinement(
+module = importlib.import_module("vsp_beyond.few_cells.simplification")
+CONFIG = Tuned(
     n_cells=3, n_episodes=60, n_restarts=1, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
     n_generations=2, n_tuning_episodes=50, failure_penalty=100.0, n_validation=100,
 )  # fmt: skip
@@ -148,7 +148,7 @@ def gain(value, k=1):
 
 def test_where_no_number_of_cells_will_do_the_best_goes_on(monkeypatch):
     made = {1: gain(100.0), 2: gain(40.0, 2), 3: gain(80.0, 3)}
-    monkeypatch.setattr(module, "refine", lambda teacher, task, config, *, seed: (made[config.n_cells], None))
+    monkeypatch.setattr(module, "distill_tuned", lambda teacher, task, config, *, seed: (made[config.n_cells], None))
     policy, tried = simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=0.0, seed=0)
     cells = tried[tried["stage"] == "cells"]
     assert not cells["kept"].any() and cells["mean"].idxmax() == 1 and len(cells) == 3
@@ -158,7 +158,7 @@ def test_where_no_number_of_cells_will_do_the_best_goes_on(monkeypatch):
 
 def test_the_tolerance_is_spent_once(monkeypatch):
     """The first size costs most of it. One digit, 20 for 16, would cost more than the rest."""
-    monkeypatch.setattr(module, "refine", lambda teacher, task, config, *, seed: (gain(16.0), None))
+    monkeypatch.setattr(module, "distill_tuned", lambda teacher, task, config, *, seed: (gain(16.0), None))
     policy, tried = simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=1.5, seed=0)
     starts = start_states(policy.task, CONFIG.n_validation, 0)
     own, size, digit = (rollout(gain(g), policy.task, starts).returns.mean() for g in (12.0, 16.0, 20.0))

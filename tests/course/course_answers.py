@@ -17,13 +17,14 @@ from sklearn.cluster import KMeans
 from sklearn.tree import DecisionTreeRegressor
 
 import vsp
-from vsp import baselines, geometry, tasks
-from vsp.baselines.dagger import dagger
-from vsp.beyond.refinement import Refinement
-from vsp.course import build, drawing, lesson_1, lesson_2, lesson_3
-from vsp.course.feedback import Exercise
+from studies.rivals.dagger import dagger
+from vsp import geometry, tasks
+from vsp.paper import baselines
 from vsp.rollouts import collect_episodes, rollout
 from vsp.subpolicies.base import PolicyClass
+from vsp_beyond.few_cells import Tuned
+from vsp_course import build, drawing, lesson_1, lesson_2, lesson_3
+from vsp_course.feedback import Exercise
 
 EXERCISES = {
     exercise.number: (lesson, exercise.name)
@@ -856,5 +857,5 @@ def quadratic_maps():
 @right("3.7")
 def dagger_on_k_means():
     fits = [functools.partial(baselines.kmeans_cells, cells=12, task="SimpleGoal-v0", seed=seed) for seed in range(6)]
-    config = Refinement(n_cells=12, n_episodes=500, n_corrections=3, n_correction_episodes=300, n_validation=1000)
+    config = Tuned(n_cells=12, n_episodes=500, n_corrections=3, n_correction_episodes=300, n_validation=1000)
     return dagger(fits, vsp.load_teacher("SimpleGoal-v0"), "SimpleGoal-v0", rounds=config, seed=0)

@@ -23,13 +23,14 @@ from course_answers import EXERCISES
 from IPython.core.interactiveshell import InteractiveShell
 
 import vsp
-from vsp import baselines, distill
+from vsp import distill
 from vsp.algorithms import split_regions, teacher_episodes
-from vsp.course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
-from vsp.course.lesson_1 import AT_MOST, CELLS, DRAWS, MARGIN
-from vsp.course.lesson_2 import _algorithm_1
+from vsp.paper import baselines
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
+from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
+from vsp_course.lesson_1 import AT_MOST, CELLS, DRAWS, MARGIN
+from vsp_course.lesson_2 import _algorithm_1
 
 LESSONS = build.read_sources()
 SIMPLEGOAL = "SimpleGoal-v0"
@@ -235,7 +236,7 @@ def run(notebook, monkeypatch):
     keep_runs(monkeypatch)
     monkeypatch.setattr(vsp, "distill", once)
     monkeypatch.setattr("vsp.show.laboratory.distill", briefly)
-    monkeypatch.setattr("vsp.course.picture", lambda fig, alt: drawing.plt.close(fig) or alt)
+    monkeypatch.setattr("vsp_course.picture", lambda fig, alt: drawing.plt.close(fig) or alt)
     names, failed = {}, {}
     for cell in code_cells(notebook):
         try:
@@ -518,7 +519,7 @@ def test_jupyter_shows_the_message_alone(monkeypatch):
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)  # IPython would take its packages for this process's
     shell, shown = InteractiveShell.instance(), []
     shell._showtraceback = lambda kind, value, lines: shown.append(lines)
-    shell.run_cell("from vsp.course import lesson_1\nlesson_1.fit_linear(None)")
+    shell.run_cell("from vsp_course import lesson_1\nlesson_1.fit_linear(None)")
     InteractiveShell.clear_instance()
     assert shown == [["✗ 1.2 fit_linear: found None, expected a function."]]
 
@@ -591,7 +592,7 @@ def test_a_hand_out_stands_on_its_own(tmp_path):
         archive.extractall(tmp_path)
     folder = tmp_path / handout.FOLDER
     code = (
-        "import vsp; from vsp.course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); "
+        "import vsp; from vsp_course import lesson_1, lesson_2, lesson_3; print(vsp.__file__); "
         "from vsp.paper import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
     )
     assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))

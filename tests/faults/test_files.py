@@ -20,9 +20,8 @@ import yaml
 from support import SIMPLEGOAL, TINY, CurvedTeacher
 
 import vsp
-from vsp.beyond.comparison import method_rows
-from vsp.beyond.comparison.method_summary import read_rows
-from vsp.course import build
+from studies.comparison import method_rows
+from studies.comparison.method_summary import read_rows
 from vsp.paper import printed, results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
@@ -30,6 +29,7 @@ from vsp.run.listed import MANIFEST, list_folder, read_carded, read_listed, read
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
 from vsp.teachers import train
+from vsp_course import build
 
 FLIPS, TRUNCATIONS = 100, 50
 PARSERS = ("json.loads", "numpy.load", "pandas.read_csv", "pickle.load", "pickle.loads", "safetensors.numpy.load",

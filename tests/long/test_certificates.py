@@ -2,8 +2,8 @@
 
 import pytest
 
-from vsp.beyond.proofs import check
 from vsp.run.atomic import ROOT
+from vsp_beyond.proofs import check
 
 
 @pytest.mark.parametrize("name", ["best_run", "limit", "margin", "paper"])

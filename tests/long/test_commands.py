@@ -17,10 +17,10 @@ def test_one_runs_by_plain_papermill_from_the_root(tmp_path):
 
 def test_commands_run_without_a_warning():
     """Of a module that its package has imported already, `python -m` warns."""
-    commands = ["beyond.comparison.stale", "beyond.comparison.make_rows --help"]
-    commands += ["paper.studies.make_studies --help", "paper.make_runs --help"]
+    commands = ["studies.comparison.stale", "studies.make_rows --help"]
+    commands += ["vsp.paper.studies.make_studies --help", "vsp.paper.make_runs --help"]
     how = {"cwd": ROOT, "stdout": PIPE, "stderr": PIPE, "text": True}
-    running = [subprocess.Popen([sys.executable, "-m", *f"vsp.{command}".split()], **how) for command in commands]
+    running = [subprocess.Popen([sys.executable, "-m", *command.split()], **how) for command in commands]
     said = [(*process.communicate(), process.returncode) for process in running]
     assert said[0] == ("", "", 0)  # nothing is stale
     assert all(out.startswith("usage:") and (err, code) == ("", 0) for out, err, code in said[1:])

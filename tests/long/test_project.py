@@ -2,7 +2,7 @@
 
 import runpy
 
-from vsp.course.build import SOURCES
+from vsp_course.build import SOURCES
 
 
 def test_the_sample_solution_compares_on_starts_that_decide_nothing(capsys):

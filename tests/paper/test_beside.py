@@ -6,10 +6,9 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
 
 from vsp import algorithms, distill
-from vsp.baselines.simple import kmeans_cells, linear_map, refit, rule_of_thumb
-from vsp.baselines.trees import Tree
 from vsp.evaluation import evaluate, rollout_from_seed
 from vsp.paper import beside, printed
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.beside import LEAVES, compare_simpler, fit, kept_comparison, teacher_data
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
 from vsp.paper.statistics import crossed_interval

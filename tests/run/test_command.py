@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from vsp.beyond.comparison import make_rows
+from studies import make_rows
 from vsp.paper import make_runs, runs
 from vsp.paper.studies import make_studies
 from vsp.run.atomic import ROOT, DamagedFile, MissingFile

@@ -19,7 +19,7 @@ from vsp import geometry
 from vsp.paper import ledger
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
-from vsp.show import explanation, state_space, style
+from vsp.show import state_space, style
 from vsp.show.returns import (
     _VERDICTS,
     again,
@@ -36,6 +36,7 @@ from vsp.show.returns import (
 )
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
+from vsp_beyond.show import explanation
 
 mpl.use("Agg")
 ALT = 'Two "cells" & their border <drawn> in grey'

@@ -8,6 +8,7 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 
 import vsp
+import vsp_beyond
 from vsp import distill
 from vsp.show import Laboratory, page
 from vsp.show.laboratory import SHOWN, Remembered
@@ -186,8 +187,8 @@ def test_a_teacher_that_does_not_play_the_task_is_refused(teacher, message):
 
 
 def test_a_laboratory_needs_cells_to_split_and_maps_to_draw():
-    with pytest.raises(ValueError, match="config is a Refinement, expected a Config"):
-        Laboratory(CurvedTeacher(), SIMPLEGOAL, vsp.preset(SIMPLEGOAL, "tuned"))
+    with pytest.raises(ValueError, match="config is a Tuned, expected a Config"):
+        Laboratory(CurvedTeacher(), SIMPLEGOAL, vsp_beyond.tuned_preset(SIMPLEGOAL))
     with pytest.raises(ValueError, match="task is Pendulum-v1, expected one of"):
         Laboratory(CurvedTeacher(), PENDULUM, CONFIG)
     with pytest.raises(ValueError, match="config.sub_policy is 'quadratic', expected one of"):

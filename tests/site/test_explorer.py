@@ -10,7 +10,7 @@ import pytest
 from visits import Visit
 
 import vsp
-from vsp.beyond import comparison
+from studies import comparison
 from vsp.show.explorer import SCRIPT
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")

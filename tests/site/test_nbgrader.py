@@ -12,9 +12,9 @@ from nbgrader.api import Gradebook
 from nbgrader.apps import NbGraderAPI
 from traitlets.config import Config
 
-from vsp.course import build
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
+from vsp_course import build
 
 ASSIGNMENT = "homework"
 LESSONS = build.read_sources()

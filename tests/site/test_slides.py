@@ -2,8 +2,8 @@
 
 import pytest
 
-from vsp.course.build import read_sources
-from vsp.course.slides import is_slide, slides
+from vsp_course.build import read_sources
+from vsp_course.slides import is_slide, slides
 
 LESSONS = read_sources()
 OVERFLOWS = """() => [...document.querySelectorAll('section')].map((slide, i) => {

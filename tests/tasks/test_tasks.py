@@ -10,8 +10,9 @@ from gymnasium.utils.env_checker import check_env
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER, RandomPolicy
 
 import vsp
+from studies.robots import halfcheetah
 from vsp.rollouts import collect_episodes, rollout
-from vsp.tasks import halfcheetah, mountaincar, registry, simplegoal
+from vsp.tasks import mountaincar, registry, simplegoal
 from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import BOX, get_task, task_names

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support import PENDULUM, SIMPLEGOAL, CurvedTeacher
 
-import vsp
+import vsp_beyond
 from vsp.teachers.agents import agent
 
 STATES = np.random.default_rng(0).random((50, 2))
@@ -15,7 +15,7 @@ def straight(obs):
 def test_a_function_is_a_teacher():
     actions, state = agent(straight).predict(STATES)
     assert state is None and np.array_equal(actions, np.full((50, 2), -0.5))
-    policy, _ = vsp.distill(agent(straight), SIMPLEGOAL, vsp.Refinement(n_cells=1, n_generations=0).quick(), seed=0)
+    policy = vsp_beyond.tuned(agent(straight), SIMPLEGOAL, vsp_beyond.Tuned(n_cells=1, n_generations=0).quick(), seed=0)
     assert np.allclose(policy.predict(STATES)[0], -0.5, atol=1e-6)
 
 

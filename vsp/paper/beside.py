@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 
 from ..algorithms import teacher_episodes
-from ..baselines.simple import kmeans_cells, linear_map, refit, rule_of_thumb
-from ..baselines.trees import Tree
 from ..checks import check_seed
 from ..evaluation import rollout_from_seed
 from ..rollouts import Outcomes, Policy
@@ -18,6 +16,7 @@ from ..run import atomic, listed, sealed, workers
 from ..tasks.base import GOAL
 from ..tasks.registry import get_task
 from . import printed
+from .baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from .results import load_made, settings_id
 from .runs import EVALUATION_SEED, Experiment, Results, Run
 from .statistics import crossed_interval

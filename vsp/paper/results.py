@@ -7,7 +7,7 @@ A row of a table and a run file state their provenance:
 - version: the method's version number in the code, raised by hand when the same arguments give other results;
 - the seed, where a result has one.
 
-`vsp.beyond.comparison.stale` compares them with the current ones.
+`studies.comparison.stale` compares them with the current ones.
 """
 
 from __future__ import annotations

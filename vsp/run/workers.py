@@ -110,7 +110,8 @@ def identity() -> dict[str, str]:
 
 def _deciding_files() -> list[Path]:
     """Return the paths of all code of the package and of the manifests of the teachers."""
-    code = [path for kind in ("*.py", "*.c") for path in sorted((ROOT / "vsp").rglob(kind))]
+    parts = [ROOT / part for part in ("vsp", "vsp_beyond", "studies")]
+    code = [path for part in parts for kind in ("*.py", "*.c") for path in sorted(part.rglob(kind))]
     return [*code, *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
 
 

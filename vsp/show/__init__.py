@@ -5,19 +5,7 @@ Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 
 import importlib
 
-from .benchmarks import fit_times, kills, times_over_dimension
 from .captions import Caption, caption_of
-from .explanation import contributions, whereabouts
-from .gait import footfall, gait_strip, save_gait
-from .methods import (
-    LIMITS,
-    ROBOTS,
-    fidelity_map,
-    likeness_over_cells,
-    over_cells,
-    return_over_cells,
-)
-from .proofs import basins, upright
 from .returns import (
     again,
     box_plot,

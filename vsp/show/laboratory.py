@@ -35,7 +35,7 @@ class Laboratory:
     """Laboratory: distil again whenever a setting changes, explore the policy, and compare it with earlier trials.
 
     `config` holds the initial settings, by default the paper's preset. Raises ValueError for tasks other than the
-    paper's, for a `Refinement`, for sub-policies that are not linear or constant, and for a teacher that cannot act in
+    paper's, for a `Tuned`, for sub-policies that are not linear or constant, and for a teacher that cannot act in
     the task.
     """
 

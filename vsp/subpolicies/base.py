@@ -8,12 +8,15 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..checks import check_array, check_count
 from ..tasks.base import Task
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Pullback = Callable[[np.ndarray], np.ndarray]
 
@@ -85,6 +88,8 @@ static double output(const double *row, const double *features) {
 
     def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
         """Return the terms of the output at `state` (d,): m rows, one per action; a column per feature and the bias."""
+        import pandas as pd  # here, because it takes long to import
+
         return pd.DataFrame(parameters.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:

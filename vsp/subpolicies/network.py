@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..tasks.base import Task
 from .base import PolicyClass, Pullback, expression, reach, state_code
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HIDDEN = 4  # tanh units of a network
 
@@ -87,6 +90,8 @@ static double output(const double *row, const double *features) {
 
     def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
         """Return the output to first order: each input times the output's slope along it. The rest has no input."""
+        import pandas as pd  # here, because it takes long to import
+
         hidden, weights, _ = self._layers(parameters)
         units = np.tanh(np.tensordot(state, hidden[:-1], 1) + hidden[-1])
         first = np.einsum("q,qhm,hm->mq", state, hidden[:-1], weights * (1.0 - units**2))

@@ -56,6 +56,7 @@ class Task:
     see: Callable[[np.ndarray], np.ndarray] = _unchanged
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
     start_size: int | None = None  # s; None: s is d
+    slowness: int = 1  # evaluations divide their number of episodes by this, because an engine steps slowly
     signals: Signals | None = None  # None: the task has no natural error
 
     @property

@@ -20,5 +20,6 @@ def landed(observation: np.ndarray, reward: float, info: dict) -> bool:
 
 def make() -> Task:
     """Return the task. Opens an environment."""
-    inputs = ("x", "y", "vx", "vy", "θ", "ω", "l", "r")
-    return replace(gymnasium_task(NAME, landed), inputs=inputs, outputs=("main", "side"), input_labels=LABELS)
+    inputs, outputs = ("x", "y", "vx", "vy", "θ", "ω", "l", "r"), ("main", "side")
+    task = gymnasium_task(NAME, landed)
+    return replace(task, inputs=inputs, outputs=outputs, input_labels=LABELS, slowness=10)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import NoReturn
@@ -13,17 +13,24 @@ import gymnasium
 import numpy as np
 
 from ..checks import check_array
-from . import bipedalwalker, halfcheetah, lunarlander, mountaincar, pendulum, simplegoal
+from . import lunarlander, mountaincar, pendulum, simplegoal
 from .base import Task
 from .gym_adapter import Outcome, gymnasium_task
 
 BOX = ("low", "high", "action_low", "action_high")  # the limits of a task
 _ADDED: dict[str, Task] = {}  # by `register`
 _TASKS = {module.TASK.name: module.TASK for module in (simplegoal, mountaincar, pendulum)}
-_ENGINES = (lunarlander, bipedalwalker, halfcheetah)
-_LATER = {module.NAME: cache(module.make) for module in _ENGINES}  # made on request: they open an environment
+_LATER: dict[str, Callable[[], Task]] = {}  # made on request: they open an environment
 
 gymnasium.register("SimpleGoal-v0", entry_point="vsp.tasks.simplegoal:SimpleGoalEnv", max_episode_steps=50)
+
+
+def register_maker(name: str, make: Callable[[], Task]) -> None:
+    """Add a task that `make` returns, on its first use: it may open an environment or need another package."""
+    _LATER[name] = cache(make)
+
+
+register_maker(lunarlander.NAME, lunarlander.make)
 
 
 def task_names() -> list[str]:
@@ -137,7 +144,3 @@ def render(name: str, state: np.ndarray) -> np.ndarray:
     image = env.render()
     env.close()
     return image
-
-
-# Tasks stepped by a physics engine: evaluations divide the number of episodes by this
-SLOW = {lunarlander.NAME: 10, bipedalwalker.NAME: 20, halfcheetah.NAME: 50}

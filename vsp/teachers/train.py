@@ -21,7 +21,7 @@ import numpy as np
 from ..evaluation import rollout_from_seed
 from ..run import atomic, command, listed, sealed
 from ..tasks.base import GOAL, PIT
-from ..tasks.registry import SLOW, get_task
+from ..tasks.registry import get_task
 from .agent_zip import part_of
 from .recipes import BARS, BEST_OF_CURVE, EARLIER_TRIALS, RECIPES, SHORT_SEEDS, SHORT_STEPS, Recipe
 from .teacher import SHIPPED, Teacher
@@ -165,7 +165,7 @@ def _restore(model, snapshot: dict) -> list[dict]:
 
 
 def _score(model, task: str) -> dict:
-    """Return one point of the learning curve, over `CURVE_EPISODES` (fewer for `SLOW` tasks) from fixed starts."""
+    """Return one point of the learning curve, over `CURVE_EPISODES` (fewer for slow tasks) from fixed starts."""
     n_episodes = CURVE_EPISODES * OFTEN.get(task, 1)
     weights = {name: tensor.numpy() for name, tensor in model.actor.state_dict().items()}
     return {"steps": model.num_timesteps, **score(Teacher(weights, task), task, n_episodes, seed=SELECTION_SEED)}
@@ -174,9 +174,9 @@ def _score(model, task: str) -> dict:
 def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed: int = SCORE_SEED) -> dict:
     """Return the mean and standard deviation of the return, and the shares of episodes that end in goal and pit.
 
-    `SLOW` tasks are scored over fewer episodes.
+    Slow tasks are scored over fewer episodes.
     """
-    result = rollout_from_seed(teacher, task, n_episodes // SLOW.get(task, 1), seed=seed)
+    result = rollout_from_seed(teacher, task, n_episodes // get_task(task).slowness, seed=seed)
     return {
         "mean": round(float(result.returns.mean()), 4),
         "std": round(float(result.returns.std(ddof=1)), 4),
@@ -243,7 +243,7 @@ def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, par
         "seed": seed,
         **about,
         "versions": {name: version(name) for name in (*PACKAGES, *ENGINES.get(task, ()))},
-        "score": {"episodes": SCORE_EPISODES // SLOW.get(task, 1), "start_seed": SCORE_SEED, **found},
+        "score": {"episodes": SCORE_EPISODES // get_task(task).slowness, "start_seed": SCORE_SEED, **found},
         "learning_curve": snapshot["curve"],
     }
     listed.write_carded(path, save(tensors), card)

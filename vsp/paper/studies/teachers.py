@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...baselines.simple import linear_map
 from ...evaluation import rollout_from_seed
 from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
+from ..baselines import linear_map
 from ..beside import teacher_data
 from ..results import settings_id
 from ..runs import EVALUATION_SEED, Experiment, load_runs, make_all, outcome_shares, paper_experiment

@@ -1,0 +1,140 @@
+"""Measure what is reported of a policy beyond the paper: returns, failures, distance from its teacher, and cost.
+
+No run has seen these start states: nothing is fitted to them or selected with them. The methods for robots and the
+search for the limit were changed after first results from the report starts. Policies of robots, and at the limit on
+LunarLander, are measured from new starts. The longer search for one map was added after results from those.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsp.evaluation import start_states
+from vsp.paper.baselines import Tree
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy, rollout, visited_states
+from vsp.tasks.base import GOAL, Task
+
+from ..rivals import tdavq
+from ..rivals.soft_tree import SoftTree
+from ..rivals.trees import LinearTree, ObliqueLinearTree
+
+VERSION = 1  # raise it when the same policy gives different numbers
+REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and for action errors
+NEW_SEED, LIMIT_SEED = 23, 24  # seeds of start states for robots, and at the limit on LunarLander
+N_REPORTED, N_ERROR = 10_000, 100  # episodes
+N_COMMON = 10_000  # states on which actions and cells are compared
+TAIL = 0.01  # share of the episodes that count as the worst
+
+
+def settings(*, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED) -> dict:
+    """Return the settings that determine the numbers of a policy, as JSON-able values."""
+    about = {"starts": [seed, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
+    return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
+
+
+def common() -> dict:
+    """Return the additional settings that determine the numbers of `fidelity`, as JSON-able values."""
+    return {"states": N_COMMON}
+
+
+def measure(
+    policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
+) -> dict[str, float]:
+    """Measure a policy: returns, action errors, size and cost.
+
+    Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
+    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
+    `tail`, worst (mean return of the worst episodes). Slow tasks are played from fewer starts; with
+    `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
+    returns.
+    """
+    fewer = task.slowness
+    result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), seed))
+    starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
+    parameters, operations = cost(policy)
+    row = {
+        "mean": float(result.returns.mean()),
+        "failing": float(np.mean(result.outcomes != GOAL)),
+        "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
+        "error_own": action_error(policy, teacher, task, starts, by=policy),
+        "cells": len(policy) if hasattr(policy, "__len__") else 0,
+        "parameters": parameters,
+        "operations": operations,
+    }
+    return row | ({"worst": worst(result.returns)} if tail else {})
+
+
+def worst(returns: np.ndarray) -> float:
+    """Return the mean of the worst `TAIL` of the returns, at least of one: the conditional value at risk."""
+    return float(np.sort(returns)[: max(1, round(TAIL * len(returns)))].mean())
+
+
+def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
+    """Return the root mean square difference between the actions of `policy` and `teacher` in the states `by` visits.
+
+    It is in units of half the action range.
+    """
+    states = visited_states(by, task, starts)
+    half = 0.5 * (task.action_high - task.action_low)
+    gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
+    return float(np.sqrt(np.square(gaps).mean()))
+
+
+def fidelity(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
+    """Measure how closely the policy's actions match the teacher's on `common_states`.
+
+    Keys: r2 (R² of the actions, all coordinates pooled), r2_worst (R² of the worst coordinate), off (share of the
+    states where an action is off by more than a tenth of its range).
+    """
+    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
+    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
+    errors = np.square(policy.predict(states)[0] / half - wanted)
+    spread = np.square(wanted - wanted.mean(axis=0))
+    varies = spread.any(axis=0)  # R² is not defined for a constant coordinate
+    worst = (errors.mean(axis=0)[varies] / spread.mean(axis=0)[varies]).max()
+    off = float((errors > 0.2**2).any(axis=1).mean())
+    return {"r2": float(1 - errors.sum() / spread.sum()), "r2_worst": float(1 - worst), "off": off}
+
+
+def common_states(teacher: Policy, task: Task) -> np.ndarray:
+    """Return 10,000 states of the teacher's own episodes, from starts that no fit, selection or tuning has seen."""
+    episodes = N_REPORTED // task.slowness
+    states = visited_states(teacher, task, start_states(task, episodes, ERROR_SEED))
+    return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
+
+
+def cost(policy: Policy) -> tuple[int, float]:
+    """Return a policy's parameters, and the mean number of arithmetic operations and comparisons per decision."""
+    if isinstance(policy, VoronoiPolicy):
+        policy.check_linear()
+        k, rows, m = policy.coefficients.shape
+        units = (rows - 1) * bool((policy.scale != 1).any())  # states are divided by these numbers
+        look_up = (k > 1) * (units + k * 3 * (rows - 1) + k - 1)
+        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units), look_up + 2 * (rows - 1) * m
+    if isinstance(policy, tdavq.DiscretePolicy):  # its values do not count: they do not affect the actions
+        (k, d), m = policy.codewords.shape, policy.actions.shape[1]
+        return k * (d + m), float((k > 1) * (k * 3 * d + k - 1))
+    if isinstance(policy, Tree | LinearTree):
+        return _tree_cost(policy)
+    if hasattr(policy, "COST"):  # counted by hand
+        return policy.COST
+    if isinstance(policy, SoftTree):  # the probabilities of all leaves, then the most probable one
+        nodes, leaves = policy.nodes, len(policy)
+        return nodes.size + policy.values.size, float(2 * nodes.size + leaves * policy.depth + leaves - 1)
+    layers = policy.layers
+    return sum(w.size + b.size for w, b in layers), float(sum(2 * w.size for w, _ in layers))
+
+
+def _tree_cost(policy: Tree | LinearTree) -> tuple[int, float]:
+    """Count the cost of a tree: an axis split is two numbers and one comparison, an oblique one d + 1 and 2 d."""
+    leaves = len(policy)
+    if isinstance(policy, Tree):
+        tree, ends = policy.model.tree_, policy.model.tree_.children_left < 0
+        depths, weights = tree.compute_node_depths()[ends] - 1, tree.n_node_samples[ends]
+        return leaves * policy.model.n_outputs_ + 2 * (leaves - 1), float(np.average(depths, weights=weights))
+    rows, m = policy.maps.shape[1:]
+    depth = float(np.average([node.depth for node in policy.ends], weights=[len(node.rows) for node in policy.ends]))
+    oblique = isinstance(policy, ObliqueLinearTree)
+    numbers = leaves * rows * m + (leaves - 1) * (rows if oblique else 2)
+    return numbers, depth * (2 * (rows - 1) if oblique else 1) + 2 * (rows - 1) * m

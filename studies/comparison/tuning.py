@@ -1,0 +1,207 @@
+"""Tune every method in the same way: CMA-ES on all numbers of a tree, a partition or a network of fixed structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from vsp.paper.baselines import Tree
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy, visited_states
+from vsp.subpolicies import linear_outputs
+from vsp.tasks.base import Task
+from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond.few_cells.tune import Candidates, Objective, tune
+from vsp_beyond.few_cells.units import Scaling, joined, parted
+
+from ..rivals.small_network import SmallNetwork
+from ..rivals.trees import LinearTree, ObliqueLinearTree
+from .measure import cost
+
+
+class Numbers(Protocol):
+    """What is tuned: a policy in the units of a `Scaling`, whose structure is fixed."""
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All its numbers, as one vector."""
+
+    def like(self, vector: np.ndarray) -> Numbers:
+        """Return the same structure with the numbers of `vector`."""
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
+
+
+@dataclass(frozen=True)
+class TreeNumbers:
+    """The splits and the maps of a tree. A tree with one leaf is one linear map."""
+
+    sides: np.ndarray  # (leaves, nodes): 1 where the path to a leaf turns right, -1 where it turns left, else 0
+    directions: np.ndarray  # (nodes, d)
+    thresholds: np.ndarray  # (nodes,) a state beyond its threshold turns right
+    maps: np.ndarray  # (leaves, d + 1, m): weights, then bias
+    oblique: bool  # whether directions are tuned
+    constant: bool  # whether leaves have only biases
+
+    @classmethod
+    def one_leaf(cls, maps: np.ndarray) -> TreeNumbers:
+        """Return a tree with one leaf, whose map is `maps` (1, d + 1, m)."""
+        d = maps.shape[1] - 1
+        return cls(np.zeros((1, 0)), np.zeros((0, d)), np.zeros(0), maps, oblique=False, constant=False)
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All tuned numbers, as one vector."""
+        return joined(self.parts)
+
+    @property
+    def parts(self) -> list[np.ndarray]:
+        """What is tuned: directions (if oblique), thresholds, maps (biases only, if constant)."""
+        directions = [self.directions] if self.oblique else []
+        return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
+
+    def like(self, vector: np.ndarray) -> TreeNumbers:
+        """Return the same structure with the numbers of `vector`."""
+        *directions, thresholds, maps = parted(vector, self.parts)
+        if self.constant:
+            maps = np.concatenate([np.zeros_like(self.maps[:, :-1]), maps[:, None]], axis=1)
+        new = {"directions": directions[0]} if directions else {}
+        return replace(self, thresholds=thresholds, maps=maps, **new)
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
+        turns = np.where(inputs[:, :-1] @ self.directions.T > self.thresholds, 1.0, -1.0)
+        wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf that the state reaches
+        return linear_outputs(inputs[:, :-1], self.maps[wrong.argmin(axis=1)])
+
+
+@dataclass(frozen=True)
+class NetworkNumbers:
+    """The weights of a network with one hidden layer of tanh units."""
+
+    hidden: np.ndarray  # (d + 1, units): weights, then biases
+    output: np.ndarray  # (units + 1, m)
+
+    @property
+    def vector(self) -> np.ndarray:
+        """All tuned numbers, as one vector."""
+        return joined([self.hidden, self.output])
+
+    def like(self, vector: np.ndarray) -> NetworkNumbers:
+        """Return the same structure with the numbers of `vector`."""
+        return NetworkNumbers(*parted(vector, [self.hidden, self.output]))
+
+    def outputs(self, inputs: np.ndarray) -> np.ndarray:
+        """Actions (n, m), not limited, for inputs (n, d + 1)."""
+        return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
+
+
+class Tunable:
+    """The policy with `numbers` in the units of `frame`. Its size and cost are those of `start`."""
+
+    def __init__(self, frame: Scaling, numbers: Numbers, start: Policy):
+        self.frame, self.numbers, self._start = frame, numbers, start
+
+    def __len__(self) -> int:
+        return len(self._start) if hasattr(self._start, "__len__") else 0
+
+    @property
+    def COST(self) -> tuple[int, float]:  # named as in policies whose cost is counted by hand
+        """The `cost` of `start`, since tuning does not change the structure."""
+        return cost(self._start)
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        return self.frame.actions(self.numbers.outputs(self.frame.inputs(obs))), None
+
+
+@dataclass(frozen=True)
+class TunableFrame(Scaling):
+    """A `Scaling` for the numbers of a policy that is not made of Voronoi cells."""
+
+    start: Policy
+
+    def policy(self, cells: Numbers) -> Tunable:
+        """Return the numbers `cells` as a policy in the units of the task."""
+        return Tunable(self, cells, self.start)
+
+
+def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) -> Policy:
+    """Tune `start` on the return as `distill_tuned` tunes its cells.
+
+    The search, the number of its start states, the penalty and the number of snapshots are the same. Returns the best
+    snapshot on the validation starts, or `start` itself if none is better.
+    """
+    streams = np.random.SeedSequence(seed).spawn(5)  # as in `distill_tuned`
+    starts, _, _, validation, search = map(np.random.default_rng, streams)
+    states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    frame, numbers = in_units(start, Scaling.of(task, states))
+    objective = Objective(config.failure_penalty)
+    candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
+    candidates.add("fit", 0, numbers)
+    for one in tune(frame, numbers, config, objective, search):
+        candidates.add("tune", 0, one)
+    return frame.policy(candidates.best)
+
+
+def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
+    """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
+
+    The frame has the policy's own scale, or that of `frame` if the policy has none. Raises TypeError for a kind of
+    policy that has no numbers to tune.
+    """
+    if isinstance(policy, Tunable):
+        return policy.frame, policy.numbers
+    if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
+        own = replace(frame, scale=policy.scale)  # the scale is part of its borders
+        return own, own.cells(policy)
+    units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
+    own = TunableFrame(frame.task, units.centre, units.scale, policy)
+    if isinstance(policy, VoronoiPolicy):
+        return own, TreeNumbers.one_leaf(own.cells(policy).maps)
+    if isinstance(policy, Tree):
+        return own, _of_cart(policy.model.tree_, own)
+    if isinstance(policy, LinearTree):
+        return own, _of_tree(policy, own)
+    if isinstance(policy, SmallNetwork):
+        hidden, output = (np.vstack(layer) for layer in policy.layers)
+        return own, NetworkNumbers(hidden, own.maps(output))
+    raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
+
+
+def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:
+    inner, ends, sides = _ways([node.children for node in tree.nodes])
+    splits = [tree.nodes[i].split for i in inner]
+    directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
+    thresholds = np.array([split.threshold for split in splits])
+    oblique = isinstance(tree, ObliqueLinearTree)
+    return TreeNumbers(sides, directions, thresholds, frame.maps(tree.maps[ends]), oblique, tree.constant)
+
+
+def _of_cart(tree, frame: Scaling) -> TreeNumbers:
+    """Return the numbers of a tree that is given by scikit-learn's arrays."""
+    pairs = zip(tree.children_left.tolist(), tree.children_right.tolist())
+    inner, ends, sides = _ways([pair if pair[0] >= 0 else () for pair in pairs])
+    axes, m, d = tree.feature[inner], tree.value.shape[1], len(frame.centre)
+    thresholds = (tree.threshold[inner] - frame.centre[axes]) / frame.scale[axes]
+    maps = np.zeros((len(ends), d + 1, m))
+    maps[:, -1] = frame.outputs(tree.value[ends, :, 0])
+    return TreeNumbers(sides, np.eye(d)[axes], thresholds, maps, oblique=False, constant=True)
+
+
+def _ways(children: list[tuple[int, ...]]) -> tuple[list[int], list[int], np.ndarray]:
+    """Return the inner nodes and leaves of a tree, and which way the path to each leaf turns: `sides` (leaves, nodes).
+
+    `children` holds the left and the right child of every node (empty for a leaf). Parents come before their children.
+    """
+    inner = [i for i, pair in enumerate(children) if pair]
+    ends = [i for i, pair in enumerate(children) if not pair]
+    sides = np.zeros((len(children), len(inner)))
+    for column, i in enumerate(inner):
+        for child, side in zip(children[i], (-1, 1)):
+            sides[child] = sides[i]
+            sides[child, column] = side
+    return inner, ends, sides[ends]

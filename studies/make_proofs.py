@@ -1,0 +1,194 @@
+"""`make proofs` and `make proofs-teacher`: write certificates to data/proofs/ and their results to data/results/."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vsp.algorithms import distill
+from vsp.config import paper_preset
+from vsp.evaluation import start_states
+from vsp.paper.baselines import linear_map
+from vsp.paper.printed import published_policy
+from vsp.paper.results import RESULTS, read_results, write_results
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import collect_episodes, rollout
+from vsp.run import command, listed
+from vsp.run.progress import progress
+from vsp.tasks import simplegoal
+from vsp.teachers.teacher import load_teacher
+from vsp_beyond.few_cells.config import tuned_preset
+from vsp_beyond.few_cells.tuned import distill_tuned
+from vsp_beyond.proofs import check
+from vsp_beyond.proofs.mountaincar import prove_mountaincar
+from vsp_beyond.proofs.mountaincar_reals import prove_reals
+from vsp_beyond.proofs.network import teacher_steps_to_goal
+from vsp_beyond.proofs.pendulum import prove_pendulum
+from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
+from vsp_beyond.proofs.prove import prove
+from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
+from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
+
+from .comparison.kept import simplest
+
+SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
+N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
+MARGIN = 0.01  # margin for which simplegoal_margin is tuned: a tenth of a step
+TEACHER_GRIDS = (500, 1000, 2000, 4000, 8000)
+HOUR = 3600.0
+
+
+def main() -> None:
+    """Prove the policies that are not proved yet. Write a certificate of each to data/proofs/ and the results to
+    data/results/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
+    that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
+    parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
+    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
+    arguments = parser.parse_args()
+    if arguments.teacher:
+        write_results(of_teacher(), "proofs_teacher", out=arguments.out)
+        return
+    results = Path(arguments.out) / "data" / "results"
+    proved = certificates(Path(arguments.out), arguments.jobs)
+    if proved or not (results / "proofs_reals.csv").exists():
+        table = pd.DataFrame([reals(arguments.jobs)])
+        write_results(table, "proofs_reals", out=arguments.out, float_format="%.17g")
+    if proved or not (results / "proofs_grid.csv").exists():
+        write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
+
+
+def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
+    """Return functions that make the policies to prove, by the names of their certificates."""
+    teacher, config, own = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
+    best = int(read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
+    spacious = replace(own, step=partial(simplegoal.step, margin=MARGIN))
+    return {
+        "simplegoal_paper": lambda: published_policy(SIMPLEGOAL),
+        "simplegoal_best_run": lambda: distill(teacher, own, paper_preset(SIMPLEGOAL), seed=best)[0],
+        "simplegoal_faithful": lambda: _kept("faithful", SIMPLEGOAL),
+        "simplegoal_tuned": lambda: distill_tuned(teacher, own, config, seed=0)[0],
+        "simplegoal_limit": lambda: _kept("limit", SIMPLEGOAL),
+        "simplegoal_simplified": lambda: simplest(SIMPLEGOAL),
+        "simplegoal_one_map": lambda: _one_map(teacher),
+        "simplegoal_margin": lambda: _of_simplegoal(
+            distill_tuned(teacher, spacious, replace(config, n_cells=3), seed=1)[0]
+        ),
+        "mountaincar_limit": lambda: _kept("limit", MOUNTAINCAR),
+        "pendulum_faithful": lambda: _kept("faithful", PENDULUM),
+    }
+
+
+def certificates(out: Path, jobs: int | str) -> list[str]:
+    """Write the missing certificates and the table, row by row: an interrupted run can continue. Return their names."""
+    table = out / "data" / "results" / "proofs.csv"
+    rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
+    makers = policies()
+    missing = [name for name in makers if name not in {row["name"] for row in rows}]
+    for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
+        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json", jobs))
+        write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
+    return missing
+
+
+def _proved(name: str, policy: VoronoiPolicy, path: Path, jobs: int | str) -> dict:
+    """Prove one policy. Write its certificate to `path` and return its row of the table."""
+    began = time.perf_counter()
+    proof = prove_mountaincar(policy, jobs=jobs) if policy.task.name == MOUNTAINCAR else prove(policy)
+    seconds = time.perf_counter() - began
+    path.parent.mkdir(parents=True, exist_ok=True)
+    proof.save(path)
+    listed.list_file(path)
+    checking = time.perf_counter()
+    claim = check.check(path)
+    times = {"seconds": seconds, "check_seconds": time.perf_counter() - checking}
+    row = {"name": name, "task": policy.task.name, "cells": len(policy), "metric": policy.metric}
+    row |= {"longest": claim["longest"], "bytes": path.stat().st_size}
+    row |= _of_simplegoal_proof(proof) if isinstance(proof, SimpleGoalProof) else {}
+    row |= {name: claim[name] for name in ("n_states", "least", "mean_low", "mean_high") if name in claim}
+    if policy.task.name == MOUNTAINCAR:
+        row["goal"] = 1.0 - claim["n_left"] / claim["n_states"]
+    if policy.task.name == PENDULUM:
+        row["goal"] = proof.share
+    return row | _sampled(policy) | times
+
+
+def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
+    low, high = proof.mean_return()
+    areas = {name: float(area) for name, area in proof.areas.items()}
+    areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
+    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
+    outside = outside_pit(steps := steps_to_goal(proof.policy))
+    of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
+    return found | of_program | {"disturbance": largest_disturbance(proof.policy)}
+
+
+def _sampled(policy: VoronoiPolicy) -> dict:
+    """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
+    SimpleGoal."""
+    n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
+    found = rollout(policy, policy.task, start_states(policy.task, n, 1))
+    shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
+    return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
+
+
+def reals(jobs: int | str) -> dict:
+    """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
+    began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
+    parts = prove_reals(policy, jobs=jobs)
+    found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
+    return found | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
+
+
+def smaller_boxes() -> pd.DataFrame:
+    """Prove from which share of its starts Pendulum gets upright, by a grid and by smaller boxes of starts."""
+    began = time.perf_counter()
+    proof = prove_pendulum(_kept("faithful", PENDULUM))
+    shares = shares_of_starts(proof)
+    boxes = [len(proof.steps) * PARTS**level for level in range(len(shares))]
+    return pd.DataFrame({"boxes": boxes, "share": shares, "seconds": time.perf_counter() - began})
+
+
+def of_teacher() -> pd.DataFrame:
+    """Prove which share of SimpleGoal's starts outside the pit the teacher takes to the goal, by ever finer grids. Stop
+    before a grid that would not end within an hour in all."""
+    began, rows = time.perf_counter(), []
+    for n in TEACHER_GRIDS:
+        last = time.perf_counter()
+        if rows and (last - began) + 4.5 * rows[-1]["seconds"] > HOUR:
+            break
+        steps = teacher_steps_to_goal(load_teacher(SIMPLEGOAL), n=n)
+        share = float((steps > 0)[outside_pit(steps)].mean())
+        rows.append({"n": n, "share": share, "longest": int(steps.max()), "seconds": time.perf_counter() - last})
+        print(f"{n} x {n} boxes: {share:.4%} proved", flush=True)
+    return pd.DataFrame(rows)
+
+
+def _kept(table: str, task: str) -> VoronoiPolicy:
+    return VoronoiPolicy.load(RESULTS / f"{table}_{task}.policy")
+
+
+def _one_map(teacher) -> VoronoiPolicy:
+    episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
+    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    return linear_map(states, actions, SIMPLEGOAL)
+
+
+def _of_simplegoal(policy: VoronoiPolicy) -> VoronoiPolicy:
+    """Convert a policy for SimpleGoal with a margin to one for SimpleGoal."""
+    return VoronoiPolicy(
+        policy.codewords, policy.coefficients, task=SIMPLEGOAL, metric=policy.metric, scale=policy.scale
+    )
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

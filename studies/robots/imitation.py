@@ -1,0 +1,76 @@
+"""Imitate also on states that follow a mistake: from the teacher's episodes, from episodes in which it is pushed,
+and from the policy's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from vsp.checks import check_seed
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy, visited_states
+from vsp.tasks.base import Task
+from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells.faithful import by_visits
+from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, spread
+from vsp_beyond.few_cells.units import LabelledStates, Scaling
+
+from .choice import most_rewarding
+from .settings import Walking
+
+COOL = range(N_STAGES // 2, N_STAGES)  # stages of a fit from the cells of the last round
+
+# Makes a policy from labelled states; after the first round, it begins from the policy of the round before
+Fit = Callable[[Scaling, LabelledStates, Policy | None, np.random.Generator], Policy]
+
+
+class Pushed:
+    """A teacher whose actions are disturbed by noise: `push` is its standard deviation, in half action ranges."""
+
+    def __init__(self, teacher: Policy, task: Task, push: float, rng: np.random.Generator):
+        self._teacher, self._task, self._rng = teacher, task, rng
+        self._deviation = push * 0.5 * (task.action_high - task.action_low)
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d)."""
+        actions = np.asarray(self._teacher.predict(obs)[0], dtype=np.float64)
+        noisy = actions + self._deviation * self._rng.normal(size=actions.shape)
+        return np.clip(noisy, self._task.action_low, self._task.action_high), None
+
+
+@threadpool_limits.wrap(limits=1)
+def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: int, fit: Fit | None = None) -> Policy:
+    """Fit a policy in each round, and return the most rewarding one. Same arguments, same policy.
+
+    `fit`: by default the closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed.
+    """
+    check_seed(seed)
+    task, fit = get_task(task), cells_fit(config) if fit is None else fit
+    starts, pushes, fits, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
+    own = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    pushed = visited_states(Pushed(teacher, task, config.push, pushes), task, task.start(starts, 2 * config.n_episodes))
+    frame = Scaling.of(task, own)
+    seen, tried = frame.labelled(teacher, np.concatenate([own, pushed])), []
+    for i in range(1 + config.n_corrections):
+        if i:
+            visited = visited_states(tried[-1], task, task.start(starts, config.n_correction_episodes))
+            seen = seen.with_more(frame.labelled(teacher, visited))
+        some = seen.rows(spread(seen.inputs[:, :-1], config.n_states, fits))
+        tried.append(fit(frame, some, tried[-1] if tried else None, fits))
+    return most_rewarding(tried, task, config.n_validation, validation)
+
+
+def cells_fit(config: Walking) -> Fit:
+    """Return the default fit: the cells with the least error, and in later rounds a descent from the cells of the round
+    before."""
+
+    def fit(frame: Scaling, seen: LabelledStates, before: VoronoiPolicy | None, rng: np.random.Generator) -> Policy:
+        if before is None:
+            cells = least_error(seen, config.n_cells, config.n_restarts, rng)
+        else:
+            cells = descend(seen, frame.cells(before), COOL)
+        return frame.policy(by_visits(cells, seen))
+
+    return fit

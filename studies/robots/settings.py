@@ -1,0 +1,81 @@
+"""`Walking`: the settings of all methods that make policies for robots, and its presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from vsp.checks import check_count, check_number
+from vsp.tasks import Task, get_task
+from vsp_beyond.few_cells.config import MOST, MOST_CELLS
+
+
+@dataclass(frozen=True)
+class Walking:
+    """How a robot's teacher is imitated and how the policy is tuned. Raises ValueError for a value out of range."""
+
+    n_cells: int
+    """Cells of the policy."""
+    push: float = 0.4
+    """Standard deviation of the noise on the teacher's actions, in half action ranges: the teacher labels the states
+    that this noise leads to (DART, Laskey et al. 2017)."""
+    n_episodes: int = 20
+    """Episodes of the teacher. With the noise it plays twice as many."""
+    n_corrections: int = 12
+    """Rounds in which the teacher labels the states that the policy itself visits (DAgger, Ross et al. 2011)."""
+    n_correction_episodes: int = 10
+    """Episodes of the policy per round."""
+    n_states: int = 30_000
+    """States that a fit uses, as dense as all of them (`search.spread`)."""
+    n_restarts: int = 8
+    """Descents from different random initial cells in the first round; the closest imitation is kept."""
+    n_validation: int = 20
+    """Episodes over which policies are compared; the best are compared again over more (`choice`)."""
+    n_steps: int = 320_000
+    """Steps for which TD3 continues, with the cells as its actor."""
+    n_filling: int = 5000
+    """The first of these steps, in which the replay buffer fills and nothing learns."""
+    learning_rate: float = 2e-4
+    """Initial learning rate of Adam for the cells; it falls linearly to 0, and the cells come to rest."""
+    critic_rate: float = 1e-3
+    """Initial learning rate of Adam for the critics, as in the teacher's own training; it falls to a tenth."""
+    batch_size: int = 100
+    """Steps from the replay buffer that each update uses."""
+    gamma: float = 0.99
+    """Discount per step, as in the teacher's own training."""
+    temperature: float = 0.3
+    """How soft the borders are while TD3 learns, in squared deviations of the states."""
+    n_random_steps: int = 20_000_000
+    """Steps of the random search for one linear map."""
+    n_directions: int = 32
+    """Directions that a round of the random search tries, forwards and backwards."""
+    n_best: int = 4
+    """Number of the best directions, which the map follows."""
+    step_size: float = 0.02
+    """Step size along these directions, for returns scaled to unit deviation."""
+    search_noise: float = 0.03
+    """Standard deviation of the changes that are tried."""
+
+    def __post_init__(self) -> None:
+        check_count("n_cells", self.n_cells, most=MOST_CELLS)
+        for name in (field.name for field in fields(self) if field.type == "int" and field.name != "n_cells"):
+            check_count(name, getattr(self, name), least=int(name != "n_corrections"), most=MOST)
+        for name in (field.name for field in fields(self) if field.type == "float"):
+            check_number(name, getattr(self, name), least=0.0 if name in ("push", "gamma") else 1e-12)
+        check_number("gamma", self.gamma, least=0.0, most=1.0)
+        check_count("n_best", self.n_best, most=self.n_directions)
+        check_count("n_filling", self.n_filling, most=self.n_steps)
+
+
+# The walker's engine takes three times as long for a step. So TD3 takes half the steps, and the search for one map has
+# more rounds of fewer directions and follows all of them
+_WALKING = {
+    "BipedalWalker-v3": Walking(
+        n_cells=8, gamma=0.98, n_steps=160_000, n_random_steps=6_000_000, n_directions=16, n_best=16
+    )
+}
+
+
+def walking_preset(task: str | Task) -> Walking:
+    """Return the settings for a robot, eight cells; other tasks get those of HalfCheetah. Raises ValueError as
+    `get_task` does."""
+    return _WALKING.get(get_task(task).name, Walking(n_cells=8))

@@ -1,0 +1,29 @@
+"""The paper's five notebooks run on `vsp` alone."""
+
+import subprocess
+import sys
+
+import pytest
+
+from vsp.run.atomic import ROOT
+
+FIVE = sorted(path.stem for path in (ROOT / "notebooks").glob("0[1-5]_*.ipynb"))
+RUN = """
+import json, sys
+cells = [cell for cell in json.load(open(sys.argv[1]))["cells"] if cell["cell_type"] == "code"]
+for cell in cells:
+    if "skip-execution" not in cell["metadata"].get("tags", []):
+        exec("".join(cell["source"]))
+    if "parameters" in cell["metadata"].get("tags", []):
+        out, runs, quick = sys.argv[2], sys.argv[2] + "/runs", True
+print("modules:", *{name.partition(".")[0] for name in sys.modules})
+"""
+
+
+@pytest.mark.parametrize("name", FIVE)
+def test_one_loads_no_other_part(name, tmp_path):
+    command = [sys.executable, "-c", RUN, f"notebooks/{name}.ipynb", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.rpartition("modules:")[2].split())
+    assert "vsp" in loaded and not loaded & {"vsp_beyond", "studies", "vsp_course"}

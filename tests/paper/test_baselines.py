@@ -1,0 +1,190 @@
+import functools
+import types
+
+import numpy as np
+import pytest
+from sklearn.linear_model import LinearRegression
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
+
+from studies.rivals.dagger import dagger
+from studies.rivals.hand_written import Heuristic, PumpAndBalance, ZeroPolicy
+from vsp.evaluation import evaluate
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import visited_states
+from vsp.tasks.registry import get_task
+
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+
+
+# One linear map
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_linear_map_is_that_of_least_squares(task):
+    states, actions = examples(task)
+    policy, model = linear_map(states, actions, task), LinearRegression().fit(states, actions)
+    assert np.allclose(policy.coefficients[0], np.vstack([model.coef_.T, model.intercept_]))
+    assert len(policy) == 1 and policy.codewords[0] == pytest.approx(states.mean(axis=0))
+
+
+def test_the_linear_map_acts_within_the_limits():
+    states, _ = examples(SIMPLEGOAL)
+    policy = linear_map(states, np.column_stack([6 * states[:, 0] - 3, np.full(300, -2.0)]), SIMPLEGOAL)
+    actions, _ = policy.predict(np.array([[0.0, 0.5], [0.6, 0.5], [1.0, 0.1]]))
+    assert np.allclose(actions, [[-1, -1], [0.6, -1], [1, -1]])
+
+
+# Cells of k-means, and DAgger
+
+
+def test_cells_of_kmeans_stand_where_the_states_are():
+    rng = np.random.default_rng(0)
+    groups = np.array([[0.2, 0.2], [0.8, 0.2], [0.5, 0.9]])
+    states = np.concatenate([group + 0.02 * rng.normal(size=(100, 2)) for group in groups])
+    actions = np.repeat([[0.1, -0.5], [0.7, 0.2], [-0.3, 0.9]], 100, axis=0)
+    policy = kmeans_cells(states, actions, cells=3, task=SIMPLEGOAL, seed=0)
+    near = policy.codewords[np.square(groups[:, None] - policy.codewords).sum(axis=2).argmin(axis=1)]
+    assert np.abs(near - groups).max() < 0.01 and np.allclose(policy.predict(states)[0], actions)
+    again, other = (kmeans_cells(*examples(SIMPLEGOAL), cells=9, task=SIMPLEGOAL, seed=seed) for seed in (1, 2))
+    assert not np.array_equal(again.codewords, other.codewords)
+    with pytest.raises(ValueError, match="cells is 3, expected an integer from 1 to 2"):  # two places, three cells
+        kmeans_cells(groups[[0, 1] * 20], np.zeros((40, 2)), cells=3, task=SIMPLEGOAL, seed=0)
+
+
+ROUNDS = types.SimpleNamespace(
+    n_episodes=20, n_corrections=2, n_correction_episodes=10, n_validation=50, failure_penalty=0.0
+)
+
+
+def test_dagger_labels_the_states_that_the_policy_visits():
+    seen = []
+
+    def fit(states, actions):
+        seen.append((states, actions))
+        return Tree(states, actions, leaves=3)
+
+    teacher = TEACHERS[SIMPLEGOAL]
+    dagger([fit], teacher, SIMPLEGOAL, rounds=ROUNDS, seed=0)
+    assert len(seen) == 3 and all(np.array_equal(a, teacher.predict(s)[0]) for s, a in seen)
+    for (fewer, _), (more, _) in zip(seen, seen[1:]):
+        assert np.array_equal(more[: len(fewer)], fewer) and len(more) > len(fewer) + 10
+    own = Tree(*seen[0], leaves=3)
+    rng = np.random.default_rng(np.random.SeedSequence(0).spawn(2)[0])
+    task = get_task(SIMPLEGOAL)
+    task.start(rng, 20)
+    assert np.array_equal(seen[1][0][len(seen[0][0]) :], visited_states(own, task, task.start(rng, 10)))
+
+
+def test_dagger_keeps_the_best_on_the_validation_starts():
+    gains = iter([5.0, -40.0, 40.0])  # pumping, braking, pumping hard
+
+    def fit(states, actions):
+        return VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [next(gains)], [0.0]]], task=MOUNTAINCAR)
+
+    kept = dagger([fit], TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0)
+    assert kept.coefficients[0, 1, 0] == 40.0
+    gains = iter([12.0, -40.0, 40.0])
+    assert dagger([fit], TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0).coefficients[0, 1, 0] == 12.0
+
+
+def test_of_several_fits_the_one_with_the_best_first_policy_goes_on():
+    made = []
+
+    def fit(states, actions, *, gain):
+        made.append(gain)
+        return VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [gain], [0.0]]], task=MOUNTAINCAR)
+
+    fits = [functools.partial(fit, gain=gain) for gain in (-40.0, 40.0, 0.0)]
+    kept = dagger(fits, TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0)
+    assert made == [-40.0, 40.0, 0.0, 40.0, 40.0] and kept.coefficients[0, 1, 0] == 40.0
+
+
+# Rules of thumb
+
+
+def test_the_rule_of_thumb_of_simplegoal_by_hand():
+    name, policy = rule_of_thumb(SIMPLEGOAL)
+    actions, _ = policy.predict(np.array([[0.0, 0.0], [0.9, 0.2], [0.5, 1.0]]))
+    assert name == "always (−1, −1)" and (actions == -1).all() and len(policy) == 1
+
+
+def test_the_pendulum_is_pumped_and_balanced_by_hand():
+    """Hanging still it has 10 J too little and is pushed along; near upright it is pushed back; never beyond 2."""
+    obs = np.array([[-1.0, 0.0, 0.1], [-1.0, 0.0, -0.1], [1.0, 0.05, 0.2], [0.0, 1.0, 5.5]])
+    actions = PumpAndBalance().predict(obs)[0].ravel()
+    assert actions[:2].tolist() == [2.0, -2.0]
+    assert actions[2:] == pytest.approx([-10 * 0.05 - 2 * 0.2, -2 * (5.5**2 / 6 - 5)])
+
+
+def test_the_pendulum_is_kept_upright():
+    frame = evaluate(PumpAndBalance(), PENDULUM, 500, seed=30)
+    assert -160 < frame["return"].mean() < -140
+
+
+def test_the_zero_policy_does_nothing():
+    assert ZeroPolicy(get_task(SIMPLEGOAL)).predict(np.ones((3, 2)))[0].tolist() == [[0.0, 0.0]] * 3
+
+
+def test_the_rule_of_thumb_of_mountaincar_by_hand():
+    name, policy = rule_of_thumb(MOUNTAINCAR)
+    actions, _ = policy.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
+    assert name == "12 · velocity" and np.allclose(actions, [[0], [0.6], [-0.84], [0.84]])
+
+
+def test_a_task_without_a_rule_of_thumb_is_named():
+    with pytest.raises(ValueError, match="task is 'Pendulum-v1', expected one of .*SimpleGoal-v0"):
+        rule_of_thumb(PENDULUM)
+
+
+def test_rules_of_thumb_do_what_is_said_of_them():
+    frame = evaluate(rule_of_thumb(MOUNTAINCAR)[1], MOUNTAINCAR, 200, seed=30)
+    assert frame["return"].mean() > 97 and (frame["outcome"] == "goal").all()
+    frame = evaluate(rule_of_thumb(SIMPLEGOAL)[1], SIMPLEGOAL, 200, seed=30)
+    assert set(frame["outcome"]) == {"goal", "pit"} and 0.05 < (frame["outcome"] == "pit").mean() < 0.3
+
+
+def test_the_heuristic_is_that_of_gymnasium():
+    lunar_lander = pytest.importorskip("gymnasium.envs.box2d.lunar_lander")
+    observations = np.random.default_rng(0).normal(0, 0.5, size=(500, 8)).astype(np.float32)
+    observations[:, 6:] = observations[:, 6:] > 0.4
+    env = types.SimpleNamespace(unwrapped=types.SimpleNamespace(continuous=True))
+    expected = np.array([lunar_lander.heuristic(env, one) for one in observations])
+    actions, state = Heuristic().predict(observations)
+    assert np.allclose(actions, expected, atol=1e-6) and state is None and actions.dtype == np.float64
+    assert 0 < observations[:, 6:].any(axis=1).mean() < 1 and len(np.unique(actions)) > 100
+
+
+# The same cells with other maps
+
+
+def three_cells(task=SIMPLEGOAL):
+    m = len(get_task(task).action_low)
+    codewords = np.array([[0.1, 0.1], [0.5, 0.5], [9.0, 9.0]])  # no state is near the last
+    return VoronoiPolicy(codewords, np.random.default_rng(1).normal(size=(3, 3, m)), task=task)
+
+
+def test_refitted_maps_are_those_of_least_squares_in_each_cell():
+    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
+    found, cells = refit(policy, states, actions), policy.cells(states)
+    assert set(cells) == {0, 1} and np.array_equal(found.cells(states), cells)
+    for i in (0, 1):
+        model = LinearRegression().fit(states[cells == i], actions[cells == i])
+        assert np.allclose(found.coefficients[i, :-1], model.coef_.T)
+        assert np.allclose(found.coefficients[i, -1], model.intercept_)
+    assert np.array_equal(found.coefficients[2], policy.coefficients[2])  # an empty cell keeps its map
+    assert np.array_equal(policy.coefficients, three_cells().coefficients)  # and the policy is not touched
+
+
+def test_constants_are_the_mean_action_of_each_cell():
+    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
+    found, cells = refit(policy, states, actions, constant=True), policy.cells(states)
+    for i in (0, 1):
+        assert np.allclose(found.coefficients[i, :-1], 0)
+        assert np.allclose(found.coefficients[i, -1], actions[cells == i].mean(axis=0))
+
+
+def test_refitting_keeps_the_distance_of_the_lookup():
+    policy = VoronoiPolicy(np.eye(2), np.zeros((2, 3, 2)), task=SIMPLEGOAL, metric="euclidean", scale=[1.0, 2.0])
+    again = refit(policy, *examples(SIMPLEGOAL))
+    assert again.metric == "euclidean" and np.array_equal(again.scale, policy.scale)

@@ -1,0 +1,192 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.tree import DecisionTreeRegressor
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, examples
+
+from studies.rivals import soft_tree, trees
+from studies.rivals.soft_tree import SoftTree
+from studies.rivals.trees import LinearTree, ObliqueLinearTree
+from vsp.paper.baselines import Tree, linear_map
+
+# Trees
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("leaves", [2, 13, 32])
+def test_a_tree_is_that_of_scikit_learn(task, leaves):
+    states, actions = examples(task)
+    tree, other = Tree(states, actions, leaves=leaves), examples(task, seed=1)[0]
+    model = DecisionTreeRegressor(max_leaf_nodes=leaves, criterion="squared_error", random_state=0)
+    found, state = tree.predict(other)
+    assert found.shape == actions.shape and state is None
+    assert np.array_equal(found, model.fit(states, actions).predict(other).reshape(actions.shape))
+    assert len(tree) == leaves == len(np.unique(tree.predict(states)[0], axis=0))
+
+
+def test_a_leaf_holds_the_mean_action_of_its_states():
+    states = np.array([[0.1, 0.5], [0.2, 0.5], [0.8, 0.5], [0.9, 0.5]])
+    actions = np.array([[0.0, 1.0], [0.2, 1.0], [-1.0, -1.0], [-0.6, -1.0]])
+    tree = Tree(states, actions, leaves=2)
+    assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
+    assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
+    assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
+
+
+@pytest.mark.parametrize("kind", ["constants", "maps"])
+def test_one_leaf_is_the_root(kind):
+    states, actions = examples(SIMPLEGOAL)
+    if kind == "constants":
+        tree, expected = Tree(states, actions, leaves=1), np.tile(actions.mean(axis=0), (300, 1))
+    else:
+        tree = LinearTree(states, actions, leaves=1, task=SIMPLEGOAL)
+        expected = linear_map(states, actions, SIMPLEGOAL).predict(states)[0]
+    assert len(tree) == 1 and np.allclose(tree.predict(states)[0], expected)
+
+
+@pytest.mark.parametrize("make", [LinearTree, lambda *data, **about: ObliqueLinearTree(*data, **about, seed=0)])
+def test_constant_leaves_hold_the_mean_action_of_their_states(make):
+    states, actions = examples(SIMPLEGOAL)
+    tree = make(states, actions, leaves=5, task=SIMPLEGOAL, constant=True)
+    assert len(tree) == 5
+    for node in tree.ends:
+        own = np.clip(actions[node.rows].mean(axis=0), -1, 1)
+        assert np.allclose(tree.predict(states[node.rows])[0], own)
+
+
+def test_constant_leaves_along_the_axes_are_nearly_those_of_cart():
+    """They differ in where a cut may lie: at a quantile, or between any two states."""
+    states, actions = examples(SIMPLEGOAL)
+    own = LinearTree(states, actions, leaves=5, task=SIMPLEGOAL, constant=True)
+    own, cart = (np.square(one.predict(states)[0] - actions).mean() for one in (own, Tree(states, actions, leaves=5)))
+    assert own == pytest.approx(cart, rel=0.05)
+
+
+def test_the_linear_leaves_are_fitted_to_their_states():
+    states, actions = examples(SIMPLEGOAL)
+    tree, other = LinearTree(states, actions, leaves=4, task=SIMPLEGOAL), examples(SIMPLEGOAL, seed=1)[0]
+    leaf, asked = tree.apply(tree.inputs(states)), tree.apply(tree.inputs(other))
+    assert len(tree) == 4 == len(np.unique(leaf)) and np.bincount(leaf)[leaf].min() >= 6
+    for node in np.unique(leaf):
+        assert np.array_equal(np.flatnonzero(leaf == node), tree.nodes[node].rows)
+        own = LinearRegression().fit(states[leaf == node], actions[leaf == node])
+        expected = np.clip(own.predict(other[asked == node]), -1, 1)
+        assert np.allclose(tree.predict(other[asked == node])[0], expected)
+
+
+def test_a_linear_tree_splits_where_lines_break_and_not_where_means_differ():
+    """Along x the action is one steep line, along y it has a kink: constants would be told apart by x."""
+    states = np.random.default_rng(0).random((2000, 2))
+    action = 0.8 * states[:, :1] - 0.6 + 0.3 * np.abs(states[:, 1:] - 0.5)
+    linear, constant = LinearTree(states, action, leaves=2, task=MOUNTAINCAR), Tree(states, action, leaves=2)
+    split = linear.nodes[0].split
+    assert split.direction.tolist() == [0, 1] and constant.model.tree_.feature[0] == 0
+    assert split.threshold * linear.scale[1] + linear.centre[1] == pytest.approx(0.5, abs=0.02)
+    assert np.abs(linear.predict(states)[0] - action).max() < 0.02
+
+
+def test_squared_errors_from_moments_are_those_of_the_regression():
+    states, actions = examples(SIMPLEGOAL)
+    rows = np.column_stack([states, np.ones(300), actions])
+    model = LinearRegression().fit(states, actions)
+    expected = np.square(model.predict(states) - actions).sum()
+    assert trees._squared_errors((rows.T @ rows)[None], 2) == pytest.approx([expected])
+
+
+def test_a_constant_variable_and_too_few_states_are_no_trouble():
+    states, actions = examples(SIMPLEGOAL)
+    states[:, 1] = 0.5
+    tree = LinearTree(states, actions, leaves=3, task=SIMPLEGOAL)
+    assert len(tree) == 3 and {tuple(node.split.direction) for node in tree.nodes if node.children} == {(1, 0)}
+    line = states @ [[0.5], [0.0]] + 0.1
+    assert len(LinearTree(states, line, leaves=5, task=MOUNTAINCAR)) == 1  # no split where one map is exact
+    assert len(LinearTree(states[:11], actions[:11], leaves=3, task=SIMPLEGOAL)) == 1  # six on each side are too many
+
+
+# Oblique trees
+
+
+def test_the_best_splits_come_first_and_a_seed_is_a_tree():
+    states, actions = examples(SIMPLEGOAL)
+    build = [ObliqueLinearTree(states, actions, leaves=5, task=SIMPLEGOAL, seed=seed) for seed in (1, 1, 2)]
+    one, same, other = (tree.predict(states)[0] for tree in build)
+    assert np.array_equal(one, same) and not np.array_equal(one, other) and len(build[0]) == 5
+    gains = [node.split.gain for node in build[0].nodes if node.children]
+    assert min(gains) >= max(node.split.gain for node in build[0].ends if node.split) - 1e-9
+    assert len(ObliqueLinearTree(states, np.ones((300, 2)), leaves=4, task=SIMPLEGOAL, seed=0)) == 1
+
+
+def test_an_oblique_tree_with_maps_finds_two_oblique_maps():
+    states = np.random.default_rng(0).random((2000, 2))
+    right = states @ [1, 1] > 1.1
+    actions = np.where(right[:, None], 0.5 * states, 0.3 - 0.8 * states[:, ::-1])
+    tree = ObliqueLinearTree(states, actions, leaves=2, task=SIMPLEGOAL, seed=0)
+    straight = LinearTree(states, actions, leaves=2, task=SIMPLEGOAL)
+    error, other = (np.square(one.predict(states)[0] - actions).mean() for one in (tree, straight))
+    assert error < 0.2 * other and len(tree) == 2
+    split = tree.nodes[0].split
+    normal = split.direction / tree.scale
+    assert abs(normal[0] / normal[1] - 1) < 0.2
+
+
+def test_a_linear_split_saves_what_it_says():
+    states, actions = examples(SIMPLEGOAL)
+    tree, whole = (ObliqueLinearTree(states, actions, leaves=n, task=SIMPLEGOAL, seed=0) for n in (2, 1))
+    tree.task = whole.task = dataclasses.replace(tree.task, action_low=-np.full(2, 9.0), action_high=np.full(2, 9.0))
+    errors = [np.square(one.predict(states)[0] - actions).sum() for one in (whole, tree)]
+    assert tree.nodes[0].split.gain == pytest.approx(errors[0] - errors[1], rel=1e-5) and len(whole) == 1
+
+
+# Soft trees
+
+
+def test_the_turns_of_a_tree_by_hand():
+    assert soft_tree._turns(2).tolist() == [
+        [0, 0, 0], [-1, 0, 0], [1, 0, 0], [-1, -1, 0], [-1, 1, 0], [1, 0, -1], [1, 0, 1]
+    ]  # fmt: skip
+    assert soft_tree._turns(0).shape == (1, 0)
+
+
+def oblique_pieces():
+    states = np.random.default_rng(0).uniform(-1, 1, size=(2000, 2))
+    u, v = states @ [1, 1] > 0, states @ [1, -1] > 0
+    return states, np.column_stack([np.where(u, 0.8, -0.6), np.where(v, 0.5, -0.9)])
+
+
+@pytest.fixture
+def shorter(monkeypatch):
+    monkeypatch.setattr(SoftTree, "N_STEPS", 400)
+
+
+def test_a_soft_tree_finds_four_oblique_pieces(shorter):
+    states, actions = oblique_pieces()
+    tree = SoftTree(states, actions, leaves=4, seed=0)
+    wrong = np.abs(tree.predict(states)[0] - actions).max(axis=1) > 0.1
+    straight = np.abs(Tree(states, actions, leaves=4).predict(states)[0] - actions).max(axis=1) > 0.1
+    assert wrong.mean() < 0.05 < straight.mean() and len(tree) == 4
+    right = 1 / (1 + np.exp(-tree._inputs(states) @ tree.nodes.T))
+    assert np.mean(np.maximum(right, 1 - right)[:, 0] > 0.95) > 0.9  # nearly sure of its leaf
+
+
+def test_a_soft_tree_acts_as_its_most_probable_leaf(shorter):
+    states, actions = examples(SIMPLEGOAL)
+    tree = SoftTree(states, actions, leaves=5, seed=1)  # rounded down to four
+    right = 1 / (1 + np.exp(-tree._inputs(states) @ tree.nodes.T))
+    probabilities = np.column_stack([
+        (1 - right[:, 0]) * (1 - right[:, 1]), (1 - right[:, 0]) * right[:, 1],
+        right[:, 0] * (1 - right[:, 2]), right[:, 0] * right[:, 2],
+    ])  # fmt: skip
+    leaf = probabilities.argmax(axis=1)
+    assert np.array_equal(tree.predict(states)[0], tree.values[leaf]) and len(tree) == 4 and len(set(leaf)) > 1
+    for i in set(leaf):
+        assert np.allclose(tree.values[i], actions[leaf == i].mean(axis=0))
+
+
+def test_a_soft_tree_of_one_leaf_is_the_mean_action_and_seeds_count(monkeypatch):
+    monkeypatch.setattr(SoftTree, "N_STEPS", 20)
+    states, actions = examples(SIMPLEGOAL)
+    assert SoftTree(states, actions, leaves=1, seed=0).values[0] == pytest.approx(actions.mean(axis=0))
+    one, same, other = (SoftTree(states, actions, leaves=2, seed=seed) for seed in (3, 3, 4))
+    assert np.array_equal(one.nodes, same.nodes) and not np.array_equal(one.nodes, other.nodes)

@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
+
+from studies.comparison.measure import cost
+from studies.comparison.tuning import TreeNumbers, in_units, tuned
+from studies.rivals.hand_written import ZeroPolicy
+from studies.rivals.small_network import SmallNetwork
+from studies.rivals.trees import LinearTree, ObliqueLinearTree
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map
+from vsp.rollouts import rollout
+from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond.few_cells.population import rollout_population
+from vsp_beyond.few_cells.tune import cma_es
+from vsp_beyond.few_cells.units import Scaling
+
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
+SMALL = Tuned(n_cells=2, n_episodes=20, n_generations=6, n_tuning_episodes=20, n_validation=100, failure_penalty=10.0)
+
+
+@pytest.fixture(autouse=True)
+def shorter(monkeypatch):
+    monkeypatch.setattr(SmallNetwork, "ITERATIONS", 20)
+
+
+KINDS = {
+    "CART": lambda x, y, task: Tree(x, y, leaves=6),
+    "linear tree": lambda x, y, task: LinearTree(x, y, leaves=6, task=task),
+    "oblique tree": lambda x, y, task: ObliqueLinearTree(x, y, leaves=5, task=task, seed=0),
+    "constant oblique tree": lambda x, y, task: ObliqueLinearTree(x, y, leaves=5, task=task, seed=0, constant=True),
+    "k-means": lambda x, y, task: kmeans_cells(x, y, cells=4, task=task, seed=0),
+    "one map": lambda x, y, task: linear_map(x, y, task),
+    "network": lambda x, y, task: SmallNetwork(x, y, units=4, task=task, seed=0),
+}
+
+
+def fitted(kind, task):
+    """The policy, its frame and its numbers."""
+    states, actions = examples(task)
+    policy = KINDS[kind](states, actions, task)
+    return policy, *in_units(policy, Scaling.of(get_task(task), states))
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_numbers_act_as_the_policy_they_are_of(kind, task):
+    policy, frame, numbers = fitted(kind, task)
+    other = examples(task, n=200, seed=1)[0]
+    expected = np.clip(policy.predict(other)[0], frame.task.action_low, frame.task.action_high)
+    same = frame.policy(numbers.like(numbers.vector))
+    assert np.allclose(same.predict(other)[0], expected, atol=1e-6)  # CART's borders are those of float32
+    assert cost(same) == cost(policy)
+
+
+@pytest.mark.parametrize(
+    ("kind", "n"),
+    # 2 inputs, 2 actions; leaves with 2 or 6 numbers; cuts with 1 or 3; 4 codewords; 4 units
+    [("CART", 5 + 6 * 2), ("linear tree", 5 + 6 * 6), ("oblique tree", 4 * 3 + 5 * 6),
+     ("constant oblique tree", 4 * 3 + 5 * 2), ("k-means", 4 * 2 + 4 * 6), ("one map", 6), ("network", 4 * 3 + 5 * 2)],
+)  # fmt: skip
+def test_all_numbers_are_tuned_and_the_structure_is_not(kind, n):
+    policy, frame, numbers = fitted(kind, SIMPLEGOAL)
+    states = examples(SIMPLEGOAL, seed=1)[0]
+    assert numbers.vector.shape == (n,)
+    moved = numbers.like(numbers.vector + 0.3)
+    assert np.allclose(moved.vector, numbers.vector + 0.3)
+    assert not np.allclose(frame.policy(moved).predict(states)[0], frame.policy(numbers).predict(states)[0])
+    if isinstance(numbers, TreeNumbers):
+        assert np.array_equal(moved.sides, numbers.sides)
+        assert np.array_equal(moved.directions, numbers.directions) != numbers.oblique
+        assert not (numbers.constant and moved.maps[:, :-1].any())
+
+
+def test_a_tree_by_hand():
+    """Beyond 0.5 of the first input to the right; there, beyond 0.2 of the second one to the right again."""
+    sides = np.array([[-1, 0], [1, -1], [1, 1]])
+    maps = np.array([[[0.0], [0.0], [0.1]], [[1.0], [0.0], [0.0]], [[0.0], [3.0], [0.0]]])
+    tree = TreeNumbers(sides, np.eye(2), np.array([0.5, 0.2]), maps, oblique=False, constant=False)
+    inputs = np.array([[0.5, 0.9, 1.0], [0.6, 0.2, 1.0], [0.6, 0.3, 1.0]])
+    assert np.allclose(tree.outputs(inputs), [[0.1], [0.6], [0.9]])
+    moved = tree.like(np.append([0.5, 0.35], maps))  # the last state now turns left at the second cut
+    assert np.allclose(moved.outputs(inputs), [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
+
+
+def test_a_population_of_trees_plays_as_each_alone():
+    _, frame, numbers = fitted("oblique tree", SIMPLEGOAL)
+    policies = [frame.policy(numbers.like(numbers.vector + shift)) for shift in (0.0, 0.2, -0.2)]
+    starts = frame.task.start(np.random.default_rng(0), 40)
+    for policy, together in zip(policies, rollout_population(policies, frame.task, starts), strict=True):
+        assert np.allclose(together.returns, rollout(policy, frame.task, starts).returns)
+
+
+@pytest.mark.parametrize("kind", ["linear tree", "one map"])
+def test_tuning_raises_the_return_and_is_the_same_again(kind):
+    task, teacher = get_task(SIMPLEGOAL), TEACHERS[SIMPLEGOAL]
+    start = fitted(kind, SIMPLEGOAL)[0]
+    one, again = (tuned(start, teacher, task, SMALL, seed=3) for _ in range(2))
+    states = examples(SIMPLEGOAL, seed=1)[0]
+    assert np.array_equal(one.predict(states)[0], again.predict(states)[0])
+    fresh = task.start(np.random.default_rng(9), 500)
+    assert rollout(one, task, fresh).returns.mean() > rollout(start, task, fresh).returns.mean() + 0.5
+    untouched = tuned(start, teacher, task, replace(SMALL, n_generations=0), seed=3)
+    assert np.allclose(untouched.predict(states)[0], start.predict(states)[0])
+
+
+def test_what_has_no_numbers_is_refused():
+    with pytest.raises(TypeError, match="the policy is a ZeroPolicy, which has no numbers to tune"):
+        in_units(ZeroPolicy(get_task(SIMPLEGOAL)), Scaling.of(get_task(SIMPLEGOAL), examples(SIMPLEGOAL)[0]))
+
+
+def test_a_short_search_of_many_numbers_gains_by_learning_variances_only():
+    scales, found = np.logspace(0, 2, 200), {}
+    for diagonal in (True, False):
+        search = cma_es(np.ones(200), 0.3, np.random.default_rng(0), diagonal=diagonal)
+        for _ in range(100):
+            steps = search.ask()
+            search.tell(steps, [float(np.square(scales * step).sum()) for step in steps])
+        found[diagonal] = search.result.fbest
+    assert found[True] < 0.95 * found[False]

@@ -1,9 +1,0 @@
-"""The course: the drawing helper of its notebooks (`picture`), the checks of each lesson, and `build`, which writes the
-versions for students and lecturers.
-
-A lesson imports its checks by name, as in `from vsp.course import lesson_1 as check`.
-"""
-
-from .drawing import picture
-
-__all__ = ["picture"]

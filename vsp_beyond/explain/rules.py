@@ -1,0 +1,189 @@
+"""Describe cells by axis-aligned rules, such as "x > 0.42 and y <= 0.61", that tell which cell a state is in.
+
+Borders between Voronoi cells are oblique, so the regions are hard to describe; the paper names this as a limitation.
+Here a small decision tree (CART, Breiman et al. 1984) learns the cell of visited states. Its leaves are boxes, and each
+box is a rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from vsp.checks import check_array, check_count, check_number
+from vsp.policy import VoronoiPolicy
+from vsp.subpolicies.base import linear_outputs, number
+
+MOST = 200  # leaves of the largest tree to try
+_DIGITS = range(1, 17)  # how many digits to try for the numbers in rules, in this order
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A box assigned to a cell: low < state <= high, infinite where there is no border."""
+
+    cell: int
+    low: np.ndarray  # (d,)
+    high: np.ndarray  # (d,)
+
+    def holds(self, states: np.ndarray) -> np.ndarray:
+        """Return which of the states (n, d) lie in the box. (n,) bool"""
+        states = check_array("states", states, (-1, len(self.low)))
+        return ((states > self.low) & (states <= self.high)).all(axis=1)
+
+    def text(self, names: tuple[str, ...]) -> str:
+        """Write the box in words, with the names of the d inputs; "always" if it has no border."""
+        conditions = []
+        for name, low, high in zip(names, map(_plain, self.low), map(_plain, self.high)):
+            if low and high:
+                conditions.append(f"{low} < {name} <= {high}")
+            elif low or high:
+                conditions.append(f"{name} > {low}" if low else f"{name} <= {high}")
+        return " and ".join(conditions) or "always"
+
+
+def describe_rules(
+    policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
+) -> pd.DataFrame:
+    """Describe the cells of `policy` by the fewest rules that agree with its look-up in a share `agreement` of states.
+
+    Rules are fitted to `states` (n, d). States of other episodes, `unseen` (u, d), both select and evaluate the rules,
+    so the agreement is slightly optimistic. The tree may have up to `leaves` leaves.
+
+    One row per rule, cell by cell. Columns: cell; share (of all states that are in this cell); rule; coverage (share of
+    the cell's states where the rule holds, largest first); fidelity (share of the rule's states that are in the cell).
+    A cell without a rule has one row with the rule "none". `attrs` has agreement, asked (the requested agreement),
+    reached (whether the agreement is as high as requested), rules (their number) and digits (of the numbers in them).
+
+    Raises ValueError for arrays of a wrong shape, no states, `agreement` outside (0, 1], or fewer than 2 leaves.
+    """
+    rules, digits = find_rules(policy, states, unseen, agreement=agreement, leaves=leaves)
+    cells, rows = policy.cells(unseen), []
+    for cell in range(len(policy)):
+        inside = cells == cell
+        known = {"cell": cell, "share": inside.mean()}
+        for rule in (own := [rule for rule in rules if rule.cell == cell]):
+            holds = rule.holds(unseen)
+            scores = {"coverage": _share(holds, inside), "fidelity": _share(inside, holds)}
+            rows.append({**known, "rule": rule.text(policy.task.inputs), **scores})
+        if not own:
+            rows.append({**known, "rule": "none", "coverage": _share(~inside, inside), "fidelity": np.nan})
+    frame = pd.DataFrame(rows).sort_values(["cell", "coverage"], ascending=[True, False], ignore_index=True)
+    reached = float(np.mean(apply(rules, unseen) == cells))
+    frame.attrs = {"agreement": reached, "asked": agreement, "reached": reached >= agreement}
+    frame.attrs |= {"rules": len(rules), "digits": digits}
+    return frame
+
+
+def find_rules(
+    policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
+) -> tuple[list[Rule], int]:
+    """Find the rules, exactly one of which holds in each state, and the number of digits in them.
+
+    Arguments and errors are those of `describe_rules`. If no tree reaches the requested agreement, the best one is
+    used.
+    """
+    d = len(policy.task.low)
+    states, unseen = check_array("states", states, (-1, d)), check_array("unseen", unseen, (-1, d))
+    if not (len(states) and len(unseen)):
+        raise ValueError(f"{len(states)} states and {len(unseen)} unseen states, expected at least one of each")
+    check_number("agreement", agreement)
+    if not 0 < agreement <= 1:
+        raise ValueError(f"agreement is {agreement}, expected a share above 0 and up to 1, such as 0.95")
+    check_count("leaves", leaves, least=2)
+    cells = policy.cells(unseen)
+    rules, found = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
+    places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimal place of the range
+    for digits in _DIGITS:
+        short = _rounded(rules, digits + places)
+        if np.mean(apply(short, unseen) == cells) >= min(agreement, found):
+            return short, digits
+    return rules, digits
+
+
+class RulePolicy:
+    """The maps of a `VoronoiPolicy` with rules in place of its look-up, to show what an occasional wrong cell costs.
+
+    A map is good in its own cell, but may be far off beyond the border. So rules that agree in 95 of 100 states can
+    describe a policy, but may not be able to replace it.
+    """
+
+    def __init__(self, policy: VoronoiPolicy, rules: list[Rule]):
+        policy.check_linear()
+        self.policy, self.rules = policy, rules
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        states, task = check_array("observations", obs, (-1, len(self.policy.task.low))), self.policy.task
+        raw = linear_outputs(states, self.policy.coefficients[apply(self.rules, states)])
+        return np.clip(raw, task.action_low, task.action_high), None
+
+
+def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
+    """Return the cell of the rule that holds in each state (n, d). (n,) Raises ValueError if `rules` is empty."""
+    if not rules:
+        raise ValueError(f"rules are {rules!r}, expected at least one")
+    held = np.array([rule.holds(states) for rule in rules])
+    return np.array([rule.cell for rule in rules])[held.argmax(axis=0)]
+
+
+def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:
+    """Return the rules and the agreement of the smallest tree that agrees enough, else of the one that agrees most."""
+    from sklearn.tree import DecisionTreeClassifier
+
+    best, found = None, -1.0
+    for leaves in range(2, most + 1):
+        tree = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0).fit(states, cells)
+        right = float(np.mean(tree.predict(unseen) == truth))
+        best, found = (tree, right) if right > found else (best, found)
+        if right >= agreement or tree.get_n_leaves() < leaves:  # it agrees enough, or nothing is left to split
+            break
+    d = states.shape[1]
+    return _merged(list(_leaves(best, 0, np.full(d, -np.inf), np.full(d, np.inf)))), found
+
+
+def _leaves(tree, node: int, low: np.ndarray, high: np.ndarray) -> Iterator[Rule]:
+    """Yield the leaves below a node as rules. The node is the box from `low` to `high`."""
+    inner = tree.tree_
+    if inner.children_left[node] < 0:
+        yield Rule(int(tree.classes_[inner.value[node, 0].argmax()]), low, high)
+        return
+    axis, border = inner.feature[node], inner.threshold[node]
+    below, above = high.copy(), low.copy()
+    below[axis] = above[axis] = border
+    yield from _leaves(tree, inner.children_left[node], low, below)
+    yield from _leaves(tree, inner.children_right[node], above, high)
+
+
+def _merged(rules: list[Rule]) -> list[Rule]:
+    """Describe the same regions by fewer boxes: merge two boxes of one cell that share a whole face."""
+    for i, one in enumerate(rules):
+        for j, other in enumerate(rules):
+            axes = np.flatnonzero((one.low != other.low) | (one.high != other.high))
+            if one.cell == other.cell and len(axes) == 1 and one.high[axes[0]] == other.low[axes[0]]:
+                rest = [rule for k, rule in enumerate(rules) if k not in (i, j)]
+                return _merged([*rest, Rule(one.cell, one.low, other.high)])
+    return sorted(rules, key=lambda rule: (rule.cell, *rule.low, *rule.high))
+
+
+def _rounded(rules: list[Rule], decimals: np.ndarray) -> list[Rule]:
+    """Round the bounds of the rules to `decimals` (d,) and drop boxes that become empty."""
+    short = []
+    for rule in rules:
+        low, high = (np.array([round(b, int(n)) for b, n in zip(ends, decimals)]) for ends in (rule.low, rule.high))
+        if (low < high).all():
+            short.append(Rule(rule.cell, low, high))
+    return _merged(short)
+
+
+def _plain(bound: float) -> str:
+    """Write a bound without trailing zeros; "" for an infinite one."""
+    return number(bound + 0.0, None) if np.isfinite(bound) else ""
+
+
+def _share(part: np.ndarray, whole: np.ndarray) -> float:
+    """Return the share of `whole` that is also in `part`, or NaN if `whole` is empty."""
+    return float(part[whole].mean()) if whole.any() else float("nan")

@@ -1,0 +1,143 @@
+"""`simplify`: the fewest cells, then the fewest and shortest coefficients, that keep the return within a tolerance."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+
+from vsp.checks import check_array, check_count, check_number, check_seed
+from vsp.evaluation import start_states
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy, rollout, score, visited_states
+from vsp.run.progress import progress
+from vsp.tasks.base import GOAL, Task
+from vsp.tasks.registry import get_task
+
+from .config import Tuned, check_tuned
+from .tuned import distill_tuned
+
+N_VISITED = 100  # episodes that show where the states lie
+DIGITS = range(1, 17)  # significant digits to try, the fewest first
+
+
+def simplify(
+    teacher: Policy, task: str | Task, config: Tuned, *, tolerance: float, seed: int
+) -> tuple[VoronoiPolicy, pd.DataFrame]:
+    """The simplest policy that returns at most `tolerance` less than `teacher`; up to `config.n_cells` cells are tried.
+
+    Candidates are compared by `score` from the same `config.n_validation` starts, so report the result from others.
+    Returns the policy, its codewords `gathered`, and one row per candidate: stage ("cells", "prune", "round"), cells,
+    nonzero coefficients, digits (0: not rounded), mean return, failing, kept. The rows of stage "cells" are the curve
+    of return over cells; `attrs` hold the teacher's mean return. If no number of cells suffices, the best one is
+    simplified, and `tolerance` counts from its return. Raises ValueError as `distill_tuned`
+    does, and for a tolerance below 0.
+    """
+    check_seed(seed)
+    check_tuned(config)
+    check_number("tolerance", tolerance, least=0)
+    task = get_task(task)
+    starts = start_states(task, config.n_validation, seed)
+    own = rollout(teacher, task, starts)
+    threshold = score(own, config.failure_penalty) - tolerance
+    tried = _Tried(task, starts, config.failure_penalty)
+    policies = []
+    for k in progress(range(1, config.n_cells + 1), "cells tried", total=config.n_cells, unit="sizes"):
+        policies.append(distill_tuned(teacher, task, dataclasses.replace(config, n_cells=k), seed=seed)[0])
+        if tried.reaches(threshold, "cells", policies[-1]):
+            break
+    best = int(np.argmax(tried.scores))
+    if tried.scores[best] < threshold:  # no number of cells suffices
+        threshold = tried.scores[best] - tolerance
+    states = visited_states(policies[best], task, starts[:N_VISITED])
+    policy = prune(gathered(policies[best], states), lambda one: tried.reaches(threshold, "prune", one))
+    for digits in DIGITS:
+        short = rounded(policy, digits)
+        if short is not None and tried.reaches(threshold, "round", short, digits=digits):
+            policy = short
+            break
+    frame = pd.DataFrame(tried.rows)
+    frame.attrs["teacher"] = float(own.returns.mean())
+    return policy, frame
+
+
+def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
+    """Move the codewords nearer to `states` (n, d) without changing the cells: tuning fixes the borders only.
+
+    The borders of up to d + 1 Euclidean cells have a point in common, at the same distance from all codewords. Moving
+    all codewords towards it by the same proportion moves no border. Other policies are returned unchanged. Raises
+    ValueError for an empty array of states, and for states that do not fit the task or are not finite.
+    """
+    states = check_array("states", states, (-1, len(policy.task.low)))
+    if not len(states):
+        raise ValueError(f"states have shape {states.shape}, expected at least one state")
+    points = policy.codewords / policy.scale
+    k, d = points.shape
+    if policy.metric != "euclidean" or not 1 < k <= d + 1:
+        return policy
+    middle, unit = states.mean(axis=0) / policy.scale, (states / policy.scale).std(axis=0).mean() or 1.0
+    points = points - middle
+    gaps = points[1:] - points[0]
+    if np.linalg.matrix_rank(gaps) < k - 1:
+        return policy
+    halves = 0.5 * np.square(gaps).sum(axis=1)  # x is equally far from codeword i and the first if gaps[i] @ x is this
+    arms = points - points[0] - np.linalg.lstsq(gaps, halves, rcond=None)[0]
+    common = np.linalg.lstsq(gaps, halves + gaps @ points[0], rcond=None)[0]  # the common point nearest to the middle
+    nearest = -(arms @ common).sum() / np.square(arms).sum()  # proportion that brings codewords nearest to the middle
+    least = unit / np.linalg.norm(arms, axis=1).max()  # proportion that keeps them apart
+    codewords = (middle + common + max(nearest, least) * arms) * policy.scale
+    return like(policy, codewords, policy.coefficients, policy.scale)
+
+
+def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
+    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True.
+
+    Coefficients are tried in order of increasing effect on the action, for a change of the input by `policy.scale`.
+    """
+    policy.check_linear()
+    sizes = np.abs(policy.coefficients) * np.append(policy.scale, 1.0)[:, None]
+    for place in np.argsort(sizes, axis=None, kind="stable"):
+        coefficients = policy.coefficients.copy()
+        if not coefficients.flat[place]:
+            continue
+        coefficients.flat[place] = 0.0
+        without = like(policy, policy.codewords, coefficients, policy.scale)
+        policy = without if good(without) else policy
+    return policy
+
+
+def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
+    """Return the policy rounded to `digits` significant digits; None if two codewords become equal."""
+    check_count("digits", digits)
+    parts = policy.codewords, policy.coefficients, policy.scale
+    codewords, coefficients, scale = (_significant(values, digits) for values in parts)
+    distinct = len(np.unique(codewords, axis=0)) == len(codewords)
+    return like(policy, codewords, coefficients, scale) if distinct else None
+
+
+def _significant(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([float(f"{value:.{digits}g}") for value in values.flat]).reshape(values.shape)
+
+
+def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
+    """Return a policy for the same task with the same metric, and these numbers."""
+    about = {"task": policy.task, "metric": policy.metric, "sub_policy": policy.policy_class.name}
+    return VoronoiPolicy(codewords, coefficients, scale=scale, **about)
+
+
+class _Tried:
+    """The policies tried so far, with their scores from the same starts."""
+
+    def __init__(self, task: Task, starts: np.ndarray, failure_penalty: float):
+        self.rows, self.scores = [], []
+        self._task, self._starts, self._failure_penalty = task, starts, failure_penalty
+
+    def reaches(self, threshold: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:
+        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
+        result = rollout(policy, self._task, self._starts)
+        self.scores.append(score(result, self._failure_penalty))
+        about = {"stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients)}
+        found = {"mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL)}
+        self.rows.append({**about, "digits": digits, **found, "kept": self.scores[-1] >= threshold})
+        return self.rows[-1]["kept"]

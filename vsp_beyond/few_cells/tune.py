@@ -1,0 +1,89 @@
+"""Tuning on the return by CMA-ES (Hansen 2016), and how candidates are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsp.rollouts import Outcomes, rollout, score
+from vsp.tasks.base import GOAL
+
+from .anneal import squared_error
+from .config import Tuned
+from .population import rollout_population
+from .units import Cells, LabelledStates, Scaling
+
+SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
+
+
+@dataclass(frozen=True)
+class Objective:
+    """The objective to maximise: the mean return, minus penalties for failures and for differing from the teacher."""
+
+    failure_penalty: float
+    error_penalty: float = 0.0
+    seen: LabelledStates | None = None  # the states of the teacher, for the error penalty
+
+    def score(self, result: Outcomes, cells: Cells) -> float:
+        """Return the value for `cells` whose episodes ended as `result`."""
+        value = score(result, self.failure_penalty)
+        return value - self.error_penalty * squared_error(self.seen, cells) if self.error_penalty else value
+
+
+class Candidates:
+    """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
+
+    def __init__(self, frame: Scaling, starts: np.ndarray, objective: Objective):
+        self.rows, self.best, self.best_restart = [], None, 0
+        self._frame, self._starts, self._objective, self._best_score = frame, starts, objective, -np.inf
+
+    def add(self, stage: str, restart: int, cells: Cells) -> None:
+        """Score `cells` from the validation starts."""
+        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
+        mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
+        self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
+        if (value := self._objective.score(result, cells)) > self._best_score:
+            self._best_score, self.best, self.best_restart = value, cells, restart
+
+
+def tune(
+    frame: Scaling, cells: Cells, config: Tuned, objective: Objective, rng: np.random.Generator
+) -> Iterator[Cells]:
+    """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
+
+    Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
+    """
+    search = cma_es(cells.vector, config.tuning_step, rng)
+    for i in range(config.n_generations):
+        starts = frame.task.start(rng, config.n_tuning_episodes)
+        vectors = search.ask()
+        candidates = [cells.like(vector) for vector in vectors]
+        results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
+        search.tell(vectors, [-objective.score(result, one) for result, one in zip(results, candidates)])
+        if is_snapshot(i, config.n_generations, SNAPSHOTS):
+            yield cells.like(search.result.xfavorite)
+
+
+def cma_es(start: np.ndarray, step: float, rng: np.random.Generator, *, diagonal: bool = False):
+    """Return the search of the library `cma` from `start`, with first standard deviation `step` and random draws from
+    `rng`.
+
+    `diagonal`: learn variances only (sep-CMA-ES, Ros & Hansen 2008), for more numbers than there are generations.
+    """
+    import cma  # here, because few uses need it
+
+    options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}
+    options["CMA_diagonal"] = diagonal
+    return cma.CMAEvolutionStrategy(start, step, options)
+
+
+def is_snapshot(i: int, n: int, n_snapshots: int) -> bool:
+    """Return whether generation i of n is one of `n_snapshots` that are evenly spread; the last one always is."""
+    return (i + 1) * n_snapshots // n > i * n_snapshots // n
+
+
+def candidates_per_generation(n: int) -> int:
+    """Return the default number of candidates in a generation of CMA-ES for n numbers (Hansen 2016, table 1)."""
+    return 4 + int(3 * np.log(n))

@@ -1,0 +1,78 @@
+"""`distill_tuned`: optimise a few codewords and their maps together, which the paper's method does not.
+
+Three parts: deterministic annealing on the teacher's actions, correction on the states that the policy itself visits,
+tuning on the return. A `Tuned` can switch off the last two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from vsp.checks import check_seed
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy, visited_states, warn_outside
+from vsp.tasks.base import Task
+from vsp.tasks.registry import get_task
+
+from .anneal import anneal, linear_init, random_init, warm
+from .config import Tuned, check_tuned
+from .tune import Candidates, Objective, tune
+from .units import METRIC, Scaling
+
+
+@threadpool_limits.wrap(limits=1)
+def distill_tuned(
+    teacher: Policy, task: str | Task, config: Tuned, *, seed: int, start: VoronoiPolicy | None = None
+) -> tuple[VoronoiPolicy, pd.DataFrame]:
+    """Distil `teacher` to `config.n_cells` cells, from scratch or from those of `start`. Same arguments, same policy.
+
+    Returns the policy and its history, one row per candidate: stage ("line", one linear map, or "start"; "fit",
+    "correct", "tune"), restart, mean return and share of failed episodes from the validation starts. Distances are
+    Euclidean; the scale of a Euclidean `start` is kept. Raises ValueError as `distill` does, for a `start` of another
+    size or task, and for `criticality` with a teacher that has no critics.
+    """
+    check_seed(seed)
+    check_tuned(config)
+    task = get_task(task)
+    if start is not None:
+        _check_start(start, task, config)
+    if config.criticality and not hasattr(teacher, "criticality"):
+        name = type(teacher).__name__
+        raise ValueError(f"criticality is True, but {name} has no critics: load a teacher with critics")
+    streams = np.random.SeedSequence(seed).spawn(5)
+    starts, init, batches, validation, search = map(np.random.default_rng, streams)
+    states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    warn_outside(task, states)
+    frame = Scaling.of(task, states)
+    if start is not None and start.metric == METRIC:
+        frame = replace(frame, scale=start.scale)  # with another one the borders of `start` would move
+    seen = frame.labelled(teacher, states, criticality=config.criticality)
+    objective = Objective(config.failure_penalty, config.error_penalty, seen)
+    candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
+
+    first = linear_init(seen, config.n_cells, init) if start is None else frame.cells(start)
+    candidates.add("line" if start is None else "start", 0, first)
+    hot = config if start is None else replace(warm(config), n_steps=config.n_steps)
+    for restart in range(config.n_restarts):
+        cells = random_init(seen, config.n_cells, init) if start is None else first
+        candidates.add("fit", restart, anneal(seen, cells, hot, batches))
+    cells = candidates.best
+    for _ in range(config.n_corrections):
+        states = visited_states(frame.policy(cells), task, task.start(starts, config.n_correction_episodes))
+        seen = seen.with_more(frame.labelled(teacher, states, criticality=config.criticality))
+        cells = anneal(seen, cells, warm(config), batches)
+        candidates.add("correct", candidates.best_restart, cells)
+    for cells in tune(frame, candidates.best, config, objective, search):
+        candidates.add("tune", candidates.best_restart, cells)
+    return frame.policy(candidates.best), pd.DataFrame(candidates.rows)
+
+
+def _check_start(start: VoronoiPolicy, task: Task, config: Tuned) -> None:
+    start.check_linear()
+    found, wanted = (len(start), start.task.name), (config.n_cells, task.name)
+    if found != wanted:
+        raise ValueError(f"start has {found[0]} cells for {found[1]}, expected n_cells = {wanted[0]} for {wanted[1]}")

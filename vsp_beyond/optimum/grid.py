@@ -1,0 +1,166 @@
+"""Dynamic programming (Bellman 1957) on a grid over two state variables: best returns, and the actions that reach them.
+
+Values are interpolated between the points of the grid, so one sparse matrix describes a step of all points under one
+action. The error falls with the spacing of the grid; comparing two spacings shows its size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from vsp.tasks.base import RUNNING, Task
+
+SWEEPS = 60  # sweeps of evaluation between two improvements (modified policy iteration, Puterman & Shin 1978)
+MOST_IMPROVEMENTS = 1000
+AT_ONCE = 5000  # states in which `GridPolicy` compares actions at once
+CLOSE = 1e-6  # the iteration ends when the values change by less
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Evenly spaced points over a box of two variables, ends included. A `periodic` variable runs around a circle."""
+
+    low: tuple[float, float]
+    high: tuple[float, float]
+    shape: tuple[int, int]
+    periodic: tuple[bool, bool] = (False, False)
+
+    def finer(self, times: float) -> Grid:
+        """Return a grid over the same box, with the spacing of the points divided by `times`."""
+        return replace(self, shape=tuple(_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic)))
+
+    def points(self) -> np.ndarray:
+        """Return all points; the last variable varies fastest. (n, 2)"""
+        about = zip(self.low, self.high, self.shape, self.periodic)
+        axes = [np.linspace(low, high, n, endpoint=not closed) for low, high, n, closed in about]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def interpolation(self, states: np.ndarray) -> sparse.csr_array:
+        """Return the matrix that maps values at the points (n,) to values at the states (t, 2)."""
+        columns, weights = self._corners(states)
+        ends = np.arange(len(states) + 1) * 4
+        return sparse.csr_array((weights.ravel(), columns.ravel(), ends), shape=(len(states), np.prod(self.shape)))
+
+    def at(self, states: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Interpolate values at the points (n,) at the states (t, 2). (t,)"""
+        columns, weights = self._corners(states)
+        return (weights * values[columns]).sum(axis=1)
+
+    def _corners(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the indices of the four points around each state, and their weights. (t, 4) each"""
+        (i, j, u), (k, m, v) = (self._between(states[:, axis], axis) for axis in (0, 1))
+        width = self.shape[1]
+        columns = np.stack([i * width + k, i * width + m, j * width + k, j * width + m], axis=1)
+        weights = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v], axis=1)
+        return columns.astype(np.int32), weights
+
+    def _between(self, x: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the two neighbours of each x along an axis, and its distance from the first in units of spacing."""
+        low, high, n = self.low[axis], self.high[axis], self.shape[axis]
+        if self.periodic[axis]:
+            place = (x - low) / (high - low) * n
+            first = np.floor(place).astype(np.int64)
+            return first % n, (first + 1) % n, place - first
+        place = np.clip((x - low) / (high - low), 0.0, 1.0) * (n - 1)
+        first = np.minimum(place.astype(np.int64), n - 2)
+        return first, first + 1, place - first
+
+
+def _steps(n: int, times: float, periodic: bool) -> int:
+    """Return the points of an axis of n points with `times` as many steps: one more than steps, unless periodic."""
+    return 2 * round(times * (n - (not periodic)) / 2) + (not periodic)
+
+
+def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:
+    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step. (n,)
+
+    The task must have one action, and the grid's variables as its state. Episodes have no step limit here; a price
+    keeps them short. Raises RuntimeError if the values do not converge.
+    """
+    moves = [_move(task, grid, action, price) for action in actions]
+    values = np.zeros(len(grid.points()))
+    for _ in range(MOST_IMPROVEMENTS):
+        before, (values, best) = values, _improved(moves, values)
+        if np.abs(values - before).max() < CLOSE:
+            return values
+        values = _followed(moves, best, values)
+    raise RuntimeError(f"values still change by {np.abs(values - before).max():g}, expected less than {CLOSE:g}")
+
+
+def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the values one step earlier, and the indices of the best actions there. (n,) each"""
+    most, best = np.full(len(values), -np.inf), np.zeros(len(values), dtype=np.intp)
+    for i, (rewards, matrix) in enumerate(moves):
+        offer = rewards + matrix @ values
+        better = offer > most
+        most[better], best[better] = offer[better], i
+    return most, best
+
+
+def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarray, sparse.csr_array]:
+    """Return the rewards of one action at all points, and the matrix that maps values to those after the step.
+
+    Its rows are 0 where the episode ended.
+    """
+    points = grid.points()
+    after, rewards, outcomes = task.step(points, np.full((len(points), 1), action))
+    goes_on = sparse.diags_array((outcomes == RUNNING).astype(np.float64))
+    return rewards - price, (goes_on @ grid.interpolation(after)).tocsr()
+
+
+def _followed(moves: list, best: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the values after `SWEEPS` steps with the actions whose indices are `best` (n,)."""
+    order = np.argsort(best, kind="stable")
+    rows = np.split(order, np.searchsorted(best[order], np.arange(1, len(moves))))
+    matrix = sparse.vstack([matrix[some] for (_, matrix), some in zip(moves, rows)], format="csr")
+    rewards = np.concatenate([rewards[some] for (rewards, _), some in zip(moves, rows)])
+    for _ in range(SWEEPS):
+        next_values = np.empty_like(values)
+        next_values[order] = rewards + matrix @ values
+        values = next_values
+    return values
+
+
+class GridPolicy:
+    """A policy that takes the best action by the values of a grid, looking one step ahead."""
+
+    def __init__(
+        self, task: Task, grid: Grid, values: np.ndarray, actions: np.ndarray, state_of: Callable, price: float = 0.0
+    ):
+        self.grid, self._task, self._values, self._price = grid, task, values, price
+        self._actions, self._state_of = actions, state_of
+
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, 1) for observations (n, d)."""
+        states = self._state_of(obs.astype(np.float64))
+        parts = np.split(states, range(AT_ONCE, len(states), AT_ONCE))
+        return np.concatenate([self._best(part) for part in parts])[:, None], None
+
+    def lost(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return.
+
+        The shape is (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible
+        after its end.
+        """
+        states, best = self._state_of(obs.astype(np.float64)), self.predict(obs)[0]
+        return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
+
+    def _best(self, states: np.ndarray) -> np.ndarray:
+        """Return the action at the top of the parabola through the best action and its two neighbours. (n,)"""
+        n = len(self._actions)
+        offers = self._offers(np.tile(states, (n, 1)), np.repeat(self._actions, len(states))).reshape(n, -1)
+        best, rows = offers.argmax(axis=0), np.arange(len(states))
+        middle = np.clip(best, 1, n - 2)
+        left, top, right = (offers[middle + shift, rows] for shift in (-1, 0, 1))
+        bend = left - 2 * top + right
+        inside = (best == middle) & (bend < 0)
+        shift = np.where(inside, 0.5 * (left - right) / np.where(inside, bend, 1.0), 0.0)
+        return self._actions[best] + shift * (self._actions[1] - self._actions[0])
+
+    def _offers(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        after, rewards, outcomes = self._task.step(states, actions[:, None])
+        return rewards - self._price + (outcomes == RUNNING) * self.grid.at(after, self._values)

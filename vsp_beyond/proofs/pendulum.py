@@ -1,0 +1,171 @@
+"""Prove for Pendulum and a policy of linear maps: a set around upright that it never leaves, and from where it gets
+there.
+
+The states, angle and angular velocity, are cut into boxes (`grid`). Each coordinate after a step is a smooth function
+of the state. So over a box it differs from its value in the middle by no more than its steepest slope allows. The proof
+holds for the program, which observes float32 and rounds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from vsp.checks import check_count
+from vsp.policy import VoronoiPolicy
+from vsp.tasks.pendulum import TASK, see
+
+from .grid import Way, around, invariant, steps_into
+from .proof import Proof
+from .robust import ROUNDING, SEEN, largest_tie, least_gap
+
+FASTEST, LIMIT = 8.0, 2.0  # largest angular velocity, rad/s; largest torque
+START_SPEED = 1.0  # rad/s, largest of the starts
+DT, FALL, PUSH = 0.05, 0.75, 0.15  # per step: seconds, and what sine and torque add to the angular velocity
+UPRIGHT = 0.5  # rad: a set "around upright" lies within this angle
+
+
+@dataclass(frozen=True)
+class PendulumProof(Proof):
+    """What is proved for the boxes of an n by n grid. The boxes of row i begin at angle -pi + 2 pi i / n, those of
+    column j at angular velocity -8 + 16 j / n."""
+
+    kept: np.ndarray  # (n, n) whether the box belongs to a set around upright that no step leaves
+    steps: np.ndarray  # (n, n) the most steps into that set; 0: not proved
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Which columns hold starts: angular velocities below 1 rad/s. (n,)"""
+        n = len(self.steps)
+        middle = FASTEST * (2 * (np.arange(n) + 0.5) / n - 1)
+        return np.abs(middle) < START_SPEED
+
+    @property
+    def share(self) -> float:
+        """The share of starts from which the pendulum is proved to get into the set."""
+        return float((self.steps > 0)[:, self.starts].mean())
+
+    @property
+    def claim(self) -> dict:
+        """The grid's `n`, the number of proved boxes of starts, the number of all boxes of starts, and the most steps
+        from any box."""
+        of_starts = (self.steps > 0)[:, self.starts]
+        counts = {"proved": int(of_starts.sum()), "starts": of_starts.size}
+        return {"n": len(self.steps), **counts, "longest": int(self.steps[~self.kept].max(initial=0))}
+
+    def parts(self) -> list:
+        """Return for each row its runs of boxes: steps (-1 in the set), length, steps, length, ..."""
+        found = []
+        for row in np.where(self.kept, -1, self.steps):
+            begins = np.flatnonzero(np.diff(row, prepend=row[0] - 1))
+            lengths = np.diff(begins, append=len(row))
+            found.append(np.column_stack([row[begins], lengths]).ravel().tolist())
+        return found
+
+
+def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
+    """Prove from which boxes the pendulum gets upright within 200 steps, and stays. Takes seconds, and 200 bytes a box.
+
+    Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
+    for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
+    """
+    check_swinging(policy)
+    check_count("n", n, most=8000)
+    if n % 16:
+        raise ValueError(f"n is {n}, expected a multiple of 16")
+    ways = [_way(policy, cell, n) for cell in range(len(policy))]
+    angle = np.pi * (2 * (np.arange(n) + 0.5) / n - 1)
+    near = np.repeat((np.abs(angle) + np.pi / n < UPRIGHT)[:, None], n, axis=1)
+    kept = invariant(near, ways, periodic=True)
+    return PendulumProof(policy, kept, steps_into(kept, ways, TASK.max_steps, periodic=True))
+
+
+def equilibria(policy: VoronoiPolicy, *, n: int = 100_000) -> np.ndarray:
+    """Find angles (rad) at which a pendulum at rest stays, in increasing order: starts from which nothing moves.
+
+    The search looks between `n` angles, where the acceleration changes its sign within a cell. It is not proved to find
+    all. Raises ValueError as `prove_pendulum` does.
+    """
+    check_swinging(policy)
+    check_count("n", n, least=16)
+
+    def acceleration(angle: np.ndarray) -> np.ndarray:
+        states = np.column_stack([angle, np.zeros_like(angle)])
+        return FALL * np.sin(angle) + PUSH * policy.predict(see(states))[0][:, 0]
+
+    angles = np.linspace(-np.pi, np.pi, n) + 1e-7  # shifted, so that no root lies on one of them by symmetry
+    found, cells = acceleration(angles), policy.cells(see(np.column_stack([angles, np.zeros(n)])))
+    crossed = np.flatnonzero((np.sign(found[:-1]) != np.sign(found[1:])) & (cells[:-1] == cells[1:]))
+    pairs = zip(angles[crossed], angles[crossed + 1])
+    return np.array([brentq(lambda angle: acceleration(np.array([angle]))[0], *pair) for pair in pairs])
+
+
+def check_swinging(policy: VoronoiPolicy) -> None:
+    """Raise ValueError unless `policy` is made of linear maps for Pendulum, without the metric "chebyshev"."""
+    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric == "chebyshev":
+        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, not 'chebyshev'")
+    policy.check_linear()
+
+
+def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
+    """Bound where a step by the map of `cell` leads from each box that touches the cell."""
+    half = np.array([np.pi, FASTEST]) / n  # of a box
+    angles, speeds = (width * (2 * np.arange(n) + 1 - n) for width in half)  # their middles
+    touched = _touched(policy, cell, angles, speeds, half)
+    angle, speed = angles[touched // n], speeds[touched % n]
+    (w_cos, w_sin, w_speed, bias), (cos, sin) = policy.coefficients[cell, :, 0], (np.cos(angle), np.sin(angle))
+    slack = SEEN * (abs(w_cos) + abs(w_sin) + FASTEST * abs(w_speed)) + ROUNDING
+
+    raw = w_cos * cos + w_sin * sin + w_speed * speed + bias
+    slope = np.abs(w_sin * cos - w_cos * sin) + (abs(w_cos) + abs(w_sin)) * half[0]
+    spread = slope * half[0] + abs(w_speed) * half[1] + slack
+    low, high = (np.clip(raw + side * spread, -LIMIT, LIMIT) for side in (-1, 1))
+    free, fixed = np.abs(raw) + spread <= LIMIT, low == high
+    # The new speed in the middle, and its slopes along the angle and along the speed
+    torque = np.where(free, raw, (low + high) / 2)
+    along = np.where(free, (FALL + PUSH * w_sin) * cos - PUSH * w_cos * sin, FALL * cos)
+    bend = FALL + PUSH * (abs(w_cos) + abs(w_sin)) * free
+    across = np.where(free, 1 + PUSH * w_speed, 1.0)
+    rest = PUSH * np.where(free, slack, np.where(fixed, 0.0, (high - low) / 2)) + ROUNDING
+    new_speed = speed + FALL * sin + PUSH * torque
+    new_angle = angle + DT * new_speed
+    speed_by = (np.abs(along) + bend * half[0]) * half[0] + np.abs(across) * half[1] + rest
+    angle_by = (np.abs(1 + DT * along) + DT * bend * half[0]) * half[0] + DT * (np.abs(across) * half[1] + rest)
+
+    limited = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
+    at_limit = np.abs(new_speed) + speed_by > FASTEST  # there the new angle follows from the limited speed
+    ends = [
+        np.where(at_limit, angle + side * half[0] + DT * one, new_angle + side * angle_by)
+        for side, one in zip((-1, 1), limited)
+    ]
+    return Way(touched, *boxes_between(ends, limited, n), np.ones(len(touched), dtype=bool))
+
+
+def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first box between two angles and two speeds, and the exclusive end of these boxes, as in `Way`. Angles
+    may be any number of turns away, but less than a turn apart."""
+    first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
+    begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
+    begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
+    turns = begin // n * n
+    return np.stack([begin - turns, first]), np.stack([end - turns, last])
+
+
+def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
+    """Return the boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
+    n, found, tie = len(angles), [], largest_tie(policy, np.array([1.0, 1.0, FASTEST]))
+    ranges = [(np.maximum(f(angles) - half[0], -1.0), np.minimum(f(angles) + half[0], 1.0)) for f in (np.cos, np.sin)]
+    for i in range(n):  # a row at a time
+        low, high = (
+            np.stack([np.full(n, ranges[0][side][i]), np.full(n, ranges[1][side][i]), speeds + sign * half[1]])
+            + sign * SEEN * FASTEST
+            for side, sign in ((0, -1), (1, 1))
+        )
+        row = np.ones(n, dtype=bool)
+        for other in range(len(policy)):
+            if other != cell:
+                row &= least_gap(policy, cell, other, low, high) <= tie
+        found.append(np.flatnonzero(row) + i * n)
+    return np.concatenate(found)

@@ -1,0 +1,53 @@
+"""The base class of all proofs: each writes a certificate, which `vsp_beyond.proofs.check` verifies without the
+prover's code."""
+
+from __future__ import annotations
+
+import json
+import os
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsp.policy import VoronoiPolicy
+from vsp.run import atomic, sealed
+
+CERTIFICATES = atomic.ROOT / "data" / "proofs"
+
+
+@dataclass(frozen=True)
+class Proof(ABC):
+    """A proved claim about a policy."""
+
+    policy: VoronoiPolicy
+
+    @property
+    @abstractmethod
+    def claim(self) -> dict:
+        """The proved claim, as JSON-serialisable values."""
+
+    @abstractmethod
+    def parts(self) -> list:
+        """Return the parts of the proof, as JSON-serialisable values."""
+
+    def certificate(self) -> dict:
+        """Return task, policy, claim and pieces, as JSON-serialisable values."""
+        numbers = {name: getattr(self.policy, name).tolist() for name in ("codewords", "coefficients", "scale")}
+        return {
+            "task": self.policy.task.name,
+            "policy": {**numbers, "metric": self.policy.metric},
+            "claim": self.claim,
+            "pieces": self.parts(),
+        }
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the certificate to one sealed file."""
+        sealed.write_sealed(path, json.dumps(self.certificate(), separators=(",", ":"), sort_keys=True).encode())
+
+
+def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
+    """Load the certificate data/proofs/NAME.json: return its policy and its whole content. Raises `DamagedFile`."""
+    content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
+    numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
+    return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content

@@ -1,0 +1,121 @@
+"""Prove over a grid what SimpleGoal's program does, also under disturbances.
+
+The square is cut into equal boxes. From each box a step leads into the boxes that its next states can touch, over all
+cells that the box may overlap, all roundings, and all disturbances. A box is good if all of these boxes are good or
+surely in the goal. Boxes that are good within a given number of steps are found backwards. What is proved in this way
+holds for every start, also on borders. What is not proved may still hold.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsp.checks import check_count, check_number
+from vsp.policy import VoronoiPolicy
+from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
+
+from .grid import Way, around, steps_into
+from .simplegoal import check_provable
+
+SEEN = 1e-7  # largest distance of an observation (float32) from the state
+TIES = 1e-12  # relative to the distances: far more than float64 loses in one
+ROUNDING = 1e-9  # far more than float64 loses in a step; the goal is narrower and the pit wider by as much
+
+
+def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1000) -> np.ndarray:
+    """Return the most steps from any state of each box into the goal, without entering the pit; 0 where this is not
+    proved. (n, n)
+
+    Row i, column j: the box from (i / n, j / n). Each step may be disturbed by up to `disturbance` in both coordinates.
+    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, and for numbers out of range.
+    """
+    check_provable(policy)
+    check_number("disturbance", disturbance, least=0.0, most=1.0)
+    check_count("n", n, most=4000)
+    edges = np.linspace(0.0, 1.0, n + 1)
+    low, high = (np.stack(np.meshgrid(one, one, indexing="ij")).reshape(2, -1) for one in (edges[:-1], edges[1:]))
+    ended = (high < GOAL_EDGE - ROUNDING).all(axis=0).reshape(n, n)
+    ways = [_way(policy, cell, low, high, disturbance + ROUNDING, n) for cell in range(len(policy))]
+    return steps_into(ended, ways, TASK.max_steps)
+
+
+def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
+    """Return the largest disturbance of a step, to `tolerance`, for which a grid proves that every start outside the
+    pit reaches the goal; NaN if this is not proved even without a disturbance. A coarse grid finds a smaller one, by
+    about 1 / n."""
+    check_number("tolerance", tolerance, least=1e-6, most=0.1)
+    low, high = 0.0, STRIDE
+    if not proved(steps_to_goal(policy, n=n)):
+        return float("nan")
+    while high - low > tolerance:
+        middle = (low + high) / 2
+        low, high = (middle, high) if proved(steps_to_goal(policy, disturbance=middle, n=n)) else (low, middle)
+    return low
+
+
+def proved(steps: np.ndarray) -> bool:
+    """Return whether every start outside the pit reaches the goal, by the result of `steps_to_goal`."""
+    return bool((steps > 0)[outside_pit(steps)].all())
+
+
+def outside_pit(steps: np.ndarray) -> np.ndarray:
+    """Return which boxes of a grid like `steps` (n, n) have starts outside the pit. (n, n)"""
+    low, high = (np.arange(len(steps)) + end for end in (0, 1))
+    within = (low > PIT_LOW * len(steps) - ROUNDING) & (high < PIT_HIGH * len(steps) + ROUNDING)
+    return ~np.logical_and.outer(within, within)
+
+
+def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, spread: float, n: int) -> Way:
+    """Bound where a step by the map of `cell` leads from each box `low` to `high` (2, n * n) that touches the cell."""
+    seen_low, seen_high, tie = low - SEEN, high + SEEN, largest_tie(policy, np.ones(2))
+    touched = np.ones(low.shape[1], dtype=bool)
+    for other in range(len(policy)):
+        if other != cell:
+            touched &= least_gap(policy, cell, other, seen_low, seen_high) <= tie
+    low, high, seen_low, seen_high = (one[:, touched] for one in (low, high, seen_low, seen_high))
+    after_low, after_high = np.empty_like(low), np.empty_like(high)
+    for axis in (0, 1):
+        *weights, bias = policy.coefficients[cell, :, axis]
+        raw = np.stack(_bounds(weights, bias, seen_low, seen_high))
+        free = (np.abs(raw) <= 1.0).all(axis=0)  # no limit acts: bounding state and action together is tighter
+        both = _bounds([(i == axis) + STRIDE * w for i, w in enumerate(weights)], STRIDE * bias, low, high)
+        slack = spread + STRIDE * SEEN * np.abs(weights).sum()
+        for after, own, action, one, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
+            limited = own[axis] + STRIDE * np.clip(action, -1.0, 1.0)
+            after[axis] = np.where(free, one + sign * slack, limited + sign * spread)
+    return way_to(np.flatnonzero(touched), after_low, after_high, n)
+
+
+def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: int) -> Way:
+    """Return the way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls limit
+    them."""
+    after_low, after_high = (np.clip(one, 0.0, 1.0) for one in (after_low, after_high))
+    in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
+    return Way(boxes, *around(after_low * n - ROUNDING, after_high * n + ROUNDING, n), ~in_pit)
+
+
+def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest value of a linear function over boxes."""
+    ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
+    return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
+
+
+def largest_tie(policy: VoronoiPolicy, reach: np.ndarray) -> float:
+    """Return the largest difference of two distances at which rounding may decide which is smaller, for observations up
+    to `reach` (d,) in size. Euclidean distances are squared."""
+    sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
+    return TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
+
+
+def least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Bound from below how much farther observations in a box are from codeword `cell` than from `other`. `low`, `high`
+    (d, m). Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone
+    function."""
+    found = 0.0
+    for axis, scale in enumerate(policy.scale):
+        gaps = []
+        for end in (low[axis], high[axis]):
+            own, others = ((end - policy.codewords[i, axis]) / scale for i in (cell, other))
+            gaps.append(np.abs(own) - np.abs(others) if policy.metric == "manhattan" else own**2 - others**2)
+        found = found + np.minimum(*gaps)
+    return found

@@ -1,0 +1,179 @@
+"""Build the student versions, the hand-out, the solutions, the slides and the lecturer's guide from the lessons.
+
+    python -m vsp_course.build --out .
+
+A source is a notebook with nbgrader's metadata: solution cells, whose answers stand between `### BEGIN SOLUTION` and
+`### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone, those tagged `slide` to the slides.
+In a student version, nbgrader's stub replaces each answer, as `nbgrader generate_assignment` does with the solution.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import hashlib
+import itertools
+import json
+import os
+import re
+from pathlib import Path
+
+from vsp.run.atomic import ROOT, DamagedFile, sha256, write_text
+from vsp.run.command import in_one_line
+from vsp.run.locks import file_lock
+from vsp.run.notebook import NotebookNode, nbformat
+from vsp.run.sealed import read_sealed, write_sealed
+
+from .handout import write_handout
+from .slides import is_slide, slides
+
+SOURCES = ROOT / "notebooks" / "course"
+HERE = Path(__file__).parent
+GUIDE = HERE / "guide.md"  # how the lecturer's guide begins
+MADE = ".made"  # checksums of the files written last
+BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
+STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
+_ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
+
+
+def build(out: str | os.PathLike) -> list[Path]:
+    """Write all versions, slides and the guide to OUT/build/course and return the files. Same sources, same bytes.
+
+    A file that somebody has edited is kept under another name.
+    """
+    folder, lessons = Path(out) / "build" / "course", read_sources()
+    students = {name: nbformat.writes(student(lesson)) + "\n" for name, lesson in lessons.items()}
+    texts = {f"student/{name}": text for name, text in students.items()}
+    texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
+    texts |= {f"slides/{Path(name).stem}.html": slides(lesson) for name, lesson in lessons.items()}
+    texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
+    texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
+    texts["guide.md"] = guide(lessons)
+    with file_lock(folder.parent / "locks" / "course", f"writes into {folder}"):
+        _keep_edited(folder, texts)
+        for name, text in texts.items():
+            write_text(folder / name, text)
+        made = {name: sha256(folder / name) for name in texts}
+        write_sealed(folder / MADE, json.dumps(made).encode())
+        write_handout(folder / "handout.zip", students)
+    return [folder / name for name in (*texts, "handout.zip")]
+
+
+def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
+    """Rename files that somebody edited: their content is neither the last build's nor this one's."""
+    try:
+        made = json.loads(read_sealed(folder / MADE))
+    except (FileNotFoundError, DamagedFile):
+        made = {}  # no record of the last build
+    for path, text in ((folder / name, text) for name, text in texts.items()):
+        ours = (made.get(path.relative_to(folder).as_posix()), hashlib.sha256(text.encode()).hexdigest())
+        if path.exists() and sha256(path) not in ours:
+            names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
+            kept = next(name for name in names if not name.exists())
+            path.rename(kept)
+            print(f"{path} was edited: kept as {kept.name}")
+
+
+def read_sources() -> dict[str, NotebookNode]:
+    """The lessons by file name, in order."""
+    return {path.name: nbformat.read(path, as_version=4) for path in sorted(SOURCES.glob("lesson_*.ipynb"))}
+
+
+def student(lesson: NotebookNode) -> NotebookNode:
+    """Return the student version: no answers, no lecturer's cells, read-only check cells."""
+    made = solution(lesson)
+    for cell in made.cells:
+        if is_solution(cell):
+            cell.source = without_answers(cell.source)
+        if is_check(cell):
+            cell.metadata.editable = cell.metadata.deletable = False
+    return made
+
+
+def solution(lesson: NotebookNode) -> NotebookNode:
+    """Return the solution: answers between their marks, no lecturer's cells. nbgrader takes it as its source."""
+    made = copy.deepcopy(lesson)
+    made.cells = [cell for cell in made.cells if not for_lecturer(cell) and not is_slide(cell)]
+    return made
+
+
+def without_answers(source: str) -> str:
+    """Replace each answer in a solution cell by the stub. Raises ValueError unless marks come in pairs."""
+    stubbed, n = _ANSWER.subn(lambda match: "\n".join(match[1] + line for line in STUB), source)
+    if not n or BEGIN in stubbed or END in stubbed:
+        raise ValueError(f"expected `{BEGIN}` and `{END}` in pairs, on lines of their own, in:\n{source}")
+    return stubbed
+
+
+def is_solution(cell: NotebookNode) -> bool:
+    """Whether the student writes in this cell."""
+    return cell.metadata.get("nbgrader", {}).get("solution", False)
+
+
+def is_check(cell: NotebookNode) -> bool:
+    """Whether this cell checks a student's answer."""
+    return cell.metadata.get("nbgrader", {}).get("grade", False)
+
+
+def for_lecturer(cell: NotebookNode) -> bool:
+    """Whether this cell appears in the guide only."""
+    return "lecturer" in cell.metadata.get("tags", [])
+
+
+def points(lesson: NotebookNode) -> int:
+    """Sum the points of all exercises of a lesson."""
+    return sum(cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell))
+
+
+def guide(lessons: dict[str, NotebookNode]) -> str:
+    """Return the lecturer's guide in Markdown: an overview, then notes and solutions for each lesson."""
+    parts = [GUIDE.read_text(encoding="utf-8"), "# What students see\n"]
+    parts += [_overview(name, lesson) for name, lesson in lessons.items()]
+    parts += ["# For lecturers only\n"]
+    parts += [_notes(lesson) for lesson in lessons.values()]
+    return "\n".join(parts)
+
+
+def _overview(name: str, lesson: NotebookNode) -> str:
+    """Title, aims and exercises with their points."""
+    exercises = [
+        re.search(r"^## (Exercise .*)", cell.source, re.MULTILINE) for cell in lesson.cells if not is_slide(cell)
+    ]
+    worth = [cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell)]
+    rows = [f"| {found[1]} | {n} |" for found, n in zip(filter(None, exercises), worth, strict=True)]
+    table = "\n".join(["| exercise | points |", "|---|---|", *rows, f"| all | {points(lesson)} |"])
+    return f"{_deeper(lesson.cells[0].source)}\n\nThe notebook: `student/{name}`.\n\n{table}\n"
+
+
+def _notes(lesson: NotebookNode) -> str:
+    """The lecturer's cells and the solutions of each section, under its heading."""
+    lines, heading = [], ""
+    for cell in lesson.cells:
+        if is_slide(cell):
+            continue
+        found = re.findall(r"^#{1,2} (.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
+        if found and not for_lecturer(cell):
+            heading = f"{'##' if cell is lesson.cells[0] else '###'} {found[0]}\n"
+        if for_lecturer(cell) or is_solution(cell):
+            lines += [heading] if heading else []
+            lines += [f"```python\n{cell.source}\n```\n" if is_solution(cell) else f"{cell.source}\n"]
+            heading = ""
+    return "\n".join(lines)
+
+
+def _deeper(markdown: str) -> str:
+    """Markdown with its headings one level down."""
+    return re.sub(r"^#", "##", markdown, flags=re.MULTILINE)
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--out", default=".", help="files go to OUT/build/course")
+    *_, guide, handout = build(parser.parse_args().out)
+    print(f"lessons, slides and project are in {guide.parent}; begin with {guide}; for students: {handout}")
+
+
+if __name__ == "__main__":
+    with in_one_line():
+        main()

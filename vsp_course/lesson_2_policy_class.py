@@ -1,0 +1,126 @@
+"""Check of lesson 2: a sub-policy class written by the student."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+from vsp import geometry
+from vsp.algorithms import teacher_episodes
+from vsp.config import paper_preset
+from vsp.export import SHARED
+from vsp.partition import Partition
+from vsp.rollouts import Episode, Policy
+from vsp.subpolicies import POLICY_CLASSES, PolicyClass, SubPolicies, policy_class
+from vsp.tasks import Task
+
+from .feedback import Exercise, joined
+
+OWN_CLASS = Exercise("2.7", "my_policy_class")
+ENOUGH = 0.8  # of the error that constants have; arbitrary features, such as the sine of 50 x, save less
+
+
+@OWN_CLASS.checks
+def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
+    """2.7: `my_policy_class(task)` returns a `PolicyClass`: new, with a right gradient, better than constants."""
+    own_class = OWN_CLASS.call(function, task)
+    OWN_CLASS.refuse_if(not isinstance(own_class, PolicyClass), f"a {type(own_class).__name__}", "a PolicyClass", 1)
+    states = np.random.default_rng(0).uniform(task.low, task.high, size=(50, len(task.low)))
+    features = _features(own_class, states)
+    for name in [name for name in POLICY_CLASSES if name != "pid" or task.signals]:
+        there = policy_class(name, task)
+        known = there.features(states)
+        same = _within(features, known) and _within(known, features)
+        if same and type(own_class) in (PolicyClass, type(there)):
+            raise OWN_CLASS.wrong(f"the features of {name!r}", "a class that is not there yet", 1)
+    sums = type(own_class) is PolicyClass and _within(features, policy_class("linear", task).features(states))
+    OWN_CLASS.refuse_if(sums, "features that are sums of the state's components", "at least one that is no such sum", 4)
+    _code(own_class, states, features)
+    _gradient(own_class, features, len(task.outputs))
+    constant, own = _errors(policy_class("constant", task), teacher, task), _errors(own_class, teacher, task)
+    share = f"{own / constant:.0%} of the error that constants have in the same cells"
+    OWN_CLASS.refuse_if(own > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
+    linear = _errors(policy_class("linear", task), teacher, task)
+    OWN_CLASS.passed(
+        f"{len(own_class.rows)} parameters per action, {share}; x and y alone have {linear / constant:.0%}."
+    )
+
+
+def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
+    for name in ("terms", "code"):
+        single = 'a tuple with an entry per feature; one alone needs a comma: ("...",)'
+        OWN_CLASS.refuse_if(isinstance(getattr(own_class, name), str), f"a string for `{name}`", single, 2)
+    q, found = len(own_class.terms), []
+    for batch, name in ((states, "50 states"), (states[0], "a single state"), (states.reshape(5, 10, -1), "5 x 10")):
+        made = OWN_CLASS.call(own_class.features, batch)
+        found.append(OWN_CLASS.array(made, (*batch.shape[:-1], q), f"features of {name}", 2))
+    same = np.allclose(found[0][0], found[1])
+    OWN_CLASS.refuse_if(not same, "other features for a single state than for the same one in a batch", "the same", 2)
+    sizes, n = OWN_CLASS.array(own_class.sizes, (q,), "sizes", 2), len(own_class.code)
+    wrong = (sizes <= 0).any() or n != q
+    OWN_CLASS.refuse_if(wrong, f"{n} pieces of code and sizes {sizes}", f"{q} of both, sizes above 0", 2)
+    return found[0]
+
+
+def _within(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether features `a` are linear combinations of features `b` and a constant."""
+    both, alone = (np.column_stack([*parts, np.ones(len(a))]) for parts in ((a, b), (b,)))
+    return np.linalg.matrix_rank(both) == np.linalg.matrix_rank(alone)
+
+
+def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> None:
+    """Whether the exported code computes the same features."""
+    names = {name: getattr(math, name) for name in SHARED}
+    for j, text in enumerate(own_class.code):
+        if found := re.search(r"\*\*|//| if ", text):
+            raise OWN_CLASS.wrong(f"{found[0].strip()!r} in the code {text!r}", "what C has too, such as products", 3)
+        try:
+            values = [float(eval(text, {"__builtins__": {}}, {**names, "state": state})) for state in states]
+        except Exception as error:
+            found = f"{type(error).__name__} ({error}) in the code {text!r}"
+            expected = f"an expression of state[0], state[1], ... with no functions but {', '.join(SHARED)}"
+            raise OWN_CLASS.wrong(found, expected, 3) from None
+        found = f"code {text!r} that gives other numbers than feature {own_class.terms[j]!r}"
+        OWN_CLASS.refuse_if(not np.allclose(values, features[:, j]), found, "the same", 3)
+
+
+def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
+    """Whether the gradient of the loss by the parameters agrees with finite differences."""
+    rng = np.random.default_rng(1)
+    inputs = np.column_stack([features, np.ones(len(features))])[None]
+    theta, actions = rng.normal(size=(1, len(own_class.rows), m)), rng.normal(size=(1, len(features), m))
+
+    def loss(parameters: np.ndarray) -> float:
+        return float(np.square(own_class.batch(inputs, parameters)[0] - actions).sum())
+
+    outputs, pull_back = own_class.batch(inputs, theta)
+    if not np.allclose(outputs[0], own_class.outputs(features, theta[0])):
+        raise OWN_CLASS.wrong("other outputs in training (`batch`) than in use (`outputs`)", "the same", 3)
+    own = pull_back(2 * (outputs - actions))
+    for index in np.ndindex(theta.shape):
+        step = np.zeros_like(theta)
+        step[index] = 1e-6 * max(1.0, abs(theta[index]))
+        slope = (loss(theta + step) - loss(theta - step)) / (2 * step[index])
+        right, found = np.isclose(own[index], slope, rtol=1e-3, atol=1e-3), f"a gradient of {own[index]:.4g}"
+        OWN_CLASS.refuse_if(not right, f"{found} by parameter {index[1]}", f"the slope {slope:.4g}", 3)
+
+
+def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:
+    """Mean squared error after training, in the cells of eight codewords, on fresh states of the teacher."""
+    rng = np.random.default_rng(7)
+    (states, actions), (fresh, right) = (joined(teacher_episodes(teacher, task, 300, rng)) for _ in range(2))
+    partition = Partition(task, paper_preset(task))
+    partition.models = SubPolicies(own_class, len(task.outputs), initial="uniform")
+    partition.buffers = type(partition.buffers)(len(own_class.terms), len(task.outputs))
+    for codeword in states[rng.choice(len(states), 8, replace=False)]:
+        partition.add(codeword, rng)
+    partition.observe(Episode(states, actions))
+    cells = np.flatnonzero(partition.buffers.counts)
+    for rate in (0.05,) * 400 + (0.01,) * 400:
+        inputs, goals = partition.buffers.sample(cells, 128, rng)
+        partition.models.train(cells, inputs, goals, learning_rate=rate)
+    own = partition.models.parameters[geometry.nearest(partition.codewords, fresh)]
+    return float(np.square(own_class.outputs(own_class.features(fresh), own) - right).mean())
