@@ -1,4 +1,4 @@
-"""`make proofs` and `make proofs-teacher`: write certificates to data/proofs/ and their results to data/results/."""
+"""`make proofs` and `make proofs-teacher`: write certificates to data/beyond/proofs and results to data/beyond."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from studies.results import RESULTS, read_results, write_results
 from vsp.algorithms import distill
 from vsp.config import paper_preset
 from vsp.evaluation import start_states
 from vsp.paper.baselines import linear_map
 from vsp.paper.printed import published_policy
-from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import collect_episodes, rollout
 from vsp.run import command, listed
@@ -46,18 +46,20 @@ HOUR = 3600.0
 
 
 def main() -> None:
-    """Prove the policies that are not proved yet. Write a certificate of each to data/proofs/ and the results to
-    data/results/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
+    """Prove the policies that are not proved yet. Write a certificate of each to data/beyond/proofs/ and the results to
+    data/beyond/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
     that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
+    parser.add_argument(
+        "--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it"
+    )
     parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     if arguments.teacher:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
-    results = Path(arguments.out) / "data" / "results"
+    results = Path(arguments.out) / "data" / "beyond"
     proved = certificates(Path(arguments.out), arguments.jobs)
     if proved or not (results / "proofs_reals.csv").exists():
         table = pd.DataFrame([reals(arguments.jobs)])
@@ -89,12 +91,12 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
 
 def certificates(out: Path, jobs: int | str) -> list[str]:
     """Write the missing certificates and the table, row by row: an interrupted run can continue. Return their names."""
-    table = out / "data" / "results" / "proofs.csv"
+    table = out / "data" / "beyond" / "proofs.csv"
     rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
     makers = policies()
     missing = [name for name in makers if name not in {row["name"] for row in rows}]
     for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
-        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json", jobs))
+        rows.append(_proved(name, makers[name](), out / "data" / "beyond" / "proofs" / f"{name}.json", jobs))
         write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
     return missing
 

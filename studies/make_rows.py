@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vsp.paper.results import write_results
+from studies.results import write_results
 from vsp.policy import VoronoiPolicy
 from vsp.run import command
 
@@ -19,21 +19,21 @@ from .comparison.regret import optimum
 
 
 def main() -> None:
-    """Make the missing rows, and write them to data/results/<table>_<task>.csv. Some tables also keep one policy, and
+    """Make the missing rows, and write them to data/beyond/<table>_<task>.csv. Some tables also keep one policy, and
     the faithful table also has same_<task>.csv. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the
     tasks that take hours.
 
-    Also write optimum.csv; or, for the tasks that take hours, beyond_<task>.policy, and for robots gait_<task>.csv and
+    Also write optimum.csv; or, for the tasks that take hours, methods_<task>.policy, and for robots gait_<task>.csv and
     fewest_<task>.csv.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="results go to OUT/data/results, rows to OUT/build/beyond")
+    parser.add_argument("--out", default=".", help="results go to OUT/data/beyond, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
     parser.add_argument("--tables", nargs="+", choices=TABLES | ROBOT_TABLES, help="default: all")
     arguments = parser.parse_args()
     out, tasks = Path(arguments.out), (*LONG, *WALKERS) if arguments.long else TASKS
-    rows_in, results = out / "build" / "beyond", out / "data" / "results"
+    rows_in, results = out / "build" / "methods", out / "data" / "beyond"
     advice = "leave --long out" if arguments.long else "add --long"
     wanted = {(table, task): jobs_of(task, table) for task in tasks for table in tables_of(task)}
     wanted = {about: jobs for about, jobs in wanted.items() if not arguments.tables or about[0] in arguments.tables}
@@ -56,7 +56,7 @@ def main() -> None:
 
 def _beside(long: bool, tables: set[str], out: Path) -> None:
     """Write the files that are made from the rows, or in addition to them."""
-    results = out / "data" / "results"
+    results = out / "data" / "beyond"
     if "robots" in tables:
         for task in WALKERS:
             policy = VoronoiPolicy.load(results / f"robots_{task}.policy")
@@ -64,7 +64,7 @@ def _beside(long: bool, tables: set[str], out: Path) -> None:
             write_results(kept_robots.fewest(policy), f"fewest_{task}", out=out)
     if "beyond" in tables and long:
         for task in LONG:
-            keep_simplest(task, results / f"beyond_{task}.policy")
+            keep_simplest(task, results / f"methods_{task}.policy")
     elif "beyond" in tables:
         write_results(optimum(), "optimum", out=out)
 

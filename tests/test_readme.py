@@ -88,7 +88,8 @@ def test_the_api_has_every_module():
 
 def table_text(name):
     """figures/tables/NAME.csv as the pages quote it: as committed, where a machine of another type wrote over it."""
-    path = f"figures/tables/{name}.csv"
+    folder, _, stem = name.rpartition("/")
+    path = f"figures/{folder}/tables/{stem}.csv".replace("//", "/")
     return _committed(path) if _made_on_another_type() else (ROOT / path).read_text("utf-8")
 
 
@@ -123,7 +124,7 @@ def test_numbers_of_the_readme_are_those_of_the_tables():
 
 
 def test_faithful_policies_are_those_of_the_table():
-    table = read_table("beyond_faithful").set_index("task")
+    table = read_table("beyond/faithful").set_index("task")
     tasks = table.to_dict("index")
     both = [f"{round(own['both'] * own['policies'])}" for own in tasks.values()]
     assert quoted("return as much, in all 20 seeds:") and both[:3] == ["20"] * 3
@@ -135,7 +136,7 @@ def test_faithful_policies_are_those_of_the_table():
     share = f"{100 * lander['r2']:.0f} %"
     assert quoted(f"LunarLander {lander['at most']} cells reproduce only {share}")
     assert lander["good"] == 0.9 and "returns in nine of ten seeds, and" in " ".join(RESULTS.split())
-    teachers = read_table("beyond_headline").set_index("task")["teacher"]
+    teachers = read_table("beyond/headline").set_index("task")["teacher"]
     pattern = r"^\| (\w+) \| (\d+) \| (0\.\d{3}) \| ([-\d.]+) \| ([-\d.]+) \| (\d+) of (\d+) \| ([\d.]+) \|$"
     assert re.findall(pattern, RESULTS, flags=re.M) == [
         (task, f"{own['at most']}", f"{own['r2']:.3f}", f"{own['mean']:.2f}", f"{teachers[task]:.2f}", good,
@@ -145,17 +146,17 @@ def test_faithful_policies_are_those_of_the_table():
 
 
 def test_who_leads_is_that_of_the_table():
-    table = read_table("beyond_leaders").set_index(["task", "size"])
+    table = read_table("beyond/leaders").set_index(["task", "size"])
     two = table.loc[("MountainCar", 2)]
     assert quoted(f"of a line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
     said = f"{two['rival mean']:.2f} on average: a policy of two cells, too, but our search ends at {two['mean']:.2f}"
     assert said in " ".join(RESULTS.split())
     assert two["rival"] == "oblique tree, constants"
-    best = read_table("limit_sizes").set_index(["task", "size"])["mean"]["MountainCar", 3]
+    best = read_table("beyond/limit_sizes").set_index(["task", "size"])["mean"]["MountainCar", 3]
     assert quoted(f"Distilled from the best policy and tuned longer, three return {best:.2f}.")
     assert set(table.loc["SimpleGoal", "ahead"]) == set(table.loc["LunarLander", "ahead"]) == {"level"}
     assert (table["ahead"] != "ours").all() and "our cells have a certain lead on no task" in " ".join(RESULTS.split())
-    means = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]
+    means = read_table("beyond/equal").set_index(["task", "size", "method"])["mean"]
     lander, constants = means["LunarLander"], means["MountainCar", 4, "oblique tree, constants"]
     said = f"one linear map returns {lander[1, 'one linear map']:.1f}, two of our cells {lander[2, 'our cells']:.1f}"
     assert said in " ".join(RESULTS.split()) and f"constant leaves returns {constants:.2f})" in notebook("09")
@@ -165,7 +166,7 @@ def test_who_leads_is_that_of_the_table():
 
 
 def test_how_like_the_teacher_trees_are_is_that_of_the_rows():
-    apart = read_table("beyond_apart").query("task == 'SimpleGoal'").set_index("method")["r2 4"]
+    apart = read_table("beyond/apart").query("task == 'SimpleGoal'").set_index("method")["r2 4"]
     tree, cells = apart["oblique tree, greedy fit"], apart["our cells, greedy fit"]
     assert f"a tree reaches {tree:.3f}, and cells {cells:.3f}, with four" in " ".join(RESULTS.split())
     lander = all_rows("LunarLanderContinuous-v3").groupby(["method", "size"])["r2"].median().drop("teacher")
@@ -175,7 +176,7 @@ def test_how_like_the_teacher_trees_are_is_that_of_the_rows():
 
 
 def test_how_often_faithful_landers_fail_is_that_of_the_table():
-    tail = read_table("beyond_tail").set_index(["method", "size"])["failing"]
+    tail = read_table("beyond/tail").set_index(["method", "size"])["failing"]
     faithful, teacher = (1000 * tail[about] for about in (("our cells, faithful", 8), ("teacher", 0)))
     said = f"{faithful:.0f} landings in a thousand fail, {teacher:.0f} of the teacher's"
     others = tail[tail.index.get_level_values("method") != "our cells, faithful"]
@@ -183,7 +184,7 @@ def test_how_often_faithful_landers_fail_is_that_of_the_table():
 
 
 def test_up_to_how_many_cells_seeds_agree():
-    sizes = read_table("beyond_sizes")
+    sizes = read_table("beyond/sizes")
     found = [largest_alike(sizes[sizes["task"] == task]) for task in ("SimpleGoal", "MountainCar", "Pendulum")]
     said = f"with up to {found[0]} cells on SimpleGoal, {found[1]} on MountainCar and {found[2]} on Pendulum"
     assert said in " ".join(RESULTS.split())
@@ -233,14 +234,14 @@ def test_headline_is_that_of_the_table():
     assert re.findall(pattern, RESULTS, flags=re.M) == [
         (row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f}",
          f"{row['rival mean']:.2f}", f"{100 * row['rival reached']:.0f}")
-        for row in read_table("beyond_headline").to_dict("records")
+        for row in read_table("beyond/headline").to_dict("records")
     ]  # fmt: skip
 
 
 def test_what_is_found_without_a_teacher_is_that_of_the_table():
-    table = read_table("beyond_ablation")
+    table = read_table("beyond/ablation")
     without = table[table["part"] == "no teacher"].set_index("task")["mean"]
-    lander = read_table("beyond_lunarlander").set_index(["method", "size"])["mean"]
+    lander = read_table("beyond/lunarlander").set_index(["method", "size"])["mean"]
     pattern = r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\) and LunarLander \(([\d.]+)\)"
     (text,) = re.findall(pattern, RESULTS)
     found = without["SimpleGoal"], without["Pendulum"], lander["refined, no teacher", 4]
@@ -250,7 +251,7 @@ def test_what_is_found_without_a_teacher_is_that_of_the_table():
 
 
 def test_the_printed_policy_is_that_of_the_table():
-    table = table_text("beyond_pendulum_policy")
+    table = table_text("beyond/pendulum_policy")
     (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", RESULTS, flags=re.S)
     cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
     for row, (codeword, equation) in zip(table.splitlines()[1:], cells, strict=True):
@@ -272,7 +273,7 @@ def test_what_cells_buy_is_that_of_the_table():
 
 def test_what_is_said_to_be_certain_is_in_its_tables():
     block = " ".join(RESULTS.partition("## What is certain?")[2].partition("\n## ")[0].split())
-    rows = pd.read_csv(ROOT / "data/results/proofs.csv").set_index("name")
+    rows = pd.read_csv(ROOT / "data/beyond/proofs.csv").set_index("name")
     paper, one, tuned, margin, car = (
         rows.loc[name]
         for name in (
@@ -292,19 +293,20 @@ def test_what_is_said_to_be_certain_is_in_its_tables():
     assert f"same within {margin['program_steps']:.0f} steps" in block
     assert f"off by {margin['disturbance']:.4f}" in block
     assert f"({car['n_states']:,.0f} states after the first step) and returns at least {car['least']:.3f}" in block
-    assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0
+    assert pd.read_csv(ROOT / "data/beyond/proofs_reals.csv")["share"].item() == 1.0
     for name in ("grid", "teacher"):
-        share = pd.read_csv(ROOT / f"data/results/proofs_{name}.csv")["share"].iloc[-1]
+        share = pd.read_csv(ROOT / f"data/beyond/proofs_{name}.csv")["share"].iloc[-1]
         assert f"from {math.floor(1e4 * share) / 100:.2f} % of the starts" in block
 
 
 def test_what_is_said_of_the_limit_is_in_its_tables():
     block = RESULTS.partition("## How good can a few cells be?")[2].partition("\n## ")[0]
     best, sizes, starts, robots = (
-        pd.read_csv(ROOT / f"figures/tables/limit_{name}.csv") for name in ("references", "sizes", "starts", "robots")
+        pd.read_csv(ROOT / f"figures/beyond/tables/limit_{name}.csv")
+        for name in ("references", "sizes", "starts", "robots")
     )
     known = {row.task: f"{row.best:.3f} | {row.teacher:.3f}" for row in best.itertuples()}
-    teachers = pd.read_csv(ROOT / "figures/tables/beyond_headline.csv").set_index("task")["teacher"]
+    teachers = pd.read_csv(ROOT / "figures/beyond/tables/headline.csv").set_index("task")["teacher"]
     known["LunarLander"] = f"not known | {teachers['LunarLander']:.2f}"
     cells = {"SimpleGoal": 4, "MountainCar": 3, "Pendulum": 8, "LunarLander": 3}
     for row in sizes[[cells[row.task] == row.size for row in sizes.itertuples()]].itertuples():
@@ -362,7 +364,7 @@ def notebook(name):
 
 
 def test_episodes_that_the_text_compares_are_those_of_the_table():
-    table = read_table("beyond_budgets").set_index(["task", "method"])
+    table = read_table("beyond/budgets").set_index(["task", "method"])
     seen, tuning = table["teacher"].unstack("task"), table["tuning"].unstack("task")
     times = seen.loc["our cells, faithful"] / seen.loc["our cells"]
     said = f"{times.min():.0f} to {times.max():.0f} times as many episodes of the teacher"

@@ -2,7 +2,7 @@
 
 A fit is some 700 evaluations of the loss and its gradient (`few_cells.search`), so one evaluation is measured. No task
 is needed: states are normally distributed, and actions are those of a limited linear map. One quantity varies at a
-time; the others are those of HalfCheetah. The command writes data/results/fits.csv. Times are processor time of one
+time; the others are those of HalfCheetah. The command writes data/beyond/fits.csv. Times are processor time of one
 thread and differ from run to run. Memory is NumPy's peak allocation.
 """
 
@@ -16,7 +16,8 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from vsp.paper.results import settings_id, write_results
+from studies.results import write_results
+from vsp.paper.results import settings_id
 from vsp.run.machine import cpu_type
 from vsp.run.progress import progress
 from vsp_beyond.few_cells.search import CLIP_SLOPES, TEMPERATURES, whole_loss
@@ -73,9 +74,9 @@ def made_with(varied: dict[str, tuple[int, ...]] = VARIED) -> dict[str, str | in
 
 
 def main() -> None:
-    """Measure fits, in under a minute, and write OUT/data/results/fits.csv."""
+    """Measure fits, in under a minute, and write OUT/data/beyond/fits.csv."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="the result goes to OUT/data/results")
+    parser.add_argument("--out", default=".", help="the result goes to OUT/data/beyond")
     write_results(study(), "fits", out=parser.parse_args().out, float_format="%.4g")
 
 

@@ -2,7 +2,7 @@
 
 The paper names both as limits in many dimensions. Codewords are uniform in the unit cube, which is equally hard for all
 methods. Distances are Euclidean, for which the Delaunay graph is exact; look-ups are also measured for the Manhattan
-distance. The command writes data/results/lookup.csv. Times are processor time of one thread. Times, and which graphs
+distance. The command writes data/beyond/lookup.csv. Times are processor time of one thread. Times, and which graphs
 exceed the time limit, differ from run to run. All other columns are the same on every machine.
 """
 
@@ -18,8 +18,9 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from studies.results import write_results
 from vsp import geometry
-from vsp.paper.results import settings_id, write_results
+from vsp.paper.results import settings_id
 from vsp.run.machine import cpu_type
 from vsp.run.progress import progress
 
@@ -221,9 +222,9 @@ def made_with(dimensions=DIMENSIONS, sizes=SIZES) -> dict[str, str | int]:
 
 
 def main() -> None:
-    """Measure look-ups and neighbour graphs, in under three minutes, and write OUT/data/results/lookup.csv."""
+    """Measure look-ups and neighbour graphs, in under three minutes, and write OUT/data/beyond/lookup.csv."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="the result goes to OUT/data/results")
+    parser.add_argument("--out", default=".", help="the result goes to OUT/data/beyond")
     write_results(study(), "lookup", out=parser.parse_args().out, float_format="%.4g")
 
 

@@ -1,11 +1,11 @@
-"""Draw the figure of docs/trust.md from data/results/kills.csv: how much time a kill costs."""
+"""Draw the figure of docs/trust.md from data/beyond/kills.csv: how much time a kill costs."""
 
 from __future__ import annotations
 
 import os
 
+from studies.results import read_results
 from vsp import show
-from vsp.paper.results import read_results
 
 
 def save_kills(out: str | os.PathLike) -> None:

@@ -1,6 +1,6 @@
 """The comparison of methods: how each row is made, and what the committed rows show."""
 
-from vsp.paper.results import RESULTS, read_results
+from studies.results import RESULTS, read_results
 
 from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail
 from .faithful_summary import largest_alike, likeness, other_teachers

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from studies.results import read_results
 from vsp.evaluation import start_states
-from vsp.paper.results import read_results
 from vsp.rollouts import visited_states
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import Teacher, load_teacher
@@ -38,7 +38,7 @@ PAIRS = {
     "one linear map": ("one linear map", "one linear map, tuned"),
 }  # fmt: skip
 # Tables of `method_tables` that together hold all methods, distilled from the shipped teacher
-TABLES = ("beyond", "tuned", "apart", "faithful", "demanded")
+TABLES = ("methods", "tuned", "apart", "faithful", "demanded")
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 
@@ -169,7 +169,7 @@ def budgets(task: str) -> pd.DataFrame:
 def _seconds(task: str) -> pd.Series:
     """Return the median seconds by method and size, from all committed tables of times."""
     long = "_long" * (task in LONG)
-    frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("beyond", "tuned", "faithful")])
+    frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
     return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
 
 

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pandas as pd
 
-from vsp.paper.results import read_results
+from studies.results import read_results
 from vsp.paper.statistics import percentile_interval, share_interval
 
 from .method_summary import AS_GOOD, mean_interval, read_rows
@@ -73,7 +73,7 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     """
     others = read_rows(task, folder, table="teachers")
     asked = others[["method", "size"]].drop_duplicates()
-    shipped = [read_rows(task, folder, table=table) for table in ("beyond", "tuned", "faithful")]
+    shipped = [read_rows(task, folder, table=table) for table in ("methods", "tuned", "faithful")]
     rows = pd.concat([pd.concat(shipped).merge(asked).assign(agent=0), others], ignore_index=True)
     teachers = rows[rows["method"] == "teacher"].set_index("agent")
     own = rows["agent"].map(teachers["mean"])

@@ -10,7 +10,7 @@ import os
 import numpy as np
 import pandas as pd
 
-from vsp.paper.results import read_results
+from studies.results import read_results
 from vsp.paper.statistics import share_interval
 from vsp_beyond.few_cells.limit import limit_preset
 
@@ -55,7 +55,7 @@ def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     (highest of a seed).
     """
     size, order = limit_preset(task).n_cells, ["refined", *reversed(STARTS), *LIMIT]
-    rows = pd.concat([read_rows(task, folder, table=table) for table in ("beyond", "starts", "limit")])
+    rows = pd.concat([read_rows(task, folder, table=table) for table in ("methods", "starts", "limit")])
     rows = rows[(rows["size"] == size) & rows["method"].isin(order)]
     table = method_summary(rows).set_index("method")[["policies", "mean", "low", "high"]]
     by_method = rows.groupby("method")

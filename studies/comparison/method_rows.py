@@ -2,7 +2,7 @@
 
 The methods of a table have the same start states and, unless their names say otherwise, the same teacher and budget.
 `make beyond` and `make beyond-long` make the missing rows.
-data/results/<table>_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
+data/beyond/<table>_<task>.csv holds the results, one row per method, size and seed. Distillation times differ from run
 to run, so they are in a separate file, <table>_seconds.csv.
 """
 
@@ -116,7 +116,7 @@ def _teacher(task: str, agent: int) -> Teacher:
     return load_teacher(list(further_teachers(task).values())[agent - 1] if agent else task)
 
 
-def jobs_of(task: str, table: str = "beyond") -> list[Job]:
+def jobs_of(task: str, table: str = "methods") -> list[Job]:
     """List all rows of a task in `table`, a key of `tables_of(task)`."""
     about, found = tables_of(task)[table], []
     for name, method in about.methods.items():
@@ -166,7 +166,7 @@ def make_row(job: Job) -> tuple[dict, dict]:
 def make_all(folder: str | os.PathLike, todo: list[Job], *, jobs: int | str = 1) -> None:
     """Make the rows of `todo` that are missing in `folder`, lower seeds first; `jobs` as in `workers`."""
     todo = sorted(todo, key=lambda job: job.seed)
-    make_missing(make_row, {job.path(folder): (job,) for job in todo}, "beyond", jobs=jobs, unit="rows")
+    make_missing(make_row, {job.path(folder): (job,) for job in todo}, "methods", jobs=jobs, unit="rows")
 
 
 def rows(folder: str | os.PathLike, wanted: list[Job]) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from vsp.paper.results import read_results
+from studies.results import read_results
 from vsp_beyond.few_cells.config import tuned_preset
 
 from .method_tables import ABLATION, METHODS, UNTUNED
@@ -20,7 +20,7 @@ MEASURED = ("mean", "failing", "error_teacher", "error_own", "cells", "parameter
 INTERVAL = ("mean", "low", "high")
 
 
-def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "beyond") -> pd.DataFrame:
+def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "methods") -> pd.DataFrame:
     """Read the rows of `task` in a table of `method_tables`, by default the committed ones, or those in `folder`.
 
     `failing` is NaN for a task where no policy can reach a goal.

@@ -179,7 +179,7 @@ AGENTS = (1, 2)  # further teachers of a task, in data/teachers/short/, in order
 
 @dataclass(frozen=True)
 class Table:
-    """Rows that are written to one file per task, data/results/<name>_<task>.csv."""
+    """Rows that are written to one file per task, data/beyond/<name>_<task>.csv."""
 
     methods: dict[str, Method]
     seeds: range = SEEDS
@@ -200,7 +200,7 @@ class Table:
 
 
 TABLES = {
-    "beyond": Table(METHODS),
+    "methods": Table(METHODS),
     "tuned": Table(RIVALS, seeds=range(7), fewer=range(7)),
     "faithful": Table(LIKE, fewer=range(6)),
     "apart": Table(APART, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
@@ -224,7 +224,7 @@ REPEATED = ("teacher", "refined")  # repeated here so that their tail is measure
 LONG_RIVALS = ("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP)
 LONG_SIZES = (0, 1, 2, 4, 8)
 LONG_TABLES = {
-    "beyond": Table(METHODS, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
+    "methods": Table(METHODS, seeds=FEW_SEEDS, fewer=FEW_SEEDS),
     "tuned": Table(
         {name: (METHODS | RIVALS)[name] for name in (*REPEATED, *LONG_RIVALS)},
         seeds=range(3), fewer=range(3), sizes=LONG_SIZES, tail=True,

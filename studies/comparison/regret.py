@@ -1,6 +1,6 @@
 """Compute regret: how far returns are below the best possible return, for the tasks whose optimum is computed.
 
-data/results/optimum.csv holds the returns of the best policies, from the start states used for all reported rows.
+data/beyond/optimum.csv holds the returns of the best policies, from the start states used for all reported rows.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ import os
 import numpy as np
 import pandas as pd
 
+from studies.results import read_results
 from vsp.evaluation import start_states
-from vsp.paper.results import provenance, read_results
+from vsp.paper.results import provenance
 from vsp.rollouts import rollout
 from vsp.run.progress import progress
 from vsp.tasks.base import GOAL, Task

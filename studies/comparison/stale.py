@@ -27,7 +27,7 @@ from .method_tables import LONG, TASKS, WALKERS
 
 
 def stale() -> list[str]:
-    """List the results in data/results that are missing, damaged or out of date, one message each.
+    """List the results in data/beyond that are missing, damaged or out of date, one message each.
 
     The list is empty if all are up to date.
     """
@@ -36,12 +36,12 @@ def stale() -> list[str]:
         try:
             differing = _differing(_provenance(results.RESULTS / name), today)
         except FileNotFoundError:
-            found.append(f"data/results/{name} is missing: `make {target}` makes it")
+            found.append(f"data/beyond/{name} is missing: `make {target}` makes it")
         except atomic.DamagedFile as error:
             found.append(str(error))
         else:
             if differing:
-                what = f"data/results/{name} was made with other {' and '.join(differing)}"
+                what = f"data/beyond/{name} was made with other {' and '.join(differing)}"
                 found.append(f"{what}: `make {target}` makes it anew")
     return found
 
@@ -60,7 +60,7 @@ def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[di
                 yield f"{table}_{task}.policy", target, lambda _, about=(task, table): [kept_job(*about).provenance]
     yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
     for task in LONG:
-        yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
+        yield f"methods_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
     for task in WALKERS:
         for name in ("gait", "fewest"):
             yield f"{name}_{task}.csv", "beyond-long", lambda _, about=(name, task): [kept_robots.provenance_of(*about)]

@@ -16,7 +16,7 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 import vsp
 import vsp_beyond
 from studies import comparison, make_proofs
-from vsp.paper.results import read_results, write_results
+from studies.results import read_results, write_results
 from vsp.run import sealed
 from vsp.run.atomic import ROOT
 from vsp.tasks import GOAL, PIT, TRUNCATED
@@ -384,7 +384,7 @@ def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path,
         monkeypatch.setattr("sys.argv", ["check", *map(str, paths)])
         runpy.run_module("vsp_beyond.proofs.check", run_name="__main__")
 
-    run(good := ROOT / "data/proofs/simplegoal_one_map.json")
+    run(good := ROOT / "data/beyond/proofs/simplegoal_one_map.json")
     assert capsys.readouterr().out.startswith(f"{good} proves {{'goal': ")
     for paths in ((), (tmp_path / "none.json",), (good, seal(tmp_path / "x.json", b"[]"))):
         with pytest.raises(SystemExit) as end:
@@ -393,13 +393,13 @@ def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path,
 
 
 def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):
-    made, folder = [], tmp_path / "data"
+    made, folder = [], tmp_path / "data" / "beyond"
     makers = {name: lambda name=name, one=one: made.append(name) or one for name, one in (("a", STRAIGHT), ("b", TWO))}
     monkeypatch.setattr(make_proofs, "policies", lambda: makers)
     monkeypatch.setattr(make_proofs, "N_SAMPLED", 2000)
     monkeypatch.setattr(make_proofs, "_of_simplegoal_proof", lambda proof: {"goal": float(proof.areas["goal"])})
     assert make_proofs.certificates(tmp_path, 1) == made == ["a", "b"]
-    first = read_results("proofs", folder / "results")
+    first = read_results("proofs", folder)
     row = first.set_index("name").loc["a"]
     assert (row["goal"], row["longest"], row["sampled"]) == (0.87, 9, 2000)
     assert row["sampled_goal"] == pytest.approx(0.87, abs=0.03)
@@ -408,7 +408,7 @@ def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):
     assert make_proofs.certificates(tmp_path, 1) == [] and made == ["a", "b"]
     write_results(first[:1], "proofs", out=tmp_path)  # as somebody who deletes a row
     assert make_proofs.certificates(tmp_path, 1) == ["b"] and made == ["a", "b", "b"]
-    assert read_results("proofs", folder / "results")["name"].tolist() == ["a", "b"]
+    assert read_results("proofs", folder)["name"].tolist() == ["a", "b"]
 
 
 # `prove`

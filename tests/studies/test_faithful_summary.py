@@ -24,7 +24,7 @@ def results(tmp_path):
                 row("faithful", 2, 3, 16.5, 0.98), row("faithful", 3, 0, 16.6, 0.99),
                 row("faithful", 3, 1, 16.6, 0.99, failing=0.01, cells=1)]  # fmt: skip
     write(tmp_path, "faithful", pd.DataFrame(faithful))
-    write(tmp_path, "beyond", pd.DataFrame([row("teacher", 0, 0, 16.6, 1.0), row("refined", 2, 0, 16.9, -1.0)]))
+    write(tmp_path, "methods", pd.DataFrame([row("teacher", 0, 0, 16.6, 1.0), row("refined", 2, 0, 16.9, -1.0)]))
     write(tmp_path, "tuned", pd.DataFrame([row("one linear map, tuned", 0, 0, 15.0, -2.0)]))
     pairs = [(2, 0, 1, 0.95, 0.2), (2, 0, 2, 0.85, 0.3), (2, 1, 2, 0.97, 0.4), (3, 0, 1, None, 0.5)]
     write(tmp_path, "same", pd.DataFrame(pairs, columns=["size", "seed", "other", "index", "ratio"]))

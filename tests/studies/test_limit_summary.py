@@ -3,7 +3,7 @@ import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
 from studies.comparison import best_mean, limit_summary, near, references, robots_summary, starts_summary
-from vsp.paper.results import write_results
+from studies.results import write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3, "parameters": 9, "operations": 9.0}
 
@@ -19,7 +19,7 @@ def test_shares_regret_and_failures_by_hand(tmp_path):
     frame = rows(*(("at the limit", 3, seed, mean) for seed, mean in enumerate((99.2, 99.4, 99.0, 99.4))))
     frame.loc[2, "failing"] = 0.25
     write_results(frame, f"limit_{MOUNTAINCAR}", out=tmp_path)
-    found = limit_summary(MOUNTAINCAR, tmp_path / "data/results").iloc[0]
+    found = limit_summary(MOUNTAINCAR, tmp_path / "data/beyond").iloc[0]
     assert (found["size"], found["policies"], found["near"], found["least"], found["failing"]) == (3, 4, 0.75, 99, 0.25)
     assert found["regret"] == pytest.approx(99.6 - 99.25) and found["low"] < 99.25 < found["high"]
     assert found["near_low"] == pytest.approx(0.194, abs=1e-3) and found["near_high"] == pytest.approx(0.994, abs=1e-3)
@@ -40,7 +40,7 @@ def test_robots_stand_beside_their_teacher(tmp_path):
     found += [("one map, random search", 0, 0, 20.0), ("robot's teacher", 0, 0, 100.0)]
     frame = rows(*found).assign(r2=[0.8, 0.9, 0.7, -1.0, 1.0])
     write_results(frame, f"robots_{CHEETAH}", out=tmp_path)
-    table = robots_summary(CHEETAH, tmp_path / "data/results").set_index("method")
+    table = robots_summary(CHEETAH, tmp_path / "data/beyond").set_index("method")
     assert table.index[0] == "robot's teacher" and table.loc["cells", "share"] == 0.5
     assert table.loc["cells", "r2"] == pytest.approx(0.85) and table.loc["cells", "policies"] == 2
     assert table.loc["one map, random search", "share"] == 0.2 and table.loc["oblique tree", "share"] == 0.3
@@ -48,13 +48,13 @@ def test_robots_stand_beside_their_teacher(tmp_path):
 
 def test_searches_stand_in_the_order_of_their_length(tmp_path):
     of_table = {
-        "beyond": [("refined", 3, 0, 95.0), ("refined", 3, 1, 96.0), ("refined", 4, 0, 90.0), ("CART", 3, 0, 91.0)],
+        "methods": [("refined", 3, 0, 95.0), ("refined", 3, 1, 96.0), ("refined", 4, 0, 90.0), ("CART", 3, 0, 91.0)],
         "starts": [("at the limit, from the teacher", 3, 0, 97.0), ("refined, 800 generations", 3, 0, 96.0)],
         "limit": [("at the limit", 3, 0, 99.4), ("at the limit", 4, 0, 99.3)],
     }
     for table, found in of_table.items():
         write_results(rows(*found), f"{table}_{MOUNTAINCAR}", out=tmp_path)
-    table = starts_summary(MOUNTAINCAR, tmp_path / "data/results")
+    table = starts_summary(MOUNTAINCAR, tmp_path / "data/beyond")
     by_length = ["refined", "refined, 800 generations", "at the limit, from the teacher", "at the limit"]
     assert table["method"].tolist() == by_length
     assert table["mean"].tolist() == [95.5, 96.0, 97.0, 99.4] and table["least"].iloc[0] == 95

@@ -139,4 +139,4 @@ def test_the_command_writes_what_was_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(lookup, "study", lambda: frame)
     monkeypatch.setattr("sys.argv", ["lookup", "--out", str(tmp_path)])
     lookup.main()
-    assert (tmp_path / "data/results/lookup.csv").read_text() == "what,d,seconds,machine\nlook-up,2,0.1235,some\n"
+    assert (tmp_path / "data/beyond/lookup.csv").read_text() == "what,d,seconds,machine\nlook-up,2,0.1235,some\n"

@@ -37,7 +37,7 @@ def small(monkeypatch):
     two = {"CART": dataclasses.replace(METHODS["CART"], sizes=(1, 3)), "teacher": METHODS["teacher"]}
     monkeypatch.setattr(method_rows, "METHODS", two)
     for module in (method_rows, make_rows):
-        monkeypatch.setattr(module, "TABLES", {"beyond": Table(two, seeds=range(2), fewer=range(2))})
+        monkeypatch.setattr(module, "TABLES", {"methods": Table(two, seeds=range(2), fewer=range(2))})
     monkeypatch.setattr(method_rows, "ABLATION", {})
     return monkeypatch
 
@@ -107,13 +107,13 @@ def test_a_table_differs_by_task_where_rows_take_long():
 
 def test_of_tasks_that_take_long_fewer_rows_are_asked_and_their_tail():
     found = {table: jobs_of(LUNARLANDER, table) for table in tables_of(LUNARLANDER)}
-    assert list(found) == ["beyond", "tuned", "faithful", "limit"]
+    assert list(found) == ["methods", "tuned", "faithful", "limit"]
     assert {job.size for table in ("tuned", "faithful") for job in found[table]} == {0, 1, 2, 4, 8}
     assert {table: {job.tail for job in jobs} for table, jobs in found.items()} == {
-        "beyond": {False}, "tuned": {True}, "faithful": {True}, "limit": {False}
+        "methods": {False}, "tuned": {True}, "faithful": {True}, "limit": {False}
     }  # fmt: skip
     n_seeds = {table: len({job.seed for job in jobs}) for table, jobs in found.items()}
-    assert n_seeds == {"beyond": 5, "tuned": 3, "faithful": 10, "limit": 2}
+    assert n_seeds == {"methods": 5, "tuned": 3, "faithful": 10, "limit": 2}
     assert sum(job.size == faithful_preset(LUNARLANDER).n_cells for job in found["faithful"]) == 10
 
 
@@ -226,12 +226,12 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
     small.setattr(make_rows, "optimum", lambda: pd.DataFrame({"seconds": [0.5]}))
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
-    results = tmp_path / "data" / "results"
+    results = tmp_path / "data" / "beyond"
     frame = read_rows(SIMPLEGOAL, results)
     assert len(frame) == 5 and "seconds" not in frame
-    assert len(pd.read_csv(results / "beyond_seconds.csv")) == 5
+    assert len(pd.read_csv(results / "methods_seconds.csv")) == 5
     assert (results / "optimum.csv").read_text() == "seconds\n0.500000\n"
-    listed.write_listed(results / "beyond_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
+    listed.write_listed(results / "methods_Pendulum-v1.csv", frame.assign(failing=1.0).to_csv(index=False))
     assert read_rows("Pendulum-v1", results)["failing"].isna().all()
 
 
@@ -246,11 +246,11 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
         small.setattr(module, "TABLES", {"faithful": Table(like, seeds=range(2), fewer=range(2))})
     small.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "1", "--tables", "faithful"])
     make_rows.main()
-    found, same = (pd.read_csv(tmp_path / f"data/results/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
+    found, same = (pd.read_csv(tmp_path / f"data/beyond/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
     assert found["size"].tolist() == [1, 1, 2, 2] and found["r2"].between(-1, 1).all() and (found["cells"] <= 2).all()
     assert same[["size", "seed", "other"]].to_numpy().tolist() == [[1, 0, 1], [2, 0, 1]]
     assert np.isnan(same["index"][0]) and (same["ratio"] < 2).all()
-    kept = VoronoiPolicy.load(tmp_path / "data/results/faithful_SimpleGoal-v0.policy")
+    kept = VoronoiPolicy.load(tmp_path / "data/beyond/faithful_SimpleGoal-v0.policy")
     first = found[(found["size"] == 2) & (found["seed"] == 0)].iloc[0]
     starts = start_states(get_task(SIMPLEGOAL), measure.N_REPORTED, measure.REPORT_SEED)
     assert rollout(kept, SIMPLEGOAL, starts).returns.mean() == pytest.approx(first["mean"], abs=1e-6)
@@ -263,13 +263,13 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     small.setattr(method_rows, "LONG_TABLES", method_rows.TABLES)
     small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
-    results = tmp_path / "data" / "results"
-    policy = VoronoiPolicy.load(results / "beyond_SimpleGoal-v0.policy")
-    _, about = sealed.load_arrays(results / "beyond_SimpleGoal-v0.policy", kind="VoronoiPolicy")
+    results = tmp_path / "data" / "beyond"
+    policy = VoronoiPolicy.load(results / "methods_SimpleGoal-v0.policy")
+    _, about = sealed.load_arrays(results / "methods_SimpleGoal-v0.policy", kind="VoronoiPolicy")
     assert 1 <= len(policy) <= SMALL.n_cells and about.items() >= kept.simplest_provenance(SIMPLEGOAL).items()
-    assert len(pd.read_csv(results / "beyond_seconds_long.csv")) == 5
+    assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5
     assert not (results / "optimum.csv").exists()
-    listed.read_listed(results / "beyond_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
+    listed.read_listed(results / "methods_SimpleGoal-v0.policy")  # not as a policy: as what `sha256sum -c` sees
 
 
 def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
@@ -287,11 +287,11 @@ def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
     small.setattr(kept_robots, "fewest", lambda policy: pd.DataFrame({"cells": [len(policy)]}))
     small.setattr("sys.argv", ["x", "--long", "--out", str(tmp_path), "--jobs", "1"])
     make_rows.main()
-    found = {name: pd.read_csv(tmp_path / f"data/results/{name}_{WALKER}.csv") for name in ("robots", "gait", "fewest")}
+    found = {name: pd.read_csv(tmp_path / f"data/beyond/{name}_{WALKER}.csv") for name in ("robots", "gait", "fewest")}
     assert found["robots"]["method"].tolist() == list(robots) and found["robots"]["r2"][1] == 1
     assert len(found["gait"]) == 20 and found["fewest"]["cells"].tolist() == [2]
-    policy = VoronoiPolicy.load(tmp_path / f"data/results/robots_{WALKER}.policy")
-    assert policy.task.name == WALKER and len(pd.read_csv(tmp_path / "data/results/robots_seconds_long.csv")) == 2
+    policy = VoronoiPolicy.load(tmp_path / f"data/beyond/robots_{WALKER}.policy")
+    assert policy.task.name == WALKER and len(pd.read_csv(tmp_path / "data/beyond/robots_seconds_long.csv")) == 2
 
 
 def test_the_simplified_policy_may_lose_its_share(small):

@@ -4,8 +4,8 @@ import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS
 
 from studies.comparison import all_rows, best_mean, regret, with_regret
+from studies.results import read_results
 from vsp.evaluation import start_states
-from vsp.paper.results import read_results
 from vsp.tasks.registry import get_task
 
 

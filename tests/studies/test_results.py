@@ -12,9 +12,9 @@ from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, TASKS
 from studies.benchmarks import fits, lookup
 from studies.comparison import kept, method_rows, method_tables, regret, stale_results
 from studies.comparison.method_tables import METHODS, WALKERS
+from studies.results import RESULTS, read_results, write_results
 from vsp.paper import results as results_module
 from vsp.paper import runs
-from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import paper_experiment
 from vsp.paper.studies import interpretations, make_studies
 from vsp.paper.studies import teachers as teachers_module
@@ -94,7 +94,7 @@ def results(tmp_path, monkeypatch):
 
 
 def says(name, what, target):
-    return f"data/results/{name} was made with other {what}: `make {target}` makes it anew"
+    return f"data/beyond/{name} was made with other {what}: `make {target}` makes it anew"
 
 
 def test_a_missing_or_damaged_file_is_named(results):
@@ -102,7 +102,7 @@ def test_a_missing_or_damaged_file_is_named(results):
     with open(results / "lookup.csv", "ab") as file:
         file.write(b"\n")
     missing, damaged = stale_results()
-    assert missing == "data/results/teachers.csv is missing: `make study` makes it"
+    assert missing == "data/beyond/teachers.csv is missing: `make study` makes it"
     assert damaged.startswith(f"{results / 'lookup.csv'}: SHA-256 is ")
 
 
@@ -129,14 +129,14 @@ def test_other_rows_are_stale(results, name, change, what):
     assert stale_results() == [says(f"{name}.csv", what, "study")]
 
 
-BEYOND = [says(f"beyond_{task}.csv", "version", "beyond") for task in method_tables.TASKS]
-LONG = [says(f"beyond_{LUNARLANDER}.csv", "version", "beyond-long")]
+BEYOND = [says(f"methods_{task}.csv", "version", "beyond") for task in method_tables.TASKS]
+LONG = [says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long")]
 STUDIES = [says(f"{name}.csv", "version", "study") for name in ("readings", "teachers")]
 
 
 def long_ones(what):
     """Of LunarLander, what holds rows of `refined` or comes from it."""
-    names = ("beyond_{}.csv", "tuned_{}.csv", "beyond_{}.policy")
+    names = ("methods_{}.csv", "tuned_{}.csv", "methods_{}.policy")
     return [says(name.format(LUNARLANDER), what, "beyond-long") for name in names]
 
 
@@ -154,7 +154,7 @@ def raised(name):
         (lambda patch: patch.setattr(lookup, "VERSION", 2), [says("lookup.csv", "version", "lookup")]),
         (lambda patch: patch.setattr(fits, "VERSION", 2), [says("fits.csv", "version", "lookup")]),
         (lambda patch: patch.setattr(kept, "SIMPLIFY_VERSION", 2),
-         [says(f"beyond_{LUNARLANDER}.policy", "version", "beyond-long")]),
+         [says(f"methods_{LUNARLANDER}.policy", "version", "beyond-long")]),
         (lambda patch: patch.setattr(interpretations, "VERSION", 2), [says("readings.csv", "settings", "study")]),
     ],
     ids=["paper", "CART", "TD-AVQ", "optimum", "lookup", "fits", "simplify", "study"],
@@ -174,8 +174,8 @@ def test_results_of_another_preset_are_stale(results, monkeypatch):
     assert stale_results() == [
         says("readings.csv", "settings", "study"),
         says("teachers.csv", "settings", "study"),
-        says(f"beyond_{SIMPLEGOAL}.csv", "settings", "beyond"),
-        says(f"teachers_{SIMPLEGOAL}.csv", "settings", "beyond"),
+        says(f"methods_{SIMPLEGOAL}.csv", "settings", "methods"),
+        says(f"teachers_{SIMPLEGOAL}.csv", "settings", "methods"),
         *long_ones("settings"),
     ]
 
@@ -196,9 +196,9 @@ def test_results_of_another_teacher_are_stale(results, monkeypatch):
     monkeypatch.setattr(kept, "load_teacher", lambda task: SimpleNamespace(digest="f" * 64))
     assert stale_results() == [
         says("teachers.csv", "teacher", "study"),
-        *(says(name, "teacher", "beyond") for task in method_tables.TASKS for name in files_of(task)),
+        *(says(name, "teacher", "methods") for task in method_tables.TASKS for name in files_of(task)),
         *(says(name, "teacher", "beyond-long") for task in (LUNARLANDER, *WALKERS) for name in files_of(task)),
-        says(f"beyond_{LUNARLANDER}.policy", "teacher", "beyond-long"),
+        says(f"methods_{LUNARLANDER}.policy", "teacher", "beyond-long"),
         *(
             says(f"{name}_{task}.csv", "settings and teacher", "beyond-long")  # those of the policy that walks
             for task in WALKERS
@@ -214,7 +214,7 @@ def test_ids_are_read_as_they_were_written(tmp_path):
     ids = {"settings": ["0123456789", "12345e6789"], "teacher": ["0000000001", None], "version": [1, None]}
     frame = pd.DataFrame(ids).astype({"version": "Int64"})
     write_results(frame.assign(mean=[1 / 3, 2.0]), "readings", out=tmp_path)
-    folder = tmp_path / "data" / "results"
+    folder = tmp_path / "data" / "beyond"
     text = b"settings,teacher,version,mean\n0123456789,0000000001,1,0.333333\n12345e6789,,,2.000000\n"
     assert (folder / "readings.csv").read_bytes() == text
     found = read_results("readings", folder)
@@ -233,5 +233,5 @@ def test_make_study_writes_what_was_found(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "3"])
     make_studies.main()
     assert asked == dict.fromkeys(("readings", "teachers"), (tmp_path / "build" / "study", 3))
-    names = [path.name for path in sorted((tmp_path / "data" / "results").iterdir())]
+    names = [path.name for path in sorted((tmp_path / "data" / "methods").iterdir())]
     assert names == [listed.MANIFEST, "readings.csv", "teachers.csv"]

@@ -37,16 +37,19 @@ def save_table(
 ) -> HTML:  # fmt: skip
     """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
+    A name such as "beyond/read" stands for OUT/figures/beyond/tables/read.csv and .tex.
+
     `shown` replaces the whole table for readers: a part of it, or equations as LaTeX code. The default `caption` is in
     notebooks/captions.toml. The LaTeX needs the packages booktabs and xcolor, and longtable for more than `PAGE` rows.
     """
-    path, shown = Path(out) / "figures" / "tables" / name, frame if shown is None else shown
+    folder, _, stem = name.rpartition("/")
+    path, shown = Path(out) / "figures" / folder / "tables" / stem, frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
     atomic.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
     about, code = caption_of("tables", name, text=caption), as_text(present(shown)).map(_escape).rename(columns=_escape)
     place = {"environment": "longtable"} if len(code) > PAGE else {"position": "t", "position_float": "centering"}
     styled = code.style.hide(axis="index")
-    body = styled.to_latex(hrules=True, caption=_escape(about.text), label=f"tab:{name}", **place)
+    body = styled.to_latex(hrules=True, caption=_escape(about.text), label=f"tab:{stem}", **place)
     atomic.write_text(path.with_suffix(".tex"), body)
     return show_table(shown, name, caption=caption)
 

@@ -13,7 +13,7 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.run import atomic, sealed
 
-CERTIFICATES = atomic.ROOT / "data" / "proofs"
+CERTIFICATES = atomic.ROOT / "data" / "beyond" / "proofs"
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Proof(ABC):
 
 
 def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
-    """Load the certificate data/proofs/NAME.json: return its policy and its whole content. Raises `DamagedFile`."""
+    """Load the certificate data/beyond/proofs/NAME.json: return its policy and its content. Raises `DamagedFile`."""
     content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
     numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
     return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content

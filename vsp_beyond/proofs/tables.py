@@ -1,4 +1,4 @@
-"""Tables and curves of what is proved, from data/results/proofs*.csv and the certificates."""
+"""Tables and curves of what is proved, from data/beyond/proofs*.csv and the certificates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vsp.tasks import mountaincar
 from .check.mountaincar import edge
 from .check.pendulum import unpacked
 from .dead_points import at_rest
-from .proof import load_certificate
+from .proof import CERTIFICATES, load_certificate
 
 NAMES = {
     "simplegoal_paper": "the paper's, as published",
@@ -36,7 +36,7 @@ def simplegoal_table() -> pd.DataFrame:
     return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
     largest one under which all of these are proved to reach it.
     """
-    rows = read_results("proofs").set_index("name").loc[list(NAMES)]
+    rows = _read("proofs").set_index("name").loc[list(NAMES)]
     table = pd.DataFrame({"policy": rows.index.map(NAMES), "cells": rows["cells"].to_numpy()})
     table["failing"] = (rows["pit"] + rows["left"]).to_numpy()
     table["outside"] = rows["failing_outside"].to_numpy()
@@ -70,13 +70,13 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
 def pendulum_table() -> pd.DataFrame:
     """Return what is proved of Pendulum by a grid, and by smaller and smaller boxes of starts. Columns: boxes (per
     axis, if all were so small), share of starts."""
-    return read_results("proofs_grid")[["boxes", "share"]]
+    return _read("proofs_grid")[["boxes", "share"]]
 
 
 def teacher_table() -> pd.DataFrame:
     """Return what is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit,
     steps (at most), minutes (computing time)."""
-    found = read_results("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
+    found = _read("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
     return found.assign(minutes=found["seconds"] / 60).drop(columns="seconds")
 
 
@@ -104,3 +104,7 @@ def _zero(policy: VoronoiPolicy, part: pd.Series) -> float:
 
     inner = 1e-12 * (part["high"] - part["low"])
     return brentq(at, part["low"] + inner, part["high"] - inner)
+
+
+def _read(name: str) -> pd.DataFrame:
+    return read_results(name, CERTIFICATES.parent)
