@@ -50,9 +50,7 @@ def main() -> None:
     data/beyond/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
     that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument(
-        "--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it"
-    )
+    parser.add_argument("--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it")
     parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()

@@ -7,7 +7,10 @@ LunarLander, are measured from new starts. The longer search for one map was add
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
+import pandas as pd
 
 from vsp.evaluation import start_states
 from vsp.paper.baselines import Tree
@@ -102,6 +105,33 @@ def common_states(teacher: Policy, task: Task) -> np.ndarray:
     episodes = N_REPORTED // task.slowness
     states = visited_states(teacher, task, start_states(task, episodes, ERROR_SEED))
     return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
+
+
+def sameness(policies: dict[int, VoronoiPolicy], teacher: Policy, task: Task) -> pd.DataFrame:
+    """Compare every pair of `policies` (by seed) on `common_states`, one row per pair.
+
+    Columns: seed, other; index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells,
+    about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their
+    actions, divided by that from the teacher's actions (mean over the two policies).
+    """
+    from sklearn.metrics import adjusted_rand_score
+
+    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
+    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
+    cells = {seed: policy.cells(states) for seed, policy in policies.items()}
+    actions = {seed: policy.predict(states)[0] / half for seed, policy in policies.items()}
+    rows = []
+    for a, b in combinations(policies, 2):
+        one_cell = min(len(policies[a]), len(policies[b])) == 1
+        index = np.nan if one_cell else adjusted_rand_score(cells[a], cells[b])
+        to_teacher = 0.5 * (_rmse(actions[a], wanted) + _rmse(actions[b], wanted))
+        ratio = _rmse(actions[a], actions[b]) / to_teacher if to_teacher else np.nan
+        rows.append({"seed": a, "other": b, "index": index, "ratio": ratio})
+    return pd.DataFrame(rows)
+
+
+def _rmse(actions: np.ndarray, others: np.ndarray) -> float:
+    return float(np.sqrt(np.square(actions - others).mean()))
 
 
 def cost(policy: Policy) -> tuple[int, float]:

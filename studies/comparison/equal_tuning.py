@@ -8,37 +8,32 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from studies.results import read_results
 from vsp.evaluation import start_states
 from vsp.rollouts import visited_states
 from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import Teacher, load_teacher
+from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells import faithful, tune
 from vsp_beyond.few_cells.config import Faithful, Tuned, faithful_preset, tuned_preset
 
+from ..results import read_results
 from ..rivals.small_network import units_for
+from .makers import numbers_of
 from .measure import ERROR_SEED, N_ERROR
-from .method_rows import tables_of
-from .method_summary import ahead, method_summary, read_rows
-from .method_tables import LONG, UNTUNED
-from .methods import numbers_of
+from .methods import LONG, METHODS, TABLES
+from .summary import INTERVAL, OURS, ahead, method_summary, read_rows
 
-OURS = "our cells"
-# By the name in tables: the method that imitates, and the same method tuned
-PAIRS = {
-    OURS: ("refined, not tuned", "refined"),
-    "axis tree, constants": ("CART, DAgger", "CART, DAgger, tuned"),
-    "axis tree, linear": ("CART, linear leaves, DAgger", "CART, linear leaves, DAgger, tuned"),
-    "oblique tree, constants": (
-        "oblique tree, constant leaves, DAgger", "oblique tree, constant leaves, DAgger, tuned",
-    ),
-    "oblique tree, linear": ("oblique tree, linear leaves, DAgger", "oblique tree, linear leaves, DAgger, tuned"),
-    "k-means cells": ("k-means cells, DAgger", "k-means cells, DAgger, tuned"),
-    "small network": ("small network, DAgger", "small network, DAgger, tuned"),
-    "one linear map": ("one linear map", "one linear map, tuned"),
-}  # fmt: skip
-# Tables of `method_tables` that together hold all methods, distilled from the shipped teacher
-TABLES = ("methods", "tuned", "apart", "faithful", "demanded")
+# By the name in tables: the untuned method; the same method tuned is "..., tuned"
+IMITATIONS = {
+    OURS: OURS,
+    "axis tree, constants": "CART, DAgger",
+    "axis tree, linear": "CART, linear leaves, DAgger",
+    "oblique tree, constants": "oblique tree, constant leaves, DAgger",
+    "oblique tree, linear": "oblique tree, linear leaves, DAgger",
+    "k-means cells": "k-means cells, DAgger",
+    "small network": "small network, DAgger",
+    "one linear map": "one linear map",
+}
+SOURCES = ("methods", "tuned", "apart", "faithful", "demanded")  # tables that hold all methods of the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
 
@@ -46,10 +41,9 @@ COLUMNS = ("mean", "low", "high", "r2")
 def all_rows(task: str) -> pd.DataFrame:
     """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`.
 
-    Each method, size and seed occurs once: the last of `TABLES` that has it counts.
+    Each method, size and seed occurs once: the last of `SOURCES` that has it counts.
     """
-    tables = [table for table in TABLES if table in tables_of(task)]
-    frame = pd.concat([read_rows(task, table=table) for table in tables])
+    frame = pd.concat([read_rows(task, table=table) for table in SOURCES if table in TABLES[task]])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
@@ -59,43 +53,34 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
     Both errors are measured in the teacher's states of `measure`, which no fit has seen. `likeness` gives R² on more
     states.
     """
-    r2 = 1.0 - np.square(frame["error_teacher"] / constant_error(load_teacher(task)))
-    return frame.assign(r2=r2)
-
-
-def constant_error(teacher: Teacher) -> float:
-    """Return the root mean square action error of the best constant action in the states of `measure`.
-
-    Errors are in units of half the action range.
-    """
-    task = teacher.task
-    states = visited_states(teacher, task, start_states(task, N_ERROR // task.slowness, ERROR_SEED))
-    half = 0.5 * (task.action_high - task.action_low)
-    return float(np.sqrt((np.asarray(teacher.predict(states)[0], dtype=np.float64) / half).var(axis=0).mean()))
+    teacher, about = load_teacher(task), get_task(task)
+    states = visited_states(teacher, about, start_states(about, N_ERROR // about.slowness, ERROR_SEED))
+    half = 0.5 * (about.action_high - about.action_low)
+    constant = float(np.sqrt((np.asarray(teacher.predict(states)[0], dtype=np.float64) / half).var(axis=0).mean()))
+    return frame.assign(r2=1.0 - np.square(frame["error_teacher"] / constant))
 
 
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per size and method of `PAIRS`, within a size the best tuned mean return first.
+    """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first.
 
     `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
     low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
     method of size 1 is one linear map. Sizes without rivals are left out.
     """
-    table, found = method_summary(frame).set_index(["method", "size"]), []
+    table, rows = method_summary(frame).set_index(["method", "size"]), []
     r2 = frame.groupby(["method", "size"])["r2"].median()
     for size in SHOWN:
-        for name, (untuned, tuned) in PAIRS.items():
-            own = 0 if name == "one linear map" else size
-            if (size == 1) != (own == 0) or (tuned, own) not in table.index:
+        for name, untuned in IMITATIONS.items():
+            tuned, cells = f"{untuned}, tuned", 0 if name == "one linear map" else size
+            if (size == 1) != (cells == 0) or (tuned, cells) not in table.index:
                 continue
-            row = {"size": size, "method": name, **table.loc[tuned, own][["policies", "parameters"]]}
+            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies", "parameters"]]}
             for prefix, method in (("", tuned), ("untuned ", untuned)):
-                scores = table.loc[method, own].to_dict() | {"r2": r2[method, own]}
+                scores = table.loc[method, cells].to_dict() | {"r2": r2[method, cells]}
                 row |= {prefix + column: scores[column] for column in COLUMNS}
-            found.append(row)
-    order = {"by": ["size", "mean"], "ascending": [True, False], "kind": "stable", "ignore_index": True}
-    compared = pd.DataFrame(found).groupby("size").filter(lambda rows: set(rows["method"]) != {OURS})
-    return compared.sort_values(**order)
+            rows.append(row)
+    compared = pd.DataFrame(rows).groupby("size").filter(lambda part: set(part["method"]) != {OURS})
+    return compared.sort_values(["size", "mean"], ascending=[True, False], kind="stable", ignore_index=True)
 
 
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
@@ -105,13 +90,13 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
     mean), "rival mean" and so on; ahead: "ours" if our interval is above those of all others, "theirs" if one of theirs
     is above ours, else "level".
     """
-    found = []
+    compared, columns = [], [*INTERVAL, "policies"]
     for size, rows in table[table["size"] > 1].groupby("size"):
-        own, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
-        row = {"size": size, **own[["mean", "low", "high", "policies"]], "rival": others["method"].iloc[0]}
-        row |= {f"rival {column}": others[column].iloc[0] for column in ("mean", "low", "high", "policies")}
-        found.append(row | {"ahead": ahead(own, {"low": others["low"].max(), "high": others["high"].max()})})
-    return pd.DataFrame(found)
+        ours, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
+        row = {"size": size, **ours[columns], "rival": others["method"].iloc[0]}
+        row |= {f"rival {column}": others[column].iloc[0] for column in columns}
+        compared.append(row | {"ahead": ahead(ours, others[["low", "high"]].max())})
+    return pd.DataFrame(compared)
 
 
 def possible(frame: pd.DataFrame) -> pd.DataFrame:
@@ -129,8 +114,9 @@ def tail(frame: pd.DataFrame) -> pd.DataFrame:
     table = by_kind[["mean", "worst", "failing"]].mean()
     table.insert(0, "policies", by_kind.size())
     table["worst_least"] = by_kind["worst"].min()
-    names = {tuned: f"{name}, tuned" for name, (_, tuned) in PAIRS.items()} | {"faithful": f"{OURS}, faithful"}
-    return table.rename(index=names).sort_values("mean", ascending=False, kind="stable").reset_index()
+    names = {f"{untuned}, tuned": f"{name}, tuned" for name, untuned in IMITATIONS.items()}
+    table = table.rename(index=names | {"faithful": f"{OURS}, faithful"})
+    return table.sort_values("mean", ascending=False, kind="stable").reset_index()
 
 
 def fit_and_geometry(task: str) -> pd.DataFrame:
@@ -157,12 +143,12 @@ def budgets(task: str) -> pd.DataFrame:
     rows = [{"method": "teacher", "steps": load_teacher(task).card["recipe"]["steps"]}]
     cost = {**_of_faithful(close, task), "seconds": seconds.get(("faithful", close.n_cells))}
     rows.append({"method": f"{OURS}, faithful", "size": close.n_cells, **cost})
-    for name, methods in PAIRS.items():
+    for name, untuned in IMITATIONS.items():
         size = 0 if name == "one linear map" else config.n_cells
-        for method, tuned in zip(methods, (False, True)):
-            if (method, size) in seconds:
-                cost = {**episodes(name, config, task, tuned=tuned), "seconds": seconds[method, size]}
-                rows.append({"method": f"{name}{', tuned' * tuned}", "size": size or 1, **cost})
+        for suffix in ("", ", tuned"):
+            if (method := untuned + suffix, size) in seconds:
+                cost = {**episodes(name, config, task, tuned=bool(suffix)), "seconds": seconds[method, size]}
+                rows.append({"method": name + suffix, "size": size or 1, **cost})
     return pd.DataFrame(rows)
 
 
@@ -174,14 +160,14 @@ def _seconds(task: str) -> pd.Series:
 
 
 def episodes(name: str, config: Tuned, task: str, *, tuned: bool) -> dict[str, int]:
-    """Count the episodes of a method of `PAIRS` with the settings `config`, with or without tuning.
+    """Count the episodes of a method of `IMITATIONS` with the settings `config`, with or without tuning.
 
     Keys: teacher, correction, tuning, validation.
     """
     if name == OURS:  # the first candidate of `distill_tuned` is one linear map
         rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
     else:
-        method = UNTUNED[PAIRS[name][0]]
+        method = METHODS[IMITATIONS[name]]
         rounds, restarts = method.settings.get("rounds", 0), config.n_restarts if "n_restarts" in method.reads else 1
         candidates = rounds + restarts + tuned
     n = config.n_corrections * config.n_correction_episodes
@@ -208,10 +194,10 @@ def _tuning(config: Tuned | Faithful, numbers: int) -> int:
 
 
 def _tuned_numbers(name: str, k: int, task: str) -> int:
-    """Return how many numbers are tuned in a method of `PAIRS` with k cells or leaves."""
-    found = get_task(task)
-    d, m = len(found.low), len(found.action_low)
-    maps, units = k * (d + 1) * m, units_for(numbers_of(k, found), found)
+    """Return how many numbers are tuned in a method of `IMITATIONS` with k cells or leaves."""
+    about = get_task(task)
+    d, m = len(about.low), len(about.action_low)
+    maps, units = k * (d + 1) * m, units_for(numbers_of(k, about), about)
     return {
         OURS: k * d + maps,
         "k-means cells": k * d + maps,

@@ -3,8 +3,7 @@
 Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
 fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
 are fitted together, and cells that are grown greedily. It also has our cells, fitted from as many random starts.
-`ObliqueLinearTree` is the fourth combination. Each method is a function of a budget, a size and a seed, and is fitted
-to the teacher's own episodes, without corrections.
+`ObliqueLinearTree` is the fourth combination.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from vsp_beyond.few_cells.anneal import temperature_unit
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling, joined
 
 from ..rivals.trees import ObliqueLinearTree, Split
-from .methods import Budget, alone
 from .tuning import TreeNumbers, Tunable, in_units
 
 N_RANDOM = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
@@ -33,21 +31,6 @@ FEW_CUTS = 31  # quantiles at which a greedy tree may be split: enough for a sta
 CERTAIN = 40.0  # larger logits give shares of exactly 0 and 1 in float64
 
 
-def tree_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """Combine our fit with a tree's borders: an oblique tree with linear leaves, all its numbers fitted together."""
-    return alone(budget, size, seed, fit=global_tree)
-
-
-def cells_by_greedy_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """Combine a tree's fit with our borders: Voronoi cells that are split one after the other, as a tree is grown."""
-    return alone(budget, size, seed, fit=greedy_cells)
-
-
-def cells_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
-    """Combine our fit with our borders: as many random starts as `tree_by_global_fit`, and the same states."""
-    return alone(budget, size, seed, fit=global_cells)
-
-
 # All numbers together
 
 
@@ -55,8 +38,8 @@ def cells_by_global_fit(budget: Budget, size: int, seed: int) -> Policy:
 def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
     """Return the cells with the least error on states (n, d) and actions (n, m) that `search.least_error` finds."""
     frame = Scaling.of(task, states)
-    seen = LabelledStates(frame.inputs(states), frame.outputs(actions))
-    return frame.policy(search.least_error(seen, size, random_starts(size), np.random.default_rng(seed)))
+    labelled = LabelledStates(frame.inputs(states), frame.outputs(actions))
+    return frame.policy(search.least_error(labelled, size, random_starts(size), np.random.default_rng(seed)))
 
 
 @threadpool_limits.wrap(limits=1)
@@ -72,7 +55,7 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
 
     def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
         seeds = rng.integers(2**31, size=n).tolist()
-        trees = [kind(states, actions, leaves=size, task=task, seed=one, cuts=FEW_CUTS) for one in seeds]
+        trees = [kind(states, actions, leaves=size, task=task, seed=s, cuts=FEW_CUTS) for s in seeds]
         return [Tunable(*in_units(tree, frame), tree) for tree in trees]
 
     def error(tree: Tunable) -> float:
@@ -121,23 +104,26 @@ def descend(
 
     The temperature is in units of half a cell's width. This makes a border as soft as one between two codewords.
     """
-    seen = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
-    numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(seen, len(tree)))
+    labelled = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
+    numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
     for stage in stages:
-        numbers = _cooler(seen, numbers, unit, stage, n_iterations)
+        numbers = _cooler(labelled, numbers, unit, stage, n_iterations)
     return Tunable(tree.frame, numbers, tree)
 
 
-def _cooler(seen: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:
+def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:
     temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
-    bases = search.uncorrelated(seen, shares(tree, seen.inputs[:, :-1], temperature))
+    clip_slope = search.CLIP_SLOPES[stage]
+    bases = search.uncorrelated(labelled, shares(tree, labelled.inputs[:, :-1], temperature))
     vector, shape, cut = tree.vector, tree.maps.shape, tree.vector.size - tree.maps.size
 
     def move(step: np.ndarray) -> TreeNumbers:
         return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = expected_loss(move(step), seen, temperature=temperature, clip_slope=search.CLIP_SLOPES[stage])
+        value, gradient = expected_loss(
+            move(step), labelled, temperature=temperature, clip_slope=search.CLIP_SLOPES[stage]
+        )
         by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
         return value, joined([slope * gradient[:cut], by_maps])
 
@@ -168,24 +154,24 @@ def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndar
 
 
 def expected_loss(
-    tree: TreeNumbers, seen: LabelledStates, *, temperature: float, clip_slope: float
+    tree: TreeNumbers, labelled: LabelledStates, *, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
     """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
 
     This is `anneal.expected_loss` for trees. The gradient is with respect to `tree.vector`.
     """
-    (n, m), (k, rows, _), states = seen.actions.shape, tree.maps.shape, seen.inputs[:, :-1]
-    raw = Cells(np.zeros((k, 0)), tree.maps).outputs(seen.inputs)
+    (n, m), (k, rows, _), states = labelled.actions.shape, tree.maps.shape, labelled.inputs[:, :-1]
+    raw = Cells(np.zeros((k, 0)), tree.maps).outputs(labelled.inputs)
     limited = np.clip(raw, -1.0, 1.0)
-    error = limited + clip_slope * (raw - limited) - seen.actions.T
+    error = limited + clip_slope * (raw - limited) - labelled.actions.T
     losses = np.square(error).mean(axis=1)
 
     ways, turns = _ways(tree), _turns(tree, states, temperature)
-    own = np.exp(ways @ turns)
-    weighted = own * losses
+    leaf_shares = np.exp(ways @ turns)
+    weighted = leaf_shares * losses
 
-    by_raw = (2 / (n * m)) * own[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
-    by_maps = (by_raw.reshape(k * m, n) @ seen.inputs).reshape(k, m, rows).transpose(0, 2, 1)
+    by_raw = (2 / (n * m)) * leaf_shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
+    by_maps = (by_raw.reshape(k * m, n) @ labelled.inputs).reshape(k, m, rows).transpose(0, 2, 1)
     by_left, by_right = np.split(ways.T @ weighted, 2)
     left, right = np.split(np.exp(turns), 2)
     by_logits = (by_right * left - by_left * right) / (n * temperature)
@@ -210,22 +196,22 @@ def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
     tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # used only to search for splits
 
     def fitted(codewords: np.ndarray) -> VoronoiPolicy:
-        cells = Cells(codewords, np.zeros((len(codewords), d + 1, m)))
-        return refit(frame.policy(cells), states, actions)
+        empty = Cells(codewords, np.zeros((len(codewords), d + 1, m)))
+        return refit(frame.policy(empty), states, actions)
 
     codewords = points.mean(axis=0)[None]
     policy = fitted(codewords)
     while len(codewords) < size:
-        own = policy.cells(states)
-        splits = {i: tree.split(points[own == i], actions[own == i]) for i in np.unique(own)}
-        i = max(splits, key=lambda one: splits[one].gain)
+        cells = policy.cells(states)
+        splits = {i: tree.split(points[cells == i], actions[cells == i]) for i in np.unique(cells)}
+        i = max(splits, key=lambda cell: splits[cell].gain)
         if splits[i].gain <= least:
             break
         others = np.delete(codewords, i, axis=0)
-        found = [np.vstack([others, pair]) for pair in pairs(codewords[i], points[own == i], splits[i])]
-        made = [fitted(one) for one in found]
-        best = int(np.argmin([action_error(one, frame, states, actions) for one in made]))
-        codewords, policy = found[best], made[best]
+        candidates = [np.vstack([others, pair]) for pair in pairs(codewords[i], points[cells == i], splits[i])]
+        policies = [fitted(candidate) for candidate in candidates]
+        best = int(np.argmin([action_error(each, frame, states, actions) for each in policies]))
+        codewords, policy = candidates[best], policies[best]
     return policy
 
 
@@ -237,7 +223,7 @@ def pairs(codeword: np.ndarray, points: np.ndarray, split: Split) -> list[np.nda
     """
     right = split.right(points)
     means = np.array([points[~right].mean(axis=0), points[right].mean(axis=0)])
-    mirrored = [np.array([one, _mirrored(one, split)]) for one in (codeword, *means)]
+    mirrored = [np.array([point, _mirrored(point, split)]) for point in (codeword, *means)]
     return [means, *mirrored]
 
 
