@@ -113,7 +113,6 @@ def descend(
 
 def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:
     temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
-    clip_slope = search.CLIP_SLOPES[stage]
     bases = search.uncorrelated(labelled, shares(tree, labelled.inputs[:, :-1], temperature))
     vector, shape, cut = tree.vector, tree.maps.shape, tree.vector.size - tree.maps.size
 

@@ -38,6 +38,7 @@ from . import measure
 from .makers import Budget
 from .methods import ALIKE, FORMER_NAMES, FOUND, LANDER, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
 
+CHEETAH = WALKERS[1]
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
 GAIT, GAIT_VERSION = {"start": 0.0, "n_steps": 200}, 2  # raise the version when the same policy gives another gait
@@ -181,7 +182,7 @@ def extras(task: str, table: str) -> Iterator[tuple[str, list[dict]]]:
         yield f"same_{task}.csv", [{**about, "seed": a.seed, "other": b.seed} for about, (a, b) in pairs]
     if TABLES[task][table].keeps:
         yield f"{table}_{task}.policy", [kept_job(task, table).provenance]
-    if table == "robots":
+    if task == CHEETAH:
         yield f"gait_{task}.csv", [gait_provenance(task)]
     if (table, task) == ("methods", LANDER):
         yield f"{table}_{task}.policy", [simplest_provenance(task)]
@@ -195,7 +196,7 @@ def write_extras(folder: str | os.PathLike, task: str, table: str, out: str | os
     if TABLES[task][table].keeps:
         job = kept_job(task, table)
         _keep(job.policy(folder), path, job.provenance)
-    if table == "robots":
+    if task == CHEETAH:
         gait = record_gait(VoronoiPolicy.load(path), task, **GAIT).assign(**gait_provenance(task))
         write_results(gait, f"gait_{task}", out=out)
     if (table, task) == ("methods", LANDER):
