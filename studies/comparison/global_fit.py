@@ -120,9 +120,7 @@ def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int
         return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = expected_loss(
-            move(step), labelled, temperature=temperature, clip_slope=search.CLIP_SLOPES[stage]
-        )
+        value, gradient = expected_loss(move(step), labelled, temperature, search.CLIP_SLOPES[stage])
         by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
         return value, joined([slope * gradient[:cut], by_maps])
 
@@ -153,7 +151,7 @@ def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndar
 
 
 def expected_loss(
-    tree: TreeNumbers, labelled: LabelledStates, *, temperature: float, clip_slope: float
+    tree: TreeNumbers, labelled: LabelledStates, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
     """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
 

@@ -47,7 +47,7 @@ def measure(
     """Measure a policy: returns, action errors, size and cost.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
+    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters; with
     `tail`, worst (mean return of the worst episodes). Slow tasks are played from fewer starts; with
     `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
     returns.
@@ -55,15 +55,13 @@ def measure(
     fewer = task.slowness
     result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), seed))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
-    parameters, operations = cost(policy)
     row = {
         "mean": float(result.returns.mean()),
         "failing": float(np.mean(result.outcomes != GOAL)),
         "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
         "error_own": action_error(policy, teacher, task, starts, by=policy),
         "cells": len(policy) if hasattr(policy, "__len__") else 0,
-        "parameters": parameters,
-        "operations": operations,
+        "parameters": parameters_of(policy),
     }
     return row | ({"worst": worst(result.returns)} if tail else {})
 
@@ -134,37 +132,22 @@ def _rmse(actions: np.ndarray, others: np.ndarray) -> float:
     return float(np.sqrt(np.square(actions - others).mean()))
 
 
-def cost(policy: Policy) -> tuple[int, float]:
-    """Return a policy's parameters, and the mean number of arithmetic operations and comparisons per decision."""
+def parameters_of(policy: Policy) -> int:
+    """Return how many numbers determine a policy's actions. An axis split has two, an oblique one d + 1."""
     if isinstance(policy, VoronoiPolicy):
         policy.check_linear()
-        k, rows, m = policy.coefficients.shape
-        units = (rows - 1) * bool((policy.scale != 1).any())  # states are divided by these numbers
-        look_up = (k > 1) * (units + k * 3 * (rows - 1) + k - 1)
-        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units), look_up + 2 * (rows - 1) * m
+        k, d = policy.codewords.shape
+        units = d * bool((policy.scale != 1).any())  # states are divided by these numbers
+        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units)
     if isinstance(policy, tdavq.DiscretePolicy):  # its values do not count: they do not affect the actions
-        (k, d), m = policy.codewords.shape, policy.actions.shape[1]
-        return k * (d + m), float((k > 1) * (k * 3 * d + k - 1))
-    if isinstance(policy, Tree | LinearTree):
-        return _tree_cost(policy)
-    if hasattr(policy, "COST"):  # counted by hand
-        return policy.COST
-    if isinstance(policy, SoftTree):  # the probabilities of all leaves, then the most probable one
-        nodes, leaves = policy.nodes, len(policy)
-        return nodes.size + policy.values.size, float(2 * nodes.size + leaves * policy.depth + leaves - 1)
-    layers = policy.layers
-    return sum(w.size + b.size for w, b in layers), float(sum(2 * w.size for w, _ in layers))
-
-
-def _tree_cost(policy: Tree | LinearTree) -> tuple[int, float]:
-    """Count the cost of a tree: an axis split is two numbers and one comparison, an oblique one d + 1 and 2 d."""
-    leaves = len(policy)
+        return policy.codewords.size + len(policy) * policy.actions.shape[1]
     if isinstance(policy, Tree):
-        tree, ends = policy.model.tree_, policy.model.tree_.children_left < 0
-        depths, weights = tree.compute_node_depths()[ends] - 1, tree.n_node_samples[ends]
-        return leaves * policy.model.n_outputs_ + 2 * (leaves - 1), float(np.average(depths, weights=weights))
-    rows, m = policy.maps.shape[1:]
-    depth = float(np.average([node.depth for node in policy.ends], weights=[len(node.rows) for node in policy.ends]))
-    oblique = isinstance(policy, ObliqueLinearTree)
-    numbers = leaves * rows * m + (leaves - 1) * (rows if oblique else 2)
-    return numbers, depth * (2 * (rows - 1) if oblique else 1) + 2 * (rows - 1) * m
+        return len(policy) * policy.model.n_outputs_ + 2 * (len(policy) - 1)
+    if isinstance(policy, LinearTree):
+        rows, m = policy.maps.shape[1:]
+        return len(policy) * rows * m + (len(policy) - 1) * (rows if isinstance(policy, ObliqueLinearTree) else 2)
+    if isinstance(policy, SoftTree):
+        return policy.nodes.size + policy.values.size
+    if hasattr(policy, "PARAMETERS"):  # counted by hand
+        return policy.PARAMETERS
+    return sum(weights.size + biases.size for weights, biases in policy.layers)

@@ -20,8 +20,8 @@ from ..robots import walking_preset
 from . import makers
 
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
-LANDER, WALKERS = "LunarLanderContinuous-v3", ("BipedalWalker-v3", "HalfCheetah-v5")
-LONG = (LANDER, *WALKERS)  # rows take minutes to hours
+LANDER, WALKER, CHEETAH = "LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5"
+LONG = (LANDER, WALKER, CHEETAH)  # rows take minutes to hours
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = ((task,) for task in TASKS)
 
 PRESETS = {
@@ -152,7 +152,7 @@ METHODS = {
     "oblique tree": (_tree := _robot(makers.robot_tree, OF_IMITATION, (2, 4, 8, 16), version=2)),
     "oblique tree, trained further": _further(_tree),
     "one map, random search": (_search := _robot(makers.searched, OF_SEARCH)),
-    "one map, longer search": replace(_search, settings={"n_random_steps": 18_000_000}, tasks=WALKERS[:1]),
+    "one map, longer search": replace(_search, settings={"n_random_steps": 18_000_000}, tasks=(WALKER,)),
     "robot's teacher": _robot(makers.the_teacher, (), chance=False),
 }  # fmt: skip
 
@@ -226,8 +226,8 @@ TABLES = {
         "faithful": Table(range(10), range(3), sizes=(0, 1, 2, 4, 8), tail=True, keeps="faithful"),
         "limit": Table(range(2), sizes=(3,), keeps="at the limit"),
     },
-    WALKERS[0]: {"robots": Table(range(3), keeps="cells, trained further")},
-    WALKERS[1]: {"robots": Table(range(5), range(3), keeps="cells, trained further")},
+    WALKER: {"robots": Table(range(3), keeps="cells, trained further")},
+    CHEETAH: {"robots": Table(range(5), range(3), keeps="cells, trained further")},
 }  # fmt: skip
 
 

@@ -36,9 +36,8 @@ from ..results import write_results
 from ..robots import record_gait
 from . import measure
 from .makers import Budget
-from .methods import ALIKE, FORMER_NAMES, FOUND, LANDER, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
+from .methods import ALIKE, CHEETAH, FORMER_NAMES, FOUND, LANDER, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
 
-CHEETAH = WALKERS[1]
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
 GAIT, GAIT_VERSION = {"start": 0.0, "n_steps": 200}, 2  # raise the version when the same policy gives another gait

@@ -14,7 +14,7 @@ from ..results import read_results
 from .methods import METHODS, PRESETS, UNTUNED
 
 OURS, TUNED = "our cells", "our cells, tuned"
-MEANS = ("failing", "error_teacher", "error_own", "cells", "parameters", "operations")
+MEANS = ("failing", "error_teacher", "error_own", "cells", "parameters")
 INTERVAL = ("mean", "low", "high")
 # When a policy matches its teacher. SimpleGoal: the mean return is at most 0.03 lower, and the failures at most 0.1
 # percentage points more. MountainCar: no failure, and a higher mean return. Pendulum, where nothing can fail: the mean
@@ -61,7 +61,7 @@ def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
     """Summarise rows of `read_rows`: one row per method and size, within a size the best mean return first.
 
     Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median; and
-    failing, error_teacher, error_own, cells, parameters, operations (means over the seeds).
+    failing, error_teacher, error_own, cells, parameters (means over the seeds).
     """
     table = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):

@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from vsp.checks import check_count
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import RUNNING, Task
 from vsp.tasks.registry import get_task
@@ -23,7 +22,6 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
     and z1 in metres, such as "torso x0", and for each input what the policy sees, such as "input θ".
     """
     task = get_task(task)
-    check_count("n_steps", n_steps)
     states, rows = task.begin(np.array([[float(start)]])), []
     for step in range(min(n_steps, task.max_steps)):
         observed, env = task.observe(states), states[0].env.unwrapped

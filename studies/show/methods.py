@@ -49,7 +49,7 @@ LARGEST = 13  # most leaves of a method drawn there
 def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
     """Plot return over fidelity. Policies further right act more like the teacher; policies higher up return more.
 
-    `points` has the columns method, size, mean and r2 of `studies.comparison.possible`. Each line is our method with one
+    `points` has the columns method, size, mean and r2 of `studies.comparison.possible`. Each line is ours with one
     number of cells. It runs from the highest R² (circle), through the highest returns at a given R², to the highest
     return (star). Marks are other methods by kind: open for imitation, filled if tuned, larger for more leaves. The
     scale is logarithmic in 1 - R², and in the return beyond `linear`.
