@@ -1,17 +1,16 @@
 """Measure how look-ups, neighbour graphs and fits scale: with dimensions, codewords, cells and states.
 
 The paper names many dimensions as a limit of kd-trees and of Delaunay triangulations. Codewords are uniform in the unit
-cube, which is equally hard for all methods. A fit is some 700 evaluations of a loss and its gradient
-(`few_cells.search`), so one evaluation is measured: its states are normally distributed, its actions those of a
-limited linear map. Times are processor time of one thread, and differ from run to run.
+cube, which is equally hard for all methods; distances are Euclidean. A fit is some 700 evaluations of a loss and its
+gradient (`few_cells.search`), so one evaluation is measured: its states are normally distributed, its actions those of
+a limited linear map. Times are processor time of one thread, and differ from run to run.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import numpy as np
@@ -20,7 +19,6 @@ from threadpoolctl import threadpool_limits
 
 from vsp import geometry
 from vsp.run.machine import cpu_type
-from vsp.run.progress import progress
 from vsp_beyond.few_cells.search import CLIP_SLOPES, TEMPERATURES, whole_loss
 from vsp_beyond.few_cells.units import Cells, LabelledStates
 
@@ -37,8 +35,8 @@ VARIED = {
 N_ACTIONS = 6
 
 
-def nearest_by_product(codewords: np.ndarray, states: np.ndarray, metric: str = "euclidean") -> np.ndarray:
-    """Find the nearest codewords by one matrix product. Euclidean distance only.
+def nearest_by_product(codewords: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Find the nearest codewords by one matrix product.
 
     Uses |s - c|^2 = |s|^2 + |c|^2 - 2 s.c, where |s|^2 is the same for all codewords.
     """
@@ -47,16 +45,43 @@ def nearest_by_product(codewords: np.ndarray, states: np.ndarray, metric: str = 
     return gaps.argmin(axis=1)
 
 
-LOOKUPS = {
-    ("cdist", "euclidean"): partial(geometry.nearest, kdtree=False),
-    ("cdist", "manhattan"): partial(geometry.nearest, kdtree=False),
-    ("matrix product", "euclidean"): nearest_by_product,
-    ("kd-tree", "euclidean"): partial(geometry.nearest, kdtree=True),
-    ("kd-tree", "manhattan"): partial(geometry.nearest, kdtree=True),
-}
+def look_ups() -> Iterator[tuple[dict, Callable[[], object]]]:
+    """Yield what is measured, and how: what ("look-up" or "graph"), d, method, k (codewords).
+
+    A look-up is that of `N_STATES` states, including building the kd-tree.
+    """
+    for d in DIMENSIONS:
+        states, low, high = np.random.default_rng(d).random((N_STATES, d)), np.zeros(d), np.ones(d)
+        for k in CODEWORDS:
+            codewords = np.random.default_rng([d, k]).random((k, d))
+            brute = partial(geometry.nearest, codewords, states, "euclidean", kdtree=False)
+            tree = partial(geometry.nearest, codewords, states, "euclidean", kdtree=True)
+            product = partial(nearest_by_product, codewords, states)
+            for method, look_up in (("cdist", brute), ("matrix product", product), ("kd-tree", tree)):
+                yield {"what": "look-up", "d": d, "method": method, "k": k}, look_up
+            if k == OF_GRAPHS and d <= DELAUNAY_UP_TO:
+                about = {"what": "graph", "d": d, "method": "Delaunay", "k": k}
+                yield about, partial(geometry.delaunay_neighbours, codewords)
+            if k == OF_GRAPHS:
+                about = {"what": "graph", "d": d, "method": "witnesses", "k": k}
+                yield about, partial(geometry.lookup_neighbours, codewords, low, high, "euclidean")
 
 
-def seconds(work: Callable[[], object], *, total: float = 0.1) -> float:
+def evaluations() -> Iterator[tuple[dict, Callable[[], object]]]:
+    """Yield evaluations of the loss and its gradient: which quantity is varied, dimensions, cells, states."""
+    stage = len(TEMPERATURES) // 2
+    for varied, values in VARIED.items():
+        for value in values:
+            size = FIT | {varied: value}
+            (d, k, n), rng = size.values(), np.random.default_rng(0)
+            inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
+            cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
+            labelled = LabelledStates(inputs, np.clip(inputs @ cells.maps[0], -1.0, 1.0))
+            about = {"temperature": TEMPERATURES[stage] * d, "clip_slope": CLIP_SLOPES[stage]}
+            yield {"varied": varied, **size}, partial(whole_loss, cells, labelled, **about)
+
+
+def seconds(work: Callable[[], object], *, total: float = 0.5) -> float:
     """Return the minimum processor time of `work` over calls that together take `total` seconds."""
     times: list[float] = []
     while not times or sum(times) < total:
@@ -66,65 +91,15 @@ def seconds(work: Callable[[], object], *, total: float = 0.1) -> float:
     return min(times)
 
 
-def lookup(dimensions: tuple[int, ...] = DIMENSIONS, codewords: tuple[int, ...] = CODEWORDS) -> pd.DataFrame:
-    """Time look-ups of `N_STATES` states, including building the kd-tree, and graphs of `OF_GRAPHS` codewords.
-
-    Columns: what ("look-up" or "graph"), method, metric, d, k (codewords), seconds.
-    """
-    rows = []
-    for d in progress(dimensions, "look-ups", total=len(dimensions), unit="dimensions"):
-        states, about = np.random.default_rng(d).random((N_STATES, d)), {"what": "look-up", "d": d}
-        for k in codewords:
-            points = np.random.default_rng([d, k]).random((k, d))
-            for (method, metric), look_up in LOOKUPS.items():
-                took = seconds(partial(look_up, points, states, metric))
-                rows.append({**about, "method": method, "metric": metric, "k": k, "seconds": took})
-        points, about = np.random.default_rng([d, OF_GRAPHS]).random((OF_GRAPHS, d)), {"what": "graph", "d": d}
-        graphs = {"witnesses": partial(geometry.lookup_neighbours, points, np.zeros(d), np.ones(d), "euclidean")}
-        graphs |= {"Delaunay": partial(geometry.delaunay_neighbours, points)} if d <= DELAUNAY_UP_TO else {}
-        for method, graph in graphs.items():
-            took = seconds(graph)
-            rows.append({**about, "method": method, "metric": "euclidean", "k": OF_GRAPHS, "seconds": took})
-    return pd.DataFrame(rows).sort_values("what", ascending=False, kind="stable")
-
-
-def evaluation(d: int, k: int, n: int) -> Callable[[], object]:
-    """Return a function that evaluates the loss of k cells and its gradient, on n states with d inputs."""
-    rng = np.random.default_rng(0)
-    inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
-    cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
-    actions = np.clip(inputs @ cells.maps[0], -1.0, 1.0)
-    stage = len(TEMPERATURES) // 2
-    about = {"temperature": TEMPERATURES[stage] * d, "clip_slope": CLIP_SLOPES[stage]}
-    return partial(whole_loss, cells, LabelledStates(inputs, actions), **about)
-
-
-def fits(varied: dict[str, tuple[int, ...]] = VARIED) -> pd.DataFrame:
-    """Measure evaluations, one row each.
-
-    Columns: varied (which quantity), dimensions, cells, states, seconds, megabytes (in addition to the states).
-    """
-    rows, cases = [], [(name, value) for name, values in varied.items() for value in values]
-    for name, value in progress(cases, "fits", total=len(cases), unit="sizes"):
-        size = FIT | {name: value}
-        work = evaluation(*size.values())
-        took = seconds(work, total=0.5)
-        tracemalloc.start()
-        work()
-        megabytes = tracemalloc.get_traced_memory()[1] / 1e6
-        tracemalloc.stop()
-        rows.append({"varied": name, **size, "seconds": took, "megabytes": megabytes})
-    return pd.DataFrame(rows)
-
-
 def main() -> None:
     """Measure, in two minutes, and write OUT/data/beyond/lookup.csv and fits.csv."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="the results go to OUT/data/beyond")
     out = parser.parse_args().out
     with threadpool_limits(1):
-        for name, measured in (("lookup", lookup), ("fits", fits)):
-            write_results(measured().assign(machine=cpu_type()), name, out=out, float_format="%.4g")
+        for name, cases in (("lookup", look_ups), ("fits", evaluations)):
+            frame = pd.DataFrame([{**about, "seconds": seconds(work)} for about, work in cases()])
+            write_results(frame.assign(machine=cpu_type()), name, out=out, float_format="%.4g")
 
 
 if __name__ == "__main__":

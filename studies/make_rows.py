@@ -10,7 +10,7 @@ import pandas as pd
 from vsp.run import command
 
 from .comparison.methods import LONG, TABLES
-from .comparison.rows import best_returns, jobs_of, make_all, rows, write_extras
+from .comparison.rows import best_returns, extras, jobs_of, make_all, rows
 from .results import write_results
 
 
@@ -19,31 +19,30 @@ def main() -> None:
     the sameness of faithful ones, gaits. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks
     that take hours. The returns of the best policies go to optimum.csv.
     """
-    names = list(dict.fromkeys(table for tables in TABLES.values() for table in tables))
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="results go to OUT/data/beyond, rows to OUT/build/beyond")
+    parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/beyond, rows to OUT/build/beyond")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
-    parser.add_argument("--tables", nargs="+", choices=names, default=names, help="default: all")
     arguments = parser.parse_args()
-    folder, long = Path(arguments.out) / "build" / "beyond", arguments.long
-    asked = [
-        (table, task)
+    out, folder = arguments.out, arguments.out / "build" / "beyond"
+    wanted = {
+        (table, task): jobs_of(task, table)
         for task in TABLES
         for table in TABLES[task]
-        if (task in LONG) == long and table in arguments.tables
-    ]
-    make_all(folder, [job for table, task in asked for job in jobs_of(task, table)], jobs=arguments.jobs)
+        if (task in LONG) == arguments.long
+    }
+    make_all(folder, [job for jobs in wanted.values() for job in jobs], jobs=arguments.jobs)
     seconds: dict[str, list[pd.DataFrame]] = {}
-    for table, task in asked:
-        frame, times = rows(folder, jobs_of(task, table))
+    for (table, task), jobs in wanted.items():
+        frame, times = rows(folder, jobs)
         seconds.setdefault(table, []).append(times)
-        write_results(frame, f"{table}_{task}", out=arguments.out)
-        write_extras(folder, task, table, arguments.out)
+        write_results(frame, f"{table}_{task}", out=out)
+        for _, _, write in extras(task, table):
+            write(folder, out)
     for table, times in seconds.items():
-        write_results(pd.concat(times), f"{table}_seconds{'_long' * long}", out=arguments.out)
-    if "methods" in seconds and not long:
-        write_results(best_returns(), "optimum", out=arguments.out)
+        write_results(pd.concat(times), f"{table}_seconds{'_long' * arguments.long}", out=out)
+    if not arguments.long:
+        write_results(best_returns(), "optimum", out=out)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import pandas as pd
 from vsp.paper import results
 from vsp.run import ROOT, listed
 
-RESULTS = ROOT / "data" / "beyond"
+BEYOND = Path("data", "beyond")
+RESULTS = ROOT / BEYOND
 
 
 def read_results(name: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
@@ -21,4 +22,4 @@ def read_results(name: str, folder: str | os.PathLike | None = None) -> pd.DataF
 def write_results(frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str = "%.6f") -> None:
     """Write OUT/data/beyond/NAME.csv atomically, and list it in the manifest of its folder."""
     text = frame.to_csv(index=False, float_format=float_format, lineterminator="\n")
-    listed.write_listed(Path(out) / "data" / "beyond" / f"{name}.csv", text)
+    listed.write_listed(Path(out) / BEYOND / f"{name}.csv", text)

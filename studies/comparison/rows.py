@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import combinations
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from vsp_beyond.few_cells.simplification import simplify
 from vsp_beyond.few_cells.units import METRIC
 from vsp_beyond.optimum.grid import GridPolicy
 
-from ..results import write_results
+from ..results import BEYOND, write_results
 from ..robots import record_gait
 from . import measure
 from .makers import Budget
@@ -173,50 +173,45 @@ def kept_job(task: str, table: str) -> Job:
     return Job(task, name, PRESETS[METHODS[name].preset](task).n_cells, 0, tail=TABLES[task][table].tail)
 
 
-def extras(task: str, table: str) -> Iterator[tuple[str, list[dict]]]:
-    """Yield the files of a table beside that of its rows, each with the provenance of its rows."""
-    if table == "faithful":
-        kinds = [(kind.provenance, jobs) for kind, jobs in by_seed(jobs_of(task, table)).items()]
-        pairs = ((made_with, pair) for made_with, jobs in kinds for pair in combinations(jobs, 2))
-        yield f"same_{task}.csv", [{**about, "seed": a.seed, "other": b.seed} for about, (a, b) in pairs]
-    if TABLES[task][table].keeps:
-        yield f"{table}_{task}.policy", [kept_job(task, table).provenance]
-    if task == CHEETAH:
-        yield f"gait_{task}.csv", [gait_provenance(task)]
-    if (table, task) == ("methods", LANDER):
-        yield f"{table}_{task}.policy", [simplest_provenance(task)]
+def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[Path, Path], None]]]:
+    """Yield the files of a table beside that of its rows: name, provenance of each row, and a function that writes it.
 
-
-def write_extras(folder: str | os.PathLike, task: str, table: str, out: str | os.PathLike) -> None:
-    """Write the files of `extras` to OUT/data/beyond. `folder` holds the rows."""
-    path = Path(out) / "data" / "beyond" / f"{table}_{task}.policy"
+    The function takes the folder of the rows and OUT; the file goes to OUT/data/beyond.
+    """
     if table == "faithful":
-        write_results(sameness_of(folder, jobs_of(task, table)), f"same_{task}", out=out)
+        pairs = (
+            {**kind.provenance, "seed": a.seed, "other": b.seed}
+            for kind, jobs in by_seed(jobs_of(task, table)).items()
+            for a, b in combinations(jobs, 2)
+        )
+        yield f"same_{task}.csv", list(pairs), partial(_write_sameness, task)
     if TABLES[task][table].keeps:
         job = kept_job(task, table)
-        _keep(job.policy(folder), path, job.provenance)
-    if task == CHEETAH:
-        gait = record_gait(VoronoiPolicy.load(path), task, **GAIT).assign(**gait_provenance(task))
-        write_results(gait, f"gait_{task}", out=out)
+        made_with, name = job.provenance, f"{table}_{task}.policy"
+        yield name, [made_with], lambda folder, out: _keep(job.policy(folder), out / BEYOND / name, made_with)
+        if task == CHEETAH:
+            walks = provenance({"policy": made_with, "table": "gait", **GAIT}, made_with["teacher"], GAIT_VERSION)
+            yield (
+                f"gait_{task}.csv",
+                [walks],
+                lambda folder, out: write_results(
+                    record_gait(job.policy(folder), task, **GAIT).assign(**walks), f"gait_{task}", out=out
+                ),
+            )
     if (table, task) == ("methods", LANDER):
-        _keep(simplest(task), path, simplest_provenance(task))
+        few, about = f"{table}_{task}.policy", simplest_provenance(task)
+        yield few, [about], lambda folder, out: _keep(simplest(task), out / BEYOND / few, about)
 
 
-def sameness_of(folder: str | os.PathLike, wanted: list[Job]) -> pd.DataFrame:
-    """Compare the policies of different seeds, one row per size and pair. The files of `wanted` must hold policies."""
+def _write_sameness(task: str, folder: Path, out: Path) -> None:
+    """Compare the faithful policies of different seeds, one row per size and pair."""
     tables = []
-    for kind, jobs in by_seed(wanted).items():
+    for kind, jobs in by_seed(jobs_of(task, "faithful")).items():
         policies = {job.seed: job.policy(folder) for job in jobs}
-        table = measure.sameness(policies, load_teacher(kind.task), get_task(kind.task)).assign(**kind.provenance)
+        table = measure.sameness(policies, load_teacher(task), get_task(task)).assign(**kind.provenance)
         table.insert(0, "size", kind.size)
         tables.append(table)
-    return pd.concat(tables, ignore_index=True)
-
-
-def gait_provenance(task: str) -> dict[str, str | int]:
-    """Return the provenance of a gait, which includes that of the policy."""
-    made_with = kept_job(task, "robots").provenance
-    return provenance({"policy": made_with, "table": "gait", **GAIT}, made_with["teacher"], GAIT_VERSION)
+    write_results(pd.concat(tables, ignore_index=True), f"same_{task}", out=out)
 
 
 def simplest(task: str) -> VoronoiPolicy:

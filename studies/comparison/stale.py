@@ -44,10 +44,9 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
     for task, tables in TABLES.items():
         target = "beyond-long" if task in LONG else "beyond"
         for table in tables:
-            kinds = by_seed(jobs_of(task, table)).items()
-            made_with = ((jobs, kind.provenance) for kind, jobs in kinds)
+            made_with = ((jobs, kind.provenance) for kind, jobs in by_seed(jobs_of(task, table)).items())
             yield f"{table}_{task}.csv", target, [{"seed": job.seed, **now} for jobs, now in made_with for job in jobs]
-            for name, today in extras(task, table):
+            for name, today, _ in extras(task, table):
                 yield name, target, today
     yield "optimum.csv", "beyond", [best_provenance(*way) for way in WAYS]
 
