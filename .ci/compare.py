@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from studies.benchmarks.trust import save_kills
 from vsp.paper import runs
 from vsp.paper.printed import PREFIX
 from vsp.paper.statistics import outlier_numbers, spread
@@ -69,7 +68,6 @@ def implausible(made: Path, task: str) -> list[str]:
 def main() -> None:
     made = Path(sys.argv[1])
     if listed.read_listed("data/results/made_on.txt").decode().strip() == cpu_type():
-        save_kills(made)  # the only figure that no notebook makes
         paths = sorted(path for path in FIGURES.rglob("*") if path.is_file())
         wrong, right = different(made, paths), f"all {len(paths)} files of {FIGURES}/ have the same bytes"
     else:

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from studies.benchmarks.trust import save_kills
-from vsp.run import atomic, listed
+from vsp.run import listed
 from vsp.run.machine import cpu_type
 
 COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
@@ -75,8 +74,6 @@ def main() -> None:
             write(results / path.name, merged(read(results / path.name), read(path)))
         else:
             listed.write_listed(results / path.name, listed.read_listed(path))
-    if results.resolve() == atomic.ROOT / "data" / "results":
-        save_kills(atomic.ROOT)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,6 @@ def compare(module, tmp_path, monkeypatch):
     shutil.copytree(tmp_path / "here", tmp_path / "made")
     write_listed(tmp_path / "here" / "data" / "results" / "made_on.txt", cpu_type() + "\n")
     monkeypatch.chdir(tmp_path / "here")
-    monkeypatch.setattr(module, "save_kills", lambda out: None)
     monkeypatch.setattr("sys.argv", ["compare.py", "../made"])
     return module.main
 

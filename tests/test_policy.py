@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
 import vsp
-from studies.comparison.measure import cost
+from studies.comparison.measure import parameters_of
 from vsp.geometry import distances
 from vsp.paper.baselines import refit
 from vsp.policy import VoronoiPolicy
@@ -327,12 +327,12 @@ def test_a_sealed_file_that_holds_no_policy_is_refused(change, tmp_path):
         lambda policy: distill_tuned(None, MOUNTAINCAR, Tuned(n_cells=6), seed=0, start=policy),
         lambda policy: PolicyBatch([policy]),
         lambda policy: prune(policy, lambda one: True),
-        lambda policy: cost(policy),
+        lambda policy: parameters_of(policy),
         lambda policy: refit(policy, np.zeros((3, 2)), np.zeros((3, 1))),
         lambda policy: RulePolicy(policy, []),
         lambda policy: compare_maps(policy, policy, np.zeros((1, 2)), scale=np.ones(2), rng=np.random.default_rng(0)),
     ],
-    ids=["refine", "PolicyBatch", "prune", "cost", "refit", "RulePolicy", "compare_maps"],
+    ids=["refine", "PolicyBatch", "prune", "parameters_of", "refit", "RulePolicy", "compare_maps"],
 )
 def test_what_knows_linear_policies_alone_refuses_others(use):
     """The PID class of MountainCar has as many parameters as the linear one: nothing else would notice."""

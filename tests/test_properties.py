@@ -19,11 +19,6 @@ from hypothesis import strategies as st
 from support import SIMPLEGOAL, Constant, CurvedTeacher, network_teacher, partition_of, tiny
 
 import vsp
-from studies.comparison import imitate
-from studies.rivals import critics, dagger, hand_written, small_network, tdavq, trees
-from studies.rivals.soft_tree import SoftTree
-from studies.robots import Walking, imitate_pushed, search_one_map, walking_preset
-from studies.robots.fewest import fewest_numbers
 from vsp import algorithms, evaluation, export, geometry, policy, rollouts
 from vsp.config import Config, paper_preset
 from vsp.paper import baselines as simple
@@ -152,10 +147,6 @@ FAITHFUL = config.Faithful(
     n_cells=2, tolerance=1.0, n_episodes=2, n_states=20, n_restarts=1, n_generations=1, n_tuning_episodes=2,
     n_validation=2,
 )  # fmt: skip
-WALKING = Walking(
-    n_cells=2, n_episodes=2, n_corrections=1, n_correction_episodes=2, n_states=20, n_restarts=1, n_validation=2,
-    n_random_steps=10, n_directions=2, n_best=1,
-)  # fmt: skip
 STILL = policy.VoronoiPolicy([[0, 0, 0]], np.zeros((1, 4, 1)), task="Pendulum-v1")
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 RULES = [
@@ -196,16 +187,6 @@ def of_ax(function, **fixed):
     return lambda **arguments: function(ax(function), **fixed, **arguments)
 
 
-class QuickSoftTree(SoftTree):
-    N_STEPS = 5
-
-
-def quick_critic_driven(*data, **about):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(critics, "N_STEPS", 3)
-        return critics.critic_driven(*data, **about)
-
-
 def partition():
     return partition_of([[0.25, 0.5], [0.75, 0.5]])
 
@@ -213,7 +194,6 @@ def partition():
 states, some_states = numbers(STATES, free=(0,)), numbers(STATES, some=True)
 pairs = {"states": numbers(STATES, free=(), some=True), "actions": numbers(ACTIONS, free=(), some=True)}
 task, seed, teacher = choice(SIMPLEGOAL), count(0, least=0), actor(TEACHER)
-critic = Argument(with_critics(), st.sampled_from([TEACHER, NET, None, 3, "TD3", np.zeros(2)]))
 player = {"policy": actor(TEACHER), "task": task}
 starts = numbers(STATES, also=[np.full((1, 2), 1.5), np.full((1, 2), -0.001)])
 points = {"codewords": numbers(STATES, free=(0, 1), some=True), "metric": choice("manhattan")}
@@ -232,21 +212,6 @@ CASES = {
     "teachers.agents.agent": (
         agents.agent,
         {"source": Argument(TEACHER, st.sampled_from([None, 3, "TD3", np.zeros(2), np.nan]))},
-    ),
-    "simple.Heuristic.predict": (hand_written.Heuristic().predict, {"obs": numbers(np.ones((3, 8)) / 4)}),
-    "simple.PumpAndBalance.predict": (hand_written.PumpAndBalance().predict, {"obs": numbers(np.ones((3, 3)) / 4)}),
-    "simple.ZeroPolicy.predict": (hand_written.ZeroPolicy(TASK).predict, {"obs": states}),
-    "critics.critic_driven": (
-        quick_critic_driven,
-        pairs | {"cells": count(2), "teacher": critic, "task": task, "seed": seed},
-    ),
-    "critics.advantage_weighted": (
-        critics.advantage_weighted,
-        pairs | {"cells": count(2, most=len(STATES)), "teacher": critic, "task": task, "seed": seed},
-    ),
-    "dagger.dagger": (
-        functools.partial(dagger.dagger, [lambda s, a: simple.linear_map(s, a, SIMPLEGOAL)]),
-        {"teacher": teacher, "task": task, "rounds": budget, "seed": seed},
     ),
     "simple.kmeans_cells": (
         simple.kmeans_cells,
@@ -286,20 +251,6 @@ CASES = {
     "proofs.network.teacher_steps_to_goal": (
         functools.partial(teacher_steps_to_goal, load_teacher("SimpleGoal-v0")),
         {"n": count(20, most=8000)},
-    ),
-    "robots.settings.Walking": (Walking, settings_of(Walking, WALKING)),
-    "robots.settings.walking_preset": (walking_preset, {"task": task}),
-    "robots.fewest.fewest_numbers": (
-        functools.partial(fewest_numbers, TWO),
-        {"keep": number(0.5, least=0.0, most=1.0), "n_episodes": count(2), "seed": seed},
-    ),
-    "robots.imitation.imitate_pushed": (
-        functools.partial(imitate_pushed, config=WALKING),
-        {"teacher": teacher, "task": task, "seed": seed},
-    ),
-    "robots.random_search.search_one_map": (
-        functools.partial(search_one_map, config=WALKING),
-        {"task": task, "seed": seed},
     ),
     "optimum.simplegoal.best_returns": (best_returns, {"starts": states}),
     "few_cells.config.faithful_preset": (config.faithful_preset, {"task": task}),
@@ -415,10 +366,6 @@ CASES = {
         },
     ),
     "paper.statistics.rounds_to": (functools.partial(statistics.rounds_to, 1.5), {"printed": number(1.5)}),
-    "few_cells.imitate.imitate": (
-        imitate.imitate,
-        {"teacher": teacher, "task": task, "config": budget, "seed": seed},
-    ),
     "paper.printed.check_task": (printed.check_task, {"task": task}),
     "paper.printed.printed_hyperparameters": (printed.printed_hyperparameters, {"task": task}),
     "paper.printed.linear_policies": (printed.linear_policies, {"task": task}),
@@ -543,19 +490,6 @@ CASES = {
             "cells": count(3),
         },
     ),
-    "tdavq.DiscretePolicy.cells": (
-        tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).cells,
-        {"states": states},
-    ),
-    "tdavq.DiscretePolicy.predict": (
-        tdavq.DiscretePolicy(STATES, np.zeros((12, 3)), ACTIONS[:3]).predict,
-        {"obs": states},
-    ),
-    "tdavq.learn": (
-        tdavq.learn,
-        {"task": task, "seed": seed, "n_steps": count(3)}
-        | {name: number(0.5, least=0) for name in ("min_distance", "likeness", "discount")},
-    ),
     "teachers.teacher.Teacher": (
         weights,
         {"weight": numbers(np.eye(2), free=()), "bias": numbers(np.zeros(2), free=())},
@@ -570,29 +504,6 @@ CASES = {
         load_teacher,
         {"source": Argument(SIMPLEGOAL, st.sampled_from(["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"]))},
     ),
-    "trees.LinearTree": (trees.LinearTree, pairs | {"leaves": leaves, "task": task}),
-    "trees.LinearTree.predict": (
-        trees.LinearTree(STATES, ACTIONS, leaves=2, task=SIMPLEGOAL).predict,
-        {"obs": states},
-    ),
-    "trees.ObliqueLinearTree": (
-        trees.ObliqueLinearTree,
-        pairs | {"leaves": leaves, "task": task, "seed": seed},
-    ),
-    "small_network.SmallNetwork": (
-        small_network.SmallNetwork,
-        pairs | {"units": leaves, "task": task, "seed": seed},
-    ),
-    "small_network.SmallNetwork.predict": (
-        small_network.SmallNetwork(STATES, ACTIONS, units=2, task=SIMPLEGOAL, seed=0).predict,
-        {"obs": states},
-    ),
-    "soft_tree.SoftTree": (
-        QuickSoftTree,
-        {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()}
-        | {"leaves": leaves, "seed": seed},
-    ),
-    "soft_tree.SoftTree.predict": (lambda obs: soft_tree().predict(obs), {"obs": states}),
     "simple.Tree": (
         simple.Tree,
         {name: numbers(one.good, free=(1,), some=True) for name, one in pairs.items()} | {"leaves": leaves},
@@ -600,11 +511,6 @@ CASES = {
     "simple.Tree.predict": (simple.Tree(STATES, ACTIONS, leaves=3).predict, {"obs": states}),
     "rollouts.standard": (rollouts.standard, {"states": numbers(STATES, free=(0, 1), some=True)}),
 }
-
-
-@functools.cache
-def soft_tree():
-    return QuickSoftTree(STATES, ACTIONS, leaves=2, seed=0)
 
 
 def call(case, /, **changes):

@@ -8,17 +8,19 @@ import numpy as np
 
 from vsp.rollouts import Policy, rollout, score, visited_states
 from vsp.tasks.base import Task
+from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells.config import Tuned
 
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 
 
-def dagger(fits: Sequence[Fit], teacher: Policy, task: Task, *, rounds: Tuned, seed: int) -> Policy:
+def dagger(fits: Sequence[Fit], teacher: Policy, task: str | Task, *, rounds: Tuned, seed: int) -> Policy:
     """Return the best of the policies fitted to the teacher's states, then also to states that fitted policies visit.
 
     `rounds` sets episodes, corrections and validation. All `fits` are tried in the first round, which helps if they
     differ in their random numbers; only the one with the best first policy is corrected.
     """
+    task = get_task(task)
     rng, validation_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
     validation = task.start(validation_rng, rounds.n_validation)
     policy, states, best = teacher, np.zeros((0, len(task.low))), (-np.inf, None)

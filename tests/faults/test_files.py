@@ -20,8 +20,8 @@ import yaml
 from support import SIMPLEGOAL, TINY, CurvedTeacher
 
 import vsp
-from studies.comparison import method_rows
-from studies.comparison.method_summary import read_rows
+from studies.comparison import read_rows
+from studies.comparison.rows import Job, make_row
 from vsp.paper import printed, results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
@@ -68,8 +68,8 @@ def run(folder: Path) -> Path:
 
 
 def row(folder: Path) -> Path:
-    job = method_rows.Job(SIMPLEGOAL, "teacher", 0, 0)
-    save_arrays(job.path(folder), *method_rows.make_row(job))
+    job = Job(SIMPLEGOAL, "teacher", 0, 0)
+    save_arrays(job.path(folder), *make_row(job))
     return job.path(folder)
 
 
@@ -102,7 +102,7 @@ def of_study(path: Path) -> object:
 KINDS = {
     "run": Kind(run, lambda path: runs.load_run(path, EXPERIMENT)),
     "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
-    "policy": Kind(copied("results/beyond_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
+    "policy": Kind(copied("beyond/methods_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
     "checkpoint of a training": Kind(checkpoint, train.read_checkpoint),
     "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
     "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
@@ -112,7 +112,7 @@ KINDS = {
     "numbers of the paper": Kind(copied("paper/spread.csv"), of_paper),
     "results of a study": Kind(copied("results/readings.csv"), of_study),
     "results of the comparison": Kind(
-        copied(f"results/beyond_{SIMPLEGOAL}.csv"), lambda path: read_rows(SIMPLEGOAL, path.parent)
+        copied(f"beyond/methods_{SIMPLEGOAL}.csv"), lambda path: read_rows(SIMPLEGOAL, path.parent)
     ),
     "summary of the runs": Kind(copied(f"results/{SIMPLEGOAL}.csv"), of_study),
     "type of processor": Kind(copied("results/made_on.txt"), read_listed),
