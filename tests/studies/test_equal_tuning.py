@@ -4,9 +4,6 @@ import importlib
 import numpy as np
 import pandas as pd
 import pytest
-from support import PENDULUM, SIMPLEGOAL
-
-from studies.comparison import fair_summary, measure
 from studies.comparison.fair_summary import (
     PAIRS,
     budgets,
@@ -19,6 +16,9 @@ from studies.comparison.fair_summary import (
 )
 from studies.comparison.method_rows import preset
 from studies.comparison.method_tables import METHODS, RIVALS
+from support import PENDULUM, SIMPLEGOAL
+
+from studies.comparison import fair_summary, measure
 from studies.comparison.methods import Budget
 from studies.comparison.tuning import in_units
 from vsp.evaluation import start_states

@@ -1,10 +1,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from support import SIMPLEGOAL
-
 from studies.comparison.method_summary import AS_GOOD, PARTS, ablation, headline, method_summary, rivals, seeds_as_good
 from studies.comparison.method_tables import ABLATION
+from support import SIMPLEGOAL
 
 ROWS = pd.DataFrame(
     [("refined", 2, seed, mean, failing, 2) for seed, mean, failing in [(0, 9.0, 0.0), (1, 9.2, 0.0), (2, 7.0, 0.1)]]

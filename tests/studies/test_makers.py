@@ -4,10 +4,10 @@ import importlib
 
 import numpy as np
 import pytest
+from studies.comparison.method_tables import ABLATION, METHODS, OWN
 from support import SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import methods
-from studies.comparison.method_tables import ABLATION, METHODS, OWN
 from studies.comparison.methods import Budget, corrected, refined
 from studies.rivals import tdavq
 from studies.rivals.soft_tree import SoftTree

@@ -3,13 +3,9 @@ import itertools
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
-from drawn import hexes, labels, named
-from matplotlib.collections import FillBetweenPolyCollection
+from drawn import labels, named
 
-from studies.comparison import method_tables
-from studies.show import methods
 from vsp.policy import VoronoiPolicy
 from vsp.show import state_space, style
 from vsp.show.style import letter, panels
@@ -111,51 +107,6 @@ def test_contributions_of_other_classes_are_refused(ax):
     policy = VoronoiPolicy([[0.0, 0.0]], np.zeros((1, 3, 1)), task="MountainCarContinuous-v0", sub_policy="pid")
     with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
         explanation.contributions(ax, policy, np.array([-0.5, 0.01]))
-
-
-# Return over cells
-
-TRIED = pd.DataFrame(
-    [(name, size, seed, 10 - gap / size * (1 + seed), size) for name, gap in (("refined", 1.0), ("CART", 4.0))
-     for size in (1, 2, 8) for seed in range(3)]
-    + [("the paper's method", 0, seed, 7.0 + seed, 12 + seed) for seed in range(3)]
-    + [("teacher", 0, 0, 10.0, 0), ("refined, no leak", 3, 0, -50.0, 3)],
-    columns=["method", "size", "seed", "mean", "cells"],
-)  # fmt: skip
-
-
-def test_return_over_cells_by_hand(ax):
-    looks = {
-        "refined": {"color": style.DISTILLED},
-        "CART": {"color": "0.4"},
-        "the paper's method": {"color": "black", "marker": "D"},
-    }
-    methods.return_over_cells(ax, TRIED, 10.0, linear=0.1, looks=looks)
-    drawn_as = named(ax)
-    assert list(drawn_as) == ["refined", "CART", "teacher", "the paper's method"]
-    assert drawn_as["refined"].get_xydata().tolist() == [[1, -2], [2, -1], [8, -0.25]]
-    assert drawn_as["CART"].get_xydata().tolist() == [[1, -8], [2, -4], [8, -1]]
-    assert set(drawn_as["teacher"].get_ydata()) == {0.0} and drawn_as["teacher"].get_color() == style.TEACHER
-    mark = drawn_as["the paper's method"].lines[0]
-    assert mark.get_xydata().tolist() == [[13, -2]]
-    (band,) = (drawn for drawn in ax.collections if isinstance(drawn, FillBetweenPolyCollection))  # ours alone
-    edge = band.get_paths()[0].vertices
-    ends = edge[edge[:, 0] == 1, 1]
-    assert (ends.min(), ends.max()) == pytest.approx((-2.8, -1.2)) and hexes(band.get_facecolor()) == [style.DISTILLED]
-    assert (ax.get_xscale(), ax.get_yscale(), ax.yaxis.get_transform().linthresh) == ("log", "symlog", 0.1)
-    assert ax.get_ylim()[0] > -40  # what is not drawn does not stretch the view
-
-
-@pytest.mark.parametrize(
-    "looks", [methods.IMITATIONS, methods.LIMITS, methods.ROBOTS], ids=["imitations", "limits", "robots"]
-)
-def test_every_method_has_a_look_and_a_name_of_its_own(looks):
-    known = method_tables.METHODS | method_tables.RIVALS | method_tables.LIMIT | method_tables.ROBOTS
-    assert set(looks) <= set(known)
-    assert len({(s["color"], s.get("ls"), s.get("marker")) for s in looks.values()}) == len(looks)
-    assert len({s["label"] for s in looks.values()}) == len(looks)
-    # A method with one size only has no curve: without a marker one would not see it
-    assert all("marker" in look for name, look in looks.items() if known[name].sizes == method_tables.OWN)
 
 
 def test_nothing_of_an_explanation_overlaps():

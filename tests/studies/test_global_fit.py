@@ -1,32 +1,25 @@
-import functools
-
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher, examples
+from support import SIMPLEGOAL, examples
 
-from studies.comparison import apart, peers
-from studies.comparison.apart import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells, pairs
-from studies.comparison.measure import cost
-from studies.comparison.methods import Budget
+from studies.comparison import global_fit
+from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells
 from studies.comparison.tuning import Tunable, in_units
 from studies.rivals.trees import ObliqueLinearTree, Split
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells import search
-from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
 TASK = get_task(SIMPLEGOAL)
-SMALL = Tuned(n_cells=2, n_episodes=10, n_corrections=1, n_correction_episodes=5, n_validation=20)
 
 
 @pytest.fixture(autouse=True)
 def shorter(monkeypatch):
-    monkeypatch.setattr(apart, "random_starts", lambda size: 2)
-    monkeypatch.setattr(apart, "N_GREEDY", 1)
-    monkeypatch.setattr(apart, "HOT", ((range(4, 6), 1),))
-    monkeypatch.setattr(apart, "WARM", ((range(8, 9), 1),))
+    monkeypatch.setattr(global_fit, "random_starts", lambda size: 2)
+    monkeypatch.setattr(global_fit, "N_GREEDY", 1)
+    monkeypatch.setattr(global_fit, "HOT", ((range(4, 6), 1),))
+    monkeypatch.setattr(global_fit, "WARM", ((range(8, 9), 1),))
 
 
 def kinked(n=600, seed=0):
@@ -64,7 +57,7 @@ def test_shares_by_hand():
     """One node on the first input, at 0.5: a state 1 beyond it turns right with the sigmoid of 1 / temperature."""
     _, _, numbers, _ = tree_of(leaves=2)
     one = numbers.like(np.concatenate([[1.0, 0.0, 0.5], np.zeros(numbers.maps.size)]))
-    found = apart.shares(one, np.array([[1.5, 9.0], [0.5, 0.0]]), 0.5)
+    found = global_fit.shares(one, np.array([[1.5, 9.0], [0.5, 0.0]]), 0.5)
     assert found[:, 0] == pytest.approx([1 / (1 + np.exp(2)), 1 / (1 + np.exp(-2))]) and found[:, 1] == pytest.approx(
         0.5
     )
@@ -73,13 +66,13 @@ def test_shares_by_hand():
 @pytest.mark.parametrize("leaves", [1, 2, 5])
 def test_in_the_cold_the_soft_tree_is_the_hard_one(leaves):
     tree, frame, numbers, seen = tree_of(leaves)
-    soft = apart.shares(numbers, seen.inputs[:, :-1], 1e-7)
+    soft = global_fit.shares(numbers, seen.inputs[:, :-1], 1e-7)
     assert np.allclose(soft.sum(axis=0), 1) and np.allclose(soft.max(axis=0), 1)
     loss, _ = expected_loss(numbers, seen, temperature=1e-7, clip_slope=0.0)
     states, _ = examples(SIMPLEGOAL)
     outputs = frame.outputs(Tunable(frame, numbers, tree).predict(states)[0])
     assert loss == pytest.approx(np.square(outputs - seen.actions).mean())
-    assert apart.shares(numbers, seen.inputs[:, :-1], 0.5).sum(axis=0) == pytest.approx(1.0)
+    assert global_fit.shares(numbers, seen.inputs[:, :-1], 0.5).sum(axis=0) == pytest.approx(1.0)
 
 
 def test_a_random_tree_has_states_in_every_leaf():
@@ -96,7 +89,7 @@ def test_a_descent_finds_a_planted_border():
     begun = Tunable(*in_units(start, Scaling.of(TASK, states)), start)
     ended = descend(begun, states, actions, range(10, search.N_STAGES))
     assert error(ended, states, actions) < 0.2 * error(begun, states, actions)
-    assert len(ended) == 2 and cost(ended) == cost(start)
+    assert len(ended) == 2 and parameters_of(ended) == parameters_of(start)
 
 
 # Each fit
@@ -124,7 +117,7 @@ def test_two_cells_are_a_tree_of_two_leaves():
 def test_pairs_by_hand():
     """The plane x = 1: the codeword (0, 5) is mirrored at (2, 5); the means are (0, 0) and (4, 1)."""
     points = np.array([[-1.0, 0.0], [1.0, 0.0], [3.0, 1.0], [5.0, 1.0]])
-    found = pairs(np.array([0.0, 5.0]), points, Split(1.0, np.array([1.0, 0.0]), 1.0))
+    found = global_fit.pairs(np.array([0.0, 5.0]), points, Split(1.0, np.array([1.0, 0.0]), 1.0))
     expected = [[[0, 0], [4, 1]], [[0, 5], [2, 5]], [[0, 0], [2, 0]], [[4, 1], [-2, 1]]]
     assert np.allclose(found, expected)
 
@@ -140,27 +133,3 @@ def test_the_same_arguments_are_the_same_policy(fit):
     states, actions = examples(SIMPLEGOAL, n=200)
     one, again, other = (fit(states, actions, 3, TASK, seed).predict(states)[0] for seed in (1, 1, 2))
     assert np.array_equal(one, again) and not np.array_equal(one, other) and np.abs(one).max() <= 1
-
-
-MAKES = {
-    "tree": apart.tree_by_global_fit,
-    "greedy": apart.cells_by_greedy_fit,
-    "cells": apart.cells_by_global_fit,
-    "critic": peers.critic_driven_cells,
-    "advantage": peers.advantage_weighted_cells,
-}
-
-
-@pytest.mark.parametrize("name", MAKES)
-def test_every_method_is_made_of_a_budget(name, monkeypatch):
-    monkeypatch.setattr("studies.rivals.critics.N_STEPS", 20)
-    make = functools.partial(MAKES[name], Budget(load_teacher(SIMPLEGOAL), TASK, SMALL))
-    policy = make(3, 0)
-    assert len(policy) == 3 and np.abs(policy.predict(np.random.default_rng(0).random((50, 2)))[0]).max() <= 1
-    assert len(make(1, 0)) == 1
-
-
-@pytest.mark.parametrize("make", [peers.critic_driven_cells, peers.advantage_weighted_cells])
-def test_a_teacher_without_critics_is_one_clear_error(make):
-    with pytest.raises(ValueError, match="the teacher is a CurvedTeacher without critics, expected one with"):
-        make(Budget(CurvedTeacher(), TASK, SMALL), 2, 0)
