@@ -4,6 +4,7 @@ from support import SIMPLEGOAL, examples
 
 from studies.comparison import global_fit
 from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells
+from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import Tunable, in_units
 from studies.rivals.trees import ObliqueLinearTree, Split
 from vsp.policy import VoronoiPolicy

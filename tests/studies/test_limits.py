@@ -1,9 +1,18 @@
 import pandas as pd
 import pytest
-from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS
 
-from studies.comparison import best_mean, limit_summary, near, references, robots_summary, starts_summary
-from studies.results import write_results
+from studies.comparison import (
+    all_rows,
+    best_mean,
+    limit_summary,
+    near,
+    references,
+    robots_summary,
+    starts_summary,
+    with_regret,
+)  # fmt: skip
+from studies.results import read_results, write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3, "parameters": 9, "operations": 9.0}
 
@@ -48,13 +57,41 @@ def test_robots_stand_beside_their_teacher(tmp_path):
 
 def test_searches_stand_in_the_order_of_their_length(tmp_path):
     of_table = {
-        "methods": [("refined", 3, 0, 95.0), ("refined", 3, 1, 96.0), ("refined", 4, 0, 90.0), ("CART", 3, 0, 91.0)],
-        "starts": [("at the limit, from the teacher", 3, 0, 97.0), ("refined, 800 generations", 3, 0, 96.0)],
+        "methods": [
+            ("our cells, tuned", 3, 0, 95.0),
+            ("our cells, tuned", 3, 1, 96.0),
+            ("our cells, tuned", 4, 0, 90.0),
+            ("CART", 3, 0, 91.0),
+        ],
+        "starts": [("at the limit, from the teacher", 3, 0, 97.0), ("our cells, 800 generations", 3, 0, 96.0)],
         "limit": [("at the limit", 3, 0, 99.4), ("at the limit", 4, 0, 99.3)],
     }
     for table, found in of_table.items():
         write_results(rows(*found), f"{table}_{MOUNTAINCAR}", out=tmp_path)
     table = starts_summary(MOUNTAINCAR, tmp_path / "data/beyond")
-    by_length = ["refined", "refined, 800 generations", "at the limit, from the teacher", "at the limit"]
+    by_length = ["our cells, tuned", "our cells, 800 generations", "at the limit, from the teacher", "at the limit"]
     assert table["method"].tolist() == by_length
     assert table["mean"].tolist() == [95.5, 96.0, 97.0, 99.4] and table["least"].iloc[0] == 95
+
+
+# Regret
+
+
+def test_two_grids_differ_by_less_than_teachers_and_the_best():
+    """So the grids are fine enough: their error is small beside what is to be gained."""
+    frame = read_results("optimum")
+    assert frame["task"].tolist() == [SIMPLEGOAL, *[MOUNTAINCAR] * 2, *[PENDULUM] * 2]
+    table = references().set_index("task").drop(SIMPLEGOAL)
+    assert frame["failing"].dropna().eq(0).all() and (table["error"] < 0.05 * table["regret"]).all()
+
+
+@pytest.mark.parametrize("task", (*TASKS, PENDULUM))
+def test_nothing_returns_more_than_the_best(task):
+    assert (with_regret(all_rows(task), task)["regret"] > 0).all()
+
+
+def test_of_a_task_without_an_optimum_the_regret_is_not_known():
+    table = with_regret(pd.DataFrame({"mean": [1.0, 2.0]}), LUNARLANDER)
+    assert table["regret"].tolist() == ["not known"] * 2
+    known = with_regret(pd.DataFrame({"mean": [1.0]}), SIMPLEGOAL)
+    assert known["regret"][0] == best_mean(SIMPLEGOAL) - 1.0
