@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from studies.results import RESULTS, read_results, write_results
 from vsp.algorithms import distill
 from vsp.config import paper_preset
 from vsp.evaluation import start_states
+from vsp.paper import results
 from vsp.paper.baselines import linear_map
 from vsp.paper.printed import published_policy
 from vsp.policy import VoronoiPolicy
@@ -36,7 +36,8 @@ from vsp_beyond.proofs.prove import prove
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
-from .comparison.kept import simplest
+from .comparison.rows import simplest
+from .results import BEYOND, RESULTS, read_results, write_results
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
@@ -57,25 +58,22 @@ def main() -> None:
     if arguments.teacher:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
-    results = Path(arguments.out) / "data" / "beyond"
-    proved = certificates(Path(arguments.out), arguments.jobs)
-    if proved or not (results / "proofs_reals.csv").exists():
+    if certificates(Path(arguments.out), arguments.jobs):
         table = pd.DataFrame([reals(arguments.jobs)])
         write_results(table, "proofs_reals", out=arguments.out, float_format="%.17g")
-    if proved or not (results / "proofs_grid.csv").exists():
         write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
     """Return functions that make the policies to prove, by the names of their certificates."""
-    teacher, config, own = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
-    best = int(read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
-    spacious = replace(own, step=partial(simplegoal.step, margin=MARGIN))
+    teacher, config, task = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
+    best = int(results.read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
+    spacious = replace(task, step=partial(simplegoal.step, margin=MARGIN))
     return {
         "simplegoal_paper": lambda: published_policy(SIMPLEGOAL),
-        "simplegoal_best_run": lambda: distill(teacher, own, paper_preset(SIMPLEGOAL), seed=best)[0],
+        "simplegoal_best_run": lambda: distill(teacher, task, paper_preset(SIMPLEGOAL), seed=best)[0],
         "simplegoal_faithful": lambda: _kept("faithful", SIMPLEGOAL),
-        "simplegoal_tuned": lambda: distill_tuned(teacher, own, config, seed=0)[0],
+        "simplegoal_tuned": lambda: distill_tuned(teacher, task, config, seed=0)[0],
         "simplegoal_limit": lambda: _kept("limit", SIMPLEGOAL),
         "simplegoal_simplified": lambda: simplest(SIMPLEGOAL),
         "simplegoal_one_map": lambda: _one_map(teacher),
@@ -89,12 +87,12 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
 
 def certificates(out: Path, jobs: int | str) -> list[str]:
     """Write the missing certificates and the table, row by row: an interrupted run can continue. Return their names."""
-    table = out / "data" / "beyond" / "proofs.csv"
-    rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
+    folder = out / BEYOND
+    rows = read_results("proofs", folder).to_dict("records") if (folder / "proofs.csv").exists() else []
     makers = policies()
     missing = [name for name in makers if name not in {row["name"] for row in rows}]
     for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
-        rows.append(_proved(name, makers[name](), out / "data" / "beyond" / "proofs" / f"{name}.json", jobs))
+        rows.append(_proved(name, makers[name](), folder / "proofs" / f"{name}.json", jobs))
         write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
     return missing
 
@@ -125,27 +123,27 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
     low, high = proof.mean_return()
     areas = {name: float(area) for name, area in proof.areas.items()}
     areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
-    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
+    row = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
-    of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
-    return found | of_program | {"disturbance": largest_disturbance(proof.policy)}
+    row |= {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
+    return row | {"disturbance": largest_disturbance(proof.policy)}
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:
     """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
     SimpleGoal."""
     n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
-    found = rollout(policy, policy.task, start_states(policy.task, n, 1))
-    shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
-    return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
+    played = rollout(policy, policy.task, start_states(policy.task, n, 1))
+    shares = {f"sampled_{name}": float((played.outcomes == end).mean()) for end, name in ENDS.items()}
+    return {"sampled": n, "sampled_mean": float(played.returns.mean()), **shares}
 
 
 def reals(jobs: int | str) -> dict:
     """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
     began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
     parts = prove_reals(policy, jobs=jobs)
-    found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
-    return found | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
+    row = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
+    return row | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
 
 
 def smaller_boxes() -> pd.DataFrame:
@@ -178,7 +176,7 @@ def _kept(table: str, task: str) -> VoronoiPolicy:
 
 def _one_map(teacher) -> VoronoiPolicy:
     episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
-    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    states, actions = (np.concatenate([getattr(each, name) for each in episodes]) for name in ("states", "actions"))
     return linear_map(states, actions, SIMPLEGOAL)
 
 

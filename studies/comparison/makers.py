@@ -1,8 +1,8 @@
 """How the compared methods make a policy, each as a function of a budget, a size and a seed.
 
 The budget is the teacher and the episodes of a `Tuned`. A fit to the teacher's own episodes alone gets as many
-episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. The paper's method
-uses the episodes of its own preset, and TD-AVQ has no teacher. Methods for robots read a `Walking`.
+episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. TD-AVQ has
+no teacher. Methods for robots read a `Walking`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from functools import partial
 
 import numpy as np
 
-from vsp.algorithms import distill
-from vsp.config import Config
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, rule_of_thumb
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, visited_states
@@ -45,7 +43,7 @@ class Budget:
 
     teacher: Policy
     task: Task
-    config: Tuned | Faithful | Config | Walking
+    config: Tuned | Faithful | Walking
 
 
 # Our own
@@ -159,11 +157,6 @@ def by_hand(budget: Budget, size: int, seed: int) -> Policy:
 def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
     """Learn from rewards by TD-AVQ, without a teacher."""
     return tdavq.learn(budget.task, seed=seed, **settings)
-
-
-def paper_method(budget: Budget, size: int, seed: int) -> Policy:
-    """Call `distill` with the paper's preset."""
-    return distill(budget.teacher, budget.task, budget.config, seed=seed)[0]
 
 
 # Robots

@@ -76,8 +76,7 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
 
     It is in units of half the action range.
     """
-    states = visited_states(by, task, starts)
-    half = 0.5 * (task.action_high - task.action_low)
+    states, half = visited_states(by, task, starts), 0.5 * (task.action_high - task.action_low)
     gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
     return float(np.sqrt(np.square(gaps).mean()))
 

@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 
-from vsp.algorithms import VERSION
-from vsp.config import Config, paper_preset
 from vsp.paper import printed
 from vsp.rollouts import Policy
 from vsp_beyond.few_cells import limit
@@ -25,8 +23,7 @@ LONG = (LANDER, WALKER, CHEETAH)  # rows take minutes to hours
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = ((task,) for task in TASKS)
 
 PRESETS = {
-    "tuned": tuned_preset, "paper": paper_preset, "faithful": faithful_preset, "limit": limit.limit_preset,
-    "walking": walking_preset,
+    "tuned": tuned_preset, "faithful": faithful_preset, "limit": limit.limit_preset, "walking": walking_preset,
 }  # fmt: skip
 ALIKE = ("faithful", "walking")  # presets whose rows also measure `fidelity`
 
@@ -44,7 +41,7 @@ def _but_cells(config: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(config) if field.name != "n_cells")
 
 
-ALL, OF_FAITHFUL, OF_PAPER = _but_cells(Tuned), _but_cells(Faithful), _but_cells(Config)
+ALL, OF_FAITHFUL = _but_cells(Tuned), _but_cells(Faithful)
 
 SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
 FOUND = (0,)  # the method finds its own number
@@ -111,9 +108,6 @@ METHODS = {
     "rule of thumb": Method(makers.by_thumb, sizes=FOUND, chance=False, tasks=printed.TASKS),
     "heuristic": Method(makers.by_hand, sizes=FOUND, chance=False, tasks=(*PENDULUM, LANDER)),
     "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=SIMPLEGOAL),
-    "the paper's method": Method(
-        makers.paper_method, OF_PAPER, FOUND, version=VERSION, tasks=printed.TASKS, preset="paper"
-    ),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
     "our cells, no correction": _without(n_corrections=0),

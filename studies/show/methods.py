@@ -43,6 +43,7 @@ RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree")
                "small network": ("P", "small network"), "soft tree": ("v", "soft tree"),
                "critic-driven": ("<", "critic-driven"), "advantage-weighted": (">", "advantage-weighted")}  # fmt: skip
 OUR_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # colours of our lines in `fidelity_map`, by number of cells
+MARK = {"ls": "", "ms": 4.5, "mec": "white", "mew": 0.4, "elinewidth": 0.7, "zorder": 6}  # of a method without a size
 LARGEST = 13  # most leaves of a method drawn there
 
 
@@ -137,17 +138,8 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
             if style["color"] == DISTILLED and len(middle) > 2:  # a band over fewer sizes would hide more than it shows
                 ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
             continue
-        look = {
-            "ls": "",
-            "ms": 4.5,
-            "mec": "white",
-            "mew": 0.4,
-            "elinewidth": 0.7,
-            "zorder": 6,
-            "label": method,
-            **style,
-        }
-        ax.errorbar(max(1, rows["cells"].median()), middle, [middle - low, high - middle], **look)
+        bounds = [middle - low, high - middle]
+        ax.errorbar(max(1, rows["cells"].median()), middle, bounds, **MARK | {"label": method} | style)
     ax.set_xlabel("cells or leaves")
     return _ticks_at(ax, frame.loc[frame["method"].isin(looks) & (frame["size"] > 0), "size"])
 

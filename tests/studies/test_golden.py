@@ -46,7 +46,6 @@ SMALL = Tuned(
 )  # fmt: skip
 PRESETS = {
     "tuned": SMALL,
-    "paper": tiny(n_epochs=40, n_freeze=10),
     "faithful": Faithful(
         n_cells=3, tolerance=0.1, n_episodes=100, n_states=1000, n_restarts=4, n_generations=3, n_tuning_episodes=10,
         n_validation=50,
@@ -176,8 +175,3 @@ def test_results_are_those_of_the_version(name, request):
         within = 0, np.max
     advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
     assert version == kept["version"] and close(found, kept["found"], *within), advice
-
-
-def test_the_papers_method_has_the_version_of_the_algorithms():
-    """tests/golden/distill.json guards it."""
-    assert METHODS["the paper's method"].version == algorithms.VERSION
