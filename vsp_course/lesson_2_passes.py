@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsp.algorithms import split_regions as vsp_split
 from vsp.config import Config, paper_preset
+from vsp.paper.readings import Readings
 from vsp.partition import Partition
 from vsp.rollouts import Episode
 from vsp.tasks import get_task
@@ -200,7 +200,7 @@ def _like_ours(function: Callable, seed: int) -> None:
     ways = []
     for after in ("reset", "kept"):
         other = copy.deepcopy(partition)
-        vsp_split(other, episode, replace(SMALL, loss_after_split=after), np.random.default_rng(0))
+        Readings(loss_after_split=after).split(other, episode, SMALL, np.random.default_rng(0))
         ways.append(other.codewords)
     if not any(own.codewords.shape == way.shape and np.allclose(own.codewords, way) for way in ways):
         found, right = (_count(len(codewords) - 4, "split") for codewords in (own.codewords, ways[0]))
@@ -329,5 +329,5 @@ def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:
             alive &= ~(alive[i] & graph[i] & alike)
             if anew:
                 graph = np.zeros((k, k), dtype=bool)
-                graph[np.ix_(alive, alive)] = partition.neighbours(alive)
+                graph[np.ix_(alive, alive)] = partition.neighbours_of(partition.codewords[alive])
     return alive

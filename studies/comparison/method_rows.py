@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import pandas as pd
 
 from vsp.config import Config, paper_preset
+from vsp.paper.readings import Readings
 from vsp.paper.results import load_made, make_missing, provenance, provenance_folder
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.registry import get_task
@@ -87,6 +88,7 @@ class Job:
         how, about = self.how, {"task": self.task, "method": self.method, "size": self.size}
         budget = preset(self.task, how.preset)
         about["settings"] = {name: getattr(budget, name) for name in how.reads} | how.settings
+        about["settings"] |= asdict(Readings()) if how.preset == "paper" else {}
         about["measure"] = measure.settings(tail=self.tail, whole=self.whole, seed=self.start_seed)
         about["measure"] |= measure.common() if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)

@@ -14,11 +14,12 @@ from studies.comparison import kept, method_rows, method_tables, regret, stale_r
 from studies.comparison.method_tables import METHODS, WALKERS
 from vsp.paper import results as results_module
 from vsp.paper import runs
+from vsp.paper.readings import ALTERNATIVES
 from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import paper_experiment
 from vsp.paper.studies import interpretations, make_studies
 from vsp.paper.studies import teachers as teachers_module
-from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, READINGS, distance, landmarks, ranking
+from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
 from vsp.paper.studies.teachers import SEEDS
 from vsp.run import listed
 
@@ -167,7 +168,7 @@ def test_results_of_another_version_are_stale(results, monkeypatch, change, expe
 def test_results_of_another_preset_are_stale(results, monkeypatch):
     fewer = cache(lambda task: dataclasses.replace(paper_experiment(task), n_episodes=999))
     monkeypatch.setattr(teachers_module, "paper_experiment", fewer)
-    monkeypatch.setitem(READINGS, "R7", [*READINGS["R7"], {"batch_size": 32}])
+    monkeypatch.setitem(ALTERNATIVES, "R7", [*ALTERNATIVES["R7"], {"batch_size": 32}])
     best = method_rows.tuned_preset
     changed = {task: dataclasses.replace(best(task), n_steps=99) for task in (SIMPLEGOAL, LUNARLANDER)}
     monkeypatch.setattr(method_rows, "tuned_preset", lambda task: changed.get(task) or best(task))
