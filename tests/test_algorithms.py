@@ -336,7 +336,7 @@ def test_visited_states_are_scaled_as_codewords_are():
 
 
 CLASSES = [("constant", "adam"), ("constant", "closed_form"), ("linear", "closed_form"), ("quadratic", "adam"),
-           ("quadratic", "closed_form"), ("pid", "adam"), ("pid", "closed_form"), ("network", "adam")]  # fmt: skip
+           ("quadratic", "closed_form"), ("pid", "adam"), ("pid", "closed_form")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("sub_policy", "fit"), CLASSES)

@@ -66,14 +66,6 @@ def test_a_freeze_longer_than_the_run_is_refused():
     assert tiny(n_freeze=120).n_freeze == 120
 
 
-@pytest.mark.parametrize("change", [{"fit": "closed_form"}, {"initial": "zeros"}])
-def test_what_a_network_cannot_do_is_refused(change):
-    ((name, value),) = change.items()
-    with pytest.raises(ValueError, match=f"{name} is '{value}', expected '.*' for networks"):
-        tiny(sub_policy="network", **change)
-    assert getattr(tiny(sub_policy="quadratic", **change), name) == value
-
-
 def test_extensions_at_rest_are_no_part_of_the_settings():
     """So runs that were made before there were any keep the name of their folder."""
     plain = TINY.settings()

@@ -83,7 +83,7 @@ class Config:
     merges. True: n = n_epochs is included ("n = 0 to n_epochs"), and n = 0 splits and merges."""
 
     # Beyond the paper
-    sub_policy: Literal["linear", "constant", "quadratic", "pid", "network"] = "linear"
+    sub_policy: Literal["linear", "constant", "quadratic", "pid"] = "linear"
     """Class of the sub-policies, an entry of `subpolicies.POLICY_CLASSES`; the paper's is linear."""
     fit: Literal["adam", "closed_form"] = "adam"
     """How each iteration fits a cell: by `n_minibatches` steps of Adam, or by least squares over all states since the
@@ -97,10 +97,6 @@ class Config:
                 f"n_freeze is {self.n_freeze}, expected at most n_epochs = {self.n_epochs}: "
                 "lower n_freeze or raise n_epochs"
             )
-        if self.sub_policy == "network" and self.fit == "closed_form":
-            raise ValueError("fit is 'closed_form', expected 'adam' for networks: they are not linear in parameters")
-        if self.sub_policy == "network" and self.initial == "zeros":
-            raise ValueError("initial is 'zeros', expected 'uniform' for networks: equal units would stay equal")
 
     @property
     def n_iterations(self) -> int:

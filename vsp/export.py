@@ -19,7 +19,7 @@ from .tasks.base import Task
 _SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
 _SYMBOLS = {
     "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
-    "cos ": r"\cos ", "sin ": r"\sin ", "tanh": r"\tanh",
+    "cos ": r"\cos ", "sin ": r"\sin ",
 }  # fmt: skip
 
 
@@ -92,7 +92,10 @@ def to_python(policy: Exportable) -> str:
         f"    distances = [{distance} for codeword in CODEWORDS]",
         "    return distances.index(min(distances))",
         "",
-        policy.policy_class.OUTPUT_IN_PYTHON,
+        "",
+        "def output(row, features):",
+        "    return sum(w * f for w, f in zip(row, features))",
+        "",
         "",
         "def act(state):",
         f'    """From [{_names(task.inputs)}] to [{_names(task.outputs)}]; nan for a state that is not finite."""',
@@ -118,7 +121,6 @@ def to_c(policy: Exportable) -> str:
         "euclidean": "distance += gap * gap;",
         "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
     }[policy.metric]
-    output = policy.policy_class.OUTPUT_IN_C.replace("INPUTS", str(inputs))
     root = "        distance = sqrt(distance);\n" if policy.metric == "euclidean" else ""
     return f"""/* {_escaped(_headline(policy))}
    state: {_names(policy.task.inputs)}; action: {_names(policy.task.outputs)}. */
@@ -148,7 +150,13 @@ int vsp_cell(const double *state) {{
     }}
     return nearest;
 }}
-{output}
+
+static double output(const double *row, const double *features) {{
+    double sum = 0.0;
+    for (int i = 0; i < {inputs}; i++) sum += row[i] * features[i];
+    return sum;
+}}
+
 void vsp_act(const double *state, double *action) {{
     const double features[{inputs}] = {{{policy.policy_class.feature_code()}}};
     int i = vsp_cell(state);

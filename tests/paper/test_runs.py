@@ -35,7 +35,7 @@ def made(tmp_path_factory):
 
 
 def test_a_run_keeps_the_class_of_its_sub_policies(tmp_path):
-    for name in ("constant", "network"):
+    for name in ("constant", "quadratic"):
         (run,) = make_runs(changed(config=dataclasses.replace(CONFIG, sub_policy=name)), [0], runs=tmp_path)
         assert run.policy.policy_class.name == name and len(run.outcomes.returns) == 20
 
