@@ -19,6 +19,7 @@ ROOMS = dict.fromkeys(METHOD, METHOD | BASIS)
 ROOMS |= {"tasks": {"checks"}, "subpolicies": {"checks", "tasks"}, "run": set()}
 ROOMS |= {"teachers": METHOD | BASIS - {"subpolicies"}, "show": METHOD | BASIS | {"teachers"}}
 ROOMS |= {"paper": METHOD | BASIS | {"teachers", "show"}}
+DEFINITIONS = ast.FunctionDef, ast.ClassDef
 
 
 @functools.cache
@@ -67,9 +68,39 @@ def test_no_circle():
     list(TopologicalSorter(GRAPH).static_order())
 
 
-def test_importing_vsp_loads_the_method_alone():
-    code = "import sys, vsp; print(*[name for name in sys.modules])"
-    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    tops = {name.partition(".")[0] for name in loaded.split()}
+def test_importing_vsp_loads_the_method_alone_and_no_part_loads_torch():
+    """In a process of its own, so that no other test has imported a part before."""
+    code = """
+import sys, vsp
+print(*sys.modules)
+import gymnasium
+gymnasium.make("SimpleGoal-v0")
+vsp.paper.published_policy("SimpleGoal-v0").predict([0.5, 0.5])
+vsp.load_teacher("SimpleGoal-v0"), vsp.show.panels, vsp.paper.baselines.linear_map
+import studies.comparison, vsp_beyond, vsp_course
+print(*sys.modules)
+"""
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    by_vsp, by_all = (line.split() for line in done.stdout.splitlines())
+    tops = {name.partition(".")[0] for name in by_vsp}
     assert not tops & {"pandas", "sklearn", "matplotlib", "torch", "stable_baselines3", *PARTS.keys() - {"vsp"}}
-    assert len([name for name in loaded.split() if name.partition(".")[0] == "vsp"]) <= 35
+    assert len([name for name in by_vsp if name.partition(".")[0] == "vsp"]) <= 35
+    assert not {"torch", "stable_baselines3"} & set(by_all)
+
+
+def without_docstring(tree):
+    """The public functions, classes and methods of a module that do not say what they do."""
+    public = [node for node in tree.body if isinstance(node, DEFINITIONS) and not node.name.startswith("_")]
+    for thing in public:
+        bases = [ast.unparse(base) for base in getattr(thing, "bases", [])]
+        if isinstance(thing, ast.ClassDef) and not {"Protocol", "gymnasium.Env", "gymnasium.Wrapper"} & set(bases):
+            public += [part for part in thing.body if isinstance(part, DEFINITIONS) and not part.name.startswith("_")]
+    return [node.name for node in public if not ast.get_docstring(node)]
+
+
+def test_everything_public_says_what_it_does():
+    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules().items()}
+    assert not [name for name, tree in trees.items() if not ast.get_docstring(tree)]
+    assert not {name: names for name, tree in trees.items() if (names := without_docstring(tree))}
