@@ -19,7 +19,8 @@ from vsp.teachers.teacher import further_teachers
 
 teacher = vsp.load_teacher("SimpleGoal-v0")
 policy, _ = vsp.distill(teacher, "SimpleGoal-v0", vsp.preset("SimpleGoal-v0").quick(), seed=0)
-few = vsp_beyond.faithful(teacher, "SimpleGoal-v0", n_cells=1, seed=0)
+quick = vsp_beyond.faithful_preset("SimpleGoal-v0", n_cells=1).quick()
+few = vsp_beyond.faithful(teacher, "SimpleGoal-v0", quick, seed=0)
 print([vsp.__file__, vsp_beyond.__file__])
 print(len(policy), len(few), len(vsp.paper.published_policy("SimpleGoal-v0")), len(further_teachers("Pendulum-v1")))
 print([importlib.util.find_spec(name) for name in ("studies", "vsp_course")])
