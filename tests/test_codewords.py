@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import nearest_brute, nearest_kdtree, partition_of, tiny
+from support import nearest_brute, nearest_kdtree, partition_of
 
-from vsp import Config, VoronoiPolicy, merge_regions
+from vsp import Config, VoronoiPolicy
 from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
 from vsp.tasks import Task
 
@@ -135,28 +135,3 @@ def test_in_another_order_it_is_the_same_partition(kind, d, seed, metric):
     expected = graphs(codewords, states, metric)
     for name, graph in graphs(codewords[order], states, metric).items():
         assert np.array_equal(graph, expected[name][np.ix_(order, order)]), name
-
-
-def survivors(places, biases, order, **settings):
-    """Codewords and actions that a merge leaves, sorted: cells in a row at `places`, with `biases`, in this order."""
-    points = np.column_stack([np.asarray(places)[order], np.full(len(places), 0.5)])
-    partition = partition_of(points, np.asarray(biases)[order], config=tiny(**settings))
-    merge_regions(partition, partition.config)
-    return sorted(partition.codewords[:, 0]), sorted(partition.models.parameters[:, -1, 0])
-
-
-@given(st.permutations(range(6)))
-def test_a_merge_of_pairs_leaves_one_of_each_in_any_order(order):
-    """Which one, the order decides: Algorithm 3 visits cells by their index, and who is visited first stays."""
-    places, biases = [0.05, 0.15, 0.4, 0.5, 0.8, 0.9], [0.0, 0.0, 2.0, 2.0, -2.0, -2.0]
-    left, actions = survivors(places, biases, list(order), min_param_distance=0.5)
-    assert actions == [-2.0, 0.0, 2.0]
-    firsts = {min(pair, key=order.index) for pair in ((0, 1), (2, 3), (4, 5))}
-    assert left == sorted(places[i] for i in firsts)
-
-
-def test_a_merge_along_a_chain_depends_on_the_order():
-    """A is like B and B like C, but A is not like C: from an end Algorithm 3 leaves two, from the middle one."""
-    places, biases = [0.1, 0.5, 0.9], [0.0, 0.4, 0.8]
-    assert survivors(places, biases, [0, 1, 2], min_param_distance=0.5)[0] == [0.1, 0.9]
-    assert survivors(places, biases, [1, 0, 2], min_param_distance=0.5)[0] == [0.5]

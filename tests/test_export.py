@@ -186,16 +186,3 @@ def test_what_is_printed_exactly_reads_back_as_the_same_policy():
 )  # fmt: skip
 def test_symbols_by_hand(name, code):
     assert symbol(name) == code
-
-
-@pytest.mark.parametrize(
-    ("form", "column", "equation"),
-    [
-        ("constant", [0.5], "$0.50$"),
-        ("pid", [-2, 1, 0.25], r"$-2.00 e + 1.00 \dot e + 0.25$"),
-        ("quadratic", [1, 2, 3, 4, 5, -6], "$1.00 x + 2.00 v + 3.00 x^2 + 4.00 x v + 5.00 v^2 - 6.00$"),
-    ],
-)
-def test_equations_of_other_classes_in_latex(form, column, equation):
-    policy = VoronoiPolicy([[0, 0]], np.array(column, dtype=float)[None, :, None], task=MOUNTAINCAR, sub_policy=form)
-    assert rf"$[0.00,\ 0.00]$ & {equation} \\" in policy.to_latex(2)

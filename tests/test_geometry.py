@@ -7,7 +7,6 @@ from support import nearest_brute, nearest_kdtree
 
 from vsp.geometry import (
     METRICS,
-    WITNESSES,
     all_differ,
     delaunay_neighbours,
     distances,
@@ -104,13 +103,6 @@ def test_all_differ():
     assert not all_differ(points[[0, 1, 0]]) and not all_differ(np.array([[0.0, 1.0], [-0.0, 1.0]]))
 
 
-@pytest.mark.parametrize("bend", [1e-4, 1e-8, 1e-13])
-def test_points_almost_in_a_row_are_no_failure(bend):
-    points = np.column_stack([np.arange(6.0), bend * np.array([0, 1, 0, -1, 0, 1])])
-    graph = delaunay_neighbours(points)
-    assert is_graph(graph) and all(graph[i, i + 1] for i in range(5))
-
-
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_delaunay_does_not_depend_on_order_position_or_size(d):
     rng = np.random.default_rng(d)
@@ -171,11 +163,6 @@ def test_lookup_neighbours_repeat_and_follow_the_box():
 # Neighbours among visited states
 
 
-def curve(angles):
-    """States along a closed curve in three dimensions."""
-    return np.column_stack([np.cos(angles), np.sin(angles), np.cos(2 * angles)])
-
-
 def test_visited_neighbours_by_hand():
     row = np.array([[0.1, 0.5], [0.5, 0.5], [0.9, 0.5]])
     assert edges(visited_neighbours(row, np.array([[0.2, 0.5], [0.3, 0.9]]))) == {(0, 1)}
@@ -191,16 +178,6 @@ def test_visited_neighbours_are_the_two_nearest_of_some_state(metric):
     graph = visited_neighbours(codewords, states, metric)
     pairs = {tuple(sorted(map(int, row.argsort()[:2]))) for row in distances(states, codewords, metric)}
     assert is_graph(graph) and edges(graph) == pairs
-
-
-def test_along_a_curve_only_states_tell_which_cells_touch():
-    """Off the curve, where no state is, cells far apart meet: the points of the box find these as well."""
-    rng = np.random.default_rng(0)
-    codewords, states = (curve(rng.uniform(0, 2 * np.pi, n)) for n in (20, WITNESSES))
-    everywhere = edges(visited_neighbours(codewords, curve(np.linspace(0, 2 * np.pi, 100_001))))
-    assert edges(visited_neighbours(codewords, states)) == everywhere
-    box = edges(lookup_neighbours(codewords, -np.ones(3), np.ones(3)))
-    assert box > everywhere and len(box) > 2 * len(everywhere)
 
 
 def test_grid():

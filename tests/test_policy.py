@@ -92,13 +92,6 @@ def test_a_policy_of_numbers_beyond_all_bounds_is_one_clear_error(change, messag
         VoronoiPolicy(**good | change)
 
 
-def test_a_policy_of_any_task_object():
-    high = np.array([0.5, 2.0])
-    task = dataclasses.replace(get_task(SIMPLEGOAL), action_low=-high, action_high=high)
-    policy = VoronoiPolicy([[0, 0]], [[[0, 0], [0, 0], [3, 1.5]]], task=task)
-    assert policy.predict([0.5, 0.5])[0].tolist() == [0.5, 1.5]
-
-
 def test_what_knows_linear_policies_alone_refuses_others():
     """The PID class of MountainCar has as many parameters as the linear one: nothing else would notice."""
     with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
@@ -258,16 +251,6 @@ def test_the_names_of_a_saved_policy_win_and_it_acts_even_if_its_task_is_not_reg
             assert len(vsp.evaluate(back, back.task, n_episodes=3, seed=0)) == 3
     with pytest.raises(ValueError, match="Nowhere-v0 is not registered here, so its policy can act but no episode"):
         vsp.evaluate(back, back.task, seed=0)
-
-
-def test_a_damaged_policy_file_is_refused(tmp_path):
-    path = tmp_path / "p.voronoi"
-    random_policy().save(path)
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1
-    path.write_bytes(content)
-    with pytest.raises(DamagedFile):
-        VoronoiPolicy.load(path)
 
 
 @pytest.mark.parametrize(
