@@ -5,15 +5,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support import nearest_brute, nearest_kdtree
 
-from vsp.geometry import (
-    METRICS,
-    all_differ,
-    delaunay_neighbours,
-    distances,
-    lookup_neighbours,
-    nearest,
-    visited_neighbours,
-)
+from vsp import nearest
+from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
 from vsp.show import grid
 
 each_metric = pytest.mark.parametrize("metric", METRICS)
