@@ -104,11 +104,6 @@ CASES = {
     "geometry.delaunay_neighbours": (geometry.delaunay_neighbours, codewords),
     "geometry.lookup_neighbours": (geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
     "geometry.visited_neighbours": (geometry.visited_neighbours, cells_of_states | {"witnesses": states}),
-    "Partition.add": (
-        lambda state: partition().add(state, np.random.default_rng(0)),
-        {"state": array([0.5, 0.5], free=(), also=[np.array([0.25, 0.5])])},
-    ),
-    "Partition.locate": (lambda state: partition().locate(state), {"state": array([0.5, 0.5], free=())}),
     "Partition.observe": (
         lambda states, actions: partition().observe(Episode(states, actions)),
         {"states": array(STATES, free=(), nonempty=True), "actions": array(ACTIONS, free=(), nonempty=True)},
