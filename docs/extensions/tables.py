@@ -27,7 +27,7 @@ def measured(frame: pd.DataFrame) -> str:
 
 def artefacts() -> str:
     """Every figure and table of notebooks/captions.toml as Markdown: label, file, cell and what it shows."""
-    lines = ["| | file | notebook, cell | what it shows |", "|---|---|---|---|"]
+    lines = ["| label | file | notebook, cell | what it shows |", "|---|---|---|---|"]
     for notebook, kinds in tomllib.loads(BOOK.read_text("utf-8")).items():
         cells = nbformat.read(ROOT / "notebooks" / f"{notebook}.ipynb", as_version=4).cells
         for kind, names in kinds.items():
