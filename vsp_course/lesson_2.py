@@ -250,7 +250,7 @@ def prediction(answers: dict, teacher: Policy, task: Task, config: Config) -> No
     first, means = _first(answers), runs(teacher, task, config)["mean"]
     wrong, wrong_first = (_disagree(means, given) for given in (answers, first))
     why = "what the runs do: look at them in the cell below, and find out why"
-    PREDICTION.refuse_if(bool(wrong), f"a prediction that the runs disagree with on {wrong}", why, 1)
+    PREDICTION.refuse_if(bool(wrong), f"wrong predictions for {wrong}", why, 1)
     corrected = f"corrected. Your first prediction was wrong about {wrong_first}; the table keeps it."
     PREDICTION.passed(corrected if wrong_first else "the runs did what you said.")
 

@@ -368,7 +368,7 @@ PREDICTION = {
     "easier merges": "fewer cells",
     "exact maps": "fewer cells",
 }
-wrong("2.6", "the runs disagree with on ['a higher loss']")(PREDICTION | {"a higher loss": "fewer cells"})
+wrong("2.6", "wrong predictions for ['a higher loss']")(PREDICTION | {"a higher loss": "fewer cells"})
 right("2.6")(PREDICTION)
 
 
