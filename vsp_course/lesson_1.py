@@ -175,7 +175,6 @@ def act(function: Callable) -> None:
         maps = coefficients[geometry.nearest(codewords, states)]
         weighted, bias = np.einsum("nd,ndm->nm", states, maps[:, :-1]), maps[:, -1]
         raw, first = weighted + bias, states @ coefficients[0, :-1] + coefficients[0, -1]
-        bias_first = np.einsum("nd,ndm->nm", states, maps[:, 1:]) + maps[:, 0]
         right, both = np.clip(raw, -1, 1), "limits on both sides, -1 and 1"
         number = f"a wrong action in {(~np.isclose(value, right).all(axis=1)).sum()} of 60 states"
         mistakes = [
@@ -185,7 +184,6 @@ def act(function: Callable) -> None:
             Mistake(np.maximum(raw, -1), "one limit only", both, 3),
             Mistake(np.clip(weighted, -1, 1), "maps without their bias", "the last row of a cell's map added", 2),
             Mistake(np.clip(weighted, -1, 1) + bias, "the bias added after the limits", "limits last", 3),
-            Mistake(np.clip(bias_first, -1, 1), "the first row taken for the bias", "it in the last row", 2),
             Mistake(np.clip(first, -1, 1), "one map for all states", "the map of each state's own cell", 1),
             Mistake(None, number, "the right one in all", 1),
         ]

@@ -82,7 +82,6 @@ def blame(function: Callable) -> None:
             Mistake(start, "failures counted in the cell of their start", "in the last one", 3),
             Mistake(count(last[in_pit]), pit_only, "also those that run out of steps", 2),
             Mistake(count(np.concatenate(of_failures)), "every step of a failure", "its last", 3),
-            Mistake(count(last), "all episodes", "those that fail", 1),
             Mistake(right / max(1, failed.sum()), "shares", "counts", 1),
             Mistake(None, number, f"{failed.sum()}, each in the cell of the policy's last state", 3),
         ]

@@ -41,11 +41,11 @@ def slides(lesson: NotebookNode) -> str:
     return page.format(title=html.escape(title), css=css, script=script, slides=pages, wide=WIDE)
 
 
-def _inline(found: re.Match) -> str:
+def _inline(image: re.Match) -> str:
     """Embed a figure of this repository in the page, no wider than a slide."""
     file = io.BytesIO()
-    with Image.open(ROOT / found[1]) as picture:
+    with Image.open(ROOT / image[1]) as picture:
         small = picture.convert("RGB")
         small.thumbnail((WIDE, WIDE))
         small.save(file, "webp", lossless=True)
-    return f'<img src="data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}" alt="{found[2]}"'
+    return f'<img src="data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}" alt="{image[2]}"'

@@ -313,7 +313,7 @@ def test_the_notes_of_lesson_2_state_the_numbers_of_runs(change, told):
 
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
     """And needs no package that the hand-out leaves out."""
-    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "pygame", "Box2D"))
+    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "studies"))
     made = build.student(lesson)
     _, failed = run(made, monkeypatch)
     checks = {cell.id for cell in by_kind(made, build.is_check)}
@@ -544,8 +544,8 @@ def test_a_hand_out_stands_on_its_own(tmp_path):
         archive.extractall(tmp_path)
     folder = tmp_path / handout.FOLDER
     code = (
-        "import vsp, vsp_course; from vsp_course import lesson_1, lesson_2, lesson_3; "
-        "print(vsp.__file__, vsp_course.__file__); "
+        "import vsp, vsp_beyond, vsp_course; from vsp_course import lesson_1, lesson_2, lesson_3; "
+        "print(vsp.__file__, vsp_beyond.__file__, vsp_course.__file__); "
         "from vsp.paper import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
     )
     assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))
@@ -553,7 +553,7 @@ def test_a_hand_out_stands_on_its_own(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", code.format(SIMPLEGOAL)], cwd=folder, env=names, capture_output=True, text=True
     )
-    places = [str(folder / package / "__init__.py") for package in ("vsp", "vsp_course")]
+    places = [str(folder / package / "__init__.py") for package in ("vsp", "vsp_beyond", "vsp_course")]
     assert done.stdout.split() == places, done.stderr
 
 
