@@ -149,10 +149,10 @@ site test-site: export SITE := $(OUT)/build/site
 site: begin venv-site ## the companion as pages for a browser, into build/site/: about a minute
 	@$(PY) -m vsp_course.pages --out="$$OUT"
 	@rm -rf "$$SITE-work"; source="$$SITE-work/source"; \
-	mkdir -p "$$source/notebooks/course" "$$source/figures" "$$source/data"; \
-	cp -R docs/*.md docs/api README.md CITATION.cff "$$source"; \
+	mkdir -p "$$source/notebooks/course" "$$source/data"; \
+	cp docs/*.md README.md CITATION.cff "$$source"; \
 	cp figures/executed/*.ipynb "$$source/notebooks"; \
-	cp -R figures/*.* figures/tables "$$source/figures"; \
+	cp -R figures "$$source"; rm -r "$$source/figures/executed"; \
 	cp data/README.md "$$source/data"; \
 	cp "$$OUT"/build/course/pages/*.ipynb "$$source/notebooks/course"
 	@$(PY) -m sphinx -q -W -c docs -d "$$SITE-work/doctrees" "$$SITE-work/source" "$$SITE-work/pages"

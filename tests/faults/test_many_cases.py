@@ -1,4 +1,4 @@
-"""The properties of tests/test_properties.py and tests/test_codewords.py with up to 200 cases each."""
+"""The properties of tests/test_properties.py, and those of tests/test_codewords.py with up to 200 cases each."""
 
 import os
 import re
@@ -23,7 +23,7 @@ def test_properties_of_public_functions(record):
 
     passed, last = with_many_cases("test_properties.py")
     what, n = "bad arguments of the public functions of a reader", len(CASES)
-    note = "a typed error, never a silent result; up to 200 cases each" if passed else last
+    note = "a typed error, never a silent result; each argument spoilt in every way" if passed else last
     record("input", what, n if passed else 0, f"of {n} functions", at_least=n, note=note)
 
 

@@ -17,6 +17,7 @@ from vsp.paper import runs as runs_module
 from vsp.paper import tables
 from vsp.paper.beside import kept_comparison
 from vsp.paper.make_runs import main
+from vsp.paper.readings import Readings
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Results, load_runs, make_all, make_run, make_runs, paper_results
 from vsp.paper.statistics import spread
 from vsp.run import atomic, listed, workers
@@ -34,7 +35,7 @@ def made(tmp_path_factory):
 
 
 def test_a_run_keeps_the_class_of_its_sub_policies(tmp_path):
-    for name in ("constant", "network"):
+    for name in ("constant", "quadratic"):
         (run,) = make_runs(changed(config=dataclasses.replace(CONFIG, sub_policy=name)), [0], runs=tmp_path)
         assert run.policy.policy_class.name == name and len(run.outcomes.returns) == 20
 
@@ -124,7 +125,7 @@ def test_all_that_is_there_is_made_no_more(made, tmp_path, monkeypatch, capsys):
     [
         changed(config=dataclasses.replace(CONFIG, n_reset=26)),
         changed(config=dataclasses.replace(CONFIG, max_pol_loss=0.0200001)),
-        changed(config=dataclasses.replace(CONFIG, split_lookup="kept")),
+        changed(readings=Readings(split_lookup="kept")),
         changed(n_episodes=21),
         changed(teacher=PumpingTeacher()),
         changed(task=MOUNTAINCAR),

@@ -6,10 +6,11 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
-from vsp.config import EXTENSIONS, Config, paper_preset
+from vsp.config import EXTENSIONS, Config
 from vsp.paper import printed as printed_module
 from vsp.paper import tables
 from vsp.paper.printed import PREFIX, SHORT, printed_hyperparameters, printed_spread, printed_text_numbers
+from vsp.paper.readings import Readings
 from vsp.paper.shown import show_table
 from vsp.paper.statistics import spread
 from vsp.paper.tables import equation_table, hyperparameter_table, save_table, text_number_table
@@ -164,9 +165,10 @@ def test_the_text_numbers_stand_beside_the_papers(task):
 
 def test_readings_are_the_fields_that_the_papers_table_does_not_print():
     frame = tables.interpretation_table(SIMPLEGOAL).set_index("reading")["default"]
-    assert frame["split_lookup"] == paper_preset(SIMPLEGOAL).split_lookup and "n_epochs" not in frame
+    assert frame["split_lookup"] == Readings().split_lookup and "n_epochs" not in frame
     others = [*printed_hyperparameters(SIMPLEGOAL), *EXTENSIONS]
-    assert sorted([*frame.index, *others]) == sorted(field.name for field in dataclasses.fields(Config))
+    fields = [field.name for kind in (Config, Readings) for field in dataclasses.fields(kind)]
+    assert sorted([*frame.index, *others]) == sorted(fields)
 
 
 def test_the_latex_escapes_text_and_leaves_mathematics(tmp_path):

@@ -26,6 +26,7 @@ from ..run.machine import cpu_type
 from ..tasks.base import GOAL, PIT, TRUNCATED
 from ..tasks.registry import get_task
 from ..teachers.teacher import Teacher, load_teacher
+from .readings import Readings
 from .results import load_made, make_missing, provenance, provenance_folder
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
@@ -57,13 +58,14 @@ class Experiment:
     config: Config
     teacher: Teacher
     n_episodes: int = N_EPISODES
+    readings: Readings | None = None  # other passes than those of `algorithms`
 
     @property
     def settings(self) -> dict:
         """Everything that determines the result of a run apart from teacher, version and seed, as JSON-able values."""
         return {
             "task": self.task,
-            "config": self.config.settings(),
+            "config": self.config.settings() | asdict(self.readings or Readings()),
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
             "versions": {name: _version(name) for name in ("numpy", "scipy")},
@@ -109,7 +111,9 @@ def make_all(work: Iterable, *, runs: str | os.PathLike, jobs: int | str = 1, la
 def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], dict]:
     """Distil and evaluate once; return the arrays and about of the run's sealed file."""
     task, n = experiment.task, experiment.n_episodes
-    policy, history = distill(experiment.teacher, get_task(task), experiment.config, seed=seed)
+    readings = experiment.readings
+    passes = {"split": readings.split, "merge": readings.merge} if readings else {}
+    policy, history = distill(experiment.teacher, get_task(task), experiment.config, seed=seed, **passes)
     result = rollout_from_seed(policy, task, n, seed=EVALUATION_SEED)
     validation = rollout_from_seed(policy, task, n, seed=VALIDATION_SEED)
     arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}

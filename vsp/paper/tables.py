@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import re
 from pathlib import Path
@@ -13,13 +12,14 @@ import numpy as np
 import pandas as pd
 
 from ..checks import check_array, check_count
-from ..config import EXTENSIONS, paper_preset
+from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
 from ..run import atomic, listed
 from ..show.captions import caption_of
 from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
+from .readings import defaults
 from .results import write_results
 from .runs import SHARES, Experiment, Results, Run, outcome_shares
 from .shown import as_text, present, show_table
@@ -66,10 +66,10 @@ def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
 
 
 def interpretation_table(task: str) -> pd.DataFrame:
-    """List what the paper leaves open: one row per configuration field that T2 does not print, with its default."""
-    here, known = paper_preset(task), printed_hyperparameters(task).keys() | EXTENSIONS
-    fields = {field.name: getattr(here, field.name) for field in dataclasses.fields(here) if field.name not in known}
-    return pd.DataFrame({"reading": list(fields), "default": list(fields.values())}, dtype=object)
+    """List what the paper leaves open, apart from what T2 prints: one row per reading, with its default."""
+    answers = defaults(paper_preset(task))
+    rows = [(name, value) for name, value in answers.items() if name not in printed_hyperparameters(task)]
+    return pd.DataFrame(rows, columns=["reading", "default"], dtype=object)
 
 
 def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: bool = False) -> pd.DataFrame:

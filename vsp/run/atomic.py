@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-ROOT = Path(__file__).resolve().parents[2]  # the checkout: data/ lies beside vsp/
+ROOT = Path(__file__).resolve().parents[2]  # the checkout, or where vsp is installed
 TEMPORARY = ".?*-????????.*"  # names of the temporary files of `atomic_path`
 
 _NO_ROOM = "free some space, make it writable or raise `ulimit -f`, or name another folder: OUT=folder"
@@ -30,6 +30,12 @@ class DamagedFile(ValueError):
 
 class MissingFile(FileNotFoundError):
     """A file of this project that does not exist; the message names it and says how to restore it."""
+
+
+def data_folder(name: str) -> Path:
+    """Return the folder data/`name` of the checkout, or its copy in an installed vsp, which has teachers and paper."""
+    installed = ROOT / "vsp" / "data" / name
+    return installed if installed.is_dir() else ROOT / "data" / name
 
 
 @contextlib.contextmanager
@@ -120,6 +126,8 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 
 def remedy(path: str | os.PathLike) -> str:
     """Say how to restore a missing or damaged file that is committed."""
+    if not (ROOT / "environment.lock").exists():
+        return "it lies in the checkout only: `git clone ADDRESS vsp`"
     return f"`git checkout {shlex.quote(str(path))}` restores a committed file"
 
 

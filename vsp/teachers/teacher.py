@@ -16,7 +16,7 @@ from ..tasks.base import Task
 from ..tasks.registry import get_task, task_names
 from .agent_zip import part_of, read_zip
 
-SHIPPED = atomic.ROOT / "data" / "teachers"
+SHIPPED = atomic.data_folder("teachers")
 MOST_WEIGHT = 1e6  # largest absolute value in a tensor, so that 3 layers of 1000 units stay far below float32's 3e38
 
 
