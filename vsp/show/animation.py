@@ -17,7 +17,7 @@ from PIL import Image
 
 from ..run import atomic
 from . import style
-from .captions import Caption, caption_of
+from .captions import Caption, caption_of, file_of
 
 WIDTH = 6.0  # inches
 DPI, COLOURS = 120, 64  # dots per inch of a GIF, and the size of its palette
@@ -96,7 +96,7 @@ def save_frames(
 
     `step`: milliseconds per frame; `hold`: milliseconds of the last frame.
     """
-    path, about = Path(out) / "figures" / name, caption_of("figures", name, alt=alt)
+    path, about = file_of("figures", name, out), caption_of("figures", name, alt=alt)
     with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
         write_gif(temporary, images, step=step, hold=hold)
     with atomic.atomic_path(path.with_suffix(".png")) as temporary:

@@ -6,8 +6,10 @@ That file lists them in the order of the notebooks, so that code cells contain o
 from __future__ import annotations
 
 import html
+import os
 import tomllib
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from ..checks import check_choice
@@ -33,13 +35,13 @@ class Caption(NamedTuple):
 @cache
 def _book() -> dict[tuple[str, str], Caption]:
     """Return all captions by kind and name. Each notebook numbers its figures and its tables separately."""
-    found = {}
+    captions = {}
     for notebook, kinds in (tomllib.loads(BOOK.read_text("utf-8")) if BOOK.exists() else {}).items():
         for kind, entries in kinds.items():
             for number, (name, about) in enumerate(entries.items(), 1):
                 label = f"{KINDS[kind]} {int(notebook[:2])}.{number}"
-                found[kind, name] = Caption(label, about["caption"], about.get("alt", ""))
-    return found
+                captions[kind, name] = Caption(label, about["caption"], about.get("alt", ""))
+    return captions
 
 
 def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None = None) -> Caption:
@@ -49,7 +51,13 @@ def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None
     """
     check_choice("kind", kind, KINDS)
     known = _book().get((kind, name), Caption("", ""))
-    found = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
-    if kind == "figures" and not found.alt:
+    caption = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
+    if kind == "figures" and not caption.alt:
         raise ValueError(f"figure {name!r} has no alternative text: pass alt= or add it to notebooks/{BOOK.name}")
-    return found
+    return caption
+
+
+def file_of(kind: str, name: str, out: str | os.PathLike) -> Path:
+    """Return the path, without suffix: figures/x or figures/tables/x; for "beyond/x" figures/beyond/(tables/)x."""
+    place = Path(out) / "figures" / name
+    return place if kind == "figures" else place.parent / kind / place.name
