@@ -33,8 +33,9 @@ def spread(returns: np.ndarray) -> dict[str, float]:
         raise ValueError("no returns, expected at least one")
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
     lower, upper = fences(q1, q3)
-    below, above = returns < lower, returns > upper
-    numbers = _moments(returns) | {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
+    below, above, moments = returns < lower, returns > upper, _moments(returns)
+    numbers = {name: moments[name] for name in ("min", "max", "mean", "std")}
+    numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
     numbers |= {"coverage": 1.0 - (below | above).mean(), "lower_fence": lower, "upper_fence": upper}
     return numbers | {"outliers_below": int(below.sum()), "outliers_above": int(above.sum())}
 
@@ -60,9 +61,9 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
 
 def _moments(values: np.ndarray) -> dict[str, float]:
     if not len(values):
-        return dict.fromkeys(("min", "max", "mean", "std"), np.nan)
+        return dict.fromkeys(("mean", "std", "min", "max"), np.nan)
     deviation = values.std(ddof=1) if len(values) > 1 else 0.0
-    return {"min": values.min(), "max": values.max(), "mean": values.mean(), "std": deviation}
+    return {"mean": values.mean(), "std": deviation, "min": values.min(), "max": values.max()}
 
 
 def bootstrap_draws(n_rows: int, n_resamples: int, seed: int) -> np.ndarray:
