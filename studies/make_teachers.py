@@ -1,4 +1,4 @@
-"""`make teachers`, `make short-teachers`: train the teachers, also those of the robots, whose tasks are in `studies`."""
+"""`make teachers`, `make short-teachers`: train the teachers, also those of robots, whose tasks are in `studies`."""
 
 from vsp.run import command
 from vsp.teachers.train import main

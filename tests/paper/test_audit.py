@@ -5,8 +5,6 @@ from support import MOUNTAINCAR, SIMPLEGOAL
 
 from vsp.paper import audit
 from vsp.paper import printed as printed_module
-from vsp.paper.audit import findings, protocol
-from vsp.paper.audit import policies as printed_policies
 from vsp.paper.printed import _read, linear_policies, printed_values, published_policy
 from vsp.paper.statistics import Part, least_std, mean_range, quarters, remaining_mean, remaining_std
 
@@ -176,7 +174,7 @@ QUARTILES = {f"mc_spread_ours_{name}": text for name, text in QUARTILES.items()}
     ],
 )
 def test_another_number_another_verdict(found, alter, title, numbers, verdict):
-    check = dict(zip(found, findings._CHECKS))[title]
+    check = dict(zip(found, audit.CHECKS))[title]
     alter(numbers)
     finding = check()
     assert finding.title == title and finding.verdict == verdict != VERDICTS[title]
@@ -191,14 +189,14 @@ def test_other_tables_other_verdicts(monkeypatch):
     cells = values["id"].str.contains("_cell_")
     values.loc[cells, "paper"] = values.loc[cells, "value"].map("{:.4f}".format)
     put("printed_values", values)
-    assert printed_policies.printed_digits().verdict == HOLDS
+    assert audit.printed_digits().verdict == HOLDS
     put("linear_policies", policies.assign(G_printed=policies["F_printed"]))
-    assert printed_policies.dimensions().verdict == HOLDS
+    assert audit.dimensions().verdict == HOLDS
     put("published_policy", published)
     put("linear_policies", policies.replace("LimeGreen", "Goldenrod"))
-    assert printed_policies.mountaincar_colours().verdict == HOLDS
+    assert audit.mountaincar_colours().verdict == HOLDS
     put("printed_hyperparameters", {"n_epochs": 8, "n_split": 4, "n_freeze": 4})
-    assert protocol.frozen_iterations().verdict == HOLDS
+    assert audit.frozen_iterations().verdict == HOLDS
 
 
 # Rounding of the printed values decides nothing

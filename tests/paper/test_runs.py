@@ -9,13 +9,13 @@ import pandas as pd
 import pytest
 import support
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, network_teacher, same_arrays
+from vsp.paper.beside import kept_comparison
 
 from vsp import config, distill
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import make_runs as command
 from vsp.paper import runs as runs_module
 from vsp.paper import tables
-from vsp.paper.beside import kept_comparison
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Results, load_runs, make_all, make_run, make_runs, paper_results

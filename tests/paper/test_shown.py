@@ -3,8 +3,8 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-
 from vsp.paper.shown import MISSING, as_text, present, show_table
+
 from vsp.show import captions
 
 

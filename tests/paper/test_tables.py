@@ -5,13 +5,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
+from vsp.paper.shown import show_table
 
 from vsp.config import EXTENSIONS, Config
 from vsp.paper import printed as printed_module
 from vsp.paper import tables
 from vsp.paper.printed import PREFIX, SHORT, printed_hyperparameters, printed_spread, printed_text_numbers
 from vsp.paper.readings import Readings
-from vsp.paper.shown import show_table
 from vsp.paper.statistics import spread
 from vsp.paper.tables import equation_table, hyperparameter_table, save_table, text_number_table
 from vsp.policy import VoronoiPolicy

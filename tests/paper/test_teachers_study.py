@@ -3,10 +3,10 @@ import pandas as pd
 import pytest
 from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, tiny
+from vsp.paper.beside import teacher_data
 
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import runs
-from vsp.paper.beside import teacher_data
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, load_runs, paper_experiment
 from vsp.paper.studies import teachers as teachers_module
