@@ -88,13 +88,6 @@ def test_what_is_in_doubt_exists(found):
     assert IN_DOUBT <= set(printed_values()["id"])
 
 
-def test_frame(found):
-    frame = audit.audit_table(list(found.values()))
-    assert frame.columns.tolist() == ["number", "finding", "printed", "arithmetic", "verdict"]
-    assert frame["number"].tolist() == list(range(1, len(VERDICTS) + 1))
-    assert frame["finding"].tolist() == list(VERDICTS) and frame["verdict"].tolist() == list(VERDICTS.values())
-
-
 @pytest.mark.parametrize(
     ("title", "numbers"),
     [
@@ -104,7 +97,6 @@ def test_frame(found):
             "SimpleGoal: coverage and outliers of the distilled policies",
             ["86.98 %", "86.17 %", "1175", "80000 episodes", "68933", "73933"],
         ),
-        ("SimpleGoal: coverage and outliers of the distilled policies", ["std 1.491 (1.633", "std 2.754 (1.647"]),
         ("Coverage and moments of the other columns", ["1 - 24/1000 = 97.6 %", "1 - 3130/40000 = 92.175 %"]),
         ("Coverage and moments of the other columns", ["1 - 0/1000 = 100 %", "mean 16.801 (", "std 2.737 ("]),
         # (94.130 - 93.313)/4 = 0.20425; 93.313 + 1.5 * 0.20425 = 93.619375; 93.403 - 1.5 * 0.145 = 93.1855
@@ -162,13 +154,8 @@ QUARTILES = {f"mc_spread_ours_{name}": text for name, text in QUARTILES.items()}
         ("The same rule for outliers in every column", {"sg_drl_outliers_max": "8.0"}, HOLDS),
         ("SimpleGoal: what the teacher's outliers are", {"sg_drl_outliers_std": "4.5"}, OPEN),
         ("Shares and moments of outliers", {"mc_ours_outliers_below_share": "73.25"}, CONTRADICTS),
-        ("Shares and moments of outliers", {"mc_ours_outliers_above_std": "0.3"}, CONTRADICTS),
         ("Numbers printed twice", {"sg_ours_mean": "12.658"}, CONTRADICTS),
-        ("Numbers printed twice", {"mc_cells": "31"}, CONTRADICTS),
-        ("Numbers printed twice", {"sg_spread_drl_iqr": "4.2"}, CONTRADICTS),
         ("Returns within the limits of the tasks", {"sg_spread_ours_max": "23.2"}, CONTRADICTS),
-        ("Returns within the limits of the tasks", {"sg_spread_drl_mean": "16.7"}, CONTRADICTS),
-        ("Returns within the limits of the tasks", {"mc_spread_ours_min": "-5"}, CONTRADICTS),
         ("MountainCar: truncation", {"mc_max_steps": "999"}, HOLDS),
         ("Training steps: a dot for thousands, elsewhere for decimals", {"sg_training_steps": "500000"}, HOLDS),
     ],
@@ -205,14 +192,6 @@ def test_other_tables_other_verdicts(monkeypatch):
 def corners(numbers):
     """Every way to be half a unit of the third decimal beside each of `numbers`."""
     return itertools.product(*((number - 0.0005, number + 0.0005) for number in numbers))
-
-
-@pytest.mark.parametrize(("n", "possible"), [(80_000, False), (85_000, True)])
-def test_rounding_does_not_decide_on_the_coverage(n, possible):
-    for mean, std, out_mean, out_std in corners([12.657, 8.436, -8.042, 1.830]):
-        out = [Part(11067, out_mean, out_std, -11.79, 1.192)]
-        groups = quarters(n, [1.192, 12.298, 15.382, 17.646, 22.798], below=11067)
-        assert (remaining_std(n, mean, std, out) >= least_std(remaining_mean(n, mean, out), groups) + 0.05) == possible
 
 
 def test_rounding_does_not_decide_on_the_quartiles():
