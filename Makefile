@@ -224,7 +224,7 @@ $(call outputs,$(1)): $(1) ;
 $(1): begin venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@for file in $$(READS_$(1)); do test -f "$$$$file" || { echo "error: $$$$file is missing: \`git checkout $$$$file\` \
 	brings it back; \`make study beyond beyond-long lookup\` makes all such files" >&2; exit 1; }; done; \
-	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb notebooks/captions.toml $$(READS_$(1)) \
+	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml $$(READS_$(1)) \
 	  $(if $(filter $(1),$(NEED_RUNS)),"$$$$STATE/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$$$QUICK"; (cd "$$$$OUT" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$$$STATE/$(1)"; then \

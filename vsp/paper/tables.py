@@ -20,7 +20,7 @@ from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
 from ..run import atomic
-from ..show.captions import caption_of, file_of
+from ..show.captions import caption_of, file_of, headings
 from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .readings import defaults
@@ -34,35 +34,7 @@ if TYPE_CHECKING:
 PAGE = 40  # rows that fit on one page
 MISSING = "–"  # where there is no number
 INTERVAL = "95 % interval"
-HEADINGS = {
-    "mean": "mean return",
-    "std": "std of the returns",
-    "r2": "R²",
-    "r2_least": "lowest R²",
-    "index": "sameness",
-    "least": "lowest mean",
-    "most": "highest mean",
-    "worst": "worst 1 %",
-    "error_teacher": "action error",
-    "linear_error": "error of one map",
-    "teacher_mean": "teacher's mean",
-    "teacher_std": "teacher's std",
-    "own": "teacher's return",
-    "gap": "minus the teacher's",
-    "parameters": "numbers",
-    "untuned mean": "untuned: mean return",
-    "untuned r2": "untuned: R²",
-}
 QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting", "hyperparameter"}
-PERCENT = {
-    "failing": "failed (%)",
-    "reached": "as good (%)",
-    "rival reached": "rival as good (%)",
-    "good": "as good (%)",
-    "both": "both (%)",
-    "off": "off by a tenth (%)",
-    "near": "near the best (%)",
-}
 
 
 # Tables for readers
@@ -112,7 +84,7 @@ def present(frame: pd.DataFrame) -> pd.DataFrame:
     frame = frame.reset_index(drop=True).apply(_in_words)
     frame = _counts(frame) if QUANTITIES & {*frame} else frame
     for name in frame:
-        if re.sub(r"_(low|high)$", "", str(name)) in PERCENT:
+        if re.sub(r"_(low|high)$", "", str(name)) in headings()["percent"]:
             frame[name] = [MISSING if np.isnan(value) else f"{100 * value:.3g}" for value in frame[name].astype(float)]
     for low in [name for name in frame if re.search(r"(^|[_ ])low$", str(name))]:
         about = low.removesuffix("low")
@@ -143,7 +115,7 @@ def _counts(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _heading(column: str) -> str:
-    return PERCENT.get(column, HEADINGS.get(column, column))
+    return (headings()["words"] | headings()["percent"]).get(column, column)
 
 
 def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:

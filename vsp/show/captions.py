@@ -1,4 +1,4 @@
-"""Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml.
+"""Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml, and headings.
 
 That file lists them in the order of the notebooks, so that code cells contain only code.
 """
@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..checks import check_choice
 from ..run import ROOT
 
-BOOK = ROOT / "notebooks" / "captions.toml"
+BOOK, HEADINGS = ROOT / "notebooks" / "captions.toml", ROOT / "notebooks" / "headings.toml"
 KINDS = {"figures": "Figure", "tables": "Table"}
 
 
@@ -32,11 +32,21 @@ class Caption(NamedTuple):
         return f"<{tag}>{label}{html.escape(self.text, quote=False)}</{tag}>" if self.text else ""
 
 
+def _parsed(path: Path) -> dict[str, dict]:
+    return tomllib.loads(path.read_text("utf-8")) if path.exists() else {}
+
+
+@cache
+def headings() -> dict[str, dict[str, str]]:
+    """Return the headings of columns in notebooks/headings.toml: of shares ("percent"), and of others ("words")."""
+    return {"words": {}, "percent": {}} | _parsed(HEADINGS)
+
+
 @cache
 def _book() -> dict[tuple[str, str], Caption]:
     """Return all captions by kind and name. Each notebook numbers its figures and its tables separately."""
     captions = {}
-    for notebook, kinds in (tomllib.loads(BOOK.read_text("utf-8")) if BOOK.exists() else {}).items():
+    for notebook, kinds in _parsed(BOOK).items():
         for kind, entries in kinds.items():
             for number, (name, about) in enumerate(entries.items(), 1):
                 label = f"{KINDS[kind]} {int(notebook[:2])}.{number}"
