@@ -160,17 +160,13 @@ def _environments() -> dict[str, float]:
     goal, car = (registry.get_task(task) for task in printed.TASKS)
     full, half = (_reward(car, [-0.5, 0.0], [force]) for force in (1.0, 0.5))
     settings = {
-        "state_dimensions": len(goal.low),
-        "sg_max_steps": goal.max_steps,
-        "mc_max_steps": car.max_steps,
+        "state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps,
         "sg_reward_factor": _reward(goal, [0.5, 0.0], [-1.0, 0.0]) / simplegoal.STRIDE,
         "sg_goal_reward": _reward(goal, [0.15, 0.0], [-1.0, 0.0]),
-        "sg_pit_reward": _reward(goal, [0.35, 0.5], [1.0, 0.0]),
-        "mc_force_reward_factor": full,
-        "mc_force_reward_exponent": np.log2(full / half),
-        "mc_goal_reward": _reward(car, [0.449, 0.07], [0.0]),
+        "sg_pit_reward": _reward(goal, [0.35, 0.5], [1.0, 0.0]), "mc_force_reward_factor": full,
+        "mc_force_reward_exponent": np.log2(full / half), "mc_goal_reward": _reward(car, [0.449, 0.07], [0.0]),
         "mc_goal_position": mountaincar.FLAG,
-    }
+    }  # fmt: skip
     for axis, name in enumerate("xy"):
         settings[f"sg_size_{name}"] = goal.high[axis] - goal.low[axis]
         settings |= {f"sg_goal_{name}_high": simplegoal.GOAL_EDGE, f"sg_stride_{name}": simplegoal.STRIDE}

@@ -13,6 +13,8 @@ from decimal import Decimal
 
 import numpy as np
 import pandas as pd
+from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 from ..checks import check_array, check_count, check_finite, check_number, check_seed
 from ..evaluation import fences
@@ -128,49 +130,95 @@ def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -
     returns = check_array("returns", returns, (-1, -1))
     if not returns.size:
         raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
-    (p, n), order = returns.shape, returns.argsort(axis=None, kind="stable")
-    values, policy = returns.ravel()[order], order // n  # sorted once: a resample only counts each value again
-    means, low, high = returns.mean(axis=1), returns.min(axis=1), returns.max(axis=1)
-    squares, rows = np.square(returns - means[:, None]).sum(axis=1), []
-    for draw in bootstrap_draws(p, n_resamples, seed):
-        mean = means[draw].mean()
-        total = (squares[draw] + n * np.square(means[draw] - mean)).sum()
-        row = {
-            "mean": mean,
-            "std": math.sqrt(total / max(1, p * n - 1)),
-            "min": low[draw].min(),
-            "max": high[draw].max(),
-        }
-        rows.append(row | _counted(values, np.bincount(draw, minlength=p).astype(np.int32)[policy]))
-    return pd.DataFrame(rows)
+    draws = bootstrap_draws(len(returns), n_resamples, seed)
+    sample = _SortedReturns(np.ascontiguousarray(returns))
+    batches = (draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH))
+    with threadpool_limits(1):  # NumPy's loops run in parallel in threads
+        columns = Parallel(n_jobs=-1, prefer="threads")(delayed(sample.statistics)(batch) for batch in batches)
+    return pd.DataFrame({name: np.concatenate([batch[name] for batch in columns]) for name in columns[0]})
 
 
-def _counted(values: np.ndarray, counts: np.ndarray) -> dict[str, float]:
-    """Return quartiles, fences and outliers of sorted `values` (k,), each of which counts `counts` (k,) times."""
-    until, n = counts.cumsum(dtype=np.int32), len(values)
-    place = np.array([0.25, 0.5, 0.75]) * (n - 1)  # interpolated as by `np.percentile`
-    below, above = values[until.searchsorted(np.array([np.floor(place), np.ceil(place)], dtype=np.int32), "right")]
-    q1, median, q3 = (below + (place - np.floor(place)) * (above - below)).tolist()
-    lower, upper = fences(q1, q3)
-    sides = {"below": slice(values.searchsorted(lower)), "above": slice(values.searchsorted(upper, "right"), n)}
-    parts = {f"outliers_{side}": (values[part], counts[part].astype(float)) for side, part in sides.items()}
-    parts["outliers"] = tuple(np.concatenate(pair) for pair in zip(*parts.values()))
-    sizes = {name: size.sum() for name, (_, size) in parts.items()}
-    total = sizes.pop("outliers")
-    row = {f"{name}_{statistic}": x for name, part in parts.items() for statistic, x in _counted_moments(*part).items()}
-    row |= {f"{name}_share": 100 * size / total if total else np.nan for name, size in sizes.items()}
-    row |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
-    return row | {"outliers": total, "coverage": 100 * (1 - total / n)}
+_BATCH = 25  # resamples at a time, so that their arrays stay in the cache
 
 
-def _counted_moments(values: np.ndarray, counts: np.ndarray) -> dict[str, float]:
-    drawn = np.flatnonzero(counts)
-    if not len(drawn):
-        return _moments(values[drawn])
-    n = counts.sum()
-    mean = values[0] + counts @ (values - values[0]) / n
-    std = math.sqrt(counts @ np.square(values - mean) / max(1, n - 1))
-    return {"mean": mean, "std": std, "min": values[drawn[0]], "max": values[drawn[-1]]}
+class _SortedReturns:
+    """Returns (p, n) of policies, sorted once, so that no resample needs sorting.
+
+    A resample contains each policy, with all its returns, some number of times. Its order statistics are found in
+    cumulative counts: first the block of sorted returns, then the return inside it.
+    """
+
+    def __init__(self, returns: np.ndarray):
+        (p, n), self.block = returns.shape, math.ceil(math.sqrt(returns.size))
+        order = returns.argsort(axis=None, kind="stable")
+        self.values, self.policy = returns.ravel()[order], order // n
+        cells = self.policy * self.block + np.arange(p * n) // self.block
+        in_block = np.bincount(cells, minlength=p * self.block).reshape(p, self.block)
+        # Returns of each policy before each block
+        self.until = np.pad(in_block.cumsum(axis=1), ((0, 0), (1, 0))).astype(float)
+        means = returns.mean(axis=1)
+        squares = np.square(returns - means[:, None]).sum(axis=1)
+        self.by_policy = np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1)
+
+    def statistics(self, draws: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the columns of `resample`, for the resamples that draw these policies (r, p)."""
+        counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
+        q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
+        lower, upper = fences(q1, q3)
+        n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
+        places = np.arange(max(1, low.max()))  # outliers of any resample
+        below = self._part(places, counts[:, self.policy[places]] * (places < low[:, None]))
+        places = np.arange(min(n - 1, high.min()), n)
+        above = self._part(places, counts[:, self.policy[places]] * (places >= high[:, None]))
+        size, mean, squares, least, most = self.by_policy
+        parts = {"": (counts * size, mean, counts * squares, least, most), "outliers_below_": below}
+        parts |= {"outliers_above_": above, "outliers_": tuple(np.hstack(pair) for pair in zip(below, above))}
+        numbers = {prefix + name: x for prefix, part in parts.items() for name, x in _pooled(*part).items()}
+        outliers = (below[0] + above[0])[:, 0]
+        some = np.where(outliers > 0, outliers, np.nan)
+        numbers["outliers_below_share"], numbers["outliers_above_share"] = (
+            100 * part[0][:, 0] / some for part in (below, above)
+        )
+        numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
+        return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / n)}
+
+    def _quantiles(self, counts: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
+        """Interpolate linearly between order statistics, as `np.percentile` does; return an array (r,) per share."""
+        until, quantiles = counts @ self.until, []
+        for place in np.multiply(shares, len(self.values) - 1):
+            below, above = (self._ranked(counts, until, rank) for rank in (math.floor(place), math.ceil(place)))
+            quantiles.append(below + (place - math.floor(place)) * (above - below))
+        return quantiles
+
+    def _ranked(self, counts: np.ndarray, until: np.ndarray, rank: int) -> np.ndarray:
+        """Return the value of this rank (0: smallest) in each resample; `until`: values before each block. (r,)"""
+        block = (until[:, 1:] <= rank).sum(axis=1, keepdims=True)
+        places = np.minimum(block * self.block + np.arange(self.block), len(self.values) - 1)
+        inside = np.take_along_axis(counts, self.policy[places], axis=1).cumsum(axis=1)
+        passed = np.take_along_axis(until, block, axis=1) + inside <= rank
+        return self.values[block[:, 0] * self.block + passed.sum(axis=1)]
+
+    def _part(self, places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the arguments (r, 1) of `_pooled` of the sorted returns at `places` (k,), counted `weights` (r, k)."""
+        values, size, there = self.values[places], weights.sum(axis=1), weights > 0
+        mean = values[0] + np.einsum("rk,k->r", weights, values - values[0]) / np.maximum(1, size)
+        squares = np.einsum("rk,rk->r", weights, np.square(values - mean[:, None]))
+        least, most = values[there.argmax(axis=1)], values[::-1][there[:, ::-1].argmax(axis=1)]
+        return tuple(x[:, None] for x in (size, mean, squares, least, most))
+
+
+def _pooled(size, mean, squares, least, most) -> dict[str, np.ndarray]:
+    """Return moments and range of the parts of each resample together, NaN where all are empty. (r,)
+
+    All arguments are (r, parts), or (parts,) where all resamples share them; `squares` are sums of squared deviations
+    from the mean.
+    """
+    n = size.sum(axis=1)
+    centre = (size * mean).sum(axis=1) / np.maximum(1, n)
+    total = (squares + size * np.square(mean - centre[:, None])).sum(axis=1)
+    low, high = np.where(size > 0, least, np.inf).min(axis=1), np.where(size > 0, most, -np.inf).max(axis=1)
+    moments = {"mean": centre, "std": np.sqrt(total / np.maximum(1, n - 1)), "min": low, "max": high}
+    return {name: np.where(n > 0, x, np.nan) for name, x in moments.items()}
 
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): `count` values lie in [low, high]
