@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -18,7 +17,7 @@ import pandas as pd
 from ..evaluation import fences
 from ..geometry import delaunay_neighbours, distances
 from ..tasks.registry import get_task
-from ..tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE
+from ..tasks.simplegoal import GOAL_EDGE, STRIDE
 from . import printed, statistics
 from .printed import PREFIX, SHORT, printed_value, spread_id
 from .statistics import Part, rounds_to
@@ -131,21 +130,6 @@ def truncation() -> Finding:
         f"{lowest:.3f}, is positive, and an episode without the goal earns at most 0"
     )
     return finding("MountainCar: truncation", quote("mc_max_steps"), text, limit == steps or None)
-
-
-def thousands() -> Finding:
-    """Show that the dot of one number separates thousands, but the dots of all others decimals."""
-    numbers, steps = printed.printed_text_numbers()["printed"], printed_value("sg_training_steps")
-    decimal = float(numbers["sg_training_steps"])
-    others = numbers.drop("sg_training_steps").str.fullmatch("-?[0-9]+[.][0-9]+%?").sum()
-    text = (
-        f"as a decimal, like {others} others with a dot: {decimal:g} steps, "
-        f"{decimal / printed_value('sg_max_steps'):g} episodes of full length, "
-        f"not {steps:g}; other thousands have no separator"
-    )
-    shown = quote("sg_training_steps", "sg_total_episodes", "mc_total_episodes")
-    title = "Training steps: a dot for thousands, elsewhere for decimals"
-    return finding(title, shown, text, decimal == steps or None)
 
 
 def frozen_iterations() -> Finding:
@@ -296,20 +280,6 @@ def printed_twice() -> Finding:
     return finding("Numbers printed twice", shown + "cells (text; T3, T4)", text, not differ)
 
 
-def simplegoal_wording() -> Finding:
-    """Compute ratios of the printed columns that the text calls similar. This is a judgement, so it is left open."""
-    ours, drl = (Column(SIMPLEGOAL, subject).values for subject in ("ours", "drl"))
-    lost = drl["mean"] - ours["mean"]
-    text = (
-        f"std {ours['std']:.3f} / {drl['std']:.3f} = {ours['std'] / drl['std']:.2f}, "
-        f"IQR {ours['iqr']:.3f} / {drl['iqr']:.3f} = {ours['iqr'] / drl['iqr']:.2f}, "
-        f"mean lower by {lost:.3f}, which is {lost / drl['std']:.2f} std of DRL or "
-        f"{100 * lost / drl['mean']:.1f} %, median lower by {drl['median'] - ours['median']:.3f}"
-    )
-    shown = "similar spread and performance (Navigation task, caption of the box plot), slight decrease (Performance)"
-    return finding("SimpleGoal: the similar spread and the slight decrease, by the table", shown, text, None)
-
-
 def return_limits() -> Finding:
     """Compare the returns with their limits.
 
@@ -353,35 +323,6 @@ def printed_digits() -> Finding:
     return finding("T3 and T4: coefficients rounded to four digits", quote(*ids), text, agrees, ids)
 
 
-def simplegoal_rows() -> Finding:
-    """Find rows of T3 without an x in any output, and codewords that lie in the pit."""
-    frame = printed.linear_policies(SIMPLEGOAL)
-    codewords, equations = frame.filter(like="codeword_"), frame.filter(like="_printed")
-    in_pit = ((codewords > PIT_LOW) & (codewords < PIT_HIGH)).all(axis=1)
-    without = ~equations.apply(lambda column: column.str.contains("x")).any(axis=1)
-    text = (
-        f"{without.sum()} of {len(frame)} rows: no x in any output. {in_pit.sum()} of {len(frame)} codewords: in the "
-        "pit. Codewords are states that the teacher acts in, and entering the pit ends an episode, so one started there"
-    )
-    shown = "; ".join(
-        f"{codewords.loc[i].tolist()}: {', '.join(equations.loc[i])} ({frame.at[i, 'where']})"
-        for i in frame.index[without | in_pit]
-    )
-    return finding("T3: a row without x, a codeword in the pit", shown, text, None)
-
-
-def mountaincar_colours() -> Finding:
-    """Find colours of T4 whose forces at the codewords overlap."""
-    frame, policy = printed.linear_policies(MOUNTAINCAR), printed.published_policy(MOUNTAINCAR)
-    force = pd.Series(policy.predict(policy.codewords)[0][:, 0]).groupby(frame["colour"])
-    low, high = force.min(), force.max()
-    overlaps = [f"{a} and {b}" for a, b in combinations(low.index, 2) if low[a] <= high[b] and low[b] <= high[a]]
-    ranges = ", ".join(f"{colour} {low[colour]:.3f} to {high[colour]:.3f}" for colour in low.index)
-    shown = f"the colours of {len(frame)} functions, said to be those of the force map (T4, caption)"
-    text = f"force at the codewords: {ranges}; overlap: {', '.join(overlaps) or 'none'}"
-    return finding("T4: colours against the force", shown, text, not overlaps or None)
-
-
 def close_pairs(task: str, table: str) -> Finding:
     """Find pairs of codewords, and neighbours' parameters, closer than the thresholds of splits and merges."""
     policy, limits = printed.published_policy(task), printed.printed_hyperparameters(task)
@@ -403,18 +344,6 @@ def close_pairs(task: str, table: str) -> Finding:
     return finding(f"{table}: pairs closer than the thresholds", quote(*ids), text, None)
 
 
-def outputs_beyond_limits() -> Finding:
-    """Count linear outputs at the codewords that lie outside the action limits before clipping."""
-    notes = []
-    for task in printed.TASKS:
-        policy = printed.published_policy(task)
-        raw = np.abs(policy.linear(policy.codewords))
-        beyond = raw > policy.task.action_high
-        notes.append(f"{SHORT[task]}: {beyond.sum()} of {raw.size} outputs at codewords, up to {raw.max():.3f}")
-    shown = quote("sg_action_low", "sg_action_high", "mc_force_low", "mc_force_high")
-    return finding("T3 and T4: outputs beyond the limits of actions", shown, "; ".join(notes), None)
-
-
 def dimensions() -> Finding:
     """Compare the coordinates and outputs counted in T3 and T4 with those that the text states."""
     frames = [printed.linear_policies(task) for task in printed.TASKS]
@@ -427,9 +356,8 @@ def dimensions() -> Finding:
 
 CHECKS = (  # in the order in which the findings are shown
     run_counts, simplegoal_coverage, other_columns, mountaincar_quartiles, outlier_rules, teacher_outliers,
-    outlier_moments, printed_twice, return_limits, simplegoal_wording, printed_digits, simplegoal_rows,
-    mountaincar_colours, partial(close_pairs, SIMPLEGOAL, "T3"), partial(close_pairs, MOUNTAINCAR, "T4"),
-    outputs_beyond_limits, dimensions, truncation, thousands, frozen_iterations,
+    outlier_moments, printed_twice, return_limits, printed_digits, partial(close_pairs, SIMPLEGOAL, "T3"),
+    partial(close_pairs, MOUNTAINCAR, "T4"), dimensions, truncation, frozen_iterations,
 )  # fmt: skip
 
 
