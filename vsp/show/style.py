@@ -85,6 +85,12 @@ class Picture:
         return self.about.alt
 
 
+def watermark(fig: Figure, **options) -> None:
+    """Mark a figure as that of a quick run."""
+    look = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
+    fig.text(0.5, 0.5, "quick run", **look, **options)
+
+
 def save_figure(
     fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str | None = None,
     caption: str | None = None,
@@ -97,7 +103,7 @@ def save_figure(
     """
     about = caption_of("figures", name, text=caption, alt=alt)
     if quick:
-        fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
+        watermark(fig)
     path = file_of("figures", name, out)
     undated = {"CreationDate": None, "Creator": None, "Producer": None}
     said = (("pdf", {"Subject": about.alt, **undated}), ("png", {"Description": about.alt, "Software": None}))

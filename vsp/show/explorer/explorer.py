@@ -122,13 +122,9 @@ class Explorer:
 
 
 def explore(
-    policies: VoronoiPolicy | dict[str, VoronoiPolicy],
-    *,
-    teacher: Policy | None = None,
-    history: History | None = None,
-    axes: tuple[str, str] | None = None,
-    guess: str | None = None,
-) -> Explorer:
+    policies: VoronoiPolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None,
+    history: History | None = None, axes: tuple[str, str] | None = None, guess: str | None = None,
+) -> Explorer:  # fmt: skip
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
     `policies`: one policy with linear maps, or several by name. `teacher`: its actions are shown beside theirs.
@@ -138,5 +134,5 @@ def explore(
     ValueError for other policies, unknown inputs, a history of another method or task, and a guess for a task that the
     browser cannot simulate.
     """
-    several = policies if isinstance(policies, dict) else {"policy": policies}
-    return Explorer(several, teacher=teacher, history=history, axes=axes, guess=guess)
+    policies = policies if isinstance(policies, dict) else {"policy": policies}
+    return Explorer(policies, teacher=teacher, history=history, axes=axes, guess=guess)
