@@ -5,10 +5,10 @@
 
 # What each notebook makes: figures/ (PDF and PNG; of animations GIF, and PNG in its stead), figures/tables/ (TEX and
 # CSV) and data/results/.
-FIGURES_01_teacher := environments learning_curves teacher_policies teacher_returns
+FIGURES_01_teacher := environments teacher_policies teacher_returns
 FIGURES_02_distillation := voronoi_example one_linear_map distillation_history partition_growth distilled_error failure
 FIGURES_03_evaluation := simplegoal_returns simplegoal_policies mountaincar_returns mountaincar_policies run_means
-RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv made_on.txt
+RESULTS_03_evaluation := SimpleGoal-v0.csv MountainCarContinuous-v0.csv
 TABLES_04_appendix_tables := tdavq_comparison hyperparameters simplegoal_linear_policies mountaincar_linear_policies \
   simplegoal_spread mountaincar_spread text_numbers
 FIGURES_05_ledger := ledger whisker_bounds what_cells_buy readings_study teacher_study
@@ -45,9 +45,7 @@ READS_08_proofs := $(foreach n,paper tuned,data/proofs/simplegoal_$(n).json) dat
 READS_09_methods := $(READS_OURS) $(foreach n,lookup $(foreach t,$(SMALL),teachers_$(t)) \
   $(foreach table,beyond tuned faithful,$(table)_seconds $(table)_seconds_long),data/results/$(n).csv) \
   data/results/beyond_LunarLanderContinuous-v3.policy
-# Notebook 5 lists stale results, so it reads all that are committed
-READS_05_ledger := $(sort data/results/readings.csv data/results/teachers.csv \
-  $(filter-out $(addprefix data/results/,$(RESULTS_03_evaluation)),$(wildcard data/results/*.csv data/results/*.policy)))
+READS_05_ledger := $(addprefix data/results/,readings.csv teachers.csv simpler.csv)
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -126,7 +124,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 	if ! state | cmp -s - "$$STATE/runs"; then \
 	  $(PY) -m vsp.paper.make_runs --out="$$OUT" --jobs="$${DASK:-$$JOBS}" $${QUICK:+--quick} && state > "$$STATE/runs"; fi
 
-study: begin venv ## studies of the readings and of the teachers, into data/results/: 15 minutes, resumable
+study: begin venv ## studies of the readings, the teachers and simpler policies, into data/results/: 15 minutes, resumable
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 lookup: begin venv ## times of look-ups, neighbour graphs and fits in many dimensions, into data/results/: 4 minutes
@@ -201,10 +199,10 @@ beyond-long: begin venv-train-mujoco ## the same for LunarLander and two robots,
 	$(PY) -m studies.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 
 short-teachers: venv-train ## trains the further teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
-	$(PY) -m vsp.teachers.train --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
+	$(PY) -m studies.make_teachers --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
 teachers: venv-train-mujoco ## trains the TD3 teachers from scratch: 9 to 11 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
-	$(PY) -m vsp.teachers.train --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
+	$(PY) -m studies.make_teachers --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
 # What others build on
 
@@ -226,7 +224,7 @@ $(call outputs,$(1)): $(1) ;
 $(1): begin venv $(if $(filter $(1),$(NEED_RUNS)),runs)
 	@for file in $$(READS_$(1)); do test -f "$$$$file" || { echo "error: $$$$file is missing: \`git checkout $$$$file\` \
 	brings it back; \`make study beyond beyond-long lookup\` makes all such files" >&2; exit 1; }; done; \
-	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb notebooks/captions.toml $$(READS_$(1)) \
+	inputs=$$$$(cksum $$(INPUTS) notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml $$(READS_$(1)) \
 	  $(if $(filter $(1),$(NEED_RUNS)),"$$$$STATE/runs")) || exit 1; \
 	state() { echo "$$$$inputs quick=$$$$QUICK"; (cd "$$$$OUT" && cksum $(call outputs,$(1)) 2>/dev/null); }; \
 	if ! state | cmp -s - "$$$$STATE/$(1)"; then \

@@ -115,7 +115,6 @@ KINDS = {
         copied(f"beyond/methods_{SIMPLEGOAL}.csv"), lambda path: read_rows(SIMPLEGOAL, path.parent)
     ),
     "summary of the runs": Kind(copied(f"results/{SIMPLEGOAL}.csv"), of_study),
-    "type of processor": Kind(copied("results/made_on.txt"), read_listed),
     "measured figures": Kind(figures, read_table),
     "what the course has made": Kind(course, read_sealed),
 }

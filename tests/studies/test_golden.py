@@ -21,8 +21,8 @@ from studies.rivals import tdavq
 from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking
 from vsp import algorithms
-from vsp.paper import beside
 from vsp.paper.runs import Experiment, Run
+from vsp.paper.studies import simpler
 from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells import limit
 from vsp_beyond.few_cells.config import Faithful, Tuned
@@ -118,8 +118,8 @@ def by_simplest():
 def beside_a_run():
     one = Experiment(SIMPLEGOAL, tiny(n_epochs=30, n_freeze=5), TEACHERS[SIMPLEGOAL], n_episodes=20)
     policy, _ = algorithms.distill(one.teacher, get_task(SIMPLEGOAL), one.config, seed=0)
-    run = Run(0, policy, None, 0.0, np.zeros(1), 0, 0, "")
-    return {kind: actions(fitted, SIMPLEGOAL) for kind, fitted in beside.fit(one, run).items()}
+    run = Run(0, policy, None, 0.0, np.zeros(1), 0, 0)
+    return {kind: actions(fitted, SIMPLEGOAL) for kind, fitted in simpler.fit(one, run).items()}
 
 
 def by_measure():
@@ -148,7 +148,7 @@ CASES = {
     if method.table != "demanded" and method.sizes != OF_PRESET and name not in UNGUARDED
 } | {
     "simplest": (by_simplest, rows.SIMPLIFY_VERSION),
-    "beside": (beside_a_run, beside.VERSION),
+    "beside": (beside_a_run, simpler.VERSION),
     "measure": (by_measure, measure.VERSION),
     "best returns": (by_best_policies, rows.OPTIMUM_VERSION),
     "at the limit": (by_limit, limit.VERSION),
