@@ -14,17 +14,16 @@ from pathlib import Path
 import pandas as pd
 
 from studies.benchmarks.trust import save_kills
-from vsp.run import atomic, listed
-from vsp.run.machine import cpu_type
+from vsp.run import atomic, kernels, listed
 
 COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
 TABLES = ["faults", "input", "same", "speed"]
 
 
 def machine() -> str:
-    """Processor, cores, memory and CPU type of this machine."""
+    """Processor, cores, memory and kernels of this machine."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
-    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({cpu_type()})"
+    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({kernels.name()})"
 
 
 def _processor() -> str:

@@ -17,7 +17,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from vsp.paper.results import settings_id, write_results
-from vsp.run.machine import cpu_type
+from vsp.run import kernels
 from vsp.run.progress import progress
 from vsp_beyond.few_cells.search import CLIP_SLOPES, TEMPERATURES, whole_loss
 from vsp_beyond.few_cells.units import Cells, LabelledStates
@@ -64,7 +64,7 @@ def study(varied: dict[str, tuple[int, ...]] = VARIED) -> pd.DataFrame:
             megabytes = tracemalloc.get_traced_memory()[1] / 1e6
             tracemalloc.stop()
             found.append({"varied": name, **size, "seconds": taken, "megabytes": megabytes})
-    return pd.DataFrame(found).assign(machine=cpu_type(), **made_with(varied))
+    return pd.DataFrame(found).assign(machine=kernels.name(), **made_with(varied))
 
 
 def made_with(varied: dict[str, tuple[int, ...]] = VARIED) -> dict[str, str | int]:

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from vsp import geometry
 from vsp.paper.results import settings_id, write_results
-from vsp.run.machine import cpu_type
+from vsp.run import kernels
 from vsp.run.progress import progress
 
 VERSION = 1  # raise it when the methods or the way of measuring change
@@ -211,7 +211,7 @@ def study(dimensions=DIMENSIONS, sizes=SIZES) -> pd.DataFrame:
     with threadpool_limits(1):
         parts = [look_ups(dimensions, sizes), graphs(dimensions, sizes)]
     frame = pd.concat(parts, ignore_index=True).astype({"witnesses": "Int64"})
-    return frame.assign(machine=cpu_type(), **made_with(dimensions, sizes))
+    return frame.assign(machine=kernels.name(), **made_with(dimensions, sizes))
 
 
 def made_with(dimensions=DIMENSIONS, sizes=SIZES) -> dict[str, str | int]:

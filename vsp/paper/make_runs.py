@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..run import atomic, command, workers
-from ..run.locks import file_lock, terminate_peers
+from ..run import atomic, command
+from ..run.locks import file_lock
 from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison
 from .runs import N_RUNS, paper_results
 
@@ -19,19 +19,15 @@ def main() -> None:
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     out, jobs = Path(arguments.out), arguments.jobs
-    runs, locks = out / "data" / "runs", out / "build" / "locks"
-    with file_lock(locks / "runs", f"makes runs in {out}"):
+    runs = out / "data" / "runs"
+    with file_lock(out / "build" / "locks" / "runs", f"makes runs in {out}"):
         for left in runs.rglob(atomic.TEMPORARY):
             left.unlink(missing_ok=True)  # left by a process that was killed
-        try:
-            for task in N_RUNS:
-                results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
-                n_runs = QUICK_BESIDE if arguments.quick else N_BESIDE
-                kept_comparison(results, n_runs, runs=runs, jobs=jobs)
-                print(f"{task}: {len(results.runs)} runs and their comparison are complete", flush=True)
-        except workers.WorkerDied:
-            terminate_peers(locks)  # else make waits minutes for its notebooks
-            raise
+        for task in N_RUNS:
+            results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
+            n_runs = QUICK_BESIDE if arguments.quick else N_BESIDE
+            kept_comparison(results, n_runs, runs=runs, jobs=jobs)
+            print(f"{task}: {len(results.runs)} runs and their comparison are complete", flush=True)
 
 
 if __name__ == "__main__":

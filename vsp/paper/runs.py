@@ -22,7 +22,6 @@ from ..evaluation import rollout_from_seed
 from ..policy import VoronoiPolicy
 from ..rollouts import Outcomes
 from ..run import sealed
-from ..run.machine import cpu_type
 from ..tasks.base import GOAL, PIT, TRUNCATED
 from ..tasks.registry import get_task
 from ..teachers.teacher import Teacher, load_teacher
@@ -47,7 +46,6 @@ class Run:
     cells: np.ndarray  # number of cells after each iteration
     splits: int
     merges: int
-    cpu: str  # type of the CPU that made it
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,6 @@ def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], 
         "validation_mean": float(validation.returns.mean()),
         "splits": changes.count("split"),
         "merges": changes.count("merge"),
-        "cpu": cpu_type(),
     }
     return arrays, about
 
@@ -138,7 +135,7 @@ def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
     form = experiment.config.sub_policy
     policy = VoronoiPolicy(codewords, coefficients, scale=scale, task=experiment.task, sub_policy=form)
     cells = arrays.pop("cells")
-    known = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges", "cpu")}
+    known = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
     return Run(policy=policy, outcomes=Outcomes(**arrays), cells=cells, **known)
 
 

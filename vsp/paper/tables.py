@@ -15,7 +15,7 @@ from ..checks import check_array, check_count
 from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
-from ..run import atomic, listed
+from ..run import atomic
 from ..show.captions import caption_of
 from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
@@ -202,8 +202,5 @@ def teacher_beside_runs(results: Results) -> dict[str, float]:
 
 
 def write_summary(results: Results, *, out: str | os.PathLike) -> None:
-    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them to made_on.txt."""
-    folder, task = Path(out) / "data" / "results", results.experiment.task
-    write_results(run_summary(results.runs, results.experiment), task, out=out)
-    cpus = sorted({run.cpu for run in results.runs})
-    listed.write_listed(folder / "made_on.txt", "".join(f"{cpu}\n" for cpu in cpus))
+    """Write the summary of the runs to OUT/data/results/TASK.csv."""
+    write_results(run_summary(results.runs, results.experiment), results.experiment.task, out=out)
