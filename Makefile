@@ -28,9 +28,7 @@ inputs = notebooks/$(1).ipynb notebooks/captions.toml environment.lock vsp data/
 OUT ?= .
 # How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
 JOBS := $(or $(value JOBS),$(shell getconf _NPROCESSORS_ONLN || echo 1))
-ifeq ($(strip $(value OUT)),)
-$(error OUT is empty, expected a folder, as in OUT=scratch)
-endif
+$(if $(strip $(value OUT)),,$(error OUT is empty, expected a folder, as in OUT=scratch))
 override OUT := $(if $(filter /% .%,$(firstword $(value OUT))),,./)$(value OUT)
 $(foreach v,JOBS DASK PYTHON QUICK,$(eval override $(v) := $$(value $(v))))
 STAMPS := $(OUT)/build/stamps
@@ -43,11 +41,7 @@ PY := .venv/bin/python
 export SOURCE_DATE_EPOCH := 1763337600
 export PYTHONHASHSEED := 0
 export PYTHONUTF8 := 1
-export OMP_NUM_THREADS := 1
-export OPENBLAS_NUM_THREADS := 1
-export MKL_NUM_THREADS := 1
-export VECLIB_MAXIMUM_THREADS := 1
-export NUMEXPR_NUM_THREADS := 1
+$(foreach v,OMP_NUM OPENBLAS_NUM MKL_NUM VECLIB_MAXIMUM NUMEXPR_NUM,$(eval export $(v)_THREADS := 1))
 export JUPYTER_PREFER_ENV_PATH := 1
 export SDL_VIDEODRIVER := dummy
 export MPLCONFIGDIR := $(CURDIR)/.venv/matplotlib
@@ -101,14 +95,11 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 
 study: begin venv ##- studies of the readings and of the teachers, into data/results/: 15 to 40 minutes, resumable
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-
 lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions: 4 to 10 minutes
 	$(PY) -m studies.benchmarks.lookup --out="$$OUT"
 	$(PY) -m studies.benchmarks.fits --out="$$OUT"
-
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-
 proofs-teacher: begin venv ##- proofs for a network: an HOUR at most
 	$(PY) -m studies.make_proofs --teacher --out="$$OUT"
 
@@ -170,19 +161,14 @@ MEASURE = $(PYTEST) $(1) --record "$$OUT/build/measured"; status=$$?; test $$sta
 
 bench: venv-test-train-dask ##- measures speed and scale, into data/results/: an HOUR or more, on an idle machine
 	@$(call MEASURE,tests/bench)
-
 faults: venv-test-train-dask ##- runs the fault-injection tests, into data/results/: 3 HOURS or more
 	@$(call MEASURE,tests/faults)
-
 beyond: begin venv-train ##- compares our own method with others, into data/beyond/: 6 to 7 HOURS, resumable
 	$(PY) -m studies.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-
 beyond-long: begin venv-train-mujoco ##- the same for LunarLander and two robots: 27 HOURS or more, resumable
 	$(PY) -m studies.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-
 short-teachers: venv-train ##- trains the teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m vsp.teachers.train --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
-
 teachers: venv-train-mujoco ##- trains the TD3 teachers from scratch: 9 to 11 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
 	$(PY) -m vsp.teachers.train --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
