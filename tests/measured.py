@@ -2,7 +2,7 @@
 
     python tests/measured.py build/measured data/results
 
-merges the tables of the first folder, where the tests write as they run, into those of the second. This waits until the
+merges the table of the first folder, where the tests write as they run, into that of the second. This waits until the
 tests have ended, because they compare what is made from data/results.
 """
 
@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from studies.benchmarks.trust import save_kills
-from vsp.run import atomic, kernels, listed
+from vsp.run import kernels, listed
 
 COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
 TABLES = ["faults", "input", "same", "speed"]
@@ -69,13 +68,7 @@ def merged(old: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
 
 def main() -> None:
     source, results = map(Path, sys.argv[1:])
-    for path in source.glob("*.csv"):
-        if path.name == "trust.csv":
-            write(results / path.name, merged(read(results / path.name), read(path)))
-        else:
-            listed.write_listed(results / path.name, listed.read_listed(path))
-    if results.resolve() == atomic.ROOT / "data" / "results":
-        save_kills(atomic.ROOT)
+    write(results / "trust.csv", merged(read(results / "trust.csv"), read(source / "trust.csv")))
 
 
 if __name__ == "__main__":
