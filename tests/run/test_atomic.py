@@ -1,7 +1,6 @@
 """Files are whole or absent; what is no regular file is refused, not waited for."""
 
 import os
-import stat
 import subprocess
 import sys
 
@@ -29,23 +28,6 @@ def test_a_failed_write_keeps_the_old_file_and_leaves_nothing(tmp_path, error):
             assert not (tmp_path / "new.txt").exists() and not (tmp_path / name).match(atomic.TEMPORARY)
             raise error
     assert visible(tmp_path) == ["x.txt"] and (tmp_path / "x.txt").read_text() == "old"
-
-
-@pytest.mark.parametrize("umask", [0o022, 0o077])
-def test_a_new_file_follows_the_umask(tmp_path, umask):
-    before = os.umask(umask)
-    try:
-        write_text(tmp_path / "x.txt", "new")
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE((tmp_path / "x.txt").stat().st_mode) == 0o666 & ~umask
-
-
-def test_a_reader_in_the_middle_of_a_file_keeps_the_old_one(tmp_path):
-    write_text(tmp_path / "x.txt", "old")
-    with open(tmp_path / "x.txt", encoding="utf-8") as reader:
-        write_text(tmp_path / "x.txt", "new")
-        assert reader.read() == "old" and (tmp_path / "x.txt").read_text() == "new"
 
 
 def test_a_killed_writer_leaves_the_old_file(tmp_path):

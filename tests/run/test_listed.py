@@ -7,11 +7,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from vsp.run import listed, manifest
+from vsp.run import manifest
 from vsp.run.atomic import DamagedFile, sha256
 from vsp.run.listed import (
     MANIFEST,
-    list_folder,
     read_carded,
     read_listed,
     read_table,
@@ -79,25 +78,18 @@ def test_an_altered_file_is_named_with_the_ways_out(table, tmp_path):
         read_listed(table)
 
 
-def test_somebody_accepts_a_file_as_it_is(table, tmp_path):
+def test_somebody_accepts_files_as_they_are(table, tmp_path, monkeypatch, capsys):
+    """By the command, whatever the manifest was."""
     table.write_text("x\n3\n")
     (tmp_path / "c.csv").write_text("x\n4\n")
     (tmp_path / "a.csv").unlink()
     (tmp_path / ".DS_Store").write_text("")
     (tmp_path / MANIFEST).write_text("rubbish")
-    assert list_folder(tmp_path) == 2
+    monkeypatch.setattr("sys.argv", ["x", str(tmp_path)])
+    manifest.main()
+    assert capsys.readouterr().out == f"{tmp_path / MANIFEST}: 2 files\n"
     assert [read_table(tmp_path / name)["x"][0] for name in ("b.csv", "c.csv")] == [3, 4]
     assert [line[66:] for line in (tmp_path / MANIFEST).read_text().splitlines()] == ["b.csv", "c.csv"]
-
-
-def test_a_writer_killed_between_file_and_line_is_healed_by_the_next(table, monkeypatch):
-    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(listed, "_write_manifest", lambda *given: (_ for _ in ()).throw(KeyboardInterrupt))
-        write_listed(table, "x\n5\n")
-    with pytest.raises(DamagedFile):
-        read_table(table)
-    write_listed(table, "x\n5\n")
-    assert read_table(table)["x"][0] == 5 and read_listed(table.with_name("a.csv"))
 
 
 def test_of_several_writers_none_loses_a_line(tmp_path):
@@ -115,10 +107,14 @@ def test_of_several_writers_none_loses_a_line(tmp_path):
 # Weights and their card
 
 
-def test_weights_come_back_with_their_card(tmp_path):
+def test_weights_come_back_with_their_card_and_neither_is_read_alone(tmp_path):
     path = tmp_path / "x.safetensors"
     write_carded(path, b"weights", {"task": "t"})
     assert read_carded(path) == (b"weights", {"task": "t", "sha256": sha256(path)})
+    for part in (path.with_suffix(".json"), path):
+        part.unlink()
+        with pytest.raises(FileNotFoundError, match=f"{part.name}: no such file"):
+            read_carded(path)
 
 
 def test_a_card_with_nan_is_refused_before_anything_is_written(tmp_path):
@@ -152,15 +148,7 @@ def test_a_card_that_is_none(tmp_path, card):
         read_carded(tmp_path / "x.safetensors")
 
 
-def test_a_missing_part_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match="x.safetensors: no such file"):
-        read_carded(tmp_path / "x.safetensors")
-    (tmp_path / "x.safetensors").write_bytes(b"weights")
-    with pytest.raises(FileNotFoundError, match="x.json: no such file"):
-        read_carded(tmp_path / "x.safetensors")
-
-
-# The committed manifests, and the command that writes them
+# The committed manifests
 
 
 @pytest.mark.parametrize("folder", manifest.FOLDERS, ids=lambda folder: folder.name)
@@ -171,19 +159,6 @@ def test_the_committed_manifests_list_every_file_there(folder):
     for tool in ("sha256sum", "shasum"):
         if shutil.which(tool):  # the standard tools agree
             subprocess.run([tool, "-c", MANIFEST], cwd=folder, check=True, stdout=subprocess.DEVNULL)
-
-
-def test_the_command_lists_the_folders_anew(tmp_path, monkeypatch, capsys):
-    write_listed(tmp_path / "x.csv", "x\n1\n")
-    (tmp_path / "x.csv").write_text("x\n2\n")
-    monkeypatch.setattr("sys.argv", ["x", str(tmp_path)])
-    manifest.main()
-    assert read_table(tmp_path / "x.csv")["x"][0] == 2
-    assert capsys.readouterr().out == f"{tmp_path / MANIFEST}: 1 files\n"
-    monkeypatch.setattr("sys.argv", ["x", str(tmp_path / "none")])
-    with pytest.raises(SystemExit):
-        manifest.main()
-    assert "none: no such folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("change", ["twice", "rubbish", "one space"])
