@@ -161,13 +161,8 @@ def test_the_committed_manifests_list_every_file_there(folder):
             subprocess.run([tool, "-c", MANIFEST], cwd=folder, check=True, stdout=subprocess.DEVNULL)
 
 
-@pytest.mark.parametrize("change", ["twice", "rubbish", "one space"])
-def test_a_manifest_of_other_lines_is_refused(table, change):
-    """Though the line of the file that is read is right."""
-    manifest = table.parent / MANIFEST
-    first, second = manifest.read_text().splitlines(keepends=True)
-    lines = {"twice": (first, second, "0" * 64 + "  b.csv\n"), "rubbish": ("x\n", first, second),
-             "one space": (first.replace("  ", " "), second)}  # fmt: skip
-    manifest.write_text("".join(lines[change]))
-    with pytest.raises(DamagedFile, match="MANIFEST.sha256: expected `sha256sum`'s lines"):
+def test_a_manifest_that_names_a_file_twice_is_refused(table):
+    with open(table.parent / MANIFEST, "a") as file:
+        file.write("0" * 64 + "  b.csv\n")
+    with pytest.raises(DamagedFile, match="MANIFEST.sha256: expected `sha256sum`'s lines, each name once"):
         read_listed(table)

@@ -1,6 +1,5 @@
 """vsp.run.run_notebook: a notebook succeeds as a whole or changes nothing, and says which cell was at fault."""
 
-import os
 import resource
 from pathlib import Path
 
@@ -154,29 +153,6 @@ def test_limit_on_the_size_of_files(tmp_path, cell):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert error.startswith("error: story.ipynb") and "File too large" in error and "\n" not in error
     assert "ulimit -f" in error and tree(tmp_path) == before
-
-
-def test_all_or_nothing_where_one_folder_is_closed(tmp_path, monkeypatch):
-    """figures/ comes after data/, yet data/ stays as it was."""
-    both = (
-        DRAW + "\n(Path(out) / 'data' / 'results').mkdir(parents=True)\n(Path(out) / 'data/results/c').write_text('c')"
-    )
-    notebook = write(tmp_path, both)
-    before, access = tree(tmp_path), os.access
-    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "figures" and access(path, mode))
-    error = refused(notebook, "--out", tmp_path)
-    assert "figures: Permission denied: " in error and "make it writable" in error
-    assert tree(tmp_path) == before
-
-
-def test_nothing_comes_from_a_run_that_was_killed(tmp_path):
-    """What it left is removed, and an orphaned kernel that writes on does not write into the staging of the next."""
-    left = tmp_path / "build" / "running" / "story-left" / "out" / "figures"
-    left.mkdir(parents=True)
-    (left / ".a-12345678.txt").write_text("torn")
-    write_on = f"import os\nassert not os.path.exists({str(left)!r})\nos.makedirs({str(left)!r})"
-    assert run_notebook.run_notebook(write(tmp_path, write_on), tmp_path) == ["figures/executed/story.ipynb"]
-    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["executed"]
 
 
 def test_wrong_parameter(tmp_path):
