@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import support
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 
 from studies.comparison import measure, rows
@@ -23,6 +22,7 @@ from studies.robots import Walking
 from vsp import algorithms
 from vsp.paper.runs import Experiment, Run
 from vsp.paper.studies import simpler
+from vsp.run import kernels
 from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells import limit
 from vsp_beyond.few_cells.config import Faithful, Tuned
@@ -32,7 +32,7 @@ from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
-# Of actions on another type of processor, where sums are rounded differently. There a split or a long descent may go
+# Of actions where kernels are not fixed, so that sums are rounded differently. There a split or a long descent may go
 # elsewhere; so of the sensitive methods the median difference is compared
 TOLERANCE, LOOSE = 1e-6, 0.1
 SENSITIVE = [
@@ -166,12 +166,12 @@ def test_results_are_those_of_the_version(name, request):
     make, version = CASES[name]
     found, every = json.loads(json.dumps(make())), json.loads(GOLDEN.read_text(encoding="utf-8"))
     if request.config.getoption("--remake-golden") and version > every.get(name, {"version": 0})["version"]:
-        every[name] = {"version": version, "made on": support.made_on(), "found": found}
+        every[name] = {"version": version, "found": found}
         lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
         GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     kept = every[name]
     within = (LOOSE, np.median) if name in SENSITIVE else (TOLERANCE, np.max)
-    if kept["made on"] == support.made_on() and "trained further" not in name:  # torch differs within a type
+    if kernels.fixed() and "trained further" not in name:  # torch has kernels of its own
         within = 0, np.max
     advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
     assert version == kept["version"] and close(found, kept["found"], *within), advice
