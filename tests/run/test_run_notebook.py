@@ -99,16 +99,16 @@ def test_a_file_that_is_no_notebook(tmp_path, content):
 
 
 FAULTS = {
-    "failing cell": (["1 / 0"], "code cell 3 (1 / 0) failed: ZeroDivisionError"),
-    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell 3 (import os) did not end: DeadKernel"),
-    "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell 3 (import sys) failed: SystemExit"),
-    "never ran": (["# skip", "2"], "code cell 3 (# skip) never ran"),
-    "too slow": (["import time; time.sleep(60)"], "code cell 3 (import time; time.sleep(60)) did not end: CellTimeout"),
-    "address": (["object()"], "code cell 3 (object()) shows 'at 0x"),
-    "path": (["print(out)"], "code cell 3 (print(out)) shows a folder of this machine"),
+    "failing cell": (["1 / 0"], "code cell (1 / 0) failed: ZeroDivisionError"),
+    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
+    "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell (import sys) failed: SystemExit"),
+    "never ran": (["# skip", "2"], "code cell (# skip) never ran"),
+    "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
+    "address": (["object()"], "code cell (object()) shows 'at 0x"),
+    "path": (["print(out)"], "code cell (print(out)) shows a folder of this machine"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
-        "code cell 3 (try:) failed: ZeroDivisionError: division by zero",
+        "code cell (try:) failed: ZeroDivisionError: division by zero",
     ),
     "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
     "missing": (["2"], "did not make figures/c.pdf"),

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import copy
 import errno
 import filecmp
@@ -22,7 +23,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .atomic import ROOT, disk_remedy, read_bytes, write_text
@@ -45,6 +46,7 @@ KERNEL_SETTINGS = {
     "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "VECLIB_MAXIMUM_THREADS": "1",
+    "JUPYTER_PREFER_ENV_PATH": "1",  # no kernel of another Python, whatever is installed
     "SDL_VIDEODRIVER": "dummy",  # no search for a screen, and no message about it on standard error
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no debugger message on standard error
 }
@@ -91,10 +93,10 @@ def run_notebook(
         staging = work / "out"
         try:
             staging.mkdir()
-            cells = _execute(notebook, source, {**values, "out": str(staging)}, work, timeout)
-            for where, cell in cells.items():
-                _check_shown(where, cell, (str(out), str(ROOT), sys.prefix))
-            _write_copy(source, list(cells.values()), staging / executed / notebook.name)
+            cells = _execute(notebook, {**values, "out": str(staging)}, work, timeout)
+            for cell in cells:
+                _check_cell(notebook, cell, (str(out), str(ROOT), sys.prefix))
+            _write_copy(source, cells, staging / executed / notebook.name)
             _check_files(notebook, staging, expect)
             return _publish(staging, out)
         finally:
@@ -132,58 +134,54 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
             )
 
 
-def _execute(
-    notebook: Path, source: NotebookNode, values: dict[str, object], work: Path, timeout: int
-) -> dict[str, NotebookNode]:
-    """Run a copy of the notebook with the parameters `values`. Returns its code cells by a name for messages."""
-    from jupyter_client import AsyncKernelManager
-    from nbclient import NotebookClient
-    from nbclient.exceptions import CellExecutionError
+def _execute(notebook: Path, values: dict[str, object], work: Path, timeout: int) -> list[NotebookNode]:
+    """Run a copy of the notebook by papermill with the parameters `values`. Returns its code cells."""
+    import papermill
 
-    running = copy.deepcopy(source)
-    code = [cell for cell in running.cells if cell.cell_type == "code"]
-    firsts = [cell.source.strip().partition("\n")[0] for cell in code]
-    names = [f"{notebook.name}, code cell {number} ({first})" for number, first in enumerate(firsts, 1)]
-    (parameters,) = (cell for cell in code if "parameters" in cell.metadata.get("tags", []))
-    parameters.source += "".join(f"\n{name} = {value!r}" for name, value in values.items())
-    kernels = AsyncKernelManager(kernel_name=KERNEL, connection_file=str(work / "kernel.json"))
-    kernels.kernel_spec_manager.kernel_dirs = []  # no kernel of another Python, whatever is installed
-    client = NotebookClient(
-        running,
-        km=kernels,
-        timeout=timeout,
-        resources={"metadata": {"path": str(notebook.parent)}},  # as in JupyterLab
-        extra_arguments=["--log-level=CRITICAL"],  # no log messages of the kernel on standard error
-    )
-    where = notebook.name
+    options = {
+        "kernel_name": KERNEL,
+        "cwd": notebook.parent,
+        "execution_timeout": timeout,
+    }  # the folder as in JupyterLab
+    quiet = {"progress_bar": False, "extra_arguments": ["--log-level=CRITICAL"]}  # no log messages on standard error
     try:
-        with client.setup_kernel(env=_environment(work), cleanup_kc=True):
-            for where, cell in zip(names, code):  # noqa: B007 (for the message below)
-                client.execute_cell(cell, running.cells.index(cell))
-    except CellExecutionError:
-        pass  # the outputs of the cell hold the error
+        with _environment(work):
+            ran = papermill.execute_notebook(notebook, work / notebook.name, values, **options, **quiet)
+    except papermill.PapermillExecutionError as error:
+        raise _failure(_name(notebook, error.source), error.ename, error.evalue, "\n".join(error.traceback)) from error
     except Exception as error:
         if disk_remedy(getattr(error, "errno", None)):
             raise
+        saved = nbformat.read(work / notebook.name, as_version=4)
+        begun = [cell.source for cell in saved.cells if cell.metadata.get("papermill", {}).get("start_time")]
+        where = _name(notebook, *begun[-1:])
         raise NotebookError(f"{where} did not end: {type(error).__name__}: {error}") from error
-    for where, cell in zip(names, code):
-        for output in cell.outputs:
-            if output["output_type"] == "error":
-                raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
-        if cell.source.strip() and cell.execution_count is None:
-            raise NotebookError(f"{where} never ran")
-    return dict(zip(names, code))
+    code = [cell for cell in ran.cells if cell.cell_type == "code"]
+    return [cell for cell in code if "injected-parameters" not in cell.metadata.get("tags", [])]
 
 
-def _environment(work: Path) -> dict[str, str]:
-    """Return the kernel's environment variables: no settings of the user, and nothing is written outside `work`."""
-    environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}  # figures are outputs
+def _name(notebook: Path, source: str = "") -> str:
+    """Return the name of the notebook, and of the cell with this source by its first line, for messages."""
+    first = source.strip().partition("\n")[0]
+    return f"{notebook.name}, code cell ({first})" if first else notebook.name
+
+
+@contextlib.contextmanager
+def _environment(work: Path) -> Iterator[None]:
+    """Give kernels an environment without settings of the user, in which nothing is written outside `work`."""
+    before, settings = dict(os.environ), dict(KERNEL_SETTINGS)
     for name, folder in KERNEL_FOLDERS.items():
         (work / folder).mkdir(exist_ok=True)
-        environment[name] = str(work / folder)
+        settings[name] = str(work / folder)
     for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # made by the set-up
         shutil.copy(fonts, work / "matplotlib")
-    return environment | KERNEL_SETTINGS
+    os.environ.update(settings)
+    os.environ.pop("MPLBACKEND", None)  # figures are outputs
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookError:
@@ -195,9 +193,14 @@ def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookErr
     return NotebookError(f"{where} failed: {kind}: {message}\n{_COLOUR.sub('', traceback)}")
 
 
-def _check_shown(where: str, cell: NotebookNode, folders: Sequence[str]) -> None:
-    """Raise NotebookError if the cell shows something that differs between runs or machines, such as `folders`."""
+def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> None:
+    """Raise NotebookError if the cell failed, never ran, or shows what differs between machines, such as `folders`."""
+    where = _name(notebook, cell.source)
+    if cell.source.strip() and cell.execution_count is None:
+        raise NotebookError(f"{where} never ran")
     for output in cell.outputs:
+        if output["output_type"] == "error":  # papermill takes `sys.exit(0)` for a success
+            raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
         shown = output.get("text") or json.dumps(output.get("data", {}))
         if varying := _VARIES.search(shown):
             raise NotebookError(
