@@ -42,7 +42,7 @@ def evaluation(d: int, k: int, n: int):
     rng = np.random.default_rng(0)
     inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
     cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
-    actions = np.clip(inputs @ cells.maps[0], -1.0, 1.0)
+    actions = np.clip(inputs @ cells.coefficients[0], -1.0, 1.0)
     about = {"temperature": TEMPERATURES[_STAGE] * d, "clip_slope": CLIP_SLOPES[_STAGE]}
     return partial(whole_loss, cells, LabelledStates(inputs, actions), **about)
 

@@ -16,7 +16,7 @@ from vsp.rollouts import Policy, visited_states
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells.anneal import anneal, random_init, squared_error, squared_errors, warm
-from vsp_beyond.few_cells.config import Tuned, check_tuned
+from vsp_beyond.few_cells.config import Tuned, check_kind
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
 N_MOVES = 40  # relocations tried after each restart
@@ -31,7 +31,7 @@ def imitate(teacher: Policy, task: str | Task, config: Tuned, *, seed: int) -> V
     seed, and if `config.n_cells` is below 2: then there is nothing to relocate.
     """
     check_seed(seed)
-    check_tuned(config)
+    check_kind(config, Tuned)
     if config.n_cells < 2:
         raise ValueError(f"n_cells is {config.n_cells}, expected at least 2: `distill_tuned` fits one cell")
     task = get_task(task)
@@ -64,7 +64,7 @@ def relocate(seen: LabelledStates, cells: Cells, rng: np.random.Generator) -> Ce
     if not weights.any():
         return cells
     place = rng.choice(every, p=weights / weights.sum())
-    codewords, maps = cells.codewords.copy(), cells.maps.copy()
+    codewords, maps = cells.codewords.copy(), cells.coefficients.copy()
     codewords[mover], maps[mover] = seen.inputs[place, :-1], maps[first[place]]
     return Cells(codewords, maps)
 

@@ -161,14 +161,14 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
     own = TunableFrame(frame.task, units.centre, units.scale, policy)
     if isinstance(policy, VoronoiPolicy):
-        return own, TreeNumbers.one_leaf(own.cells(policy).maps)
+        return own, TreeNumbers.one_leaf(own.cells(policy).coefficients)
     if isinstance(policy, Tree):
         return own, _of_cart(policy.model.tree_, own)
     if isinstance(policy, LinearTree):
         return own, _of_tree(policy, own)
     if isinstance(policy, SmallNetwork):
         hidden, output = (np.vstack(layer) for layer in policy.layers)
-        return own, NetworkNumbers(hidden, own.maps(output))
+        return own, NetworkNumbers(hidden, own.coefficients(output))
     raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
 
 
@@ -178,7 +178,7 @@ def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:
     directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
     thresholds = np.array([split.threshold for split in splits])
     oblique = isinstance(tree, ObliqueLinearTree)
-    return TreeNumbers(sides, directions, thresholds, frame.maps(tree.maps[ends]), oblique, tree.constant)
+    return TreeNumbers(sides, directions, thresholds, frame.coefficients(tree.maps[ends]), oblique, tree.constant)
 
 
 def _of_cart(tree, frame: Scaling) -> TreeNumbers:

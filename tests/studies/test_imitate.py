@@ -48,7 +48,7 @@ def test_a_cell_that_is_not_needed_goes_to_where_another_errs(monkeypatch):
     seen = labelled([0.1, 0.9, 2.1, 9.0, 9.5], [0.5, 0.5, -0.5, 0.0, 1.0])
     cells = relocate(seen, constants(LINE, [0.5, 0.5, -0.5, 0.0]), np.random.default_rng(0))
     assert cells.codewords.ravel().tolist() == [9.5, 1.0, 2.0, 9.0]
-    assert cells.maps[:, 1, 0].tolist() == [0.0, 0.5, -0.5, 0.0]  # and has the map of that one
+    assert cells.coefficients[:, 1, 0].tolist() == [0.0, 0.5, -0.5, 0.0]  # and has the map of that one
 
 
 def test_where_nothing_is_wrong_nothing_moves():
