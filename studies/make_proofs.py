@@ -26,17 +26,16 @@ from vsp.tasks import simplegoal
 from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells.config import tuned_preset
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.proofs import check
+from vsp_beyond.proofs import check, prove
 from vsp_beyond.proofs.mountaincar import prove_mountaincar
-from vsp_beyond.proofs.mountaincar_reals import prove_reals
-from vsp_beyond.proofs.network import teacher_steps_to_goal
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
-from vsp_beyond.proofs.prove import prove
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .comparison.kept import simplest
+from .proofs.mountaincar_reals import prove_reals
+from .proofs.network import teacher_steps_to_goal
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof

@@ -15,7 +15,7 @@ MOST_CELLS, MOST = 1000, 10**8  # largest plausible number of cells, and of anyt
 
 @dataclass(frozen=True)
 class Tuned:
-    """How `distill_tuned` finds a few cells and their coefficients together. Raises ValueError for a value out of range."""
+    """How `distill_tuned` finds a few cells, all their numbers together. Raises ValueError for a value out of range."""
 
     n_cells: int
     """Cells of the policy."""

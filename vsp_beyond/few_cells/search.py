@@ -102,8 +102,8 @@ def whole_loss(cells: Cells, labelled: LabelledStates, **about: float) -> tuple[
 
 
 def uncorrelated(labelled: LabelledStates, shares: np.ndarray) -> np.ndarray:
-    """Return bases of the coefficients in which a step of length 1 changes the mean squared output of a cell by about 1.
-    (k, p, p)
+    """Return bases of the coefficients in which a step of length 1 changes the mean squared output of a cell by
+    about 1. (k, p, p)
 
     `shares` (k, n): how much of each state belongs to each cell.
     """

@@ -25,7 +25,7 @@ class Scaling:
 
     @classmethod
     def of(cls, task: Task, states: np.ndarray) -> Scaling:
-        """Return the scaling in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
+        """Return the scaling that gives `states` (n, d) mean 0 and deviation 1; a constant variable keeps its unit."""
         return cls(task, *standard(states))
 
     @property

@@ -18,7 +18,7 @@ import pandas as pd
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.mountaincar import TASK
 
-from .simplegoal import METRICS
+from .proof import check_provable
 
 LOW, HIGH = Fraction(-3, 5), Fraction(-2, 5)  # the starts
 PUSH, PULL = 0.0015, 0.0025
@@ -36,9 +36,7 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
     dead, whether the acceleration changes its sign between them, so that there is a dead point. Exact except for the
     rounding of g. Raises ValueError for a policy of another task or class, and for the metric "chebyshev".
     """
-    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric not in METRICS:
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, with one of {METRICS}")
-    policy.check_linear()
+    check_provable(policy, TASK)
     rows = []
     for low, high in pairwise(_borders(policy)):
         cell = min(range(len(policy)), key=lambda i: (_distance(policy, (low + high) / 2, i), i))

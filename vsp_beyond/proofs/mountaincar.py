@@ -25,7 +25,7 @@ from vsp.policy import VoronoiPolicy
 from vsp.run import workers
 from vsp.tasks.mountaincar import TASK
 
-from .proof import Proof
+from .proof import Proof, check_provable
 
 LEFT, RIGHT = -0.6, -0.4  # ends of the range of starts
 COSINE = 1e-15  # several times the difference between libraries
@@ -33,6 +33,7 @@ SUMS = 1e-15  # relative to the terms added up: more than float64 loses in four 
 TIES = 1e-12  # likewise, for distances
 BLOCK = 10_000  # observations at a time
 MOST = 20_000_000  # most states after the first step of a block; exceeded where the car hardly moves
+MOST_CELLS = 64  # in mountaincar.c
 MOST_WAYS = 10_000  # most states that one step may lead to
 COMPILE = ("-O2", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")  # no fused multiply-add
 
@@ -111,7 +112,9 @@ def prove_mountaincar(policy: VoronoiPolicy, *, jobs: int | str = -1) -> Mountai
     `jobs` as in `vsp.run.workers`. Raises ValueError for a policy that is not made of linear
     maps and Euclidean cells for MountainCar, and for one with a start from which the car hardly moves.
     """
-    check_runnable(policy)
+    check_provable(policy, TASK, ["euclidean"])
+    if len(policy) > MOST_CELLS:
+        raise ValueError(f"the policy has {len(policy)} cells, expected at most {MOST_CELLS}")
     n = 1 + int(np.subtract(*_numbers(np.array([RIGHT, LEFT], dtype=np.float32))))
     work = [(policy, begin, min(BLOCK, n - begin)) for begin in range(0, n, BLOCK)]
     found = dict(workers.results(run_block, work, "every start", jobs=jobs, total=len(work), unit="blocks"))
@@ -169,15 +172,6 @@ def step(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
     addresses = (part.ctypes.data_as(ctypes.c_void_p) for part in (states, actions, after))
     _compiled().step_all(ctypes.c_long(len(states)), *addresses)
     return after
-
-
-def check_runnable(policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `policy` is made of linear maps and at most 64 Euclidean cells for MountainCar."""
-    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric != "euclidean":
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, with metric 'euclidean'")
-    policy.check_linear()
-    if len(policy) > 64:
-        raise ValueError(f"the policy has {len(policy)} cells, expected at most 64")
 
 
 @cache

@@ -22,10 +22,10 @@ from vsp.tasks.base import GOAL, PIT, RUNNING, TRUNCATED
 from vsp.tasks.simplegoal import TASK
 
 from .polygons import Line, Polygon, box, line_of, reduced
+from .proof import check_provable
 
 STRIDE, GOAL_EDGE = Fraction(1, 10), Fraction(1, 10)
 PIT_LOW, PIT_HIGH = Fraction(2, 5), Fraction(3, 5)
-METRICS = ("euclidean", "manhattan")
 MOST = 200_000  # most pieces: some minutes
 SQUARE = box((Fraction(0), Fraction(1)), (Fraction(0), Fraction(1)))
 
@@ -93,7 +93,7 @@ class Piece:
 def follow(policy: VoronoiPolicy, *, starts: Polygon = SQUARE, most: int = MOST) -> list[Piece]:
     """Cut `starts` into pieces and follow each to its end: at the goal, in the pit, or truncated.
 
-    Raises ValueError for a policy of another task or class, for a metric that is not in `METRICS`, and for more than
+    Raises ValueError for a policy of another task or class, for the metric "chebyshev", and for more than
     `most` pieces: a policy that wanders cuts the square ever finer.
     """
     loop, ended, running = Loop(policy), [], [Piece(starts)]
@@ -110,7 +110,7 @@ class Loop:
     """The closed loop of a policy and the task."""
 
     def __init__(self, policy: VoronoiPolicy):
-        check_provable(policy)
+        check_provable(policy, TASK)
         self.maps = [[tuple(_exact(numbers)) for numbers in one.T] for one in policy.coefficients]  # a form per action
         self.distance = Distance(policy)
 
@@ -195,18 +195,6 @@ class Distance:
                 at_i, at_j = sides[2 * axis : 2 * axis + 2]
                 found = _sum(found, (X, Y)[axis], weight * (at_i - at_j), weight * (at_j * d - at_i * c))
         return found
-
-
-def check_provable(policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `policy` is made of linear maps for SimpleGoal, with a metric of `METRICS`."""
-    if not isinstance(policy, VoronoiPolicy):
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy: others have no cells to follow")
-    policy.check_linear()
-    if policy.task.name != TASK.name:
-        why = "whose steps are affine except for limits and walls: other tasks need their own proof"
-        raise ValueError(f"the policy is for {policy.task.name}, expected {TASK.name}, {why}")
-    if policy.metric not in METRICS:
-        raise ValueError(f"the policy has metric {policy.metric!r}, expected one of {METRICS}")
 
 
 def _ended(piece: Piece) -> Iterator[Piece]:

@@ -13,7 +13,7 @@ from vsp.tasks import mountaincar
 from .check.mountaincar import edge
 from .check.pendulum import unpacked
 from .dead_points import at_rest
-from .proof import load_certificate
+from .proof import RESULTS, load_certificate
 
 NAMES = {
     "simplegoal_paper": "the paper's, as published",
@@ -36,7 +36,7 @@ def simplegoal_table() -> pd.DataFrame:
     return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
     largest one under which all of these are proved to reach it.
     """
-    rows = read_results("proofs").set_index("name").loc[list(NAMES)]
+    rows = read_results("proofs", RESULTS).set_index("name").loc[list(NAMES)]
     table = pd.DataFrame({"policy": rows.index.map(NAMES), "cells": rows["cells"].to_numpy()})
     table["failing"] = (rows["pit"] + rows["left"]).to_numpy()
     table["outside"] = rows["failing_outside"].to_numpy()
@@ -70,13 +70,13 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
 def pendulum_table() -> pd.DataFrame:
     """Return what is proved of Pendulum by a grid, and by smaller and smaller boxes of starts. Columns: boxes (per
     axis, if all were so small), share of starts."""
-    return read_results("proofs_grid")[["boxes", "share"]]
+    return read_results("proofs_grid", RESULTS)[["boxes", "share"]]
 
 
 def teacher_table() -> pd.DataFrame:
     """Return what is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit,
     steps (at most), minutes (computing time)."""
-    found = read_results("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
+    found = read_results("proofs_teacher", RESULTS).rename(columns={"n": "boxes", "longest": "steps"})
     return found.assign(minutes=found["seconds"] / 60).drop(columns="seconds")
 
 
