@@ -123,11 +123,9 @@ class RulePolicy:
 
 
 def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
-    """Return the cell of the rule that holds in each state (n, d). (n,) Raises ValueError if `rules` is empty."""
-    if not rules:
-        raise ValueError(f"rules are {rules!r}, expected at least one")
-    held = np.array([rule.holds(states) for rule in rules])
-    return np.array([rule.cell for rule in rules])[held.argmax(axis=0)]
+    """Return the cell of the rule that holds in each state (n, d). (n,)"""
+    holds = np.array([rule.holds(states) for rule in rules])
+    return np.array([rule.cell for rule in rules])[holds.argmax(axis=0)]
 
 
 def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:

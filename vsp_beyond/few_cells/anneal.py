@@ -1,4 +1,4 @@
-"""Deterministic annealing (Rose 1998): gradient descent on the imitation error, of all numbers of the cells together."""
+"""Deterministic annealing (Rose 1998): gradient descent on the imitation error, of all numbers of cells together."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> C
 
 
 def anneal(labelled: LabelledStates, cells: Cells, config: Tuned, rng: np.random.Generator) -> Cells:
-    """Optimise all numbers of `cells` by Adam while the temperature falls from the initial to the final one of `config`.
+    """Optimise all numbers of `cells` by Adam while the temperature falls from the initial to the final of `config`.
 
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
     lower the temperature, the faster they fall. The last tenth of the steps stays at the final temperature.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -63,8 +62,7 @@ def distill_faithfully(
     candidates.add("fit", cells)
     if config.min_r2 is not None or candidates.shortfall:  # else tuning gains nothing
         some = labelled.rows(spread(labelled.inputs[:, :-1], TUNING_STATES, init))
-        config = replace(config, tolerance=candidates.tolerance)
-        for tuned in _tune(scaling, teacher, some, cells, config, search):
+        for tuned in _tune(candidates, teacher, some, cells, search):
             candidates.add("tune", tuned)
     if candidates.shortfall:
         warnings.warn(candidates.shortfall, stacklevel=4)  # points at the caller of `vsp_beyond.faithful`
@@ -82,7 +80,7 @@ class _Candidates:
         self, scaling: Scaling, teacher: Policy, labelled: LabelledStates, config: Faithful, starts: np.ndarray
     ):
         self._rows, self._cells = [], []
-        self._scaling, self._labelled, self._config, self._starts = scaling, labelled, config, starts
+        self.scaling, self._labelled, self.config, self._starts = scaling, labelled, config, starts
         result = rollout(teacher, scaling.task, starts)
         self._teacher_score = score(result, config.failure_penalty)
         self.tolerance = config.tolerance or max(SHARE * abs(float(result.returns.mean())), 1e-9)
@@ -94,18 +92,18 @@ class _Candidates:
         self._cells.append(cells)
 
     def _gap(self, cells: Cells) -> float:
-        result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
-        return score(result, self._config.failure_penalty) - self._teacher_score
+        result = rollout(self.scaling.policy(cells), self.scaling.task, self._starts)
+        return score(result, self.config.failure_penalty) - self._teacher_score
 
     def returns_enough(self, cells: Cells) -> bool:
         """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
         gap = self._rows[self._kept]["gap"]
-        return self._gap(cells) >= (gap if self._config.min_r2 is not None else min(gap, self._least_gap))
+        return self._gap(cells) >= (gap if self.config.min_r2 is not None else min(gap, self._least_gap))
 
     @property
     def _kept(self) -> int:
         r2, gap = (np.array([row[name] for row in self._rows]) for name in ("r2", "gap"))
-        return kept(r2, gap, least_gap=self._least_gap, min_r2=self._config.min_r2)
+        return kept(r2, gap, least_gap=self._least_gap, min_r2=self.config.min_r2)
 
     @property
     def best(self) -> Cells:
@@ -114,7 +112,7 @@ class _Candidates:
     @property
     def shortfall(self) -> str | None:
         """The requirement that no candidate meets, in words; None if one meets all."""
-        best, k, min_r2 = self._rows[self._kept], self._config.n_cells, self._config.min_r2
+        best, k, min_r2 = self._rows[self._kept], self.config.n_cells, self.config.min_r2
         if min_r2 is not None and best["r2"] < min_r2:
             return f"no policy of {k} cells with R² {min_r2:g} was found: the closest is kept, R² {best['r2']:.3f}"
         if min_r2 is None and best["gap"] < self._least_gap:
@@ -149,46 +147,42 @@ def variance(labelled: LabelledStates) -> float:
 
 
 def _tune(
-    scaling: Scaling,
-    teacher: Policy,
-    labelled: LabelledStates,
-    cells: Cells,
-    config: Faithful,
-    rng: np.random.Generator,
+    candidates: _Candidates, teacher: Policy, labelled: LabelledStates, cells: Cells, rng: np.random.Generator
 ) -> Iterator[Cells]:
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
     `SNAPSHOTS` times.
 
     Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
     """
+    config, policy, task = candidates.config, candidates.scaling.policy, candidates.scaling.task
     move, _ = moves(cells, *_units(labelled, cells))
     whole = variance(labelled)
     step = np.sqrt(FIRST_STEP * max(squared_error(labelled, cells), 1e-6) / cells.vector.size)
     search = cma_es(np.zeros(cells.vector.size), step, rng, diagonal=cells.vector.size > MANY)
-    pool = scaling.task.start(rng, POOL * config.n_tuning_episodes)
-    result = rollout(teacher, scaling.task, pool)
+    pool = task.start(rng, POOL * config.n_tuning_episodes)
+    result = rollout(teacher, task, pool)
     scores = result.returns - config.failure_penalty * (result.outcomes != GOAL)
     for i in range(config.n_generations):
         rows, steps = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
         starts, target = pool[rows], scores[rows].mean() + config.margin
-        candidates = [move(vector) for vector in steps]
-        results = rollout_population([scaling.policy(cells) for cells in candidates], scaling.task, starts)
+        moved = [move(vector) for vector in steps]
+        results = rollout_population([policy(cells) for cells in moved], task, starts)
         missed = np.array([target - score(result, config.failure_penalty) for result in results])
-        errors = np.array([squared_error(labelled, cells) / whole for cells in candidates])
-        search.tell(steps, _cost(errors, missed, config).tolist())
+        errors = np.array([squared_error(labelled, cells) / whole for cells in moved])
+        search.tell(steps, _cost(errors, missed, candidates.tolerance, config.min_r2).tolist())
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
 
 
-def _cost(errors: np.ndarray, missed: np.ndarray, config: Faithful) -> np.ndarray:
+def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: float | None) -> np.ndarray:
     """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,).
 
     It is the error plus a penalty for a missed return. With `min_r2`, it is the missed return plus a penalty for an
     error beyond it.
     """
-    if config.min_r2 is None:
-        return errors + PRICE / config.tolerance * np.maximum(0.0, missed)
-    return missed / config.tolerance + np.maximum(0.0, errors - (1.0 - config.min_r2)) / BEYOND
+    if min_r2 is None:
+        return errors + PRICE / tolerance * np.maximum(0.0, missed)
+    return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND
 
 
 def _units(labelled: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:

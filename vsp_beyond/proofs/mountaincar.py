@@ -37,7 +37,6 @@ MOST_CELLS = 64  # in mountaincar.c
 MOST_WAYS = 10_000  # most states that one step may lead to
 COMPILE = ("-O2", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")  # no fused multiply-add
 
-STATE = np.dtype([("x", "f4"), ("v", "f4"), ("ended", "i4")])
 ENDS = np.dtype([("least", "f8"), ("most", "f8"), ("longest", "i4"), ("left", "i4"), ("doubts", "i4")], align=True)
 
 
@@ -162,16 +161,6 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     which = which[again]
     rewards = -0.1 * np.square(actions).max(axis=0)
     return np.column_stack([positions, velocities[again]]), index[which], rewards[which]
-
-
-def step(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-    """Make Gymnasium's step from float32 states (n, 2) with float64 actions (n,). Return a record array x, v, ended
-    (n,)."""
-    states, actions = np.ascontiguousarray(states, np.float32), np.ascontiguousarray(actions, np.float64)
-    after = np.empty(len(states), STATE)
-    addresses = (part.ctypes.data_as(ctypes.c_void_p) for part in (states, actions, after))
-    _compiled().step_all(ctypes.c_long(len(states)), *addresses)
-    return after
 
 
 @cache

@@ -12,7 +12,7 @@ from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
 from . import returns
-from .polygons import Polygon, line_of, total
+from .polygons import Polygon, total
 from .proof import Proof
 from .simplegoal import IN_PIT, Piece, follow
 
@@ -85,8 +85,8 @@ def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
 
 def _in_pit(starts: Polygon) -> Polygon | None:
     """Return the part of `starts` inside the pit."""
-    for form in IN_PIT:
-        starts = starts and starts.cut(line_of(form))[1]
+    for line in IN_PIT:
+        starts = starts and starts.cut(line)[1]
     return starts
 
 
