@@ -36,6 +36,7 @@ from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 from .comparison.kept import simplest
 from .proofs.mountaincar_reals import prove_reals
 from .proofs.network import teacher_steps_to_goal
+from .proofs.returns import mean_return, worst_start
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
@@ -121,10 +122,10 @@ def _proved(name: str, policy: VoronoiPolicy, path: Path, jobs: int | str) -> di
 
 
 def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
-    low, high = proof.mean_return()
+    (low, high), (_, least) = mean_return(proof.pieces), worst_start(proof.pieces)
     areas = {name: float(area) for name, area in proof.areas.items()}
     areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
-    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
+    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": least}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
     of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
     return found | of_program | {"disturbance": largest_disturbance(proof.policy)}

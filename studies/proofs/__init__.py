@@ -1,1 +1,1 @@
-"""Proofs that only make committed tables: of MountainCar over the real numbers, and of SimpleGoal's teacher."""
+"""Proofs that only make committed tables: MountainCar over the real numbers, SimpleGoal's teacher, exact returns."""

@@ -59,7 +59,7 @@ def search_limit(
     task = get_task(task)
     config = limit_preset(task) if config is None else config
     teacher = _best_teacher(task) if teacher is None else teacher
-    n_starts = _n_starts(task)
+    n_starts = N_SLOW if task.one_by_one else N_STARTS
     last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts + N_AGAIN).tolist()
     brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, AGAIN))
     screened = [_screened(teacher, task, brief, seeds[i], closest=i % 2 == 0) for i in range(n_starts)]
@@ -73,13 +73,9 @@ def search_limit(
 
 def whole_search(task: Task, config: Tuned) -> Tuned:
     """Return settings of one search that takes as long as all of `search_limit`, for `expected_time`."""
-    parts = 1 + SCREENING * _n_starts(task) + AGAIN * N_AGAIN * task.one_by_one
-    n_generations, n_restarts = round(parts * config.n_generations), config.n_restarts * _n_starts(task)
-    return replace(config, n_generations=n_generations, n_restarts=n_restarts)
-
-
-def _n_starts(task: Task) -> int:
-    return N_SLOW if task.one_by_one else N_STARTS
+    n_starts, n_again = (N_SLOW, N_AGAIN) if task.one_by_one else (N_STARTS, 0)
+    n_generations = round((1 + SCREENING * n_starts + AGAIN * n_again) * config.n_generations)
+    return replace(config, n_generations=n_generations, n_restarts=config.n_restarts * n_starts)
 
 
 def _best_teacher(task: Task) -> Policy:

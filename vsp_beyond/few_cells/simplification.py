@@ -110,14 +110,10 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
 def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     """Return the policy rounded to `digits` significant digits; None if two codewords become equal."""
     check_count("digits", digits)
-    parts = policy.codewords, policy.coefficients, policy.scale
-    codewords, coefficients, scale = (_significant(values, digits) for values in parts)
+    short = np.vectorize(lambda value: float(f"{value:.{digits}g}"))
+    codewords, coefficients, scale = map(short, (policy.codewords, policy.coefficients, policy.scale))
     distinct = len(np.unique(codewords, axis=0)) == len(codewords)
     return like(policy, codewords, coefficients, scale) if distinct else None
-
-
-def _significant(values: np.ndarray, digits: int) -> np.ndarray:
-    return np.array([float(f"{value:.{digits}g}") for value in values.flat]).reshape(values.shape)
 
 
 def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:

@@ -54,16 +54,16 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
 def _borders(policy: VoronoiPolicy) -> list[Fraction]:
     """Return the ends of the line of starts, and all places between at which two codewords are equally near. For the
     Manhattan distance, return also where the difference of two distances bends."""
-    found = {LOW, HIGH}
+    borders = {LOW, HIGH}
     for i, j in combinations(range(len(policy)), 2):
         bends = {Fraction(float(policy.codewords[k, 0])) for k in (i, j)} if policy.metric == "manhattan" else set()
         ends = sorted({LOW, HIGH} | {bend for bend in bends if LOW < bend < HIGH})
-        found |= set(ends)
+        borders |= set(ends)
         for low, high in pairwise(ends):
-            gap, other = (_distance(policy, x, i) - _distance(policy, x, j) for x in (low, high))
-            if gap * other < 0:  # the difference is linear between them
-                found.add(low + (high - low) * gap / (gap - other))
-    return sorted(found)
+            gap, gap_at_high = (_distance(policy, x, i) - _distance(policy, x, j) for x in (low, high))
+            if gap * gap_at_high < 0:  # the difference is linear between them
+                borders.add(low + (high - low) * gap / (gap - gap_at_high))
+    return sorted(borders)
 
 
 def _distance(policy: VoronoiPolicy, x: Fraction, i: int) -> Fraction:

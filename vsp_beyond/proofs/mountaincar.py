@@ -95,10 +95,10 @@ class MountainCarProof(Proof):
     def claim(self) -> dict:
         """The number `n` of observations, of states after the first step, and of episodes that do not arrive; the most
         steps, the lowest return, and bounds on the mean return."""
-        found = {name: sum(getattr(block, name) for block in self.blocks) for name in ("n", "n_states", "n_left")}
-        found |= {"longest": max(b.longest for b in self.blocks), "least": min(b.least for b in self.blocks)}
+        claim = {name: sum(getattr(block, name) for block in self.blocks) for name in ("n", "n_states", "n_left")}
+        claim |= {"longest": max(b.longest for b in self.blocks), "least": min(b.least for b in self.blocks)}
         means = ("mean_low", "mean_high")
-        return found | {name: sum(b.width * getattr(b, name) for b in self.blocks) for name in means}
+        return claim | {name: sum(b.width * getattr(b, name) for b in self.blocks) for name in means}
 
     def parts(self) -> list:
         """Return the blocks."""
@@ -116,8 +116,8 @@ def prove_mountaincar(policy: VoronoiPolicy, *, jobs: int | str = -1) -> Mountai
         raise ValueError(f"the policy has {len(policy)} cells, expected at most {MOST_CELLS}")
     n = 1 + int(np.subtract(*_numbers(np.array([RIGHT, LEFT], dtype=np.float32))))
     work = [(policy, begin, min(BLOCK, n - begin)) for begin in range(0, n, BLOCK)]
-    found = dict(workers.results(run_block, work, "every start", jobs=jobs, total=len(work), unit="blocks"))
-    return MountainCarProof(policy, tuple(found[i] for i in range(len(work))))
+    blocks = dict(workers.results(run_block, work, "every start", jobs=jobs, total=len(work), unit="blocks"))
+    return MountainCarProof(policy, tuple(blocks[i] for i in range(len(work))))
 
 
 def run_block(policy: VoronoiPolicy, first: int, n: int) -> Block:
@@ -129,7 +129,7 @@ def run_block(policy: VoronoiPolicy, first: int, n: int) -> Block:
     np.minimum.at(least, owner, ends["least"])
     np.maximum.at(most, owner, ends["most"])
     widths = high - low
-    means = (float(widths @ one / widths.sum()) for one in (least, most))
+    means = (float(widths @ bound / widths.sum()) for bound in (least, most))
     sums = (int(ends[name].sum()) for name in ("doubts", "left"))
     longest, width = int(ends["longest"].max()), float(widths.sum() / (RIGHT - LEFT))
     return Block(first, n, len(states), *sums, longest, float(least.min()), *means, width)
@@ -152,7 +152,7 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     least = actions[0] * 0.0015 - 0.0025 * (np.cos(3 * high) + COSINE)
     doubt = (actions[1] - actions[0]) * 0.0015 + 0.005 * COSINE
     which, velocities = _between(least, most)
-    low, high, least, most, doubt = (one[which] for one in (low, high, least, most, doubt))
+    low, high, least, most, doubt = (values[which] for values in (low, high, least, most, doubt))
     above, below = (np.clip(_halfway(velocities, side), least, most) for side in (1, -1))
     steepness = 0.0075 * np.abs(np.sin(3 * low))
     begin = np.maximum(low, low + (most - above - doubt) / steepness * (1 - 1e-6) - 1e-12)

@@ -57,12 +57,12 @@ class PendulumProof(Proof):
 
     def parts(self) -> list:
         """Return for each row its runs of boxes: steps (-1 in the set), length, steps, length, ..."""
-        found = []
+        runs = []
         for row in np.where(self.kept, -1, self.steps):
             begins = np.flatnonzero(np.diff(row, prepend=row[0] - 1))
             lengths = np.diff(begins, append=len(row))
-            found.append(np.column_stack([row[begins], lengths]).ravel().tolist())
-        return found
+            runs.append(np.column_stack([row[begins], lengths]).ravel().tolist())
+        return runs
 
 
 def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
@@ -110,8 +110,8 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
     limited = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
     at_limit = np.abs(new_speed) + speed_by > FASTEST  # there the new angle follows from the limited speed
     ends = [
-        np.where(at_limit, angle + side * half[0] + DT * one, new_angle + side * angle_by)
-        for side, one in zip((-1, 1), limited)
+        np.where(at_limit, angle + side * half[0] + DT * speed_there, new_angle + side * angle_by)
+        for side, speed_there in zip((-1, 1), limited)
     ]
     return Way(touched, *boxes_between(ends, limited, n), np.ones(len(touched), dtype=bool))
 
@@ -119,8 +119,8 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
 def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the first box between two angles and two speeds, and the exclusive end of these boxes, as in `Way`. Angles
     may be any number of turns away, but less than a turn apart."""
-    first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
-    begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
+    first, last = around(*((end / FASTEST + 1) * n / 2 + side * ROUNDING for end, side in zip(speeds, (-1, 1))), n)
+    begin, end = ((end / np.pi + 1) * n / 2 + side * ROUNDING * n for end, side in zip(angles, (-1, 1)))
     begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
     turns = begin // n * n
     return np.stack([begin - turns, first]), np.stack([end - turns, last])

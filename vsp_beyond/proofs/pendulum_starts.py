@@ -142,19 +142,19 @@ def _limited(value: np.ndarray, slopes: np.ndarray, spread: np.ndarray, limit: f
 def _touched(policy: VoronoiPolicy, cell: int, boxes: Boxes) -> np.ndarray:
     """Return which boxes may have states in a cell, by the ranges of cosine, sine and speed. (m,)"""
     half, (angle, speed) = boxes.half, boxes.centre
-    seen = np.stack([np.cos(angle), np.sin(angle), speed])
+    observed = np.stack([np.cos(angle), np.sin(angle), speed])
     # A sine changes by at most its slope times the change of the angle, plus half the square of that change
-    change = [np.abs(slope) * half[0] + half[0] ** 2 / 2 for slope in (seen[1], seen[0])]
+    change = [np.abs(slope) * half[0] + half[0] ** 2 / 2 for slope in (observed[1], observed[0])]
     width = np.stack([*change, half[1]]) + SEEN * FASTEST
-    return touches(policy, cell, seen - width, seen + width, REACH)
+    return touches(policy, cell, observed - width, observed + width, REACH)
 
 
 def _arrived(boxes: Boxes, good: np.ndarray) -> np.ndarray:
     """Return which boxes have all their states within proved boxes. (m,)"""
     half = boxes.half
-    angles, speeds = ([one - width, one + width] for one, width in zip(boxes.centre, half))
+    angles, speeds = ([middle - width, middle + width] for middle, width in zip(boxes.centre, half))
     return rectangles_within(good, *boxes_between(angles, speeds, good.shape[1] - 1))
 
 
 def _joined(parts: list[Boxes]) -> Boxes:
-    return Boxes(*(np.concatenate([getattr(part, one.name) for part in parts], axis=-1) for one in fields(Boxes)))
+    return Boxes(*(np.concatenate([getattr(part, field.name) for part in parts], axis=-1) for field in fields(Boxes)))

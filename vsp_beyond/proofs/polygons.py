@@ -86,9 +86,9 @@ def reduced(line: Line) -> Line:
     return tuple(number // shared for number in line)
 
 
-def meet(one: Line, other: Line) -> Corner:
+def meet(first: Line, second: Line) -> Corner:
     """Return the intersection of two lines that are not parallel."""
-    (a, b, c), (d, e, f) = one, other
+    (a, b, c), (d, e, f) = first, second
     w = a * e - b * d
     corner = (b * f - c * e, c * d - a * f, w)
     return corner if w > 0 else tuple(-number for number in corner)

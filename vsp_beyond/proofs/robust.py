@@ -33,7 +33,7 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
     check_number("disturbance", disturbance, least=0.0, most=1.0)
     check_count("n", n, most=4000)
     edges = np.linspace(0.0, 1.0, n + 1)
-    low, high = (np.stack(np.meshgrid(one, one, indexing="ij")).reshape(2, -1) for one in (edges[:-1], edges[1:]))
+    low, high = (np.stack(np.meshgrid(ends, ends, indexing="ij")).reshape(2, -1) for ends in (edges[:-1], edges[1:]))
     ended = (high < GOAL_EDGE - ROUNDING).all(axis=0).reshape(n, n)
     ways = [_way(policy, cell, low, high, disturbance + ROUNDING, n) for cell in range(len(policy))]
     return steps_into(ended, ways, TASK.max_steps)
@@ -76,16 +76,16 @@ def _way(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, sp
         free = (np.abs(raw) <= 1.0).all(axis=0)  # no limit acts: bounding state and action together is tighter
         both = _bounds([(i == axis) + STRIDE * w for i, w in enumerate(weights)], STRIDE * bias, low, high)
         slack = spread + STRIDE * SEEN * np.abs(weights).sum()
-        for after, own, action, one, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
-            limited = own[axis] + STRIDE * np.clip(action, -1.0, 1.0)
-            after[axis] = np.where(free, one + sign * slack, limited + sign * spread)
+        for after, before, action, bound, sign in zip((after_low, after_high), (low, high), raw, both, (-1, 1)):
+            limited = before[axis] + STRIDE * np.clip(action, -1.0, 1.0)
+            after[axis] = np.where(free, bound + sign * slack, limited + sign * spread)
     return way_to(np.flatnonzero(touched), after_low, after_high, n)
 
 
 def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: int) -> Way:
     """Return the way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls limit
     them."""
-    after_low, after_high = (np.clip(one, 0.0, 1.0) for one in (after_low, after_high))
+    after_low, after_high = (np.clip(states, 0.0, 1.0) for states in (after_low, after_high))
     in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
     return Way(boxes, *around(after_low * n - ROUNDING, after_high * n + ROUNDING, n), ~in_pit)
 
@@ -93,7 +93,7 @@ def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: 
 def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the largest value of a linear function over boxes."""
     ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
-    return tuple(bias + sum(one[side] for one in ends) for side in (0, 1))
+    return tuple(bias + sum(pair[side] for pair in ends) for side in (0, 1))
 
 
 def touches(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, reach: np.ndarray) -> np.ndarray:

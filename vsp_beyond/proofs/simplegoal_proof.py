@@ -11,7 +11,6 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
-from . import returns
 from .polygons import Polygon, total
 from .proof import Proof
 from .simplegoal import IN_PIT, Piece, follow
@@ -55,14 +54,6 @@ class SimpleGoalProof(Proof):
     def longest(self) -> int:
         """The number of steps of the longest episode."""
         return max(len(piece.steps) for piece in self.pieces)
-
-    def mean_return(self) -> tuple[float, float]:
-        """Return bounds on the mean return over all starts, at most 1e-6 apart."""
-        return returns.mean_return(self.pieces)
-
-    def worst_start(self) -> tuple[np.ndarray, float]:
-        """Return a start (2,) with the lowest return, to 1e-6, and this return."""
-        return returns.worst_start(self.pieces)
 
     @property
     def claim(self) -> dict:
