@@ -20,6 +20,7 @@ from support import SIMPLEGOAL, Constant, CurvedTeacher, network_teacher, partit
 
 import vsp
 from studies.comparison import imitate
+from studies.proofs.network import teacher_steps_to_goal
 from studies.rivals import critics, dagger, hand_written, small_network, tdavq, trees
 from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking, imitate_pushed, search_one_map, walking_preset
@@ -39,8 +40,8 @@ from vsp_beyond.explain import lime, rules
 from vsp_beyond.few_cells import config, faithful, simplification, tuned
 from vsp_beyond.few_cells.limit import limit_preset
 from vsp_beyond.optimum import best_policy, best_returns
-from vsp_beyond.proofs import largest_disturbance, steps_to_goal, teacher_steps_to_goal
-from vsp_beyond.proofs.pendulum import equilibria, prove_pendulum
+from vsp_beyond.proofs import largest_disturbance, steps_to_goal
+from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import shares_of_starts
 
 NOWHERE = (np.nan, np.inf, -np.inf)
@@ -257,7 +258,7 @@ CASES = {
     "simple.rule_of_thumb": (simple.rule_of_thumb, {"task": task}),
     "config.Config": (Config, settings_of(Config, SHORT)),
     "few_cells.config.Tuned": (config.Tuned, settings_of(config.Tuned, REFINEMENT)),
-    "few_cells.config.check_faithful": (config.check_faithful, {"config": intent}),
+    "few_cells.config.check_kind": (functools.partial(config.check_kind, kind=config.Faithful), {"config": intent}),
     "optimum.limit.limit_preset": (limit_preset, {"task": task}),
     "optimum.references.best_policy": (
         best_policy,
@@ -278,10 +279,6 @@ CASES = {
     "proofs.pendulum_starts.shares_of_starts": (
         functools.partial(shares_of_starts, prove_pendulum(STILL, n=16)),
         {"parts": count(2, most=64), "levels": count(1, most=8)},
-    ),
-    "proofs.pendulum.equilibria": (
-        functools.partial(equilibria, STILL),
-        {"n": count(50, least=16)},
     ),
     "proofs.network.teacher_steps_to_goal": (
         functools.partial(teacher_steps_to_goal, load_teacher("SimpleGoal-v0")),
@@ -307,7 +304,6 @@ CASES = {
         faithful.distill_faithfully,
         {"teacher": teacher, "task": task, "config": intent, "seed": seed},
     ),
-    "few_cells.config.check_tuned": (config.check_tuned, {"config": budget}),
     "config.paper_preset": (paper_preset, {"task": task}),
     "few_cells.config.tuned_preset": (config.tuned_preset, {"task": task}),
     "vsp.distill": (

@@ -50,14 +50,11 @@ def limit_preset(task: str | Task) -> Tuned:
     return replace(config, **_LIMIT.get(name, {"n_generations": 3 * config.n_generations}))
 
 
-def search_limit(
-    task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None
-) -> VoronoiPolicy:
+def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy | None = None) -> VoronoiPolicy:
     """Do what `vsp_beyond.at_the_limit` does, without a word about the time."""
     check_seed(seed)
     check_seed(seed)
     task = get_task(task)
-    config = limit_preset(task) if config is None else config
     teacher = _best_teacher(task) if teacher is None else teacher
     n_starts = N_SLOW if task.one_by_one else N_STARTS
     last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts + N_AGAIN).tolist()
