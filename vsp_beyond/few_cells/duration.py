@@ -16,18 +16,21 @@ DESCENT, ANNEALING = (0.02, 0.4), (0.01, 0.3)
 
 def expected_time(task: Task, config: Faithful | Tuned) -> str:
     """Return how long the search with `config` takes on one core, as a range in words."""
+    low, high = expected_seconds(task, config)
+    return f"some {in_words(low)} to {in_words(high)} on one core"
+
+
+def expected_seconds(task: Task, config: Faithful | Tuned) -> tuple[float, float]:
+    """Return the least and the most seconds of the search with `config` on one core, roughly."""
     most, least = ONE_BY_ONE if task.one_by_one else BATCHED
     d, m, k = len(task.low), len(task.action_low), config.n_cells
     candidates = config.n_generations * candidates_per_generation(k * (d + (d + 1) * m))
     taught, tuning = config.n_episodes + config.n_validation, candidates * config.n_tuning_episodes
+    fits, (quick, slow) = config.n_restarts * (k + 2), DESCENT
+    certain = taught  # it is not tuned if the closest cells return enough
     if isinstance(config, Tuned):
-        certain, (quick, slow) = taught + tuning, (config.n_steps / 1000 * seconds for seconds in ANNEALING)
-    else:  # it is not tuned if the closest cells return enough
-        certain, (quick, slow) = taught, DESCENT
-    fits = config.n_restarts * (k + 2)
-    low = certain * task.max_steps / most + fits * quick
-    high = (taught + tuning) * task.max_steps / least + fits * slow
-    return f"some {in_words(low)} to {in_words(high)} on one core"
+        certain, fits, (quick, slow) = taught + tuning, fits * config.n_steps / 1000, ANNEALING
+    return certain * task.max_steps / most + fits * quick, (taught + tuning) * task.max_steps / least + fits * slow
 
 
 def in_words(seconds: float) -> str:
