@@ -16,7 +16,7 @@ from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 
 N = 400
-STILL = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM)
+STILL = vsp.VoronoiPolicy([[0.0, 0.0, 0.0]], np.zeros((1, 4, 1)), task=PENDULUM, metric="euclidean")
 
 
 def way(boxes, first, last, safe=True):

@@ -19,10 +19,9 @@ LITTLE = vsp_beyond.Faithful(
 )
 NAMES = {
     "Dock-v0": (["east", "north", "ve", "vn"], ["push e", "push n"]),
-    "Arm-v0": (["q1", "q2", "w1", "w2", "g1", "g2"], ["t1", "t2"]),
     "Tank-v0": (["level", "mark"], ["valve"]),
 }
-PILOTS = {"Dock-v0": own_tasks.dock_pilot, "Arm-v0": own_tasks.arm_pilot, "Tank-v0": own_tasks.tank_pilot}
+PILOTS = {"Dock-v0": own_tasks.dock_pilot, "Tank-v0": own_tasks.tank_pilot}
 
 
 def docked(observation, reward, info):
@@ -103,17 +102,10 @@ def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
                 vsp_beyond.tuned(own_tasks.tank_pilot, "Tank-v0", seed=0),
                 vsp_beyond.at_the_limit("Tank-v0", seed=0, teacher=own_tasks.tank_pilot)]  # fmt: skip
     said = capsys.readouterr().out.splitlines()
-    assert [line.split(":")[0] for line in said] == [
-        f"{what} for Tank-v0" for what in 2 * ["distilling"] + ["searching"]
-    ]
+    assert [line.split(" for Tank-v0: some ")[0] for line in said] == ["distilling", "distilling", "searching"]
     assert all(policy.task.name == "Tank-v0" for policy in policies)
     with pytest.raises(ValueError, match="either these or a config"):
         vsp_beyond.faithful(own_tasks.tank_pilot, "Tank-v0", LITTLE, n_cells=2, seed=0)
-
-
-def test_the_papers_method_needs_settings_for_a_task_of_ones_own():
-    with pytest.raises(ValueError, match=r"no settings for task 'Tank-v0'.*vsp_beyond\.faithful\(agent, 'Tank-v0'"):
-        vsp.distill(vsp.agent(own_tasks.tank_pilot), "Tank-v0", seed=0)
 
 
 def test_observations_beyond_the_declared_box_are_counted():
@@ -155,8 +147,6 @@ def test_bad_names_and_outcomes_are_refused(about, why):
 def test_our_own_tasks_keep_their_names():
     with pytest.raises(ValueError, match="'Pendulum-v1' is one of vsp's own tasks"):
         vsp.register("Pendulum-v1", outputs=["torque"])
-    with pytest.raises(ValueError, match="unknown task 'Tonk-v0', .* did you mean 'Tank-v0'"):
-        vsp.register("Tonk-v0")
 
 
 def test_an_agent_with_a_memory_is_refused():

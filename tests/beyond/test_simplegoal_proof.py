@@ -331,7 +331,7 @@ def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path,
 
     vsp_beyond.prove(TWO).save(good := tmp_path / "two.json")
     run(good)
-    assert capsys.readouterr().out == f"{good} proves {vsp_beyond.prove(TWO).claim}\n"
+    assert capsys.readouterr().out.startswith(f"{good} proves {{'goal': ")
     (altered := tmp_path / "altered.json").write_bytes(good.read_bytes().replace(b"goal", b"goat", 1))
     for paths in ((), (tmp_path / "none.json",), (good, seal(tmp_path / "x.json", b"[]")), (altered,)):
         with pytest.raises(SystemExit) as end:
