@@ -1,4 +1,4 @@
-"""`make proofs` and `make proofs-teacher`: write certificates to data/proofs/ and their results to data/results/."""
+"""`make proofs` and `make proofs-teacher`: write certificates to data/beyond/proofs and results to data/beyond."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ import pandas as pd
 from vsp.algorithms import distill
 from vsp.config import paper_preset
 from vsp.evaluation import start_states
+from vsp.paper import results
 from vsp.paper.baselines import linear_map
 from vsp.paper.printed import published_policy
-from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import collect_episodes, rollout
 from vsp.run import command, listed
@@ -33,10 +33,11 @@ from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
-from .comparison.kept import simplest
+from .comparison.rows import simplest
 from .proofs.mountaincar_reals import prove_reals
 from .proofs.network import teacher_steps_to_goal
 from .proofs.returns import mean_return, worst_start
+from .results import BEYOND, RESULTS, read_results, write_results
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
@@ -46,36 +47,33 @@ HOUR = 3600.0
 
 
 def main() -> None:
-    """Prove the policies that are not proved yet. Write a certificate of each to data/proofs/ and the results to
-    data/results/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
+    """Prove the policies that are not proved yet. Write a certificate of each to data/beyond/proofs/ and the results to
+    data/beyond/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
     that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="certificates go to OUT/data/proofs, tables to OUT/data/results")
+    parser.add_argument("--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it")
     parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
     if arguments.teacher:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
-    results = Path(arguments.out) / "data" / "results"
-    proved = certificates(Path(arguments.out), arguments.jobs)
-    if proved or not (results / "proofs_reals.csv").exists():
+    if certificates(Path(arguments.out), arguments.jobs):
         table = pd.DataFrame([reals(arguments.jobs)])
         write_results(table, "proofs_reals", out=arguments.out, float_format="%.17g")
-    if proved or not (results / "proofs_grid.csv").exists():
         write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
     """Return functions that make the policies to prove, by the names of their certificates."""
-    teacher, config, own = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
-    best = int(read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
-    spacious = replace(own, step=partial(simplegoal.step, margin=MARGIN))
+    teacher, config, task = load_teacher(SIMPLEGOAL), tuned_preset(SIMPLEGOAL), simplegoal.TASK
+    best = int(results.read_results(SIMPLEGOAL).set_index("seed")["mean"].idxmax())
+    spacious = replace(task, step=partial(simplegoal.step, margin=MARGIN))
     return {
         "simplegoal_paper": lambda: published_policy(SIMPLEGOAL),
-        "simplegoal_best_run": lambda: distill(teacher, own, paper_preset(SIMPLEGOAL), seed=best)[0],
+        "simplegoal_best_run": lambda: distill(teacher, task, paper_preset(SIMPLEGOAL), seed=best)[0],
         "simplegoal_faithful": lambda: _kept("faithful", SIMPLEGOAL),
-        "simplegoal_tuned": lambda: distill_tuned(teacher, own, config, seed=0)[0],
+        "simplegoal_tuned": lambda: distill_tuned(teacher, task, config, seed=0)[0],
         "simplegoal_limit": lambda: _kept("limit", SIMPLEGOAL),
         "simplegoal_simplified": lambda: simplest(SIMPLEGOAL),
         "simplegoal_one_map": lambda: _one_map(teacher),
@@ -89,12 +87,12 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
 
 def certificates(out: Path, jobs: int | str) -> list[str]:
     """Write the missing certificates and the table, row by row: an interrupted run can continue. Return their names."""
-    table = out / "data" / "results" / "proofs.csv"
-    rows = read_results("proofs", table.parent).to_dict("records") if table.exists() else []
+    folder = out / BEYOND
+    rows = read_results("proofs", folder).to_dict("records") if (folder / "proofs.csv").exists() else []
     makers = policies()
     missing = [name for name in makers if name not in {row["name"] for row in rows}]
     for name in progress(missing, "proofs", total=len(makers), unit="policies", done=len(rows)):
-        rows.append(_proved(name, makers[name](), out / "data" / "proofs" / f"{name}.json", jobs))
+        rows.append(_proved(name, makers[name](), folder / "proofs" / f"{name}.json", jobs))
         write_results(pd.DataFrame(rows), "proofs", out=out, float_format="%.12g")  # areas are small
     return missing
 
@@ -125,27 +123,27 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
     (low, high), (_, least) = mean_return(proof.pieces), worst_start(proof.pieces)
     areas = {name: float(area) for name, area in proof.areas.items()}
     areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
-    found = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": least}
+    row = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": least}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
-    of_program = {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
-    return found | of_program | {"disturbance": largest_disturbance(proof.policy)}
+    row |= {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
+    return row | {"disturbance": largest_disturbance(proof.policy)}
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:
     """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
     SimpleGoal."""
     n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
-    found = rollout(policy, policy.task, start_states(policy.task, n, 1))
-    shares = {f"sampled_{name}": float((found.outcomes == end).mean()) for end, name in ENDS.items()}
-    return {"sampled": n, "sampled_mean": float(found.returns.mean()), **shares}
+    played = rollout(policy, policy.task, start_states(policy.task, n, 1))
+    shares = {f"sampled_{name}": float((played.outcomes == end).mean()) for end, name in ENDS.items()}
+    return {"sampled": n, "sampled_mean": float(played.returns.mean()), **shares}
 
 
 def reals(jobs: int | str) -> dict:
     """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
     began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
     parts = prove_reals(policy, jobs=jobs)
-    found = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
-    return found | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
+    row = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
+    return row | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
 
 
 def smaller_boxes() -> pd.DataFrame:
@@ -178,7 +176,7 @@ def _kept(table: str, task: str) -> VoronoiPolicy:
 
 def _one_map(teacher) -> VoronoiPolicy:
     episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
-    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    states, actions = (np.concatenate([getattr(each, name) for each in episodes]) for name in ("states", "actions"))
     return linear_map(states, actions, SIMPLEGOAL)
 
 

@@ -14,6 +14,7 @@ from vsp.algorithms import due, may_alter, merge_regions, split_regions, teacher
 from vsp.buffers import Buffers
 from vsp.config import Config
 from vsp.rollouts import Episode, collect_episodes
+from vsp.run import kernels
 from vsp.subpolicies.stacked import SubPolicies
 from vsp.tasks.registry import get_task
 
@@ -77,15 +78,12 @@ BACK = [[0.1, 0.5], [0.4, 0.5], [0.0, 0.75]]  # the third is in the old cell aga
         ({"max_pol_loss": 0.17}, [[0.5, 0.5]], [0.4], 0),
         ({"min_pol_distance": 0.49}, [[0.5, 0.5]], [1], 1),
         ({"min_pol_distance": 0.51}, [[0.5, 0.5]], [1], 0),
+        ({}, BESIDE, [1, 1], 1),
+        ({"max_pol_loss": 0.05, "min_pol_distance": 0.2}, BACK, [0, 0.4, 0], 1),
         ({"one_split": False}, THRICE, [1, 1, 1], 3),
         ({"one_split": True}, THRICE, [1, 1, 1], 1),
-        ({"split_lookup": "refreshed"}, BESIDE, [1, 1], 1),
-        ({"split_lookup": "kept"}, BESIDE, [1, 1], 2),
-        ({"split_lookup": "kept"}, [[0.5, 0.5]] * 3, [1, 1, 1], 1),  # no state becomes a codeword twice
         ({"min_pol_distance": 0.17, "split_metric": "manhattan"}, [[0.1, 0.6]], [1], 1),  # (0.1, 0.1): 0.2 or 0.141
         ({"min_pol_distance": 0.17, "split_metric": "euclidean"}, [[0.1, 0.6]], [1], 0),
-        ({"max_pol_loss": 0.05, "min_pol_distance": 0.2, "loss_after_split": "reset"}, BACK, [0, 0.4, 0], 1),
-        ({"max_pol_loss": 0.05, "min_pol_distance": 0.2, "loss_after_split": "kept"}, BACK, [0, 0.4, 0], 2),
     ],
 )
 def test_settings_decide_how_often_a_cell_splits(settings, states, actions, splits):
@@ -120,30 +118,10 @@ def test_scale_box_divides_by_the_width_of_the_box():
     assert located["box"].policy().cells(state) == 1 and located["raw"].policy().cells(state) == 0
 
 
-@pytest.mark.parametrize(
-    ("reset", "neighbours", "expected"),
-    [
-        ("cell_and_neighbours", "old", [0, 0, 0, 0]),  # the middle cell and both its neighbours
-        ("neighbours", "old", [0, 1, 0, 0]),  # not the cell that was split
-        ("cell_and_neighbours", "new", [1, 0, 0, 0]),  # the new cell touches the middle and the right one
-        ("neighbours", "new", [1, 0, 0, 0]),
-    ],
-)
-def test_split_reset_and_split_neighbours_choose_the_buffers(reset, neighbours, expected):
-    config = tiny(max_pol_loss=0.01, min_pol_distance=0.1, split_reset=reset, split_neighbours=neighbours)
-    partition = partition_of(ROW, config=config)
+def test_a_split_resets_its_cell_and_the_old_neighbours():
+    partition = partition_of(ROW, config=tiny(max_pol_loss=0.01, min_pol_distance=0.1))
     assert split(partition, walk([[0.625, 0.5]], [1])) == [(0.625, 0.5)]
-    assert partition.buffers.counts.tolist() == expected
-
-
-def test_split_reset_also_reaches_a_cell_that_the_new_one_does_not_touch():
-    for reset, counts in (("cell_and_neighbours", [0, 0, 0]), ("neighbours", [1, 0, 0])):
-        config = tiny(max_pol_loss=0.01, min_pol_distance=0.1, split_reset=reset, split_neighbours="new")
-        partition = partition_of([[0, 0.5], [0.25, 0.5]], config=config)
-        # as under a metric in which the state belongs to the far cell
-        partition.cells = lambda states: np.zeros(len(states), int)
-        split(partition, walk([[0.75, 0.5]], [1]))
-        assert partition.buffers.counts.tolist() == counts
+    assert partition.buffers.counts.tolist() == [0, 0, 0, 0]  # the middle cell, both its neighbours, the new cell
 
 
 # Algorithm 3 by hand
@@ -174,9 +152,8 @@ BENT = [[0.1, 0.5], [0.5, 0.49], [0.9, 0.5]]  # the outer two meet at y = 8.5
         ({"min_param_distance": 0.5}, ROW, [0, 1, 0], ROW),  # cells that do not touch
         ({"merge_parameters": "all"}, ROW, [0, 1, 2], ROW),
         ({"merge_parameters": "weights"}, ROW, [0, 1, 2], ROW[2:]),
-        # the first removes the middle one, which would remove the last
-        ({"min_param_distance": 0.3, "merge_visits_removed": False}, ROW, [0, 0.2, 0.4], [ROW[0], ROW[2]]),
-        ({"min_param_distance": 0.3, "merge_visits_removed": True}, ROW, [0, 0.2, 0.4], ROW[:1]),
+        # the first removes the middle one, which is not visited any more
+        ({"min_param_distance": 0.3}, ROW, [0, 0.2, 0.4], [ROW[0], ROW[2]]),
         ({"neighbours": "delaunay"}, BENT, [0, 1, 0], BENT[:2]),
         ({"neighbours": "lookup"}, BENT, [0, 1, 0], BENT),
     ],
@@ -195,13 +172,6 @@ def test_the_distance_of_parameters_is_the_largest_difference():
     assert len(merge_regions(partition, partition.config)) == 1
 
 
-def test_merge_reset_neighbours_keeps_the_buffer_of_the_survivor():
-    for reset, count in (("survivor_and_neighbours", 0), ("neighbours", 1)):
-        partition = partition_of(ROW[:2], [0, 0.1], config=tiny(merge_reset=reset))
-        merge_regions(partition, partition.config)
-        assert partition.buffers.counts.tolist() == [count]
-
-
 def test_merge_resets_neighbours_that_stay():
     partition = partition_of(ROW, [1, 0, 0.9], config=tiny(min_param_distance=0.25))
     partition.models.parameters[0, -1] = 0.1  # the first swallows the middle one; then the last is its neighbour
@@ -213,9 +183,8 @@ def test_merge_resets_neighbours_that_stay():
     assert partition.codewords.tolist() == ROW[:2] and partition.buffers.counts.tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("visits", [False, True])
-def test_a_merge_of_equal_cells_leaves_one(visits):
-    partition = partition_of(np.random.default_rng(2).random((9, 2)), config=tiny(merge_visits_removed=visits))
+def test_a_merge_of_equal_cells_leaves_one():
+    partition = partition_of(np.random.default_rng(2).random((9, 2)))
     removed = merge_regions(partition, partition.config)
     assert len(removed) == 8 and len(partition.codewords) == 1
 
@@ -316,11 +285,9 @@ def test_batch_size_n_minibatches_and_learning_rate_act(teacher, monkeypatch):
 ALTERNATIVES = {
     "n_epochs": 121, "n_split": 5, "n_merge": 11, "n_freeze": 60, "n_reset": 26, "min_param_distance": 0.2,
     "min_pol_distance": 0.3, "max_pol_loss": 0.05, "one_split": True, "freeze": "first_n_freeze",
-    "split_lookup": "kept", "split_metric": "euclidean", "periodic_reset": "off", "merge_reset": "neighbours",
-    "merge_visits_removed": True, "batch_size": 9, "n_minibatches": 2, "learning_rate": 0.02, "initial": "zeros",
-    "adam_on_reset": "restart", "scale": "box", "neighbours": "lookup", "split_loss": "clipped",
-    "merge_parameters": "weights", "split_reset": "neighbours", "split_neighbours": "new",
-    "loss_after_split": "kept", "inclusive": True, "sub_policy": "quadratic", "fit": "closed_form",
+    "split_metric": "euclidean", "periodic_reset": "off", "batch_size": 9, "n_minibatches": 2, "learning_rate": 0.02,
+    "initial": "zeros", "adam_on_reset": "restart", "scale": "box", "neighbours": "lookup", "split_loss": "clipped",
+    "merge_parameters": "weights", "inclusive": True, "sub_policy": "quadratic", "fit": "closed_form",
 }  # fmt: skip
 
 
@@ -338,7 +305,6 @@ class Bold:
 SPECIAL = {  # where the field needs a run of its own to have a say
     "scale": (MOUNTAINCAR, PumpingTeacher(), tiny(n_epochs=50, n_freeze=5, min_pol_distance=0.04)),  # no unit square
     "split_loss": (SIMPLEGOAL, Bold(), tiny(learning_rate=0.1)),
-    "loss_after_split": (SIMPLEGOAL, CurvedTeacher(), tiny(split_lookup="kept", max_pol_loss=0.2)),
 }
 
 
@@ -371,7 +337,7 @@ def test_visited_states_are_scaled_as_codewords_are():
 
 
 CLASSES = [("constant", "adam"), ("constant", "closed_form"), ("linear", "closed_form"), ("quadratic", "adam"),
-           ("quadratic", "closed_form"), ("pid", "adam"), ("pid", "closed_form"), ("network", "adam")]  # fmt: skip
+           ("quadratic", "closed_form"), ("pid", "adam"), ("pid", "closed_form")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("sub_policy", "fit"), CLASSES)
@@ -498,12 +464,11 @@ def test_golden_history(request):
     run = json.loads(json.dumps(golden_run()))
     if request.config.getoption("--remake-golden"):
         GOLDEN.parent.mkdir(exist_ok=True)
-        GOLDEN.write_text(json.dumps({"made on": support.made_on(), "run": run}, indent=1) + "\n", encoding="utf-8")
-    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))
-    if kept["made on"] == support.made_on():
-        assert run == kept["run"]
+        GOLDEN.write_text(json.dumps({"run": run}, indent=1) + "\n", encoding="utf-8")
+    kept = json.loads(GOLDEN.read_text(encoding="utf-8"))["run"]
+    if kernels.fixed():
+        assert run == kept
         return
-    kept = kept["run"]
     assert abs(len(run["events"]) - len(kept["events"])) <= 2 and abs(run["cells"][-1] - kept["cells"][-1]) <= 1
     assert [e[:2] for e in run["events"][:5]] == [e[:2] for e in kept["events"][:5]]
     assert np.allclose(run["losses"][:20], kept["losses"][:20], rtol=1e-6)

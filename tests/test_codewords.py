@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import nearest_brute, nearest_kdtree, partition_of, tiny
+from support import nearest_brute, nearest_kdtree, partition_of
 
-from vsp.algorithms import merge_regions
-from vsp.config import Config
+from vsp import Config, VoronoiPolicy
 from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
-from vsp.partition import Partition
-from vsp.policy import VoronoiPolicy
-from vsp.tasks.base import Task
+from vsp.tasks import Task
 
 
 def unit(vectors):
@@ -36,7 +33,10 @@ KINDS = {
     "far off": lambda rng, d: 1e6 + rng.random((6, d)),
     "tiny": lambda rng, d: 1e-9 * rng.random((6, d)),
 }
-given_codewords = given(st.sampled_from(sorted(KINDS)), st.integers(1, 8), st.integers(0, 2**32))
+NOT_ON_BORDERS = ["one", "two", "scattered", "in a row", "tiny"]
+given_codewords = given(
+    st.sampled_from(sorted(KINDS)), st.integers(1, 8), st.integers(0, 2**32), st.sampled_from(sorted(METRICS))
+)
 
 
 def codewords_of(kind, d, seed):
@@ -78,9 +78,8 @@ def test_every_kind_of_neighbours_is_tried():
     assert graphs(*codewords_of("two", 2, 0), "manhattan").keys() == set(get_args(get_type_hints(Config)["neighbours"]))
 
 
-@pytest.mark.parametrize("metric", METRICS)
 @given_codewords
-def test_neighbours_are_symmetric_and_nobody_is_his_own(metric, kind, d, seed):
+def test_neighbours_are_symmetric_and_no_cell_is_its_own(kind, d, seed, metric):
     codewords, states = codewords_of(kind, d, seed)
     for name, graph in graphs(codewords, states, metric).items():
         assert graph.shape == (len(codewords),) * 2 and graph.dtype == bool
@@ -89,21 +88,17 @@ def test_neighbours_are_symmetric_and_nobody_is_his_own(metric, kind, d, seed):
             assert graph.any(axis=1).all(), "one without neighbours could never be merged"
 
 
-@pytest.mark.parametrize("metric", METRICS)
 @given_codewords
-def test_both_look_ups_find_the_nearest_and_a_codeword_its_own_cell(metric, kind, d, seed):
+def test_both_look_ups_find_the_nearest_and_a_codeword_its_own_cell(kind, d, seed, metric):
     codewords, states = codewords_of(kind, d, seed)
-    found = nearest_brute(codewords, states, metric)
     gaps = distances(states, codewords, metric)
-    assert np.array_equal(gaps[np.arange(len(states)), found], gaps.min(axis=1))
-    assert np.array_equal(nearest_kdtree(codewords, states, metric), found)
-    assert np.array_equal(nearest_brute(codewords, codewords, metric), np.arange(len(codewords)))
-    assert np.array_equal(nearest_kdtree(codewords, codewords, metric), np.arange(len(codewords)))
+    for lookup in (nearest_brute, nearest_kdtree):
+        assert np.array_equal(lookup(codewords, states, metric), gaps.argmin(axis=1))
+        assert np.array_equal(lookup(codewords, codewords, metric), np.arange(len(codewords)))
 
 
-@pytest.mark.parametrize("metric", METRICS)
 @given_codewords
-def test_a_policy_acts_and_explains_itself_there(metric, kind, d, seed):
+def test_a_policy_acts_and_explains_itself_there(kind, d, seed, metric):
     codewords, states = codewords_of(kind, d, seed)
     policy = policy_of(codewords, metric)
     actions, _ = policy.predict(states)
@@ -113,15 +108,14 @@ def test_a_policy_acts_and_explains_itself_there(metric, kind, d, seed):
     assert len(policy.to_frame()) == len(codewords) and policy.to_c() and policy.to_python() and policy.to_text(None)
 
 
-@given_codewords
+@given(st.sampled_from(sorted(KINDS)), st.integers(1, 8), st.integers(0, 2**32))
 def test_what_is_a_codeword_already_is_refused(kind, d, seed):
     codewords, _ = codewords_of(kind, d, seed)
-    again = codewords[[seed % len(codewords)]]
-    twice, partition = np.concatenate([codewords, again]), Partition(box(d), tiny())
-    for codeword in codewords:
-        partition.add(codeword, np.random.default_rng(0))
-    refused = (lambda: policy_of(twice), lambda: delaunay_neighbours(twice), lambda: partition.add(again[0], None))
-    for call in refused:
+    twice = np.concatenate([codewords, codewords[[seed % len(codewords)]]])
+    partition = partition_of(codewords, task=box(d))
+    for call in (
+        lambda: policy_of(twice), lambda: delaunay_neighbours(twice), lambda: partition.add(twice[-1], None)
+    ):  # fmt: skip
         with pytest.raises(ValueError, match="expected .*(differ|different|another)"):
             call()
 
@@ -129,41 +123,15 @@ def test_what_is_a_codeword_already_is_refused(kind, d, seed):
 # The order of the codewords is a matter of labels
 
 
-@pytest.mark.parametrize("metric", METRICS)
-@given(st.sampled_from(["one", "two", "scattered", "in a row", "tiny"]), st.integers(1, 8), st.integers(0, 2**32))
-def test_in_another_order_it_is_the_same_partition(metric, kind, d, seed):
+@given(st.sampled_from(NOT_ON_BORDERS), st.integers(1, 8), st.integers(0, 2**32), st.sampled_from(sorted(METRICS)))
+def test_in_another_order_it_is_the_same_partition(kind, d, seed, metric):
     """But for what is on a border to the last bit: ties go to the lowest index, and Qhull cuts a square as it comes."""
     codewords, states = codewords_of(kind, d, seed)
     order = np.random.default_rng(seed).permutation(len(codewords))
-    here, there = policy_of(codewords, metric), policy_of(codewords, metric)
-    there = VoronoiPolicy(codewords[order], here.coefficients[order], task=here.task, metric=metric)
-    assert np.array_equal(order[there.cells(states)], here.cells(states))
-    assert np.array_equal(there.predict(states)[0], here.predict(states)[0])
-    one, other = graphs(codewords, states, metric), graphs(codewords[order], states, metric)
-    for name in one:
-        assert np.array_equal(other[name], one[name][np.ix_(order, order)]), name
-
-
-def survivors(places, biases, order, **settings):
-    """Codewords and actions that a merge leaves, sorted: cells in a row at `places`, with `biases`, in this order."""
-    points = np.column_stack([np.asarray(places)[order], np.full(len(places), 0.5)])
-    partition = partition_of(points, np.asarray(biases)[order], config=tiny(**settings))
-    merge_regions(partition, partition.config)
-    return sorted(partition.codewords[:, 0]), sorted(partition.models.parameters[:, -1, 0])
-
-
-@given(st.permutations(range(6)))
-def test_a_merge_of_pairs_leaves_one_of_each_in_any_order(order):
-    """Which one, the order decides: Algorithm 3 visits cells by their index, and who is visited first stays."""
-    places, biases = [0.05, 0.15, 0.4, 0.5, 0.8, 0.9], [0.0, 0.0, 2.0, 2.0, -2.0, -2.0]
-    left, actions = survivors(places, biases, list(order), min_param_distance=0.5)
-    assert actions == [-2.0, 0.0, 2.0]
-    firsts = {min(pair, key=order.index) for pair in ((0, 1), (2, 3), (4, 5))}
-    assert left == sorted(places[i] for i in firsts)
-
-
-def test_a_merge_along_a_chain_depends_on_the_order():
-    """A is like B and B like C, but A is not like C: from an end Algorithm 3 leaves two, from the middle one."""
-    places, biases = [0.1, 0.5, 0.9], [0.0, 0.4, 0.8]
-    assert survivors(places, biases, [0, 1, 2], min_param_distance=0.5)[0] == [0.1, 0.9]
-    assert survivors(places, biases, [1, 0, 2], min_param_distance=0.5)[0] == [0.5]
+    policy = policy_of(codewords, metric)
+    reordered = VoronoiPolicy(codewords[order], policy.coefficients[order], task=policy.task, metric=metric)
+    assert np.array_equal(order[reordered.cells(states)], policy.cells(states))
+    assert np.array_equal(reordered.predict(states)[0], policy.predict(states)[0])
+    expected = graphs(codewords, states, metric)
+    for name, graph in graphs(codewords[order], states, metric).items():
+        assert np.array_equal(graph, expected[name][np.ix_(order, order)]), name

@@ -5,9 +5,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support import nearest_brute, nearest_kdtree
 
-from vsp import geometry
+from vsp import nearest
 from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
-from vsp.show.state_space import grid
+from vsp.show import grid
+
+each_metric = pytest.mark.parametrize("metric", METRICS)
 
 
 def edges(graph):
@@ -23,35 +25,24 @@ def is_graph(graph):
 
 def test_distances_by_hand():
     states, codewords = np.array([[0.0, 0.0]]), np.array([[3.0, -4.0], [1.0, 0.0]])
-    found = {metric: distances(states, codewords, metric).tolist() for metric in METRICS}
-    assert found == {"manhattan": [[7, 1]], "euclidean": [[5, 1]], "chebyshev": [[4, 1]]}
+    by_metric = {metric: distances(states, codewords, metric).tolist() for metric in METRICS}
+    assert by_metric == {"manhattan": [[7, 1]], "euclidean": [[5, 1]], "chebyshev": [[4, 1]]}
 
 
-@pytest.mark.parametrize("lookup", [geometry.nearest, nearest_brute, nearest_kdtree])
+@pytest.mark.parametrize("lookup", [nearest, nearest_kdtree])
 def test_nearest_by_hand_and_the_metric_matters(lookup):
     codewords = np.array([[0.0, 0.75], [0.5, 0.5]])  # from the origin: 0.75 or 1; 0.75 or 0.71
     origin = np.zeros((1, 2))
     assert lookup(codewords, origin).tolist() == [0]
-    assert lookup(codewords, origin, "euclidean").tolist() == [1]
-    assert lookup(codewords, origin, "chebyshev").tolist() == [1]
+    assert lookup(codewords, origin, "euclidean").tolist() == lookup(codewords, origin, "chebyshev").tolist() == [1]
 
 
-@pytest.mark.parametrize("lookup", [geometry.nearest, nearest_brute, nearest_kdtree])
-@pytest.mark.parametrize("metric", METRICS)
-def test_ties_go_to_the_lowest_index(lookup, metric):
-    corners = np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
-    for order in ([0, 1, 2, 3], [3, 1, 0, 2], [2, 3, 1, 0]):
-        assert lookup(corners[order], np.array([[0.5, 0.5]]), metric).tolist() == [0]
-    assert lookup(np.zeros((5, 2)), np.array([[0.0, 0.0], [0.3, 0.1]]), metric).tolist() == [0, 0]
-
-
-@pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("step", [1.0, 0.1, 1 / 3])
-def test_kdtree_equals_brute_force_on_grids(metric, step):
+@each_metric
+def test_kdtree_equals_brute_force_on_grids(metric):
     """Codewords on a shuffled grid and states on a finer one: most states are between two or more codewords."""
     rng = np.random.default_rng(0)
-    codewords = rng.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(20)), -1).reshape(-1, 2)) * step
-    states = np.stack(np.meshgrid(np.arange(80), np.arange(80)), -1).reshape(-1, 2) * step / 4
+    codewords = rng.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(20)), -1).reshape(-1, 2)) / 3
+    states = np.stack(np.meshgrid(np.arange(80), np.arange(80)), -1).reshape(-1, 2) / 12
     expected = nearest_brute(codewords, states, metric)
     assert np.array_equal(nearest_kdtree(codewords, states, metric), expected)
 
@@ -62,9 +53,10 @@ def test_kdtree_equals_brute_force_on_grids(metric, step):
     st.sampled_from(sorted(METRICS)),
 )
 def test_the_answer_is_a_minimum_and_the_first_one(codewords, states, metric):
+    """Many of these numbers are equally near, and some codewords are equal."""
     codewords, states = codewords / 2, states / 2
     gaps = distances(states, codewords, metric)
-    for lookup in (nearest_brute, nearest_kdtree):
+    for lookup in (nearest, nearest_brute, nearest_kdtree):
         for row, i in zip(gaps, lookup(codewords, states, metric)):
             assert row[i] == row.min() and (row[:i] > row[i]).all()
 
@@ -79,15 +71,12 @@ def test_the_answer_is_a_minimum_and_the_first_one(codewords, states, metric):
         ([[0, 0], [1, 1]], {(0, 1)}),
         ([[0, 0], [1, 0], [0, 1]], {(0, 1), (0, 2), (1, 2)}),
         ([[0, 0], [3, 0], [1, 0]], {(0, 2), (1, 2)}),  # in a row, out of order
-        ([[0, 0], [1, 1], [2, 2], [3, 3]], {(0, 1), (1, 2), (2, 3)}),
         ([[0, 0], [0.1, 0.3], [0.2, 0.6], [0.3, 0.9]], {(0, 1), (1, 2), (2, 3)}),  # in a row up to rounding
         ([[0, 0], [4, 0], [2, 1], [2, -1]], {(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),  # the short diagonal
         ([[0, 0], [2, 0], [0, 2], [2, 2], [1, 1]], {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),
         ([[5], [1], [3]], {(0, 2), (1, 2)}),
-        ([[7], [2]], {(0, 1)}),
         ([[0, 0, 1], [2, 0, 1], [0, 2, 1], [2, 2, 1], [1, 1, 1]],
          {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),  # in a plane of three dimensions
-        ([[0, 0, 0], [1, 1, 1], [3, 3, 3]], {(0, 1), (1, 2)}),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], {(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),
     ],
 )  # fmt: skip
@@ -96,10 +85,9 @@ def test_delaunay_by_hand(points, expected):
     assert is_graph(graph) and edges(graph) == expected
 
 
-def test_a_square_has_its_sides_and_at_most_one_diagonal():
-    found = edges(delaunay_neighbours(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])))
-    assert {(0, 1), (0, 2), (1, 3), (2, 3)} <= found <= {(0, 1), (0, 2), (1, 3), (2, 3), (0, 3), (1, 2)}
-    assert len(found) == 5
+def test_a_square_has_its_sides_and_one_diagonal():
+    square = edges(delaunay_neighbours(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])))
+    assert square - {(0, 3), (1, 2)} == {(0, 1), (0, 2), (1, 3), (2, 3)} and len(square) == 5
 
 
 def test_all_differ():
@@ -108,52 +96,45 @@ def test_all_differ():
     assert not all_differ(points[[0, 1, 0]]) and not all_differ(np.array([[0.0, 1.0], [-0.0, 1.0]]))
 
 
-@pytest.mark.parametrize("bend", [1e-4, 1e-7, 1e-8, 1e-10, 1e-13])
-def test_points_almost_in_a_row_are_no_failure(bend):
-    points = np.column_stack([np.arange(6.0), bend * np.array([0, 1, 0, -1, 0, 1])])
-    graph = delaunay_neighbours(points)
-    assert is_graph(graph) and all(graph[i, i + 1] for i in range(5))
-
-
 @pytest.mark.parametrize("d", [1, 2, 3])
-@pytest.mark.parametrize("k", [1, 2, 3, 4, 5, 30])
-def test_delaunay_does_not_depend_on_order_position_or_size(d, k):
-    rng = np.random.default_rng(10 * d + k)
-    points, order = rng.random((k, d)), rng.permutation(k)
+def test_delaunay_does_not_depend_on_order_position_or_size(d):
+    rng = np.random.default_rng(d)
+    points, order = rng.random((30, d)), rng.permutation(30)
     graph = delaunay_neighbours(points)
-    assert is_graph(graph)
-    assert np.array_equal(delaunay_neighbours(points[order]), graph[np.ix_(order, order)])
+    assert is_graph(graph) and np.array_equal(delaunay_neighbours(points[order]), graph[np.ix_(order, order)])
     assert np.array_equal(delaunay_neighbours(3 * points - 5), graph)
 
 
 def test_every_delaunay_edge_has_an_empty_circle():
-    """The property that defines the graph: some circle through both ends holds no third codeword."""
+    """The property that defines the graph: some circle through both ends holds no third codeword.
+
+    With its centre t steps along the bisector, a point is outside where a linear function of t is positive.
+    """
     points = np.random.default_rng(3).random((15, 2))
     graph = delaunay_neighbours(points)
     for i in range(15):
         for j in range(i):
-            middle, across = (points[i] + points[j]) / 2, (points[i] - points[j])[::-1] * [1, -1]
-            centres = middle + np.linspace(-50, 50, 40001)[:, None] * across
-            radius = np.hypot(*(centres - points[i]).T)
+            middle, bisector = (points[i] + points[j]) / 2, (points[i] - points[j])[::-1] * [1, -1]
             others = np.delete(points, [i, j], axis=0)
-            empty = (np.hypot(*(centres[:, None] - others).transpose(2, 0, 1)) > radius[:, None]).all(axis=1)
-            assert empty.any() == graph[i, j]
+            at_0 = np.square(middle - others).sum(axis=1) - np.square(middle - points[i]).sum()
+            slope = 2 * (points[i] - others) @ bisector
+            zeros = -at_0 / slope
+            assert (zeros[slope > 0].max(initial=-np.inf) < zeros[slope < 0].min(initial=np.inf)) == graph[i, j]
 
 
 # Look-up neighbours
 
 
-@pytest.mark.parametrize("metric", METRICS)
+@each_metric
 def test_lookup_neighbours_against_a_dense_grid(metric):
     codewords = np.random.default_rng(4).random((13, 2))
-    _, _, points = grid(np.zeros(2), np.ones(2), 401)
+    _, _, points = grid(np.zeros(2), np.ones(2), 201)
     pairs = np.sort(np.argsort(distances(points, codewords, metric), axis=1, kind="stable")[:, :2], axis=1)
-    seen, counts = np.unique(pairs, axis=0, return_counts=True)
-    seen = [tuple(map(int, pair)) for pair in seen]
+    pairs, counts = np.unique(pairs, axis=0, return_counts=True)
+    pairs = [tuple(map(int, pair)) for pair in pairs]
     graph = lookup_neighbours(codewords, np.zeros(2), np.ones(2), metric)
-    found = edges(graph)
-    assert is_graph(graph) and found <= set(seen)
-    assert {pair for pair, count in zip(seen, counts) if count > len(points) / 500} <= found
+    assert is_graph(graph) and edges(graph) <= set(pairs)
+    assert {pair for pair, count in zip(pairs, counts) if count > len(points) / 500} <= edges(graph)
 
 
 def test_lookup_neighbours_by_hand():
@@ -167,34 +148,12 @@ def test_lookup_neighbours_by_hand():
 
 def test_lookup_neighbours_repeat_and_follow_the_box():
     codewords = np.random.default_rng(5).random((20, 3))
-    args = codewords, np.zeros(3), np.ones(3)
-    assert np.array_equal(lookup_neighbours(*args), lookup_neighbours(*args))
-    scaled = lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0))
-    assert np.array_equal(scaled, lookup_neighbours(*args))
-
-
-def test_grid():
-    x, y, states = grid(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), 5)
-    assert x[0].tolist() == [-1, -0.5, 0, 0.5, 1] and y[:, 0].tolist() == [0, 1, 2, 3, 4]
-    assert states[7].tolist() == [x.ravel()[7], y.ravel()[7]] == [0.0, 1.0]
-
-
-def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):
-    built, tree = [], geometry.cKDTree
-    monkeypatch.setattr(geometry, "KDTREE_FROM", 4)
-    monkeypatch.setattr(geometry, "cKDTree", lambda codewords: built.append(len(codewords)) or tree(codewords))
-    for k in (3, 4, 5):
-        assert geometry.nearest(np.arange(2.0 * k).reshape(k, 2), np.zeros((1, 2))).tolist() == [0]
-    assert built == [4, 5]
+    graph = lookup_neighbours(codewords, np.zeros(3), np.ones(3))
+    assert np.array_equal(lookup_neighbours(codewords, np.zeros(3), np.ones(3)), graph)
+    assert np.array_equal(lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0)), graph)
 
 
 # Neighbours among visited states
-
-
-def curve(angles, d):
-    """States along a closed curve in d dimensions: cosines and sines of the angle, of twice the angle, and so on."""
-    waves = [wave(i * angles) for i in range(1, d) for wave in (np.cos, np.sin)]
-    return np.column_stack(waves[:d])
 
 
 def test_visited_neighbours_by_hand():
@@ -205,22 +164,16 @@ def test_visited_neighbours_by_hand():
     assert edges(visited_neighbours(row[:1], np.array([[0.2, 0.5]]))) == set()
 
 
-@pytest.mark.parametrize("metric", METRICS)
-@pytest.mark.parametrize("d", [3, 8])
-def test_visited_neighbours_are_the_two_nearest_of_some_state(metric, d):
-    rng = np.random.default_rng(d)
-    codewords, states = rng.random((15, d)), rng.random((300, d))
+@each_metric
+def test_visited_neighbours_are_the_two_nearest_of_some_state(metric):
+    rng = np.random.default_rng(8)
+    codewords, states = rng.random((15, 8)), rng.random((300, 8))
     graph = visited_neighbours(codewords, states, metric)
     pairs = {tuple(sorted(map(int, row.argsort()[:2]))) for row in distances(states, codewords, metric)}
     assert is_graph(graph) and edges(graph) == pairs
 
 
-@pytest.mark.parametrize("d", [3, 8])
-def test_along_a_curve_only_states_tell_which_cells_touch(d):
-    """Off the curve, where no state is, cells far apart meet: the points of the box find these as well."""
-    rng = np.random.default_rng(0)
-    codewords, states = (curve(rng.uniform(0, 2 * np.pi, n), d) for n in (20, geometry.WITNESSES))
-    everywhere = edges(visited_neighbours(codewords, curve(np.linspace(0, 2 * np.pi, 100_001), d)))
-    assert edges(visited_neighbours(codewords, states)) == everywhere
-    box = edges(lookup_neighbours(codewords, -np.ones(d), np.ones(d)))
-    assert box > everywhere and len(box) > 2 * len(everywhere)
+def test_grid():
+    x, y, states = grid(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), 5)
+    assert x[0].tolist() == [-1, -0.5, 0, 0.5, 1] and y[:, 0].tolist() == [0, 1, 2, 3, 4]
+    assert states[7].tolist() == [x.ravel()[7], y.ravel()[7]] == [0.0, 1.0]

@@ -1,7 +1,6 @@
 """Who may import whom, that no circle comes back, and what `import vsp` loads."""
 
 import ast
-import functools
 import importlib.util
 import subprocess
 import sys
@@ -19,39 +18,41 @@ ROOMS = dict.fromkeys(METHOD, METHOD | BASIS)
 ROOMS |= {"tasks": {"checks"}, "subpolicies": {"checks", "tasks"}, "run": set()}
 ROOMS |= {"teachers": METHOD | BASIS - {"subpolicies"}, "show": METHOD | BASIS | {"teachers"}}
 ROOMS |= {"paper": METHOD | BASIS | {"teachers", "show"}}
+DEFINITIONS = ast.FunctionDef, ast.ClassDef
+
+TREES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts): ast.parse(path.read_text(encoding="utf-8"))
+    for part in PARTS for path in (ROOT / part).rglob("*.py")
+}  # fmt: skip
 
 
-@functools.cache
-def modules():
-    files = [path for part in PARTS for path in (ROOT / part).rglob("*.py")]
-    return {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in files}
-
-
-def imported(name: str, path: Path) -> set[str]:
+def imported(name: str, tree: ast.Module) -> set[str]:
     """The modules of ours that a module imports anywhere but for types."""
-    package = name.rpartition(".")[0]
-    tree, found = ast.parse(path.read_text(encoding="utf-8")), set()
-    for block in [one for one in ast.walk(tree) if isinstance(one, ast.If) and "TYPE_CHECKING" in ast.dump(one.test)]:
-        block.body = [ast.Pass()]
-    for node in ast.walk(tree):
+    package, names = name.rpartition(".")[0], set()
+    nodes = list(ast.walk(tree))
+    for_types = [node for node in nodes if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)]
+    skipped = {part for block in for_types for part in block.body}
+    for node in nodes:
+        if node in skipped:
+            continue
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names if alias.name.partition(".")[0] in PARTS}
+            names |= {alias.name for alias in node.names if alias.name.partition(".")[0] in PARTS}
         elif isinstance(node, ast.ImportFrom):
             origin = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
             if origin.partition(".")[0] in PARTS:
                 parts = {f"{origin}.{alias.name}" for alias in node.names}
-                found |= {part if part in modules() or f"{part}.__init__" in modules() else origin for part in parts}
-    return {one if one in modules() else f"{one}.__init__" for one in found}
+                names |= {part if part in TREES or f"{part}.__init__" in TREES else origin for part in parts}
+    return {module if module in TREES else f"{module}.__init__" for module in names}
 
 
-GRAPH = {name: imported(name, path) for name, path in modules().items()}
+GRAPH = {name: imported(name, tree) for name, tree in TREES.items()}
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_a_part_imports_only_what_it_may(part):
-    own = {name: others for name, others in GRAPH.items() if name.partition(".")[0] == part}
-    assert own and not {
-        (name, other) for name, others in own.items() for other in others
+    in_part = {name: others for name, others in GRAPH.items() if name.partition(".")[0] == part}
+    assert in_part and not {
+        (name, other) for name, others in in_part.items() for other in others
         if other.partition(".")[0] not in PARTS[part] | {part}
     }  # fmt: skip
 
@@ -67,9 +68,38 @@ def test_no_circle():
     list(TopologicalSorter(GRAPH).static_order())
 
 
-def test_importing_vsp_loads_the_method_alone():
-    code = "import sys, vsp; print(*[name for name in sys.modules])"
-    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    tops = {name.partition(".")[0] for name in loaded.split()}
+def test_importing_vsp_loads_the_method_alone_and_no_part_loads_torch():
+    """In a process of its own, so that no other test has imported a part before."""
+    code = """
+import sys, vsp
+print(*sys.modules)
+import gymnasium
+gymnasium.make("SimpleGoal-v0")
+vsp.paper.published_policy("SimpleGoal-v0").predict([0.5, 0.5])
+vsp.load_teacher("SimpleGoal-v0"), vsp.show.panels, vsp.paper.baselines.linear_map
+import studies.comparison, vsp_beyond, vsp_course
+print(*sys.modules)
+"""
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    by_vsp, by_all = (line.split() for line in done.stdout.splitlines())
+    tops = {name.partition(".")[0] for name in by_vsp}
     assert not tops & {"pandas", "sklearn", "matplotlib", "torch", "stable_baselines3", *PARTS.keys() - {"vsp"}}
-    assert len([name for name in loaded.split() if name.partition(".")[0] == "vsp"]) <= 35
+    assert len([name for name in by_vsp if name.partition(".")[0] == "vsp"]) <= 35
+    assert not {"torch", "stable_baselines3"} & set(by_all)
+
+
+def without_docstring(tree):
+    """The public functions, classes and methods of a module that do not say what they do."""
+    public = [node for node in tree.body if isinstance(node, DEFINITIONS) and not node.name.startswith("_")]
+    for thing in public:
+        bases = [ast.unparse(base) for base in getattr(thing, "bases", [])]
+        if isinstance(thing, ast.ClassDef) and not {"Protocol", "gymnasium.Env"} & set(bases):
+            public += [part for part in thing.body if isinstance(part, DEFINITIONS) and not part.name.startswith("_")]
+    return [node.name for node in public if not ast.get_docstring(node)]
+
+
+def test_everything_public_says_what_it_does():
+    assert not [name for name, tree in TREES.items() if not ast.get_docstring(tree)]
+    assert not {name: names for name, tree in TREES.items() if (names := without_docstring(tree))}

@@ -78,7 +78,7 @@ def test_every_saved_figure_and_table_has_its_caption_in_the_notebooks_order(pat
     book = tomllib.loads((ROOT / "notebooks" / "captions.toml").read_text("utf-8")).get(path.stem, {})
     listed = list(saved(nbformat.read(path, as_version=4)))
     for kind in ("figures", "tables"):
-        assert list(book.get(kind, {})) == [name for one, name in listed if one == kind]
+        assert list(book.get(kind, {})) == [name for saved_kind, name in listed if saved_kind == kind]
         for about in book.get(kind, {}).values():
             assert about["caption"].endswith((".", "?")) and len(about["caption"].split()) > 2
             assert kind == "tables" or (about["alt"].endswith(".") and len(about["alt"]) > 60)

@@ -1,16 +1,17 @@
 """The README and docs/: examples run, links lead somewhere, and what is quoted equals the tables."""
 
-import functools
-import io
 import math
 import pydoc
 import re
 import subprocess
+import tomllib
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from studies.comparison import all_rows, largest_alike, read_results
+import vsp
+from studies.comparison import all_rows, largest_alike, method_summary, read_results
 from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
@@ -28,6 +29,10 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "push east = -1.50" in said and "action within the limits: push east" in said  # as the pilot's
     assert (tmp_path / "my_policy.vsp").exists()
+
+
+def test_the_readme_is_short():
+    assert len(README.split()) <= 700
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
@@ -54,304 +59,147 @@ def test_targets_exist():
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_names_exist(page):
     text = page.read_text("utf-8")
-    assert [
-        name for name in re.findall(r"`((?:vsp|vsp_beyond|studies)(?:\.\w+)+)", text) if pydoc.locate(name) is None
-    ] == []
-    assert [path for path in re.findall(r"`((?:vsp|tests|\.ci)/[\w/.]*)`", text) if not (ROOT / path).exists()] == []
+    names = re.findall(r"`((?:vsp|vsp_beyond|studies)(?:\.\w+)+)", text)
+    assert [name for name in names if pydoc.locate(name) is None] == []
+    paths = re.findall(r"`((?:vsp|vsp_beyond|studies|vsp_course|tests|\.ci)/[\w/.]*)`", text)
+    assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
-def test_artefacts_and_cells_exist():
-    cells = {
-        path.stem[:2]: {cell.id for cell in nbformat.read(path, as_version=4).cells}
-        for path in (ROOT / "notebooks").glob("*.ipynb")
-    }
-    page = (ROOT / "docs" / "artefacts.md").read_text("utf-8")
-    rows = re.findall(r"^\| [^|]* \| ([^|]*) \| (\d\d), ([^|]*) \|$", page, flags=re.M)
-    assert {notebook for _, notebook, _ in rows} == set(cells)
-    for artefacts, notebook, names in rows:
-        assert set(re.findall(r"`([^`]+)`", names)) <= cells[notebook]
-        for artefact in re.findall(r"`([a-z_/]+)`", artefacts):
-            assert list((ROOT / "figures").glob(f"{artefact}.*")), artefact
-
-
-def test_the_api_has_every_module():
-    """But those of the course, which checks answers."""
-    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs" / "api").glob("*.md"))
-    shown = set(re.findall(r"automodule:: ([\w.]+)", pages))
-    parts = ("vsp", "vsp_beyond", "studies")
-    paths = [path.relative_to(ROOT) for part in parts for path in (ROOT / part).rglob("*.py")]
-    assert shown == {".".join(path.with_suffix("").parts) for path in paths if not path.name.startswith("_")}
+def test_one_version_everywhere():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.search(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)[1] == version
 
 
 # Quoted results
 
 
-def table_text(name):
-    """figures/tables/NAME.csv as the pages quote it: as committed, where a machine of another type wrote over it."""
-    path = f"figures/tables/{name}.csv"
-    return _committed(path) if _made_on_another_type() else (ROOT / path).read_text("utf-8")
-
-
 def read_table(name, **options):
-    return pd.read_csv(io.StringIO(table_text(name)), **options)
+    """The table NAME of figures/tables, or beyond/NAME of figures/beyond/tables."""
+    folder, _, file = name.rpartition("/")
+    return pd.read_csv(ROOT / "figures" / folder / "tables" / f"{file}.csv", **options)
 
 
-@functools.cache
-def _made_on_another_type():
-    path = "data/results/made_on.txt"
-    return (ROOT / ".git").exists() and _committed(path) != (ROOT / path).read_text("utf-8")
+def section(title, page="docs/results.md"):
+    """The text below a heading of a page, up to the next heading of its level or above."""
+    level, text = len(title.partition(" ")[0]), (ROOT / page).read_text("utf-8")
+    return re.split(rf"^#{{1,{level}}} ", text.partition(f"{title}\n")[2], flags=re.M)[0]
 
 
-def _committed(path):
-    run = subprocess.run(["git", "-C", ROOT, "show", f"HEAD:{path}"], capture_output=True, check=True)
-    return run.stdout.decode()
+def rows_of(text, width):
+    """The cells of all rows with `width` cells in the Markdown tables of `text`, but not of the headers."""
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+    return [row for row in rows if len(row) == width and re.search("[0-9]", "".join(row[1:]))]
 
 
-def quoted(text):
-    """Whether the README says `text`, wherever its lines break."""
-    return " ".join(text.split()) in " ".join(README.split())
+def test_counts_are_those_of_the_ledger():
+    book, said = read_table("ledger"), " ".join(RESULTS.split())
+    counts = book.groupby("part")["verdict"].value_counts()
+    verdicts = ("reproduced", "differs", "cannot be checked", "contradicts itself")
+    for part, cells in zip(("settings", "results", "coefficients"), rows_of(section("## Did it reproduce?"), 5)):
+        assert [int(n) for n in cells[1:]] == [counts[part].get(verdict, 0) for verdict in verdicts]
+    checked = book[(book["part"] == "results") & book["verdict"].isin(verdicts[:2])]
+    reproduced, once = checked["verdict"] == "reproduced", checked.drop_duplicates(["task", "subject", "value"])
+    wide, share = (checked["wide"] & reproduced).sum(), f"{reproduced.sum()} of {len(checked)} checkable results"
+    assert f"**{share} reproduce** ({wide} with a wide interval)" in README
+    assert f"{share} reproduce, {wide} of them with a wide interval" in said
+    assert f"The paper prints {len(checked) - len(once)} of these results again" in said
+    assert f"{(once['verdict'] == 'reproduced').sum()} of {len(once)} reproduce." in said
 
 
-def test_numbers_of_the_readme_are_those_of_the_tables():
-    cells = read_table("what_cells_buy").set_index(["task", "policy"])
-    failing = cells["failing"]["SimpleGoal-v0"]
-    assert quoted(f"13 constants misses the goal in {failing['tree, 13 leaves']:.1%}".replace("%", " %"))
-    assert quoted(f"the distilled policies in {failing['distilled, all runs']:.1%}".replace("%", " %"))
-    assert quoted(f"in the same cells, in {failing['same cells, least squares']:.1%}".replace("%", " %"))
-    spread = read_table("simplegoal_spread", index_col="metric").loc["Mean"]
-    assert quoted(f"return {spread.iloc[3]:.2f}, the paper prints {spread.iloc[2]:.2f}")
+def test_the_spread_is_that_of_the_tables():
+    rows = [row for row in rows_of(section("## Did it reproduce?").partition("### ")[0], 5) if ", " in row[0]]
+    assert len(rows) == 8
+    for name, *cells in rows:
+        task, metric = name.split(",")
+        table = read_table(f"{task.lower()}_spread", index_col="metric").rename(index={"Median/Q2": "Median"})
+        assert cells == [f"{value:.3f}" for value in table.loc[metric.split()[0].capitalize()]]
+
+
+def test_what_cells_buy_is_that_of_the_table():
+    rows = rows_of(section("### What do the cells buy?"), 5)
+    for (_, kinds), columns in zip(read_table("what_cells_buy").groupby("task", sort=False), ((1, 2), (3, 4))):
+        shown = {tuple(row[i] for i in columns) for row in rows}
+        assert shown == {(f"{row.mean:.2f}", f"{100 * row.failing:.1f}") for row in kinds.itertuples()}
 
 
 def test_faithful_policies_are_those_of_the_table():
-    table = read_table("beyond_faithful").set_index("task")
-    tasks = table.to_dict("index")
-    both = [f"{round(own['both'] * own['policies'])}" for own in tasks.values()]
-    assert quoted("return as much, in all 20 seeds:") and both[:3] == ["20"] * 3
-    assert list(table["policies"]) == [20, 20, 20, 10]
-    first, *others, lander = tasks.values()
-    assert quoted(f"{first['at most']} cells reproduce {first['r2']:.0%}".replace("%", " %"))
-    for own, task in zip(others, ("MountainCar", "Pendulum")):
-        assert quoted(f"{own['at most']} cells {own['r2']:.0%} on {task}".replace("%", " %"))
-    share = f"{100 * lander['r2']:.0f} %"
-    assert quoted(f"LunarLander {lander['at most']} cells reproduce only {share}")
-    assert lander["good"] == 0.9 and "returns in nine of ten seeds, and" in " ".join(RESULTS.split())
-    teachers = read_table("beyond_headline").set_index("task")["teacher"]
-    pattern = r"^\| (\w+) \| (\d+) \| (0\.\d{3}) \| ([-\d.]+) \| ([-\d.]+) \| (\d+) of (\d+) \| ([\d.]+) \|$"
-    assert re.findall(pattern, RESULTS, flags=re.M) == [
-        (task, f"{own['at most']}", f"{own['r2']:.3f}", f"{own['mean']:.2f}", f"{teachers[task]:.2f}", good,
-         f"{own['policies']}", f"{own['index']:.2f}")
-        for good, (task, own) in zip(both, tasks.items())
+    table = read_table("beyond/faithful").set_index("task")
+    teachers = read_table("beyond/headline").set_index("task")["teacher"]
+    assert rows_of(section("## A few equations that act like the teacher"), 7) == [
+        [task, f"{row['at most']}", f"{row['r2']:.3f}", f"{row['mean']:.2f}", f"{teachers[task]:.2f}",
+         f"{row['both'] * row['policies']:.0f} of {row['policies']}", f"{row['index']:.2f}"]
+        for task, row in table.iterrows()
     ]  # fmt: skip
 
 
 def test_who_leads_is_that_of_the_table():
-    table = read_table("beyond_leaders").set_index(["task", "size"])
-    two = table.loc[("MountainCar", 2)]
-    assert quoted(f"of a line return {two['rival mean']:.2f}, two of our cells {two['mean']:.2f}")
-    said = f"{two['rival mean']:.2f} on average: a policy of two cells, too, but our search ends at {two['mean']:.2f}"
-    assert said in " ".join(RESULTS.split())
-    assert two["rival"] == "oblique tree, constants"
-    best = read_table("limit_sizes").set_index(["task", "size"])["mean"]["MountainCar", 3]
-    assert quoted(f"Distilled from the best policy and tuned longer, three return {best:.2f}.")
+    table = read_table("beyond/leaders").set_index(["task", "size"])
+    assert (table["ahead"] != "ours").all() and table["rival"]["MountainCar", 2] == "oblique tree, constants"
     assert set(table.loc["SimpleGoal", "ahead"]) == set(table.loc["LunarLander", "ahead"]) == {"level"}
-    assert (table["ahead"] != "ours").all() and "our cells have a certain lead on no task" in " ".join(RESULTS.split())
-    means = read_table("beyond_equal").set_index(["task", "size", "method"])["mean"]
-    lander, constants = means["LunarLander"], means["MountainCar", 4, "oblique tree, constants"]
-    said = f"one linear map returns {lander[1, 'one linear map']:.1f}, two of our cells {lander[2, 'our cells']:.1f}"
-    assert said in " ".join(RESULTS.split()) and f"constant leaves returns {constants:.2f})" in notebook("09")
-    rows = all_rows("MountainCarContinuous-v0").set_index(["method", "size"])["mean"]
-    seeds = rows["oblique tree, constant leaves, DAgger, tuned", 2]
-    assert f"on average ({seeds.min():.1f} to {seeds.max():.1f} in seven seeds)" in notebook("06") and len(seeds) == 7
 
 
-def test_how_like_the_teacher_trees_are_is_that_of_the_rows():
-    apart = read_table("beyond_apart").query("task == 'SimpleGoal'").set_index("method")["r2 4"]
-    tree, cells = apart["oblique tree, greedy fit"], apart["our cells, greedy fit"]
-    assert f"a tree reaches {tree:.3f}, and cells {cells:.3f}, with four" in " ".join(RESULTS.split())
-    lander = all_rows("LunarLanderContinuous-v3").groupby(["method", "size"])["r2"].median().drop("teacher")
-    best = lander["oblique tree, linear leaves, DAgger", 32]
-    said = f"with 32 linear leaves reproduces {100 * best:.0f} % (on fewer states), more than any other row"
-    assert said in " ".join(RESULTS.split()) and best == lander.max()
-
-
-def test_how_often_faithful_landers_fail_is_that_of_the_table():
-    tail = read_table("beyond_tail").set_index(["method", "size"])["failing"]
-    faithful, teacher = (1000 * tail[about] for about in (("our cells, faithful", 8), ("teacher", 0)))
-    said = f"{faithful:.0f} landings in a thousand fail, {teacher:.0f} of the teacher's"
-    others = tail[tail.index.get_level_values("method") != "our cells, faithful"]
-    assert said in " ".join(RESULTS.split()) and 1000 * others.max() <= teacher
-
-
-def test_up_to_how_many_cells_seeds_agree():
-    sizes = read_table("beyond_sizes")
-    found = [largest_alike(sizes[sizes["task"] == task]) for task in ("SimpleGoal", "MountainCar", "Pendulum")]
-    said = f"with up to {found[0]} cells on SimpleGoal, {found[1]} on MountainCar and {found[2]} on Pendulum"
-    assert said in " ".join(RESULTS.split())
-
-
-def test_counts_of_the_readme_are_those_of_the_ledger():
-    counts = read_table("ledger").groupby("part")["verdict"].value_counts()
-    (results, of), (settings, of_settings) = (
-        (found["reproduced"], found["reproduced"] + found["differs"])
-        for found in (counts["results"], counts["settings"])
-    )
-    book = read_table("ledger")
-    wide = (book["wide"] & (book["verdict"] == "reproduced") & (book["part"] == "results")).sum()
-    assert quoted(f"{results} of {of} checkable results reproduce** ({wide} with a wide interval)")
-    assert quoted(f"and {settings} of {of_settings} settings. On")
-    counted = f"{results} of {of} checkable results reproduce, {wide} of them with a wide interval"
-    assert counted in " ".join(RESULTS.split())
-    checked = book[(book["part"] == "results") & book["verdict"].isin(["reproduced", "differs"])]
-    once = checked.drop_duplicates(["task", "subject", "value"])
-    again = f"{of - len(once)} of these results again, mostly in a table after the text; if each counts once, "
-    again += f"{(once['verdict'] == 'reproduced').sum()} of {len(once)} reproduce."
-    assert again in " ".join(RESULTS.split())
-    assert quoted(f"contradicts itself in {counts[:, 'contradicts itself'].sum()} values")
-
-
-def test_results_are_those_of_the_tables():
-    tables = {name: read_table(f"{name.lower()}_spread", index_col="metric") for name in ("SimpleGoal", "MountainCar")}
-    rows = re.findall(r"^\| (SimpleGoal|MountainCar), ([a-z]+)[^|]* \| (.*) \|$", RESULTS, flags=re.M)
-    assert len(rows) == 8
-    for task, metric, cells in rows:
-        expected = tables[task].rename(index={"Median/Q2": "Median"}).loc[metric.capitalize()]
-        assert cells.split(" | ") == [f"{value:.3f}" for value in expected]
-
-
-def test_ledger_counts_are_those_of_the_ledger():
-    book = read_table("ledger")
-    verdicts = ["reproduced", "differs", "cannot be checked", "contradicts itself"]
-    names = {"settings": "settings and counts", "results": "results", "coefficients": "coefficients[^|]*"}
-    for part, name in names.items():
-        (cells,) = re.findall(rf"^\| {name} \| (.*) \|$", RESULTS, flags=re.M)
-        found = book.loc[book["part"] == part, "verdict"].value_counts()
-        assert [int(n) for n in cells.split(" | ")] == [found.get(verdict, 0) for verdict in verdicts]
-
-
-def test_headline_is_that_of_the_table():
-    pattern = r"^\| (\w+) \| ([-\d.]+) \| (\d+) \| ([-\d.]+) \| (\d+) % \| ([-\d.]+) \| (\d+) % \|$"
-    assert re.findall(pattern, RESULTS, flags=re.M) == [
-        (row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f}",
-         f"{row['rival mean']:.2f}", f"{100 * row['rival reached']:.0f}")
-        for row in read_table("beyond_headline").to_dict("records")
+def test_the_headline_is_that_of_the_table():
+    assert rows_of(section("## Tuned for the return"), 7) == [
+        [row["task"], f"{row['teacher']:.2f}", f"{row['cells']}", f"{row['mean']:.2f}", f"{100 * row['reached']:.0f} %",
+         f"{row['rival mean']:.2f}", f"{100 * row['rival reached']:.0f} %"]
+        for row in read_table("beyond/headline").to_dict("records")
     ]  # fmt: skip
 
 
-def test_what_is_found_without_a_teacher_is_that_of_the_table():
-    table = read_table("beyond_ablation")
-    without = table[table["part"] == "no teacher"].set_index("task")["mean"]
-    lander = read_table("beyond_lunarlander").set_index(["method", "size"])["mean"]
-    pattern = r"SimpleGoal \(([\d.]+)\), and fail on Pendulum \((-[\d.]+)\) and LunarLander \(([\d.]+)\)"
-    (text,) = re.findall(pattern, RESULTS)
-    found = without["SimpleGoal"], without["Pendulum"], lander["refined, no teacher", 4]
-    assert text == tuple(f"{mean:.2f}" for mean in found)
-    said = " ".join(RESULTS.split())
-    assert f"one linear map per engine, tuned by our method, returns {lander['refined', 1]:.2f}" in said
+def test_the_limit_is_that_of_the_tables():
+    best = read_table("beyond/limit_references").set_index("task")
+    sizes = read_table("beyond/limit_sizes").set_index(["task", "size"])
+    rows = rows_of(section("## How good can a few cells be?"), 6)
+    assert len(rows) == 4
+    for task, possible, teacher, cells, mean, near in rows:
+        row = sizes.loc[task, int(cells)]
+        assert [mean, near] == [f"{row['mean']:.3f}", f"{row['near'] * row['policies']:.0f} of {row['policies']:.0f}"]
+        if task in best.index:
+            assert [possible, teacher] == [f"{best.loc[task, column]:.3f}" for column in ("best", "teacher")]
 
 
-def test_the_printed_policy_is_that_of_the_table():
-    table = table_text("beyond_pendulum_policy")
-    (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", RESULTS, flags=re.S)
-    cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
-    for row, (codeword, equation) in zip(table.splitlines()[1:], cells, strict=True):
-        found, printed = (
-            re.findall(r"-?\d+\.?\d*", text.replace("- ", "-")) for text in (row, f"{codeword} {equation}")
-        )
-        assert found == printed
+TABLES = {  # a task stands for the summary of its rows
+    ("README.md", "## Results"): "simplegoal_spread what_cells_buy faithful",
+    ("docs/explore.md", "### Three cells against thirteen"): "proofs_simplegoal",
+    ("docs/results.md", "## Did it reproduce?"):
+        "simplegoal_spread mountaincar_spread text_numbers what_cells_buy limit_references",
+    ("docs/results.md", "## A few equations that act like the teacher"):
+        "faithful headline leaders equal apart teachers LunarLanderContinuous-v3",
+    ("docs/results.md", "## Tuned for the return"):
+        "headline equal pendulum_policy SimpleGoal-v0 Pendulum-v1 MountainCarContinuous-v0 "
+        "LunarLanderContinuous-v3",
+    ("docs/results.md", "## How good can a few cells be?"):
+        "limit_references limit_sizes limit_starts limit_robots headline leaders",
+    ("docs/results.md", "## What is certain?"): "proofs_simplegoal proofs_pendulum proofs_teacher proofs_dead_points",
+}  # fmt: skip
 
 
-def test_what_cells_buy_is_that_of_the_table():
-    table = read_table("what_cells_buy")
-    block = RESULTS.partition("### What do the cells buy?")[2]
-    rows = re.findall(r"^\| ([^|]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", block, flags=re.M)
-    shown = {tuple(row[1:3]) for row in rows}, {tuple(row[3:]) for row in rows}
-    for (_, kinds), found in zip(table.groupby("task", sort=False), shown, strict=True):
-        kinds = kinds.to_dict("records")
-        assert found == {(f"{row['mean']:.2f}", f"{100 * row['failing']:.1f}") for row in kinds}
+def table_of(name):
+    """A table of the paper, one of ours, or the summary of a task's rows."""
+    if name in vsp.task_names():
+        return method_summary(all_rows(name))
+    return read_table(name if (ROOT / f"figures/tables/{name}.csv").exists() else f"beyond/{name}")
 
 
-def test_what_is_said_to_be_certain_is_in_its_tables():
-    block = " ".join(RESULTS.partition("## What is certain?")[2].partition("\n## ")[0].split())
-    rows = pd.read_csv(ROOT / "data/results/proofs.csv").set_index("name")
-    paper, one, tuned, margin, car = (
-        rows.loc[name]
-        for name in (
-            "simplegoal_paper",
-            "simplegoal_one_map",
-            "simplegoal_tuned",
-            "simplegoal_margin",
-            "mountaincar_limit",
-        )
-    )
-    three, explore = rows.loc["simplegoal_simplified"], (ROOT / "docs/explore.md").read_text("utf-8")
-    told = f"fail from {100 * three['pit']:.2f} % of all starts, the paper's thirteen from {100 * paper['pit']:.2f} %"
-    assert told in " ".join(explore.split()) and three["cells"] == 3
-    assert f"pit from {paper['pit']:.4%}".replace("%", " %") in block and f"map from {one['pit']:.4%}"[:-1] in block
-    assert tuned["program"] == margin["program"] == 1.0 and (tuned["cells"], margin["cells"]) == (4, 3)
-    assert f"goal within {tuned['program_steps']:.0f} steps" in block
-    assert f"same within {margin['program_steps']:.0f} steps" in block
-    assert f"off by {margin['disturbance']:.4f}" in block
-    assert f"({car['n_states']:,.0f} states after the first step) and returns at least {car['least']:.3f}" in block
-    assert pd.read_csv(ROOT / "data/results/proofs_reals.csv")["share"].item() == 1.0
-    for name in ("grid", "teacher"):
-        share = pd.read_csv(ROOT / f"data/results/proofs_{name}.csv")["share"].iloc[-1]
-        assert f"from {math.floor(1e4 * share) / 100:.2f} % of the starts" in block
+def values_of(tables):
+    """Every number in these tables, also in their texts, as it is and in percent."""
+    cells = pd.concat([pd.Series(table.to_numpy().ravel()) for table in tables]).dropna().astype(str)
+    values = np.array([float(number) for cell in cells for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", cell)])
+    return np.concatenate([values, 100 * values])
 
 
-def test_what_is_said_of_the_limit_is_in_its_tables():
-    block = RESULTS.partition("## How good can a few cells be?")[2].partition("\n## ")[0]
-    best, sizes, starts, robots = (
-        pd.read_csv(ROOT / f"figures/tables/limit_{name}.csv") for name in ("references", "sizes", "starts", "robots")
-    )
-    known = {row.task: f"{row.best:.3f} | {row.teacher:.3f}" for row in best.itertuples()}
-    teachers = pd.read_csv(ROOT / "figures/tables/beyond_headline.csv").set_index("task")["teacher"]
-    known["LunarLander"] = f"not known | {teachers['LunarLander']:.2f}"
-    cells = {"SimpleGoal": 4, "MountainCar": 3, "Pendulum": 8, "LunarLander": 3}
-    for row in sizes[[cells[row.task] == row.size for row in sizes.itertuples()]].itertuples():
-        near = f"{row.near * row.policies:.0f} of {row.policies}"
-        assert f"| {row.task} | {known[row.task]} | {row.size} | {row.mean:.3f} | {near} |" in block
-    robots, said = robots.set_index(["task", "method", "size"]), " ".join(block.split())
-    longer, many = (f"{row.mean:.3f} ({row.low:.2f} to {row.high:.2f}" for row in starts[1:3].itertuples())
-    assert f"generations reach {longer}), and twelve initial policies {many}; three seeds each)" in said
-    assert (starts["policies"][1:3] == 3).all()
-    proved = read_results("proofs").set_index("name")["mean_low"]
-    simplegoal, car = (f"{proved[f'{task}_limit']:.3f}" for task in ("simplegoal", "mountaincar"))
-    # The mean of max(10, 10 d + 9) over the unit square, by integration; notebook 07 sums over small squares
-    possible = 10 * (math.sqrt(2) + math.asinh(1)) / 3 + 9 + math.pi / 1200
-    assert f"return {simplegoal} (the best possible: {possible:.3f}), and one of MountainCar {car}." in said
-    failing = {row.task: f"{100 * row.failing:.2f} %" for row in sizes.itertuples() if cells[row.task] == row.size}
-    assert f"at most {failing['SimpleGoal']} on SimpleGoal and {failing['LunarLander']} on LunarLander" in said
-    walker, cheetah, ours = robots.loc["BipedalWalker"], robots.loc["HalfCheetah"], "cells, trained further"
-    map_, teacher, tree = "one map, random search", "robot's teacher", cheetah.loc[("oblique tree, trained further", 8)]
-    one, eight, sixteen = (cheetah.loc[(ours, k)] for k in (1, 8, 16))
-    large = cheetah.loc[("oblique tree, trained further", 16)]
-    assert f"are, returns {tree['mean']:.0f}, {100 * tree['share']:.0f} % of its teacher's return" in said
-    assert f"eight cells {eight['mean']:.0f} ({100 * eight['share']:.0f} %)" in said
-    assert f"Sixteen leaves return {large['mean']:.0f} ({100 * large['share']:.0f} %), sixteen cells" in said
-    assert f"cells {sixteen['mean']:.0f} ({100 * sixteen['share']:.0f} %)" in said
-    assert f"one cell returns {one['mean']:.0f}." in said and eight["most"] < tree["least"]
-    assert f"random search, returns {cheetah['mean'][map_, 0]:.0f}." in said and sixteen["most"] < large["least"]
-    assert cheetah["high"][map_, 0] < eight["low"] and cheetah["policies"][map_, 0] == eight["policies"] == 5
-    fives = [(map_, 0), *((kind + more, 8) for kind in ("cells", "oblique tree") for more in ("", ", trained further"))]
-    others = robots["policies"].drop([("HalfCheetah", *row) for row in fives])
-    assert (others[others.index.get_level_values("method") != teacher] == 3).all()
-    assert eight["high"] < tree["low"] and tree["policies"] == 5
-    alone = walker.loc[("oblique tree", 4)]
-    cells_alone = walker["mean"]["cells", 8]
-    assert f"by imitation alone it returns {alone['mean']:.1f}, and eight cells {cells_alone:.1f}." in said
-    assert alone["least"] > 300 and alone["share"] > 1
-    two, played = walker.loc[(ours, 2)], walker["mean"][teacher, 0]
-    least = math.floor(10 * two["least"]) / 10  # rounded down: "at least" must hold
-    two_cells = f"they return {two['mean']:.1f}, at least {least} with each of three seeds"
-    assert f"{two_cells} (interval {two['low']:.1f} to {two['high']:.1f}); its teacher returns {played:.1f}." in said
-    assert two["least"] > 0.98 * played
-    search = walker.loc[(map_, 0)]
-    assert f"returns {search['most']:.0f} in the best of three searches and {search['mean']:.1f} on average" in said
-    longer = walker.loc[("one map, longer search", 0)]
-    others = (3 * longer["mean"] - longer["most"]) / 2
-    assert f"returns {longer['most']:.0f}, the other two {others:.0f}." in said and longer["most"] > played
-    likeness = f"to {eight['r2']:.2f} on HalfCheetah and {walker['r2'][ours, 8]:.2f} on BipedalWalker."
-    assert f"lowers R²: with eight cells {likeness}" in said
+@pytest.mark.parametrize(("page", "title"), TABLES, ids=" ".join)
+def test_every_decimal_number_of_a_section_is_in_its_tables(page, title):
+    """Rounded as the text rounds it. A few come from elsewhere: the teacher's card, proofs, the mean by integration."""
+    possible = 10 * (math.sqrt(2) + math.asinh(1)) / 3 + 9 + math.pi / 1200  # the mean of max(10, 10 d + 9)
+    elsewhere = pd.DataFrame([vsp.load_teacher("SimpleGoal-v0").card["score"]["mean"], possible])
+    values = values_of([*map(table_of, TABLES[page, title].split()), read_results("proofs"), elsewhere])
+    numbers = re.findall(r"(?<!Figure )(?<![\w.,])(-?\d+\.\d+|\d+(?= %))", section(title, page))
+    digits = {number: len(number.partition(".")[2]) for number in numbers}
+    assert len(numbers) > 1
+    missing = [n for n in digits if not np.isclose(values.round(digits[n]), float(n), rtol=0, atol=1e-9).any()]
+    assert missing == []
 
 
 def notebook(name):
@@ -361,13 +209,19 @@ def notebook(name):
     return " ".join(" ".join(cell.source for cell in cells if cell.cell_type == "markdown").split())
 
 
+def test_up_to_how_many_cells_seeds_agree_is_that_of_the_table():
+    sizes = dict(list(read_table("beyond/sizes").groupby("task")))
+    said = "with up to {} cells on SimpleGoal, {} on MountainCar and {} on Pendulum"
+    most = (largest_alike(sizes[task]) for task in ("SimpleGoal", "MountainCar", "Pendulum"))
+    assert said.format(*most) in " ".join(RESULTS.split())
+
+
 def test_episodes_that_the_text_compares_are_those_of_the_table():
-    table = read_table("beyond_budgets").set_index(["task", "method"])
-    seen, tuning = table["teacher"].unstack("task"), table["tuning"].unstack("task")
-    times = seen.loc["our cells, faithful"] / seen.loc["our cells"]
+    table = read_table("beyond/budgets").set_index(["task", "method"])
+    episodes, tuning = table["teacher"].unstack("task"), table["tuning"].unstack("task")
+    times = episodes.loc["our cells, faithful"] / episodes.loc["our cells"]
     said = f"{times.min():.0f} to {times.max():.0f} times as many episodes of the teacher"
-    for text in (" ".join(RESULTS.split()), notebook("06"), notebook("09")):
-        assert said in text
+    assert all(said in text for text in (" ".join(RESULTS.split()), notebook("06"), notebook("09")))
     more = tuning.loc["our cells, tuned"] / tuning.filter(regex="axis tree.*tuned", axis=0).min()
     assert f"our cells get up to {more.max():.1f} times as many as an axis tree" in notebook("06")
 
@@ -376,7 +230,7 @@ def test_how_far_mountaincar_is_from_the_paper_is_that_of_the_ledger():
     row, said = read_table("ledger", index_col="id"), notebook("05")
     teacher = row["here"]["mc_drl_mean"] - row["value"]["mc_drl_mean"]
     implied = quartiles_from_fences(row["value"]["mc_ours_whisker_low"], row["value"]["mc_ours_whisker_high"])
-    ours = [row["here"][f"mc_spread_ours_{name}"] for name in ("q1", "q3")]
-    below = [round(mine - theirs, 1) for mine, theirs in zip(ours, implied, strict=True)]
-    assert f"returns {teacher:.2f} more than the paper's." in said and 0.4 < teacher / below[0] < 0.55
-    assert below[0] == below[1] and f"lie {below[0]} below the rerun's" in said
+    rerun = [row["here"][f"mc_spread_ours_{name}"] for name in ("q1", "q3")]
+    (below,) = {round(here - there, 1) for here, there in zip(rerun, implied, strict=True)}
+    assert f"returns {teacher:.2f} more than the paper's." in said and 0.4 < teacher / below < 0.55
+    assert f"lie {below} below the rerun's" in said

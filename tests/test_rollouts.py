@@ -5,10 +5,9 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
 import vsp
-import vsp_beyond
-from vsp.rollouts import collect_episodes, rollout, standard, visited_states
-from vsp.tasks.base import GOAL, PIT, TRUNCATED
-from vsp.tasks.registry import get_task
+from vsp import collect_episodes, get_task, rollout, visited_states
+from vsp.rollouts import standard
+from vsp.tasks import GOAL, PIT, TRUNCATED
 
 PLAYERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 
@@ -16,7 +15,7 @@ PLAYERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 def test_three_episodes_by_hand():
     """Left by a tenth per step: into the goal after 2 steps, into the pit after 1, against the wall for 50."""
     starts = np.array([[0.25, 0.05], [0.65, 0.5], [0.25, 0.95]])
-    result = rollout(Constant(-1.0, 0.0), get_task(SIMPLEGOAL), starts)
+    result = rollout(Constant(-1.0, 0.0), SIMPLEGOAL, starts)
     assert result.lengths.tolist() == [2, 1, 50] and result.outcomes.tolist() == [GOAL, PIT, TRUNCATED]
     first_step = 10 * (np.hypot(0.25, 0.05) - np.hypot(0.15, 0.05))
     to_the_wall = 10 * (np.hypot(0.25, 0.95) - 0.95)
@@ -25,7 +24,7 @@ def test_three_episodes_by_hand():
 
 def test_recorded_episodes_by_hand():
     starts = np.array([[0.25, 0.05], [0.65, 0.5]])
-    first, second = collect_episodes(Constant(-1.0, 0.125), get_task(SIMPLEGOAL), starts)
+    first, second = collect_episodes(Constant(-1.0, 0.125), SIMPLEGOAL, starts)
     assert np.allclose(first.states, [[0.25, 0.05], [0.15, 0.0625]]) and np.allclose(second.states, [[0.65, 0.5]])
     assert first.actions.tolist() == [[-1, 0.125]] * 2 and second.actions.tolist() == [[-1, 0.125]]
     assert first.states.dtype == first.actions.dtype == np.float64
@@ -33,48 +32,34 @@ def test_recorded_episodes_by_hand():
 
 def test_visited_states_by_hand():
     """Down the diagonal, episode by episode, the goal itself not acted in."""
-    states = visited_states(Constant(-1.0, -1.0), get_task(SIMPLEGOAL), np.array([[0.25, 0.25], [0.15, 0.05]]))
+    states = visited_states(Constant(-1.0, -1.0), SIMPLEGOAL, np.array([[0.25, 0.25], [0.15, 0.05]]))
     assert np.allclose(states, [[0.25, 0.25], [0.15, 0.15], [0.15, 0.05]])
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_playing_and_recording_agree_and_an_episode_is_the_same_alone(task):
+def test_playing_and_recording_agree_and_an_episode_is_the_same_by_itself(task):
     player, task = PLAYERS[task], get_task(task)
     starts = task.start(np.random.default_rng(0), 40)
     result, episodes = rollout(player, task, starts), collect_episodes(player, task, starts)
     assert [len(e.states) for e in episodes] == [len(e.actions) for e in episodes] == result.lengths.tolist()
     assert np.allclose([e.states[0] for e in episodes], starts, atol=1e-7)
     for i in (0, 17, 39):
-        alone, one = rollout(player, task, starts[i : i + 1]), collect_episodes(player, task, starts[i : i + 1])[0]
-        assert (alone.returns[0], alone.lengths[0]) == (result.returns[i], result.lengths[i])
-        assert same_arrays((one.states, episodes[i].states), (one.actions, episodes[i].actions))
+        single, (episode,) = (call(player, task, starts[i : i + 1]) for call in (rollout, collect_episodes))
+        assert (single.returns[0], single.lengths[0]) == (result.returns[i], result.lengths[i])
+        assert same_arrays((episode.states, episodes[i].states), (episode.actions, episodes[i].actions))
 
 
-@pytest.mark.parametrize("task", TASKS)
-def test_the_policy_sees_float32_and_the_state_stays_as_exact_as_the_environment_keeps_it(task):
-    seen = []
-
-    class Spy:
-        def predict(self, obs):
-            seen.append(obs.copy())
-            return PLAYERS[task].predict(obs)
-
-    starts = get_task(task).start(np.random.default_rng(0), 3)
-    episodes = collect_episodes(Spy(), get_task(task), starts)
-    assert all(obs.dtype == np.float32 for obs in seen)
-    assert np.array_equal(episodes[0].states[0], starts[0].astype(np.float32).astype(np.float64))
-
-
-def test_finished_episodes_are_not_asked_again():
-    asked = []
+def test_the_policy_gets_float32_of_the_episodes_that_still_run():
+    batches, starts = [], np.array([[0.25, 0.05], [0.65, 0.5], [0.15, 0.05]])
 
     class Spy(Constant):
         def predict(self, obs):
-            asked.append(len(obs))
+            batches.append((obs.dtype, len(obs)))
             return super().predict(obs)
 
-    rollout(Spy(-1.0, 0.0), get_task(SIMPLEGOAL), np.array([[0.25, 0.05], [0.65, 0.5], [0.15, 0.05]]))
-    assert asked == [3, 1]
+    episodes = collect_episodes(Spy(-1.0, 0.0), SIMPLEGOAL, starts)
+    assert batches == [(np.float32, 3), (np.float32, 1)]
+    assert np.array_equal(episodes[0].states[0], starts[0].astype(np.float32).astype(np.float64))
 
 
 def test_a_constant_variable_keeps_its_unit():
@@ -91,7 +76,5 @@ def test_rewards_that_are_no_numbers_are_one_clear_error():
         return moved, np.full_like(rewards, np.nan), outcomes
 
     task = dataclasses.replace(plain, name="Broken", step=step)
-    config = vsp_beyond.Faithful(n_cells=2, n_episodes=5, n_restarts=1, n_validation=5)
-    for call in (vsp.evaluate, lambda teacher, task, n, seed: vsp_beyond.faithful(teacher, task, config, seed=seed)):
-        with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
-            call(Constant(-1.0, -1.0), task, 3, seed=0)
+    with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
+        vsp.evaluate(Constant(-1.0, -1.0), task, 3, seed=0)

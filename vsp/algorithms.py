@@ -2,12 +2,12 @@
 
 Two speed-ups leave the algorithm unchanged. The teacher's episodes do not depend on the partition, so they are rolled
 out in large batches ahead of the loop. The cells' models are stacked, so one step trains all of them. "l. 4" is a line
-of the algorithm as the paper prints it; "R4" is an open question, a field of `Config`.
+of the algorithm as the paper prints it; "R1" is an open question, a field of `Config` or a pass of `paper.readings`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -25,14 +25,21 @@ from .tasks import Task
 EPISODES_AHEAD = 500
 VERSION = 1  # increase it when a change makes the same arguments give another policy
 
+SplitPass = Callable[[Partition, Episode, Config, np.random.Generator], list[np.ndarray]]
+MergePass = Callable[[Partition, Config], list[np.ndarray]]
+
 
 @threadpool_limits.wrap(limits=1)  # the same sums in the same order on any machine
-def distill(teacher: Policy, task: Task, config: Config, *, seed: int) -> tuple[VoronoiPolicy, History]:
+def distill(
+    teacher: Policy, task: Task, config: Config, *, seed: int, split: SplitPass | None = None,
+    merge: MergePass | None = None,
+) -> tuple[VoronoiPolicy, History]:  # fmt: skip
     """Algorithm 1: imitate `teacher` by sub-policies, each valid in the Voronoi cell of its codeword.
 
-    Returns the policy and the history of the run. The same arguments give the same policy. `vsp.distill` checks the
-    arguments first.
+    `split` and `merge` replace Algorithms 2 and 3, as `paper.readings` does. Returns the policy and the history of the
+    run. The same arguments give the same policy. `vsp.distill` checks the arguments first.
     """
+    split, merge = split or split_regions, merge or merge_regions
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     partition, history = Partition(task, config), History(config.n_iterations)
     for n, episode in enumerate(teacher_episodes(teacher, task, config.n_iterations, starts)):
@@ -42,9 +49,11 @@ def distill(teacher: Policy, task: Task, config: Config, *, seed: int) -> tuple[
         loss = partition.train(batches)  # l. 13-15
         if may_alter(n, config):  # l. 16
             if due(n, config.n_split, config):  # l. 17-19
-                history.add_events(n, "split", split_regions(partition, episode, config, init))
+                splits = split(partition, episode, config, init)
+                history.add_events(n, "split", splits)
             if due(n, config.n_merge, config):  # l. 20-22
-                history.add_events(n, "merge", merge_regions(partition, config))
+                merges = merge(partition, config)
+                history.add_events(n, "merge", merges)
         if due(n, config.n_reset, config) and config.periodic_reset == "buffers":  # R5
             partition.clear()
         history.observe(n, loss, partition)
@@ -56,55 +65,37 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
     Returns the new codewords, each (d,).
     """
-    cells, losses = partition.cells(episode.states), np.zeros(len(episode.states))
-    previous, first, added = None, 0, []  # the running loss averages over the states from `first` on
-    for t, (state, action) in enumerate(zip(episode.states, episode.actions)):
-        i = cells[t]  # l. 4
+    previous, losses, added = None, [], []
+    for state, action in zip(episode.states, episode.actions):
+        i = partition.locate(state)  # l. 4
         if i != previous:  # l. 5-8
-            previous, first = i, t
-        losses[t] = partition.loss(i, state, action)  # l. 9
-        if losses[first : t + 1].mean() > config.max_pol_loss and partition.far(i, state):  # l. 10
-            before = partition.neighbours()[i]
-            j = partition.add(state, rng)  # l. 11-12
-            near = np.append(before, False) if config.split_neighbours == "old" else partition.neighbours()[j]  # R13
-            near[i] |= config.split_reset == "cell_and_neighbours"  # R13
-            partition.reset(near)  # l. 13-14
+            previous, losses = i, []
+        losses.append(partition.loss(i, state, action))  # l. 9
+        if np.mean(losses) > config.max_pol_loss and partition.far(i, state):  # l. 10
+            affected = np.append(partition.neighbours()[i], False)  # the old region's neighbours (R13)
+            affected[i] = True
+            partition.add(state, rng)  # l. 11-12
+            partition.reset(affected)  # l. 13-14
             added.append(state.copy())  # a view would keep the whole batch of episodes in memory
+            losses = []  # R14
             if config.one_split:  # R4
                 break
-            if config.split_lookup == "refreshed":  # R2
-                cells = partition.cells(episode.states)
-            if config.loss_after_split == "reset":  # R14
-                first = t + 1
     return added
 
 
 def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
     """Algorithm 3: for each cell, remove neighbours with similar parameters. Returns the removed codewords."""
-    k = len(partition.codewords)
-    parameters = partition.comparable_parameters()
-    alive = np.ones(k, dtype=bool)
-    members, graph = alive, partition.neighbours()  # the graph of `members`, recomputed only when these change
-    for i in range(k):  # l. 1
-        if not alive[i] and not config.merge_visits_removed:  # R6
-            continue
-        now = alive.copy()
-        now[i] = True
-        if not np.array_equal(now, members):
-            members, graph = now, partition.neighbours(now)
-        near = np.zeros(k, dtype=bool)
-        near[members] = graph[members[:i].sum()]  # l. 2
-        apart = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
-        similar = near & alive & (apart < config.min_param_distance)  # l. 3-4
-        if not alive[i]:
-            similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other
+    before, i = partition.codewords, 0
+    while i < len(partition.codewords):  # l. 1
+        parameters, near = partition.comparable_parameters(), partition.neighbours()[i]  # l. 2
+        distances = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
+        similar = near & (distances < config.min_param_distance)  # l. 3-4
         if similar.any():
-            alive = alive & ~similar  # l. 5-6
-            near[i] |= config.merge_reset == "survivor_and_neighbours"  # R6
+            near[i] = True  # R6
             partition.reset(near)  # l. 7
-    removed = list(partition.codewords[~alive])
-    partition.keep(alive)
-    return removed
+            partition.keep(~similar)  # l. 5-6
+        i += 1 - similar[:i].sum()  # removed cells before this one moved it up
+    return [codeword for codeword in before if not (partition.codewords == codeword).all(axis=1).any()]
 
 
 def may_alter(n: int, config: Config) -> bool:

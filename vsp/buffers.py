@@ -10,6 +10,9 @@ from collections import deque
 
 import numpy as np
 
+from .config import Config
+from .subpolicies import SubPolicies
+
 
 class Buffers:
     """Growing per-cell buffers with uniform minibatches: one log of rows, and a list of row numbers per cell.
@@ -51,6 +54,13 @@ class Buffers:
         slots = (rng.random((len(cells), size)) * self.counts[cells, None]).astype(np.intp)
         rows = self._table[cells[:, None], slots]
         return self._inputs.take(rows, axis=0), self._actions.take(rows, axis=0)
+
+    def fit(self, models: SubPolicies, cells: np.ndarray, config: Config, rng: np.random.Generator) -> np.ndarray:
+        """Train the models of `cells` (c,) on minibatches. Returns each cell's loss before the last step. (c,)"""
+        for _ in range(config.n_minibatches):
+            inputs, actions = self.sample(cells, config.batch_size, rng)
+            losses = models.train(cells, inputs, actions, learning_rate=config.learning_rate)
+        return losses
 
     def add(self) -> None:
         """Append the empty buffer of a new cell."""
@@ -96,6 +106,12 @@ class SufficientStatistics:
         squares = self.squares[cells] + (parameters * (products @ parameters - 2 * targets)).sum(axis=(1, 2))
         return np.maximum(squares, 0.0) / (self.counts[cells] * targets.shape[2])  # rounding may go below 0
 
+    def fit(self, models: SubPolicies, cells: np.ndarray, config: Config, rng: np.random.Generator) -> np.ndarray:
+        """Solve least squares for the models of `cells` (c,). Returns each cell's loss before. (c,)"""
+        losses = self.losses(cells, models.parameters[cells])
+        models.solve(cells, self.products[cells], self.targets[cells])
+        return losses
+
     def add(self) -> None:
         """Append the empty sums of a new cell."""
         for name in ("products", "targets", "squares", "counts"):
@@ -115,6 +131,9 @@ class SufficientStatistics:
     def clear(self) -> None:
         """Set all sums to zero."""
         self.reset(slice(None))
+
+
+FITS = {"adam": Buffers, "closed_form": SufficientStatistics}  # `Config.fit` to the data that it needs
 
 
 class RecentStates:

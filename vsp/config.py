@@ -1,7 +1,8 @@
 """`Config`: the hyperparameters of the paper (table T2), and its open questions R1 to R15 as fields with defaults.
 
-Code that depends on an open question names it: search this folder for "R9", for example. R11 (which states a splitting
-pass reads) is not a field, because the paper's prose answers it: "this iteration's episode".
+Code that depends on an open question names it: search this folder for "R9", for example. R2, R6, R13 and R14, which
+change the passes themselves, are in `paper.readings`. R11 (which states a splitting pass reads) is answered by the
+paper's prose: "this iteration's episode".
 """
 
 from __future__ import annotations
@@ -48,20 +49,11 @@ class Config:
     freeze: Literal["last_n_freeze", "first_n_freeze", "last_n_split"] = "last_n_freeze"
     """R1. When cells are neither split nor merged: in the last `n_freeze` iterations (prose, twice), in all but the
     first `n_freeze` iterations (Algorithm 1 prints n < n_freeze), or in the last `n_split` (prose, once)."""
-    split_lookup: Literal["refreshed", "kept"] = "refreshed"
-    """R2. The codewords among which a splitting pass looks states up: all, including those that it has just added
-    (Algorithm 2 has line 4 inside the loop), or those that existed before the pass."""
     split_metric: Literal["manhattan", "euclidean"] = "manhattan"
     """R3. Metric of `min_pol_distance`. In T3, 1 pair of codewords is closer than 0.3 in Manhattan distance, which the
     look-up uses; 12 pairs are closer in Euclidean distance."""
     periodic_reset: Literal["buffers", "off"] = "buffers"
     """R5. What happens every `n_reset` iterations: nothing, or all buffers are cleared, which also bounds memory."""
-    merge_reset: Literal["survivor_and_neighbours", "neighbours"] = "survivor_and_neighbours"
-    """R6. Buffers that a merge resets: those of the survivor and its neighbours (prose), or of the neighbours only
-    (Algorithm 3)."""
-    merge_visits_removed: bool = False
-    """R6. Whether a cell removed earlier in the pass is still visited, as in Algorithm 3, which removes while it
-    iterates. If so, it may only remove cells that are visited later; otherwise equal cells would remove each other."""
     batch_size: int = 64
     """R7. States per minibatch and cell, drawn with replacement. The paper does not state it."""
     n_minibatches: int = 1
@@ -86,20 +78,12 @@ class Config:
     box."""
     merge_parameters: Literal["all", "weights"] = "all"
     """R12. Whether `min_param_distance` compares biases too: "both sets of parameters" includes them."""
-    split_reset: Literal["cell_and_neighbours", "neighbours"] = "cell_and_neighbours"
-    """R13. Buffers that a split resets: those of the neighbours and of the split cell, which still holds states of the
-    new cell, or those of the neighbours only (Algorithm 2)."""
-    split_neighbours: Literal["old", "new"] = "old"
-    """R13. Which neighbours a split resets: those of the split cell (prose: "of the old region") or of the new cell."""
-    loss_after_split: Literal["reset", "kept"] = "reset"
-    """R14. Whether the running loss restarts after a split. The paper does not state it. By default it restarts, since
-    the split already responds to the loss so far."""
     inclusive: bool = False
     """R15. The range of n. False: n = 0 ... n_epochs - 1; n = 0, where one cell was trained once, neither splits nor
     merges. True: n = n_epochs is included ("n = 0 to n_epochs"), and n = 0 splits and merges."""
 
     # Beyond the paper
-    sub_policy: Literal["linear", "constant", "quadratic", "pid", "network"] = "linear"
+    sub_policy: Literal["linear", "constant", "quadratic", "pid"] = "linear"
     """Class of the sub-policies, an entry of `subpolicies.POLICY_CLASSES`; the paper's is linear."""
     fit: Literal["adam", "closed_form"] = "adam"
     """How each iteration fits a cell: by `n_minibatches` steps of Adam, or by least squares over all states since the
@@ -113,10 +97,6 @@ class Config:
                 f"n_freeze is {self.n_freeze}, expected at most n_epochs = {self.n_epochs}: "
                 "lower n_freeze or raise n_epochs"
             )
-        if self.sub_policy == "network" and self.fit == "closed_form":
-            raise ValueError("fit is 'closed_form', expected 'adam' for networks: they are not linear in parameters")
-        if self.sub_policy == "network" and self.initial == "zeros":
-            raise ValueError("initial is 'zeros', expected 'uniform' for networks: equal units would stay equal")
 
     @property
     def n_iterations(self) -> int:

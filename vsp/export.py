@@ -7,25 +7,38 @@ divided by the scale of the distance, and states are divided before distances ar
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from .checks import check_count
-from .subpolicies.base import SHARED, number
-
-if TYPE_CHECKING:
-    from .policy import VoronoiPolicy
+from .subpolicies.base import SHARED, PolicyClass, number
+from .tasks.base import Task
 
 # What LaTeX would take as a command
 _SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
 _SYMBOLS = {
     "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
-    "cos ": r"\cos ", "sin ": r"\sin ", "tanh": r"\tanh",
+    "cos ": r"\cos ", "sin ": r"\sin ",
 }  # fmt: skip
 
 
-def to_json(policy: VoronoiPolicy) -> str:
+class Exportable(Protocol):
+    """What these functions read of a `VoronoiPolicy`."""
+
+    task: Task
+    policy_class: PolicyClass
+    metric: str
+    codewords: np.ndarray  # (k, d)
+    coefficients: np.ndarray  # (k, p, m)
+    scale: np.ndarray  # (d,)
+
+    def __len__(self) -> int: ...
+
+    def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]: ...
+
+
+def to_json(policy: Exportable) -> str:
     """Return all numbers of the policy by name, as JSON."""
     task = policy.task
     about = {
@@ -44,7 +57,7 @@ def to_json(policy: VoronoiPolicy) -> str:
     return json.dumps(about, ensure_ascii=False, indent=1) + "\n"
 
 
-def to_python(policy: VoronoiPolicy) -> str:
+def to_python(policy: Exportable) -> str:
     """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
 
     It imports only the standard library. For a state that is not finite the functions return -1 and nan.
@@ -79,7 +92,10 @@ def to_python(policy: VoronoiPolicy) -> str:
         f"    distances = [{distance} for codeword in CODEWORDS]",
         "    return distances.index(min(distances))",
         "",
-        policy.policy_class.OUTPUT_IN_PYTHON,
+        "",
+        "def output(row, features):",
+        "    return sum(w * f for w, f in zip(row, features))",
+        "",
         "",
         "def act(state):",
         f'    """From [{_names(task.inputs)}] to [{_names(task.outputs)}]; nan for a state that is not finite."""',
@@ -93,7 +109,7 @@ def to_python(policy: VoronoiPolicy) -> str:
     ])  # fmt: skip
 
 
-def to_c(policy: VoronoiPolicy) -> str:
+def to_c(policy: Exportable) -> str:
     """Return C99 code with `int vsp_cell(const double *state)` and `void vsp_act(const double *state, double *action)`.
 
     It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
@@ -105,7 +121,6 @@ def to_c(policy: VoronoiPolicy) -> str:
         "euclidean": "distance += gap * gap;",
         "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
     }[policy.metric]
-    output = policy.policy_class.OUTPUT_IN_C.replace("INPUTS", str(inputs))
     root = "        distance = sqrt(distance);\n" if policy.metric == "euclidean" else ""
     return f"""/* {_escaped(_headline(policy))}
    state: {_names(policy.task.inputs)}; action: {_names(policy.task.outputs)}. */
@@ -135,7 +150,13 @@ int vsp_cell(const double *state) {{
     }}
     return nearest;
 }}
-{output}
+
+static double output(const double *row, const double *features) {{
+    double sum = 0.0;
+    for (int i = 0; i < {inputs}; i++) sum += row[i] * features[i];
+    return sum;
+}}
+
 void vsp_act(const double *state, double *action) {{
     const double features[{inputs}] = {{{policy.policy_class.feature_code()}}};
     int i = vsp_cell(state);
@@ -147,7 +168,7 @@ void vsp_act(const double *state, double *action) {{
 """
 
 
-def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+def to_text(policy: Exportable, digits: int | None = 3) -> str:
     """Return the whole policy in words: the distance, and the equations of every codeword."""
     lines = [_headline(policy)]
     if len(policy) > 1:
@@ -161,7 +182,7 @@ def to_text(policy: VoronoiPolicy, digits: int | None = 3) -> str:
     return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
 
 
-def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
+def _of_scaled(policy: Exportable, digits: int | None) -> str:
     """Return the scale of the distance in words; an empty text for raw states."""
     if (policy.scale == 1).all():
         return ""
@@ -169,7 +190,7 @@ def _of_scaled(policy: VoronoiPolicy, digits: int | None) -> str:
     return f" of states divided, {', '.join(units)}"
 
 
-def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+def to_latex(policy: Exportable, digits: int | None = 3) -> str:
     """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
     outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
     rows = [
@@ -185,7 +206,7 @@ def to_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
     )
 
 
-def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
+def distances_latex(policy: Exportable, digits: int | None = 3) -> str:
     """Describe the distance to the codewords, as a caption for their table."""
     if len(policy) == 1:
         return "One cell, wherever its codeword is"
@@ -195,13 +216,13 @@ def distances_latex(policy: VoronoiPolicy, digits: int | None = 3) -> str:
     return f"{policy.metric.capitalize()} distances of states divided by $[{units}]$"
 
 
-def codeword_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> str:
+def codeword_latex(policy: Exportable, cell: int, digits: int | None = 3) -> str:
     """Return the codeword of a cell between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return "$[" + ",\\ ".join(number(c, digits) for c in policy.codewords[cell]) + "]$"
 
 
-def equations_latex(policy: VoronoiPolicy, cell: int, digits: int | None = 3) -> list[str]:
+def equations_latex(policy: Exportable, cell: int, digits: int | None = 3) -> list[str]:
     """Return the right-hand sides of the equations of a cell, one per action, between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return [f"${policy.policy_class.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
@@ -224,7 +245,7 @@ def symbol(name: str) -> str:
     return rf"\mathrm{{{name}}}" if name.isalpha() and len(name) > 1 else name
 
 
-def _headline(policy: VoronoiPolicy) -> str:
+def _headline(policy: Exportable) -> str:
     if len(policy) == 1:
         return f"{policy.task.name}: one {policy.policy_class.name} policy."
     policies = f"{len(policy)} {policy.policy_class.name} policies"

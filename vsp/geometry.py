@@ -51,6 +51,11 @@ def look_up(
     return index
 
 
+def gap(state: np.ndarray, codeword: np.ndarray, metric: str) -> float:
+    """Distance of one state (d,) to one codeword (d,), without checks."""
+    return cdist(state[None], codeword[None], METRICS[metric][0])[0, 0]
+
+
 def all_differ(points: np.ndarray) -> bool:
     """Whether no two of `points` (n, d) are equal."""
     return len(set(map(tuple, points.tolist()))) == len(points)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import geometry
-from .buffers import Buffers, RecentStates, SufficientStatistics
-from .checks import check_array
+from .buffers import FITS, RecentStates
 from .config import Config
 from .policy import VoronoiPolicy
 from .rollouts import Episode
@@ -17,17 +16,17 @@ from .tasks import Task
 class Partition:
     """The state of a distillation: codewords, the cells' models, their buffers.
 
-    `add`, `observe` and `locate` check their arguments: they raise ValueError for states that do not fit the task. The
-    other methods do not check, because a run calls them thousands of times.
+    `observe` checks its episode. The other methods do not check, because a run calls them thousands of times.
     """
 
     def __init__(self, task: Task, config: Config):
         d, m = len(task.low), len(task.action_low)
         self.task, self.config = task, config
         self.codewords = np.zeros((0, d))
+        self._graph: np.ndarray | None = None  # of the neighbours, while the codewords stay
         self.models = SubPolicies(policy_class(config.sub_policy, task), m, initial=config.initial)
         q = len(self.models.policy_class.terms)
-        self.buffers = Buffers(q, m) if config.fit == "adam" else SufficientStatistics(q, m)
+        self.buffers = FITS[config.fit](q, m)
         self.recent = RecentStates(geometry.WITNESSES)
         self.scale = np.ones(d) if config.scale == "raw" else task.high - task.low  # R8
 
@@ -46,31 +45,23 @@ class Partition:
     def train(self, rng: np.random.Generator) -> float:
         """Train every cell that has data. Returns the mean loss over cells."""
         cells = np.flatnonzero(self.buffers.counts)
-        if isinstance(self.buffers, SufficientStatistics):
-            losses = self.buffers.losses(cells, self.models.parameters[cells])
-            self.models.solve(cells, self.buffers.products[cells], self.buffers.targets[cells])
-            return float(losses.mean())
-        for _ in range(self.config.n_minibatches):
-            inputs, actions = self.buffers.sample(cells, self.config.batch_size, rng)
-            losses = self.models.train(cells, inputs, actions, learning_rate=self.config.learning_rate)
-        return float(losses.mean())
+        return float(self.buffers.fit(self.models, cells, self.config, rng).mean())
 
     def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
         """Make `state` (d,) the codeword of a new, untrained cell. Returns its index.
 
         Raises ValueError if `state` is a codeword already.
         """
-        state = check_array("state", state, (len(self.task.low),))
         if (self.codewords == state).all(axis=1).any():
             raise ValueError(f"state {state.tolist()} is a codeword already, expected another")
-        self.codewords = np.concatenate([self.codewords, state[None]])
+        self.codewords, self._graph = np.concatenate([self.codewords, state[None]]), None
         self.models.add(rng)
         self.buffers.add()
         return len(self.codewords) - 1
 
     def keep(self, kept: np.ndarray) -> None:
         """Keep only the cells of the mask `kept` (k,)."""
-        self.codewords = self.codewords[kept]
+        self.codewords, self._graph = self.codewords[kept], None
         self.models.keep(kept)
         self.buffers.keep(kept)
 
@@ -95,16 +86,14 @@ class Partition:
         return states if self.config.scale == "raw" else states / self.scale
 
     def locate(self, state: np.ndarray) -> int:
-        """Cell of one state (d,). Raises ValueError if it does not fit the task."""
-        return int(self.cells(check_array("state", state, (len(self.task.low),))[None])[0])
+        """Cell of one state (d,). Raises ValueError for a state of another length."""
+        return int(self.cells(state[None])[0])
 
     def far(self, i: int, state: np.ndarray) -> bool:
         """Whether `state` is far enough from codeword i to become one (R3), and is not a codeword already."""
-        gap = geometry.distances(
-            self.scaled(state[None]), self.scaled(self.codewords[i][None]), self.config.split_metric
-        )
-        # A teacher that pushes against the border stands still: with split_lookup="kept" a state could be added twice.
-        return gap[0, 0] > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
+        gap = geometry.gap(self.scaled(state), self.scaled(self.codewords[i]), self.config.split_metric)
+        # A teacher that pushes against the border stands still: with kept look-ups (R2) a state could be added twice.
+        return gap > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
 
     def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
         """Mean squared error of cell i's action at `state` against the teacher's."""
@@ -113,9 +102,15 @@ class Partition:
             own = np.clip(own, self.task.action_low, self.task.action_high)
         return float(np.square(own - action).mean())
 
-    def neighbours(self, members: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Which cells of `members` are neighbours (R9). (k, k) bool"""
-        codewords = self.scaled(self.codewords[members])
+    def neighbours(self) -> np.ndarray:
+        """Which cells are neighbours (R9). (k, k) bool"""
+        if self._graph is None or self.config.neighbours == "visited":  # the visited states change, too
+            self._graph = self.neighbours_of(self.codewords)
+        return self._graph.copy()
+
+    def neighbours_of(self, codewords: np.ndarray) -> np.ndarray:
+        """Which cells are neighbours if these are all `codewords` (k, d). (k, k) bool"""
+        codewords = self.scaled(codewords)
         if self.config.neighbours == "lookup":
             return geometry.lookup_neighbours(codewords, self.scaled(self.task.low), self.scaled(self.task.high))
         if self.config.neighbours == "visited":

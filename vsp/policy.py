@@ -28,7 +28,7 @@ class Explanation:
     """Why a policy acts as it does in one state; `print` shows it as text.
 
     `cell` is its index. It has a `codeword` (d,) and `equations`, one per action, such as "F = 0.5 x - 1.2 v + 0.3".
-    `contributions` has a row per action and a column per feature and the bias (or rest). A row adds up to `raw` (m,),
+    `contributions` has a row per action and a column per feature and the bias. A row adds up to `raw` (m,),
     the output of the sub-policy; `action` (m,) is `raw` limited to the action box. `next_cell` is the cell with the
     second nearest codeword, None if there is one cell. `margin` is the distance to that codeword minus the distance to
     the nearest, in the look-up metric. `borders` has a row per input: the least change of it alone that reaches another

@@ -136,11 +136,10 @@ def guide(lessons: dict[str, NotebookNode]) -> str:
 
 def _overview(name: str, lesson: NotebookNode) -> str:
     """Title, aims and exercises with their points."""
-    exercises = [
-        re.search(r"^## (Exercise .*)", cell.source, re.MULTILINE) for cell in lesson.cells if not is_slide(cell)
-    ]
+    text = "\n".join(cell.source for cell in lesson.cells if not is_slide(cell))
+    exercises = re.findall(r"^## (Exercise .*)", text, re.MULTILINE)
     worth = [cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell)]
-    rows = [f"| {found[1]} | {n} |" for found, n in zip(filter(None, exercises), worth, strict=True)]
+    rows = [f"| {exercise} | {n} |" for exercise, n in zip(exercises, worth, strict=True)]
     table = "\n".join(["| exercise | points |", "|---|---|", *rows, f"| all | {points(lesson)} |"])
     return f"{_deeper(lesson.cells[0].source)}\n\nThe notebook: `student/{name}`.\n\n{table}\n"
 
@@ -151,9 +150,9 @@ def _notes(lesson: NotebookNode) -> str:
     for cell in lesson.cells:
         if is_slide(cell):
             continue
-        found = re.findall(r"^#{1,2} (.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
-        if found and not for_lecturer(cell):
-            heading = f"{'##' if cell is lesson.cells[0] else '###'} {found[0]}\n"
+        titles = re.findall(r"^#{1,2} (.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
+        if titles and not for_lecturer(cell):
+            heading = f"{'##' if cell is lesson.cells[0] else '###'} {titles[0]}\n"
         if for_lecturer(cell) or is_solution(cell):
             lines += [heading] if heading else []
             lines += [f"```python\n{cell.source}\n```\n" if is_solution(cell) else f"{cell.source}\n"]

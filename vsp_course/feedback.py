@@ -6,29 +6,23 @@ Feedback names what was found and what was expected, and points to a hint. It ne
 from __future__ import annotations
 
 import copy
+import dis
 import functools
 import hashlib
 import inspect
-import signal
-import sys
 import textwrap
-import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
-from types import FrameType
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from vsp.rollouts import Episode, Policy
+from vsp.rollouts import Episode
 
 WIDTH = 90  # characters of a message's lines
 _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with questions
-
-
-class TooLong(BaseException):
-    """A check took too long. Not an Exception, so that a student's `except Exception` does not catch it."""
 
 
 class NotYet(AssertionError):
@@ -38,8 +32,7 @@ class NotYet(AssertionError):
         return _lines(f"✗ {self}")
 
 
-@dataclass(frozen=True)
-class Mistake:
+class Mistake(NamedTuple):
     """The wrong result of a common mistake, and the feedback for it."""
 
     result: object  # numbers, compared with what the student's function returned; None: any others
@@ -48,25 +41,13 @@ class Mistake:
     hint: int | None = None
 
 
-@dataclass(frozen=True)
-class Question:
+class Question(NamedTuple):
     """A question, its possible answers, and the feedback for wrong ones."""
 
     options: Sequence[str]
-    right: str  # the right answer, or its `seal` where students must not read it
+    right: str  # the `seal` of the right answer
     hint: int
-    teaching: dict[str, str] = field(default_factory=dict)
-
-
-class ActionsAlone:
-    """A policy whose `predict` returns the actions alone, as a student may wrongly expect."""
-
-    def __init__(self, policy: Policy):
-        self.policy = policy
-
-    def predict(self, obs: np.ndarray) -> np.ndarray:
-        """Return the actions alone."""
-        return self.policy.predict(obs)[0]
+    teaching: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -75,8 +56,8 @@ class Exercise:
 
     number: str
     name: str
-    refused: tuple[str, ...] = ()  # "module.name" of vsp functions that the answer must not call
-    seconds: float = 30  # time limit of a check
+    refused: tuple[str, ...] = ()  # functions of vsp that the answer must not call
+    cures: tuple[tuple[type, str, int], ...] = ()  # type of an error, words of its message, the hint that helps
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
         """Return the exception to raise for a wrong answer. `hint` is the number of the hint that helps."""
@@ -97,21 +78,14 @@ class Exercise:
         return NotYet(f"{self.number} {self.name} is not written yet: {todo}.")
 
     def checks(self, check: Callable) -> Callable:
-        """Decorate the exercise's check: errors inside it and endless loops become feedback too."""
+        """Decorate the exercise's check: errors inside it become feedback too."""
 
         @functools.wraps(check)
-        def careful(*answer: object, **settings: object) -> None:
+        def careful(*answer: object) -> None:
             try:
-                with time_limit(self.seconds):
-                    check(*answer, **settings)
+                check(*answer)
             except NotYet:
                 raise
-            except TooLong:
-                found, expected = (
-                    f"no result after {self.seconds:g} seconds",
-                    "a result in that time: look for an endless loop",
-                )
-                raise self.wrong(found, expected) from None
             except Exception as error:
                 found = f"an answer that raises an error ({type(error).__name__}: {error})"
                 raise self.wrong(found, "an answer as the text describes it") from None
@@ -125,29 +99,36 @@ class Exercise:
     def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> object:
         """Call a student's function and return its result. It gets copies of `arguments` unless `keep`.
 
-        Raises NotYet for a stub, an error, an argument altered in place, a call of the library's own function, and
-        (unless `empty`) for no result.
+        Raises NotYet for a stub, an error, an interrupt, an argument altered in place, a call of the library's own
+        function, and (unless `empty`) for no result.
         """
         self.refuse_if(not callable(function), f"{function!r}", "a function")
+        for name in _called(function) & set(self.refused):
+            raise self.wrong(f"a call of vsp's `{name}`", "code of your own")
         given = arguments if keep else copy.deepcopy(arguments)
         try:
-            with calls_of(self.refused) as called:
-                result = function(*given)
-        except NotImplementedError as error:
-            stub = traceback.extract_tb(error.__traceback__)[-1].name
-            if stub != getattr(function, "__name__", stub):
-                expected = "that one written first, or vsp's function if the text names it"
-                raise self.wrong(f"a call of your own `{stub}`, which is still a stub", expected) from None
-            raise self.unsolved() from None
-        except Exception as error:
-            found = f"{type(error).__name__} ({error}) {_place(function, error)}"
-            raise self.wrong(found, "a result: print what that line works with") from None
-        self.refuse_if(bool(called), f"a call of vsp's `{''.join(called[:1])}`", "code of your own")
+            result = function(*given)
+        except (Exception, KeyboardInterrupt) as error:
+            raise self._failure(function, error) from None
         self.refuse_if(result is None and not empty, "None as the result", "something after `return`")
-        for i, (before, after) in enumerate(zip(arguments, given)):
+        for i, (before, after) in enumerate(zip(arguments, given), 1):
             altered = isinstance(before, np.ndarray) and not np.array_equal(before, after)
-            self.refuse_if(altered, f"{_parameter(function, i)} altered in place", "it as it was: work on a copy")
+            self.refuse_if(altered, f"argument {i} altered in place", "it as it was: work on a copy")
         return result
+
+    def _failure(self, function: Callable, error: BaseException) -> NotYet:
+        """Return the exception to raise if a student's function ends with `error`."""
+        if isinstance(error, NotImplementedError):
+            stub = traceback.extract_tb(error.__traceback__)[-1].name
+            if stub == getattr(function, "__name__", stub):
+                return self.unsolved()
+            expected = "that one written first, or vsp's function if the text names it"
+            return self.wrong(f"a call of your own `{stub}`, which is still a stub", expected)
+        if isinstance(error, KeyboardInterrupt):
+            return self.wrong(f"no end {_place(function, error)}", "one: look for an endless loop")
+        hints = (hint for kind, words, hint in self.cures if isinstance(error, kind) and words in str(error))
+        found = f"{type(error).__name__} ({error}) {_place(function, error)}"
+        return self.wrong(found, "a result: print what that line works with", next(hints, None))
 
     def array(
         self, value: object, shape: tuple[int, ...], what: str = "a result", hint: int | None = None, meaning: str = ""
@@ -180,8 +161,7 @@ class Exercise:
                 todo = "write your answer in place of None and run that cell, without the stub"
                 raise NotYet(f"{self.number} {self.name}: question {key!r} is not answered yet: {todo}.")
             if choices is float:
-                number = isinstance(answer, int | float | np.number) and not isinstance(answer, bool)
-                self.refuse_if(not number, f"{answer!r} for {key!r}", "a number")
+                self.refuse_if(not isinstance(answer, int | float | np.number), f"{answer!r} for {key!r}", "a number")
             else:
                 self.refuse_if(answer not in choices, f"{answer!r} for {key!r}", f"one of {list(choices)}")
 
@@ -193,65 +173,16 @@ class Exercise:
         """
         self.answers(given, {key: question.options for key, question in questions.items()})
         first = self.first(given)
+        right = [seal(self.number, key, first[key]) == question.right for key, question in questions.items()]
         for key, question in questions.items():
-            if not self._right(question, key, given[key]):
-                teaching = question.teaching.get(given[key], "look again")
-                words = f"not {given[key]!r}: {teaching}.{self._pointer(question.hint)}"
-                raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}")
-        right = sum(self._right(question, key, first[key]) for key, question in questions.items())
-        return f" Of your first answers {right} of {len(questions)} were right."
+            if seal(self.number, key, given[key]) != question.right:
+                words = f"not {given[key]!r}: {question.teaching.get(given[key], 'look again')}."
+                raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}{self._pointer(question.hint)}")
+        return f" Of your first answers {sum(right)} of {len(questions)} were right."
 
     def first(self, given: dict) -> dict:
         """The first answers that this was called with since the kernel started."""
         return _FIRST.setdefault(self.number, dict(given))
-
-    def _right(self, question: Question, key: str, answer: str) -> bool:
-        return question.right in (answer, seal(self.number, key, answer))
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise TooLong after `seconds`. Does nothing on Windows and outside the main thread, which get no signals."""
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        raise TooLong
-
-    handler = signal.signal(signal.SIGALRM, stop)
-    timer = signal.setitimer(signal.ITIMER_REAL, seconds, 1)  # again after a second, if a bare `except` caught it
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, *timer)
-        signal.signal(signal.SIGALRM, handler)
-
-
-@contextmanager
-def calls_of(functions: Sequence[str]) -> Iterator[list[str]]:
-    """Collect the calls of `functions` ("module.name" each) inside the `with` block."""
-    called, before = [], sys.getprofile()
-
-    def watch(frame: FrameType, event: str, argument: object) -> None:
-        name = f"{frame.f_globals.get('__name__')}.{frame.f_code.co_name}"
-        if event == "call" and name in functions:
-            called.append(frame.f_code.co_name)
-
-    sys.setprofile(watch if functions else before)
-    try:
-        yield called
-    finally:
-        sys.setprofile(before)
-
-
-def works(attempt: Callable, *given: object) -> bool:
-    """Whether `attempt` raises no error."""
-    try:
-        attempt(*given)
-    except Exception:
-        return False
-    return True
 
 
 def joined(episodes: Iterable[Episode]) -> tuple[np.ndarray, np.ndarray]:
@@ -265,19 +196,20 @@ def seal(number: str, key: str, answer: str) -> str:
     return hashlib.sha256(f"vsp course|{number}|{key}|{answer}".encode()).hexdigest()[:16]
 
 
-def _place(function: Callable, error: Exception) -> str:
+def _called(function: Callable) -> set[str]:
+    """Names that the code of a student's function looks up, but its own; of a function of vsp, its name."""
+    if str(getattr(function, "__module__", "")).startswith("vsp"):
+        return {function.__name__}
+    steps = dis.get_instructions(function) if inspect.isfunction(function) else ()
+    names = {(step.opname, step.argval) for step in steps if step.opcode in dis.hasname}
+    return {name for _, name in names - {("LOAD_GLOBAL", getattr(function, "__name__", ""))}}
+
+
+def _place(function: Callable, error: BaseException) -> str:
     """Name the last line of the student's cell that ran before `error`."""
     file = getattr(getattr(function, "__code__", None), "co_filename", None)
     lines = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     return f"in line {lines[-1].lineno} of its cell, `{lines[-1].line}`" if lines else "when it is called"
-
-
-def _parameter(function: Callable, i: int) -> str:
-    """Name argument `i` of a function for a message."""
-    try:
-        return f"argument `{list(inspect.signature(function).parameters)[i]}`"
-    except (TypeError, ValueError, IndexError):  # no signature, or `*arguments`
-        return f"argument {i + 1}"
 
 
 def _lines(text: str) -> list[str]:

@@ -14,32 +14,16 @@ from vsp.run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
 UNUSED = ("papermill",)  # dependencies of the package that the course does not need
-FILES = ("LICENSE", "vsp/**/*.py", "vsp/show/**/*.js", "data/paper/*", "data/teachers/*.*")
-
-README = """# vsp: the course
-
-Set up once, with Python 3.11, 3.12 or 3.13 (Linux, macOS):
-
-    python3 -m venv .venv
-    .venv/bin/python -m pip install --no-compile -r requirements.txt
-
-and then, each time:
-
-    .venv/bin/jupyter lab
-
-On Windows, `py -m venv .venv` and `.venv\\Scripts\\` in place of `.venv/bin/`. Linux is tested. For macOS and Windows
-all packages come as wheels, but nobody has tried them there.
-
-Begin with lesson_1_black_box.ipynb; the project comes after lesson 3 (project.md). The packages take 145 MB
-to download and 0.55 GB on the disk. Whatever you change stays in this folder.
-"""
+CODE = ("vsp/**/*.py", "vsp/show/**/*.js", "vsp_beyond/**/*.py")
+CHECKS = tuple(f"vsp_course/{name}.py" for name in ("__init__", "drawing", "feedback", "lesson_*"))
+FILES = ("LICENSE", "data/paper/*", "data/teachers/*.*", *CODE, *CHECKS)
 
 
 def write_handout(path: Path, copies: dict[str, str]) -> None:
     """Write a zip file with the students' notebooks `copies` (file name: text), the package, its data and the list of
     packages to install. Same sources, same bytes."""
-    project = Path(__file__).with_name("project.md").read_text("utf-8")
-    texts = {**copies, "README.md": README, "requirements.txt": requirements(), "project.md": project}
+    readme, project = (Path(__file__).with_name(name).read_text("utf-8") for name in ("handout.md", "project.md"))
+    texts = {**copies, "README.md": readme, "requirements.txt": requirements(), "project.md": project}
     files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
     contents = {name: text.encode() for name, text in texts.items()}
     contents |= {name: file.read_bytes() for name, file in files.items()}
@@ -54,7 +38,6 @@ def requirements() -> str:
     """Return the lines of requirements.txt: the packages that the lessons need, in the versions of environment.lock."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = [re.match(r"[\w-]+", line)[0] for line in project["dependencies"]]
-    locked = dict(
-        re.findall(r"^([\w-]+)==(\S+)", (ROOT / "environment.lock").read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    lock = (ROOT / "environment.lock").read_text(encoding="utf-8")
+    locked = dict(re.findall(r"^([\w-]+)==(\S+)", lock, re.MULTILINE))
     return "".join(f"{name}=={locked[name]}\n" for name in wanted if name not in UNUSED)

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize import approx_fprime
 
 from vsp import geometry
 from vsp.algorithms import teacher_episodes
@@ -40,9 +41,9 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     OWN_CLASS.refuse_if(sums, "features that are sums of the state's components", "at least one that is no such sum", 4)
     _code(own_class, states, features)
     _gradient(own_class, features, len(task.outputs))
-    constant, own = _errors(policy_class("constant", task), teacher, task), _errors(own_class, teacher, task)
-    share = f"{own / constant:.0%} of the error that constants have in the same cells"
-    OWN_CLASS.refuse_if(own > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
+    constant, error = _errors(policy_class("constant", task), teacher, task), _errors(own_class, teacher, task)
+    share = f"{error / constant:.0%} of the error that constants have in the same cells"
+    OWN_CLASS.refuse_if(error > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
     linear = _errors(policy_class("linear", task), teacher, task)
     OWN_CLASS.passed(
         f"{len(own_class.rows)} parameters per action, {share}; x and y alone have {linear / constant:.0%}."
@@ -53,16 +54,16 @@ def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
     for name in ("terms", "code"):
         single = 'a tuple with an entry per feature; one alone needs a comma: ("...",)'
         OWN_CLASS.refuse_if(isinstance(getattr(own_class, name), str), f"a string for `{name}`", single, 2)
-    q, found = len(own_class.terms), []
+    q, features = len(own_class.terms), []
     for batch, name in ((states, "50 states"), (states[0], "a single state"), (states.reshape(5, 10, -1), "5 x 10")):
         made = OWN_CLASS.call(own_class.features, batch)
-        found.append(OWN_CLASS.array(made, (*batch.shape[:-1], q), f"features of {name}", 2))
-    same = np.allclose(found[0][0], found[1])
+        features.append(OWN_CLASS.array(made, (*batch.shape[:-1], q), f"features of {name}", 2))
+    same = np.allclose(features[0][0], features[1])
     OWN_CLASS.refuse_if(not same, "other features for a single state than for the same one in a batch", "the same", 2)
     sizes, n = OWN_CLASS.array(own_class.sizes, (q,), "sizes", 2), len(own_class.code)
     wrong = (sizes <= 0).any() or n != q
     OWN_CLASS.refuse_if(wrong, f"{n} pieces of code and sizes {sizes}", f"{q} of both, sizes above 0", 2)
-    return found[0]
+    return features[0]
 
 
 def _within(a: np.ndarray, b: np.ndarray) -> bool:
@@ -75,16 +76,16 @@ def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> N
     """Whether the exported code computes the same features."""
     names = {name: getattr(math, name) for name in SHARED}
     for j, text in enumerate(own_class.code):
-        if found := re.search(r"\*\*|//| if ", text):
-            raise OWN_CLASS.wrong(f"{found[0].strip()!r} in the code {text!r}", "what C has too, such as products", 3)
+        if python := re.search(r"\*\*|//| if ", text):
+            raise OWN_CLASS.wrong(f"{python[0].strip()!r} in the code {text!r}", "what C has too, such as products", 3)
         try:
             values = [float(eval(text, {"__builtins__": {}}, {**names, "state": state})) for state in states]
         except Exception as error:
-            found = f"{type(error).__name__} ({error}) in the code {text!r}"
+            failure = f"{type(error).__name__} ({error}) in the code {text!r}"
             expected = f"an expression of state[0], state[1], ... with no functions but {', '.join(SHARED)}"
-            raise OWN_CLASS.wrong(found, expected, 3) from None
-        found = f"code {text!r} that gives other numbers than feature {own_class.terms[j]!r}"
-        OWN_CLASS.refuse_if(not np.allclose(values, features[:, j]), found, "the same", 3)
+            raise OWN_CLASS.wrong(failure, expected, 3) from None
+        other = f"code {text!r} that gives other numbers than feature {own_class.terms[j]!r}"
+        OWN_CLASS.refuse_if(not np.allclose(values, features[:, j]), other, "the same", 3)
 
 
 def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
@@ -94,18 +95,16 @@ def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
     theta, actions = rng.normal(size=(1, len(own_class.rows), m)), rng.normal(size=(1, len(features), m))
 
     def loss(parameters: np.ndarray) -> float:
-        return float(np.square(own_class.batch(inputs, parameters)[0] - actions).sum())
+        return float(np.square(own_class.batch(inputs, parameters.reshape(theta.shape))[0] - actions).sum())
 
     outputs, pull_back = own_class.batch(inputs, theta)
     if not np.allclose(outputs[0], own_class.outputs(features, theta[0])):
         raise OWN_CLASS.wrong("other outputs in training (`batch`) than in use (`outputs`)", "the same", 3)
-    own = pull_back(2 * (outputs - actions))
-    for index in np.ndindex(theta.shape):
-        step = np.zeros_like(theta)
-        step[index] = 1e-6 * max(1.0, abs(theta[index]))
-        slope = (loss(theta + step) - loss(theta - step)) / (2 * step[index])
-        right, found = np.isclose(own[index], slope, rtol=1e-3, atol=1e-3), f"a gradient of {own[index]:.4g}"
-        OWN_CLASS.refuse_if(not right, f"{found} by parameter {index[1]}", f"the slope {slope:.4g}", 3)
+    gradient, slopes = pull_back(2 * (outputs - actions)).ravel(), approx_fprime(theta.ravel(), loss, 1e-6)
+    worst = np.abs(gradient - slopes).argmax()
+    number = f"a gradient of {gradient[worst]:.4g} by parameter {worst // m}"
+    wrong = not np.allclose(gradient, slopes, rtol=1e-3, atol=1e-2)
+    OWN_CLASS.refuse_if(wrong, number, f"the slope {slopes[worst]:.4g}", 3)
 
 
 def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:

@@ -1,6 +1,7 @@
 """Slides of the lessons: the cells tagged `slide`, as one HTML file that opens from disk.
 
-reveal.js 5.2.1 (MIT license) shows them; `reveal/` holds it as published by its authors.
+reveal.js 5.2.1 (MIT license) shows them; `reveal/` holds it as published by its authors, and the
+page around it.
 """
 
 from __future__ import annotations
@@ -19,30 +20,6 @@ from vsp.run.notebook import NotebookNode
 REVEAL = Path(__file__).with_name("reveal")
 WIDE = 1280  # pixels of a figure, and of a slide
 _FIGURE = re.compile(r'<img src="([\w./]+)" alt="([^"]*)"')
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<style>{css}
-.reveal {{ font: 34px/1.35 system-ui, sans-serif; color: #222 }}
-.reveal .slides {{ text-align: left }}
-.reveal h1 {{ font-size: 1.9em; line-height: 1.15; margin: 0 0 .4em }}
-.reveal h2 {{ font-size: 1.35em; line-height: 1.2; margin: 0 0 .5em; color: #01558a }}
-.reveal p, .reveal ul, .reveal ol {{ margin: 0 0 .55em }} .reveal ul, .reveal ol {{ padding-left: 1.1em }}
-.reveal img {{ display: block; max-width: 100%; max-height: 400px; margin: .2em auto; background: #fff }}
-.reveal code {{ font-size: .85em; background: #eef2f5; padding: 0 .2em }}
-.reveal pre {{ font-size: .95em; line-height: 1.3; background: #eef2f5; padding: .5em .7em }}
-.reveal table {{ border-collapse: collapse; margin: 0 auto }}
-.reveal :is(th, td) {{ padding: .1em .7em; text-align: left }}
-</style></head>
-<body><div class="reveal"><div class="slides">
-{slides}
-</div></div>
-<script>{script}</script>
-<script>
-Reveal.initialize({{hash: true, slideNumber: "c/t", width: {wide}, height: 720, margin: .06, transition: "none"}})
-</script>
-</body></html>
-"""
 
 
 def is_slide(cell: NotebookNode) -> bool:
@@ -60,15 +37,15 @@ def slides(lesson: NotebookNode) -> str:
     markdown = mistune.create_markdown(plugins=["table"])
     pages = "\n".join(f"<section>\n{_FIGURE.sub(_inline, markdown(source))}</section>" for source in sources)
     title = re.sub(r"^#+ ", "", sources[0].splitlines()[0])
-    css, script = ((REVEAL / name).read_text("utf-8") for name in ("reveal.css", "reveal.js"))
-    return _PAGE.format(title=html.escape(title), css=css, script=script, slides=pages, wide=WIDE)
+    page, css, script = ((REVEAL / name).read_text("utf-8") for name in ("page.html", "reveal.css", "reveal.js"))
+    return page.format(title=html.escape(title), css=css, script=script, slides=pages, wide=WIDE)
 
 
-def _inline(found: re.Match) -> str:
+def _inline(image: re.Match) -> str:
     """Embed a figure of this repository in the page, no wider than a slide."""
     file = io.BytesIO()
-    with Image.open(ROOT / found[1]) as picture:
+    with Image.open(ROOT / image[1]) as picture:
         small = picture.convert("RGB")
         small.thumbnail((WIDE, WIDE))
         small.save(file, "webp", lossless=True)
-    return f'<img src="data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}" alt="{found[2]}"'
+    return f'<img src="data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}" alt="{image[2]}"'

@@ -47,10 +47,10 @@ def escape(text: str) -> str:
     return _PUBLIC.sub(_public, "".join(parts))
 
 
-def _public(found: re.Match) -> str:
+def _public(name: re.Match) -> str:
     """A link to the page of `vsp.name`, which is written down in a module of vsp."""
-    home = getattr(getattr(vsp, found[1], None), "__module__", None)
-    return f":py:obj:`vsp.{found[1]} <{home}.{found[1]}>`" if home else found[0]
+    home = getattr(getattr(vsp, name[1], None), "__module__", None)
+    return f":py:obj:`vsp.{name[1]} <{home}.{name[1]}>`" if home else name[0]
 
 
 def _lines(app, pagename, templatename, context, doctree):

@@ -29,7 +29,8 @@ def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
         policies["the paper's, as published"] = published_policy(task)
     policies |= {f"ours, {name}": policy for name, policy in _ours(task, teacher)}
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
-    states, actions = (np.concatenate([getattr(one, name) for one in episodes]) for name in ("states", "actions"))
+    states = np.concatenate([episode.states for episode in episodes])
+    actions = np.concatenate([episode.actions for episode in episodes])
     policies["one linear map"] = linear_map(states, actions, task)
     return vsp.explore(policies, teacher=teacher, history=history, axes=axes)
 
@@ -47,8 +48,8 @@ def challenge(task: str, guess: str) -> Explorer:
     """The paper's policy, about which `guess` asks, and three cells for the reader, which all go to the origin."""
     maps = np.zeros((3, 3, 2))
     maps[:, 2] = -1.0
-    own = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.4], [0.4, 0.75]], maps, task=task)
-    policies = {"the paper's, as published": published_policy(task), "three cells, for you to change": own}
+    three_cells = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.4], [0.4, 0.75]], maps, task=task)
+    policies = {"the paper's, as published": published_policy(task), "three cells, for you to change": three_cells}
     return vsp.explore(policies, teacher=vsp.load_teacher(task), guess=guess)
 
 

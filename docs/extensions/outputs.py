@@ -40,8 +40,8 @@ def _improve(text: str, folder: Path = None, top: str = "") -> str:
     for style in soup.find_all("style"):  # pandas' and Pygments' own; the site has one style
         style.decompose()
     for tag in soup.find_all(["img", "source"]):
-        if found := _IMAGE.fullmatch(tag.get("src") or tag.get("srcset") or ""):
-            _picture(tag, base64.b64decode(found[1]), folder, top)
+        if match := _IMAGE.fullmatch(tag.get("src") or tag.get("srcset") or ""):
+            _picture(tag, base64.b64decode(match[1]), folder, top)
     for script in soup.select(".vsp-explorer > script[type='application/json']"):  # loads when it comes into view
         script.parent["data-scene"] = top + _write(folder, script.get_text().encode(), "json")
         script.decompose()
@@ -93,7 +93,7 @@ def _table(soup: BeautifulSoup, table) -> None:
             cell["scope"] = "col" if cell.find_parent("thead") else "row"
     _align(table)
     for string in table.find_all(string=_MATH):
-        markup = _MATH.sub(lambda found: mathml(found[1]), html.escape(string, quote=False))
+        markup = _MATH.sub(lambda match: mathml(match[1]), html.escape(string, quote=False))
         string.replace_with(BeautifulSoup(markup, "html.parser"))
     table.wrap(soup.new_tag("div", attrs={"class": "pst-scrollable-table-container"}))
 

@@ -21,8 +21,8 @@ def _move_links(app, docname, source):
 
 def _describe(app, pagename, templatename, context, doctree):
     """The first paragraph with something in it, as the page's description."""
-    found = doctree.findall(nodes.paragraph) if doctree else ()
-    texts = (node.astext() for node in found if isinstance(node.parent, nodes.section))
+    paragraphs = doctree.findall(nodes.paragraph) if doctree else ()
+    texts = (node.astext() for node in paragraphs if isinstance(node.parent, nodes.section))
     text = next((text for text in texts if len(text) > 60), f"{app.config.html_title}: {pagename}")
     text = html.escape(textwrap.shorten(text, 200, placeholder=" …"))
     context["metatags"] = context.get("metatags", "") + f'\n<meta name="description" content="{text}" />'

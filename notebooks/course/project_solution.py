@@ -1,6 +1,6 @@
 """A sample solution of the project: MountainCar in two cells, beside one linear map and a tree.
 
-    .venv/bin/python notebooks/course/project_solution.py
+.venv/bin/python notebooks/course/project_solution.py
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 import vsp
-from vsp import baselines, paper
+import vsp_beyond
+from vsp.paper import baselines, interval
 from vsp.rollouts import Policy
 from vsp.tasks import GOAL
 
@@ -24,13 +25,13 @@ REPORTED = 9000  # the seed of the start states that decide nothing
 def made(teacher: Policy, seed: int) -> dict[str, Policy]:
     """The three policies of a seed, fitted to as many episodes of the teacher.
 
-    Why "faithful"? The project asks how well the policy acts like the teacher, and this preset looks for just that.
+    Why `faithful`? The project asks how well the policy acts like the teacher, and this method looks for just that.
     """
     episodes = vsp.collect_episodes(teacher, TASK, vsp.start_states(TASK, N_EPISODES, seed))
     states, actions = (np.concatenate([getattr(e, name) for e in episodes]) for name in ("states", "actions"))
-    config = replace(vsp.preset(TASK, "faithful", n_cells=CELLS), n_episodes=N_EPISODES)
+    config = replace(vsp_beyond.faithful_preset(TASK, n_cells=CELLS), n_episodes=N_EPISODES)
     return {
-        f"{CELLS} cells": vsp.distill(teacher, TASK, config, seed=seed)[0],
+        f"{CELLS} cells": vsp_beyond.faithful(teacher, TASK, config, seed=seed),
         "one linear map": baselines.linear_map(states, actions, TASK),
         f"tree, {CELLS} leaves": baselines.Tree(states, actions, leaves=CELLS),
     }
@@ -39,23 +40,24 @@ def made(teacher: Policy, seed: int) -> dict[str, Policy]:
 def measured(policy: Policy, teacher: Policy) -> dict[str, float]:
     """Mean return and share of failures from the reported starts, and R² where the teacher goes from them."""
     starts = vsp.start_states(TASK, N_STARTS, REPORTED)
-    played, seen = vsp.rollout(policy, TASK, starts), vsp.visited_states(teacher, TASK, starts)
-    wanted = teacher.predict(seen)[0]
-    r2 = 1 - np.square(policy.predict(seen)[0] - wanted).mean() / wanted.var()
+    played, visited = vsp.rollout(policy, TASK, starts), vsp.visited_states(teacher, TASK, starts)
+    actions = teacher.predict(visited)[0]
+    r2 = 1 - np.square(policy.predict(visited)[0] - actions).mean() / actions.var()
     return {"mean": played.returns.mean(), "failing": np.mean(played.outcomes != GOAL), "r2": r2}
 
 
 def report(seeds: range = SEEDS) -> pd.DataFrame:
     """One row per method: mean return with its 95 % interval over seeds, the most failures of a seed, the median R²."""
     teacher = vsp.load_teacher(TASK)
-    rows = [{"method": name, **measured(one, teacher)} for seed in seeds for name, one in made(teacher, seed).items()]
+    policies = [named for seed in seeds for named in made(teacher, seed).items()]
+    rows = [{"method": name, **measured(policy, teacher)} for name, policy in policies]
     rows.append({"method": "teacher", **measured(teacher, teacher)})
-    found = []
-    for name, own in pd.DataFrame(rows).groupby("method", sort=False):
-        low, high = paper.interval(own["mean"].to_numpy(), np.mean, vectorized=True)
-        about = {"policies": len(own), "mean": own["mean"].mean(), "low": low, "high": high}
-        found.append({"method": name, **about, "failing": own["failing"].max(), "r2": own["r2"].median()})
-    return pd.DataFrame(found)
+    table = []
+    for name, of_method in pd.DataFrame(rows).groupby("method", sort=False):
+        low, high = interval(of_method["mean"].to_numpy(), np.mean, vectorized=True)
+        returns = {"policies": len(of_method), "mean": of_method["mean"].mean(), "low": low, "high": high}
+        table.append({"method": name, **returns, "failing": of_method["failing"].max(), "r2": of_method["r2"].median()})
+    return pd.DataFrame(table)
 
 
 def main() -> None:
@@ -63,21 +65,27 @@ def main() -> None:
     teacher, table = vsp.load_teacher(TASK), report()
     best = table[table["method"] != "teacher"].sort_values("mean").iloc[-1]
     policy = made(teacher, 0)[f"{CELLS} cells"]
-    seen = vsp.visited_states(policy, TASK, vsp.start_states(TASK, N_STARTS, REPORTED))
-    apart = np.abs(policy.predict(seen)[0] - teacher.predict(seen)[0])[:, 0]
-    state = seen[apart.argmax()].round(3)
+    visited = vsp.visited_states(policy, TASK, vsp.start_states(TASK, N_STARTS, REPORTED))
+    difference = np.abs(policy.predict(visited)[0] - teacher.predict(visited)[0])[:, 0]
+    state = visited[difference.argmax()].round(3)
     print(f"# {TASK}: who returns most?\n")
     print(f"{best['method']} returns {best['mean']:.2f} on average, from {N_STARTS} starts.\n")
     print(table.round(3).to_string(index=False))
-    print("\nmean, low, high: mean return and its 95 % interval over seeds; failing: the largest share of failed episodes of")
+    print(
+        "\nmean, low, high: mean return and its 95 % interval over seeds; failing: the largest share of failed episodes of"
+    )
     print("a seed; r2: median over seeds.")
     print(f"\nThe policy of seed 0:\n\n{policy.to_text()}")
     print(f"Of the states it visits, it differs most from the teacher in {state.tolist()}. There it is in")
     print(f"cell {policy.explain(state).cell}: {policy.explain(state).equations[0]};")
     print(f"it pushes with {policy.predict(state)[0][0]:.2f}, the teacher with {teacher.predict(state)[0][0]:.2f}.")
-    print(f"Actions differ by more than 0.1 in {np.mean(apart > 0.1):.1%} of the visited states.")
-    print("\nThis cannot be concluded: whether another teacher would give the same order, for there is one. All methods")
-    print(f"fit {N_EPISODES} episodes; the cells are also compared with the teacher on others, to choose among restarts.")
+    print(f"Actions differ by more than 0.1 in {np.mean(difference > 0.1):.1%} of the visited states.")
+    print(
+        "\nThis cannot be concluded: whether another teacher would give the same order, for there is one. All methods"
+    )
+    print(
+        f"fit {N_EPISODES} episodes; the cells are also compared with the teacher on others, to choose among restarts."
+    )
 
 
 if __name__ == "__main__":

@@ -1,17 +1,7 @@
 """The comparison of methods: how each row is made, and what the committed rows show."""
 
-from vsp.paper.results import RESULTS, read_results
-
-from .fair_summary import all_rows, budgets, episodes, equal_budget, fit_and_geometry, leaders, possible, tail
-from .faithful_summary import largest_alike, likeness, other_teachers
-from .limit_summary import limit_summary, near, references, robots_summary, starts_summary
-from .method_summary import AS_GOOD, ablation, headline, method_summary, read_rows, rivals, seeds_as_good
-from .method_tables import TASKS
-from .regret import best_mean, with_regret
-
-
-def stale_results() -> list[str]:
-    """List the committed results made with other settings, teachers or versions than today's, one message each."""
-    from .stale import stale  # imported here: `python -m` warns if the module it runs is already imported
-
-    return stale()
+from ..results import RESULTS, read_results
+from .equal_tuning import all_rows, budgets, equal_budget, fit_and_geometry, leaders, possible, tail
+from .limits import best_mean, limit_summary, near, references, robots_summary, starts_summary, with_regret
+from .methods import TASKS
+from .summary import ablation, headline, largest_alike, likeness, method_summary, other_teachers, read_rows

@@ -7,7 +7,10 @@ LunarLander, are measured from new starts. The longer search for one map was add
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
+import pandas as pd
 
 from vsp.evaluation import start_states
 from vsp.paper.baselines import Tree
@@ -44,7 +47,7 @@ def measure(
     """Measure a policy: returns, action errors, size and cost.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters, operations (per decision); with
+    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters; with
     `tail`, worst (mean return of the worst episodes). Slow tasks are played from fewer starts; with
     `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
     returns.
@@ -52,15 +55,13 @@ def measure(
     fewer = task.slowness
     result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), seed))
     starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
-    parameters, operations = cost(policy)
     row = {
         "mean": float(result.returns.mean()),
         "failing": float(np.mean(result.outcomes != GOAL)),
         "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
         "error_own": action_error(policy, teacher, task, starts, by=policy),
         "cells": len(policy) if hasattr(policy, "__len__") else 0,
-        "parameters": parameters,
-        "operations": operations,
+        "parameters": parameters_of(policy),
     }
     return row | ({"worst": worst(result.returns)} if tail else {})
 
@@ -75,8 +76,7 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
 
     It is in units of half the action range.
     """
-    states = visited_states(by, task, starts)
-    half = 0.5 * (task.action_high - task.action_low)
+    states, half = visited_states(by, task, starts), 0.5 * (task.action_high - task.action_low)
     gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
     return float(np.sqrt(np.square(gaps).mean()))
 
@@ -104,37 +104,49 @@ def common_states(teacher: Policy, task: Task) -> np.ndarray:
     return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
 
 
-def cost(policy: Policy) -> tuple[int, float]:
-    """Return a policy's parameters, and the mean number of arithmetic operations and comparisons per decision."""
+def sameness(policies: dict[int, VoronoiPolicy], teacher: Policy, task: Task) -> pd.DataFrame:
+    """Compare every pair of `policies` (by seed) on `common_states`, one row per pair.
+
+    Columns: seed, other; index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells,
+    about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their
+    actions, divided by that from the teacher's actions (mean over the two policies).
+    """
+    from sklearn.metrics import adjusted_rand_score
+
+    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
+    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
+    cells = {seed: policy.cells(states) for seed, policy in policies.items()}
+    actions = {seed: policy.predict(states)[0] / half for seed, policy in policies.items()}
+    rows = []
+    for a, b in combinations(policies, 2):
+        one_cell = min(len(policies[a]), len(policies[b])) == 1
+        index = np.nan if one_cell else adjusted_rand_score(cells[a], cells[b])
+        to_teacher = 0.5 * (_rmse(actions[a], wanted) + _rmse(actions[b], wanted))
+        ratio = _rmse(actions[a], actions[b]) / to_teacher if to_teacher else np.nan
+        rows.append({"seed": a, "other": b, "index": index, "ratio": ratio})
+    return pd.DataFrame(rows)
+
+
+def _rmse(actions: np.ndarray, others: np.ndarray) -> float:
+    return float(np.sqrt(np.square(actions - others).mean()))
+
+
+def parameters_of(policy: Policy) -> int:
+    """Return how many numbers determine a policy's actions. An axis split has two, an oblique one d + 1."""
     if isinstance(policy, VoronoiPolicy):
         policy.check_linear()
-        k, rows, m = policy.coefficients.shape
-        units = (rows - 1) * bool((policy.scale != 1).any())  # states are divided by these numbers
-        look_up = (k > 1) * (units + k * 3 * (rows - 1) + k - 1)
-        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units), look_up + 2 * (rows - 1) * m
+        k, d = policy.codewords.shape
+        units = d * bool((policy.scale != 1).any())  # states are divided by these numbers
+        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units)
     if isinstance(policy, tdavq.DiscretePolicy):  # its values do not count: they do not affect the actions
-        (k, d), m = policy.codewords.shape, policy.actions.shape[1]
-        return k * (d + m), float((k > 1) * (k * 3 * d + k - 1))
-    if isinstance(policy, Tree | LinearTree):
-        return _tree_cost(policy)
-    if hasattr(policy, "COST"):  # counted by hand
-        return policy.COST
-    if isinstance(policy, SoftTree):  # the probabilities of all leaves, then the most probable one
-        nodes, leaves = policy.nodes, len(policy)
-        return nodes.size + policy.values.size, float(2 * nodes.size + leaves * policy.depth + leaves - 1)
-    layers = policy.layers
-    return sum(w.size + b.size for w, b in layers), float(sum(2 * w.size for w, _ in layers))
-
-
-def _tree_cost(policy: Tree | LinearTree) -> tuple[int, float]:
-    """Count the cost of a tree: an axis split is two numbers and one comparison, an oblique one d + 1 and 2 d."""
-    leaves = len(policy)
+        return policy.codewords.size + len(policy) * policy.actions.shape[1]
     if isinstance(policy, Tree):
-        tree, ends = policy.model.tree_, policy.model.tree_.children_left < 0
-        depths, weights = tree.compute_node_depths()[ends] - 1, tree.n_node_samples[ends]
-        return leaves * policy.model.n_outputs_ + 2 * (leaves - 1), float(np.average(depths, weights=weights))
-    rows, m = policy.maps.shape[1:]
-    depth = float(np.average([node.depth for node in policy.ends], weights=[len(node.rows) for node in policy.ends]))
-    oblique = isinstance(policy, ObliqueLinearTree)
-    numbers = leaves * rows * m + (leaves - 1) * (rows if oblique else 2)
-    return numbers, depth * (2 * (rows - 1) if oblique else 1) + 2 * (rows - 1) * m
+        return len(policy) * policy.model.n_outputs_ + 2 * (len(policy) - 1)
+    if isinstance(policy, LinearTree):
+        rows, m = policy.maps.shape[1:]
+        return len(policy) * rows * m + (len(policy) - 1) * (rows if isinstance(policy, ObliqueLinearTree) else 2)
+    if isinstance(policy, SoftTree):
+        return policy.nodes.size + policy.values.size
+    if hasattr(policy, "PARAMETERS"):  # counted by hand
+        return policy.PARAMETERS
+    return sum(weights.size + biases.size for weights, biases in policy.layers)

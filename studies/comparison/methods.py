@@ -1,174 +1,238 @@
-"""The methods that are compared beyond the paper, each a function of a budget, a size and a seed.
+"""The table of methods: how each is made, at which sizes, with which settings. And the tables of rows.
 
-The budget is the teacher and the episodes of a `Tuned`. A fit to the teacher's own episodes alone gets as many
-episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. The paper's method
-uses the episodes of its own preset, and TD-AVQ has no teacher.
+A row is one method at one size with one seed. data/beyond/<table>_<task>.csv holds the rows of a table and a task.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 
-from vsp.algorithms import distill
-from vsp.config import Config
-from vsp.paper.baselines import Tree, kmeans_cells, linear_map, rule_of_thumb
+from vsp.paper import printed
 from vsp.rollouts import Policy
-from vsp.tasks.base import Task
-from vsp_beyond.few_cells.config import Faithful, Tuned
-from vsp_beyond.few_cells.faithful import distill_faithfully
-from vsp_beyond.few_cells.limit import search_limit
-from vsp_beyond.few_cells.tuned import distill_tuned
+from vsp_beyond.few_cells import limit
+from vsp_beyond.few_cells.config import Faithful, Tuned, faithful_preset, tuned_preset
 
-from ..rivals import tdavq
-from ..rivals.dagger import dagger
-from ..rivals.hand_written import Heuristic, PumpAndBalance, ZeroPolicy
-from ..rivals.small_network import SmallNetwork, units_for
-from ..rivals.soft_tree import SoftTree
-from ..rivals.trees import LinearTree, ObliqueLinearTree
-from ..robots import Walking
-from .imitate import imitate
-from .tuning import tuned
+from ..robots import walking_preset
+from . import makers
+
+TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
+LANDER, WALKER, CHEETAH = "LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5"
+LONG = (LANDER, WALKER, CHEETAH)  # rows take minutes to hours
+SIMPLEGOAL, MOUNTAINCAR, PENDULUM = ((task,) for task in TASKS)
+
+PRESETS = {
+    "tuned": tuned_preset, "faithful": faithful_preset, "limit": limit.limit_preset, "walking": walking_preset,
+}  # fmt: skip
+ALIKE = ("faithful", "walking")  # presets whose rows also measure `fidelity`
+
+# Settings of presets that policies depend on
+EPISODES = ("n_episodes", "n_corrections", "n_correction_episodes", "n_validation", "failure_penalty")
+TUNING = ("n_restarts", "n_generations", "n_tuning_episodes", "tuning_step")
+OF_IMITATION = (
+    "push", "n_episodes", "n_corrections", "n_correction_episodes", "n_states", "n_restarts", "n_validation"
+)  # fmt: skip
+OF_TRAINING = ("n_steps", "n_filling", "learning_rate", "critic_rate", "batch_size", "gamma", "temperature")
+OF_SEARCH = ("n_random_steps", "n_directions", "n_best", "step_size", "search_noise", "n_validation")
+
+
+def _but_cells(config: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(config) if field.name != "n_cells")
+
+
+ALL, OF_FAITHFUL = _but_cells(Tuned), _but_cells(Faithful)
+
+SIZES = (1, 2, 3, 4, 8, 13, 32)  # cells or leaves
+FOUND = (0,)  # the method finds its own number
+OF_PRESET = (-1,)  # the preset's number
+TUNED_SIZES = (2, 3, 4, 8, 13)  # of other methods tuned as ours; "one linear map" has size 1
 
 
 @dataclass(frozen=True)
-class Budget:
-    """What a method may use: the teacher, its task, and the settings of its preset.
+class Method:
+    """How a policy is made: `make(budget, size, seed, **settings)`."""
 
-    Methods that imitate or tune take their episodes and rounds from a `Tuned`.
-    """
-
-    teacher: Policy
-    task: Task
-    config: Tuned | Faithful | Config | Walking
-
-
-# Our own
-
-
-def refined(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """Call `distill_tuned` with some settings changed."""
-    config = replace(budget.config, n_cells=size, **changes)
-    return distill_tuned(budget.teacher, budget.task, config, seed=seed)[0]
+    make: Callable[..., Policy]
+    reads: tuple[str, ...] = ()  # settings of the preset that the policy depends on
+    sizes: tuple[int, ...] = SIZES
+    table: str = "methods"  # where its rows are
+    settings: dict = field(default_factory=dict)
+    version: int = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
+    chance: bool = True  # whether the policy depends on the seed
+    tasks: tuple[str, ...] | None = None  # None: all tasks
+    preset: str = "tuned"  # key of `PRESETS`
 
 
-def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
-    """Call `distill_tuned` with a teacher that does nothing, to see what tuning finds without one."""
-    return refined(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
+def _corrected(fit: str, *, by_chance: bool = True, rounds: int = 5, **about) -> Method:
+    make = partial(makers.corrected, fit=fit, by_chance=by_chance)
+    return Method(make, EPISODES + ("n_restarts",) * by_chance, settings={"rounds": rounds}, **about)
 
 
-def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """Call `distill_faithfully` with some settings of the faithful preset changed."""
-    config = replace(budget.config, n_cells=size, **changes)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "no policy of")  # the row shows what was found
-        return distill_faithfully(budget.teacher, budget.task, config, seed=seed)[0]
+def _uncorrected(fit: str, sizes: tuple[int, ...] = SIZES, **about) -> Method:
+    return Method(partial(makers.uncorrected, fit=fit), EPISODES, sizes, **about)
 
 
-def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -> Policy:
-    """Call `search_limit`, from the best policy where it is known, or with `by_teacher` from the teacher."""
-    teacher = budget.teacher if by_teacher else None
-    return search_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
+def _tuned(fit: Method) -> Method:
+    make = partial(makers.tuned_fit, imitation=fit.make)
+    sizes = FOUND if fit.sizes == FOUND else TUNED_SIZES
+    return replace(fit, make=make, reads=EPISODES + TUNING, sizes=sizes, table="tuned")
 
 
-def imitated(budget: Budget, size: int, seed: int) -> Policy:
-    """Imitate the teacher's own episodes as closely as possible: relocate cells, without correction or tuning."""
-    config = budget.config
-    n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    config = replace(config, n_cells=size, n_episodes=n, n_restarts=3)
-    return imitate(budget.teacher, budget.task, config, seed=seed)
+def _robot(make: Callable[..., Policy], reads: tuple[str, ...], sizes: tuple[int, ...] = FOUND, **about) -> Method:
+    return Method(make, reads, sizes, "robots", preset="walking", **about)
 
 
-def gently(budget: Budget, size: int, seed: int, **changes) -> Policy:
-    """Tune the policy of `imitated` gently, as long as the gain outweighs the distance from the teacher.
-
-    Of the teacher's episodes, those of one round serve the tuning, and those of the other rounds the fit.
-    """
-    config = budget.config
-    start = imitated(replace(budget, config=replace(config, n_corrections=config.n_corrections - 1)), size, seed)
-    changes |= {"n_restarts": 1, "n_corrections": 0, "n_episodes": config.n_correction_episodes}
-    return distill_tuned(budget.teacher, budget.task, replace(config, n_cells=size, **changes), seed=seed, start=start)[
-        0
-    ]
+def _further(imitation: Method) -> Method:
+    make = partial(makers.trained_further, imitation=imitation.make)
+    return replace(imitation, make=make, reads=imitation.reads + OF_TRAINING)
 
 
-# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves
-FITS: dict[str, Callable[..., Policy]] = {
-    "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
-    "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
-    "oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(x, y, leaves=size, task=task, seed=seed),
-    "constant oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(
-        x, y, leaves=size, task=task, seed=seed, constant=True
+def _without(**settings) -> Method:
+    """Tune our cells at the size of the preset, with one part removed or changed."""
+    return Method(makers.our_cells, ALL, OF_PRESET, settings=settings, tasks=TASKS)
+
+
+METHODS = {
+    "our cells, tuned": Method(makers.our_cells, ALL),
+    "our cells": Method(makers.our_cells, ALL, settings={"n_generations": 0}),
+    "our cells, no teacher": Method(makers.no_teacher, ALL, (3, 4)),  # sizes of presets
+    "k-means cells, DAgger": _corrected("k-means"),
+    "CART": _uncorrected("tree"),
+    "CART, DAgger": _corrected("tree", by_chance=False),
+    "CART, linear leaves, DAgger": _corrected("linear tree", by_chance=False),
+    "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
+    "soft tree, DAgger": _corrected("soft tree", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
+    "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
+    "one linear map": _uncorrected("one map", FOUND),
+    "rule of thumb": Method(makers.by_thumb, sizes=FOUND, chance=False, tasks=printed.TASKS),
+    "heuristic": Method(makers.by_hand, sizes=FOUND, chance=False, tasks=(*PENDULUM, LANDER)),
+    "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=SIMPLEGOAL),
+    "our cells, no annealing": _without(initial_temperature=0.04),
+    "our cells, one restart": _without(n_restarts=1),
+    "our cells, no correction": _without(n_corrections=0),
+    "our cells, no slope beyond the limits": _without(clip_slope=1e-9),
+    "our cells, no failure penalty": _without(failure_penalty=0.0),
+    "our cells, weighted by criticality": _without(criticality=True),
+    # The highest likeness to the teacher; and the highest return of policies whose R² is at least a given value
+    "faithful": Method(makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"),
+    **{
+        f"faithful, R² {r2:g}": Method(
+            makers.faithful, OF_FAITHFUL, (2, 4, 8), "demanded", {"min_r2": r2}, preset="faithful"
+        )
+        for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
+    },
+    # The fit and the borders exchanged, and newer methods: all imitate the teacher's own episodes
+    "our cells, our fit": _uncorrected("global cells", (2, 4, 8), table="apart"),
+    "our cells, greedy fit": _uncorrected("greedy cells", (2, 4, 8), table="apart", version=2),
+    "oblique tree, our fit": _uncorrected("global tree", (2, 4, 8), table="apart"),
+    "oblique tree, greedy fit": _uncorrected("oblique tree", (2, 4, 8), table="apart", version=2),
+    "critic-driven splitting": _uncorrected("critic-driven", (2, 4, 8), table="apart"),
+    "advantage-weighted maps": _uncorrected("advantage-weighted", (2, 4, 8), table="apart"),
+    # The highest return, from the best policy where it is known; and searches with another start or another length
+    "at the limit": Method(
+        makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"
     ),
-    "small network": lambda x, y, size, task, seed: SmallNetwork(
-        x, y, units=units_for(numbers_of(size, task), task), task=task, seed=seed
+    "at the limit, from the teacher": Method(
+        partial(makers.limited, by_teacher=True), ALL, (3,), "starts", version=limit.VERSION, tasks=MOUNTAINCAR,
+        preset="limit",
     ),
-    "soft tree": lambda x, y, size, task, seed: SoftTree(x, y, leaves=size, seed=seed),
-    "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
-    "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
+    "our cells, 800 generations": Method(
+        makers.our_cells, ALL, (3,), "starts", {"n_generations": 800}, tasks=MOUNTAINCAR
+    ),
+    # Robots: imitate the teacher, then continue training as its actor; and one linear map by returns alone
+    "cells": (_cells := _robot(makers.robot_cells, OF_IMITATION, (1, 2, 4, 8, 16))),
+    "cells, trained further": _further(_cells),
+    "oblique tree": (_tree := _robot(makers.robot_tree, OF_IMITATION, (2, 4, 8, 16), version=2)),
+    "oblique tree, trained further": _further(_tree),
+    "one map, random search": (_search := _robot(makers.searched, OF_SEARCH)),
+    "one map, longer search": replace(_search, settings={"n_random_steps": 18_000_000}, tasks=(WALKER,)),
+    "robot's teacher": _robot(makers.the_teacher, (), chance=False),
+}  # fmt: skip
+
+# Methods tuned as our cells are, beside them untuned where no other table has them
+_NEW = {
+    "oblique tree, constant leaves, DAgger": _corrected(
+        "constant oblique tree", sizes=TUNED_SIZES, version=2, table="tuned"
+    ),
+    "small network, DAgger": _corrected("small network", sizes=TUNED_SIZES, table="tuned"),
+}
+_UNTUNED = (
+    "CART, DAgger", "CART, linear leaves, DAgger", "oblique tree, linear leaves, DAgger", "k-means cells, DAgger",
+    "one linear map",
+)  # fmt: skip
+UNTUNED = _NEW | {name: METHODS[name] for name in _UNTUNED}
+METHODS |= {f"{name}, tuned": _tuned(fit) for name, fit in UNTUNED.items()} | _NEW
+
+# Names under which rows were made before; their ids contain these
+FORMER_NAMES = {
+    "our cells, tuned": "refined",
+    "our cells": "refined, not tuned",
+    "our cells, no teacher": "refined, no teacher",
+    "our cells, no annealing": "refined, cold from the start",
+    "our cells, one restart": "refined, one beginning",
+    "our cells, no correction": "refined, not corrected",
+    "our cells, no slope beyond the limits": "refined, no leak",
+    "our cells, no failure penalty": "refined, failures at no price",
+    "our cells, weighted by criticality": "refined, drawn by stakes",
+    "our cells, 800 generations": "refined, 800 generations",
 }
 
 
-def corrected(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy], rounds: int, by_chance: bool):
-    """Run DAgger with `fit`, with as many corrected episodes as ours, in more rounds since these fits are quick.
+@dataclass(frozen=True)
+class Table:
+    """The rows that are written to one file of a task."""
 
-    A fit that depends `by_chance` on its seed gets as many restarts as ours; the best is corrected.
-    """
-    n = budget.config.n_corrections * budget.config.n_correction_episodes
-    config = replace(budget.config, n_corrections=rounds, n_correction_episodes=n // rounds)
-    return _fitted(fit, config, budget, size, seed, config.n_restarts if by_chance else 1)
-
-
-def alone(budget: Budget, size: int, seed: int, *, fit: Callable[..., Policy]) -> Policy:
-    """Call `fit` on the teacher's own episodes, without corrections."""
-    config = budget.config
-    n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    return _fitted(fit, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
+    seeds: range = range(20)
+    fewer: range | None = None  # seeds of sizes other than the preset's; None: the same
+    methods: tuple[str, ...] | None = None  # None: the methods whose table it is
+    sizes: tuple[int, ...] | None = None  # only these sizes; None: all sizes of a method
+    agents: tuple[int, ...] = (0,)  # teachers: 0 is the shipped one, the others are those of `further_teachers`
+    at_preset: bool = False  # only the preset's size
+    tail: bool = False  # measure the worst returns too
+    keeps: str | None = None  # the method whose policy of the preset's size and of the first seed is kept
 
 
-def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:
-    """Tune the policy of `imitation` on the return as `distill_tuned` tunes its cells."""
-    start = imitation(budget, size, seed, **settings)
-    return tuned(start, budget.teacher, budget.task, budget.config, seed)
+OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the closest rivals
+_SMALL = {
+    "methods": Table(),
+    "tuned": Table(range(7)),
+    "faithful": Table(fewer=range(6), keeps="faithful"),
+    "apart": Table(range(5)),
+    "demanded": Table(range(2)),
+    "teachers": Table(
+        range(5), methods=("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP), agents=(1, 2), at_preset=True
+    ),
+    "limit": Table(fewer=range(3), keeps="at the limit"),
+}
+TABLES = {
+    TASKS[0]: _SMALL,
+    TASKS[1]: _SMALL | {
+        "limit": Table(range(5), range(3), sizes=(3, 4), keeps="at the limit"), "starts": Table(range(3))
+    },
+    TASKS[2]: _SMALL | {"limit": Table(range(10), range(3), sizes=(8, 12), keeps="at the limit")},
+    LANDER: {
+        "methods": Table(range(5)),
+        "tuned": Table(  # the first two again, so that their tail is measured too
+            range(3), methods=("teacher", "our cells, tuned", "CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP),
+            sizes=(0, 1, 2, 4, 8), tail=True,
+        ),
+        "faithful": Table(range(10), range(3), sizes=(0, 1, 2, 4, 8), tail=True, keeps="faithful"),
+        "limit": Table(range(2), sizes=(3,), keeps="at the limit"),
+    },
+    WALKER: {"robots": Table(range(3), keeps="cells, trained further")},
+    CHEETAH: {"robots": Table(range(5), range(3), keeps="cells, trained further")},
+}  # fmt: skip
 
 
-def numbers_of(cells: int, task: Task) -> int:
-    """Return how many numbers a policy of `cells` Voronoi cells with linear maps has."""
-    d, m = len(task.low), len(task.action_low)
-    return cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
+def methods_of(task: str, table: str) -> dict[str, Method]:
+    """Return the methods that have rows of `task` in `table`, by name."""
+    names = TABLES[task][table].methods or [name for name, method in METHODS.items() if method.table == table]
+    return {name: METHODS[name] for name in names if METHODS[name].tasks is None or task in METHODS[name].tasks}
 
 
-def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts: int) -> Policy:
-    seeds = range(n_restarts * seed, n_restarts * (seed + 1))
-    fits = [partial(fit, size=size, task=budget.task, seed=one) for one in seeds]
-    return dagger(fits, budget.teacher, budget.task, rounds=config, seed=seed)
-
-
-# Methods that find their own size
-
-
-def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
-    """Return the teacher itself."""
-    return budget.teacher
-
-
-def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
-    """Return the rule of thumb that a person would write down for the task."""
-    return rule_of_thumb(budget.task.name)[1]
-
-
-def by_hand(budget: Budget, size: int, seed: int) -> Policy:
-    """Return a hand-written controller."""
-    return {"Pendulum-v1": PumpAndBalance, "LunarLanderContinuous-v3": Heuristic}[budget.task.name]()
-
-
-def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
-    """Learn from rewards by TD-AVQ, without a teacher."""
-    return tdavq.learn(budget.task, seed=seed, **settings)
-
-
-def paper_method(budget: Budget, size: int, seed: int) -> Policy:
-    """Call `distill` with the paper's preset."""
-    return distill(budget.teacher, budget.task, budget.config, seed=seed)[0]
+def sizes_of(task: str, method: Method, table: Table) -> tuple[int, ...]:
+    """Return the sizes at which `table` has a method."""
+    if method.sizes == OF_PRESET or table.at_preset and method.sizes != FOUND:
+        return (PRESETS[method.preset](task).n_cells,)
+    return tuple(size for size in method.sizes if table.sizes is None or size in table.sizes)

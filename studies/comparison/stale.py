@@ -1,124 +1,66 @@
 """Find committed results that were made with other settings, another teacher or another version than today's.
 
-`python -m studies.comparison.stale` prints them, or nothing if all are up to date. Not checked are the
-tables that `make paper-figures` rewrites each time, and those of proofs, times, faults and speed.
+`python -m studies.comparison.stale` prints them, or nothing if all are up to date. Which results there are, and what
+they were made with, follows from the table of methods. Not checked are proofs, times and measurements.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
-from functools import partial
-from itertools import combinations
-from pathlib import Path
+from collections.abc import Iterator
 
 import pandas as pd
 
-from vsp.paper import results
-from vsp.paper.studies import interpretations, teachers
+from vsp.paper.results import PROVENANCE
 from vsp.run import atomic, command, sealed
 
-from ..benchmarks import fits, lookup
-from . import kept_robots, regret
-from .kept import KEPT, kept_job, simplest_provenance
-from .method_rows import Job, jobs_of, tables_of
-from .method_tables import LONG, TASKS, WALKERS
+from ..results import RESULTS, read_results
+from .methods import LONG, TABLES
+from .rows import WAYS, best_provenance, by_seed, extras, jobs_of
 
 
 def stale() -> list[str]:
-    """List the results in data/results that are missing, damaged or out of date, one message each.
+    """List the results in data/beyond that are missing, damaged or out of date, one message each.
 
     The list is empty if all are up to date.
     """
-    found = []
+    messages = []
     for name, target, today in committed():
         try:
-            differing = _differing(_provenance(results.RESULTS / name), today)
+            differing = _differing(name, today)
         except FileNotFoundError:
-            found.append(f"data/results/{name} is missing: `make {target}` makes it")
+            messages.append(f"data/beyond/{name} is missing: `make {target}` makes it")
         except atomic.DamagedFile as error:
-            found.append(str(error))
+            messages.append(str(error))
         else:
             if differing:
-                what = f"data/results/{name} was made with other {' and '.join(differing)}"
-                found.append(f"{what}: `make {target}` makes it anew")
-    return found
+                what = f"data/beyond/{name} was made with other {' and '.join(differing)}"
+                messages.append(f"{what}: `make {target}` makes it anew")
+    return messages
 
 
-def committed() -> Iterator[tuple[str, str, Callable[[pd.DataFrame], Iterable[dict]]]]:
-    """Yield the committed files: name, make target, and a function from a file's rows to their provenance today."""
-    yield "readings.csv", "study", _readings
-    yield "teachers.csv", "study", _teachers
-    for task in (*TASKS, *LONG, *WALKERS):
-        target = "beyond" if task in TASKS else "beyond-long"
-        for table in tables_of(task):
-            yield f"{table}_{task}.csv", target, partial(_rows, task, table)
-            if table == "faithful":
-                yield f"same_{task}.csv", target, partial(_pairs, task)
-            if table in KEPT:
-                yield f"{table}_{task}.policy", target, lambda _, about=(task, table): [kept_job(*about).provenance]
-    yield "optimum.csv", "beyond", lambda _: [regret.provenance_of(*way) for way in regret.WAYS]
-    for task in LONG:
-        yield f"beyond_{task}.policy", "beyond-long", lambda _, task=task: [simplest_provenance(task)]
-    for task in WALKERS:
-        for name in ("gait", "fewest"):
-            yield f"{name}_{task}.csv", "beyond-long", lambda _, about=(name, task): [kept_robots.provenance_of(*about)]
-    for benchmark in (lookup, fits):
-        name = f"{benchmark.__name__.rpartition('.')[2]}.csv"
-        yield name, "lookup", lambda _, benchmark=benchmark: [benchmark.made_with()]
+def committed() -> Iterator[tuple[str, str, list[dict]]]:
+    """Yield the committed files: name, make target, and the provenance today, of each row or of the whole file."""
+    for task, tables in TABLES.items():
+        target = "beyond-long" if task in LONG else "beyond"
+        for table in tables:
+            made_with = ((jobs, kind.provenance) for kind, jobs in by_seed(jobs_of(task, table)).items())
+            yield f"{table}_{task}.csv", target, [{"seed": job.seed, **now} for jobs, now in made_with for job in jobs]
+            for name, today, _ in extras(task, table):
+                yield name, target, today
+    yield "optimum.csv", "beyond", [best_provenance(*way) for way in WAYS]
 
 
-def _differing(frame: pd.DataFrame, today: Callable[[pd.DataFrame], Iterable[dict]]) -> list[str]:
-    """Return the columns in which the provenance of the rows differs from today's; none if it is up to date."""
-    now = pd.DataFrame(list(today(frame)))
-    columns = [name for name in (*results.PROVENANCE, "seed", "other") if name in now]
-    now, then = now[columns].astype(str), frame.reindex(columns=columns).dropna(how="all").astype(str)
-    count = Counter if "seed" in now else set  # with a seed, each row stands for one job
+def _differing(name: str, today: list[dict]) -> list[str]:
+    """Return the columns in which the provenance in a file differs from today's; none if it is up to date."""
+    now, path = pd.DataFrame(today), RESULTS / name
+    columns = [column for column in (*PROVENANCE, "seed", "other") if column in now]
+    kept = [sealed.load_arrays(path, kind="VoronoiPolicy")[1]] if path.suffix == ".policy" else read_results(path.stem)
+    now, then = now[columns].astype(str), pd.DataFrame(kept).reindex(columns=columns).astype(str)
+    count = Counter if "seed" in columns else set  # with a seed, each row stands for one job
     if count(map(tuple, now.to_numpy())) == count(map(tuple, then.to_numpy())):
         return []
-    return [name for name in columns if set(now[name]) != set(then[name])] or ["rows"]
-
-
-def _provenance(path: Path) -> pd.DataFrame:
-    """Read the rows of a table, or the metadata of a policy as one row."""
-    if path.suffix == ".policy":
-        return pd.DataFrame([sealed.load_arrays(path, kind="VoronoiPolicy")[1]])
-    frame = results.read_results(path.stem, path.parent)
-    return frame.assign(teacher=frame["checksum"]) if "checksum" in frame else frame
-
-
-def _readings(frame: pd.DataFrame) -> Iterable[dict]:
-    """Yield today's provenance of the readings. All variants are ranked; the rows show which were also confirmed."""
-    seeds = {"choosing": interpretations.CHOOSING, "confirming": interpretations.CONFIRMING}
-    confirmed = set(frame.loc[frame["phase"] == "confirming", "variant"])
-    for (name, _), experiment in interpretations.experiments(interpretations.variants()).items():
-        for phase in seeds if name in confirmed else ("choosing",):
-            yield interpretations.provenance_of(experiment, seeds[phase])
-
-
-def _teachers(frame: pd.DataFrame) -> Iterable[dict]:
-    for experiment in teachers.experiments().values():
-        yield from ({**teachers.provenance_of(experiment), "seed": seed} for seed in teachers.SEEDS)
-
-
-def _rows(task: str, table: str, frame: pd.DataFrame) -> Iterable[dict]:
-    made_with: dict[Job, dict] = {}  # the same for all seeds
-    for job in jobs_of(task, table):
-        kind = replace(job, seed=0)
-        if kind not in made_with:
-            made_with[kind] = kind.provenance
-        yield {"seed": job.seed, **made_with[kind]}
-
-
-def _pairs(task: str, frame: pd.DataFrame) -> Iterable[dict]:
-    """Yield today's provenance of each pair of seeds whose faithful policies are compared."""
-    seeds: dict[Job, list[int]] = {}
-    for job in jobs_of(task, "faithful"):
-        seeds.setdefault(replace(job, seed=0), []).append(job.seed)
-    for kind, found in seeds.items():
-        made_with = kind.provenance
-        yield from ({**made_with, "seed": one, "other": other} for one, other in combinations(found, 2))
+    return [column for column in columns if set(now[column]) != set(then[column])] or ["rows"]
 
 
 def main() -> None:

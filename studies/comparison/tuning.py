@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -14,25 +13,11 @@ from vsp.subpolicies import linear_outputs
 from vsp.tasks.base import Task
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import Candidates, Objective, tune
-from vsp_beyond.few_cells.units import Scaling, joined, parted
+from vsp_beyond.few_cells.units import Cells, Scaling, joined, parted
 
 from ..rivals.small_network import SmallNetwork
 from ..rivals.trees import LinearTree, ObliqueLinearTree
-from .measure import cost
-
-
-class Numbers(Protocol):
-    """What is tuned: a policy in the units of a `Scaling`, whose structure is fixed."""
-
-    @property
-    def vector(self) -> np.ndarray:
-        """All its numbers, as one vector."""
-
-    def like(self, vector: np.ndarray) -> Numbers:
-        """Return the same structure with the numbers of `vector`."""
-
-    def outputs(self, inputs: np.ndarray) -> np.ndarray:
-        """Actions (n, m), not limited, for inputs (n, d + 1)."""
+from .measure import parameters_of
 
 
 @dataclass(frozen=True)
@@ -99,8 +84,11 @@ class NetworkNumbers:
         return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
 
 
+Numbers = TreeNumbers | NetworkNumbers | Cells  # what is tuned, in the units of a `Scaling`: its structure is fixed
+
+
 class Tunable:
-    """The policy with `numbers` in the units of `frame`. Its size and cost are those of `start`."""
+    """The policy with `numbers` in the units of `frame`. Its size and structure are those of `start`."""
 
     def __init__(self, frame: Scaling, numbers: Numbers, start: Policy):
         self.frame, self.numbers, self._start = frame, numbers, start
@@ -109,9 +97,9 @@ class Tunable:
         return len(self._start) if hasattr(self._start, "__len__") else 0
 
     @property
-    def COST(self) -> tuple[int, float]:  # named as in policies whose cost is counted by hand
-        """The `cost` of `start`, since tuning does not change the structure."""
-        return cost(self._start)
+    def PARAMETERS(self) -> int:  # named as in policies whose numbers are counted by hand
+        """The `parameters_of` `start`, since tuning does not change the structure."""
+        return parameters_of(self._start)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
@@ -142,8 +130,8 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
     objective = Objective(config.failure_penalty)
     candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
     candidates.add("fit", 0, numbers)
-    for one in tune(frame, numbers, config, objective, search):
-        candidates.add("tune", 0, one)
+    for snapshot in tune(frame, numbers, config, objective, search):
+        candidates.add("tune", 0, snapshot)
     return frame.policy(candidates.best)
 
 
@@ -156,19 +144,19 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
     if isinstance(policy, Tunable):
         return policy.frame, policy.numbers
     if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
-        own = replace(frame, scale=policy.scale)  # the scale is part of its borders
-        return own, own.cells(policy)
+        scaled = replace(frame, scale=policy.scale)  # the scale is part of its borders
+        return scaled, scaled.cells(policy)
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
-    own = TunableFrame(frame.task, units.centre, units.scale, policy)
+    tunable = TunableFrame(frame.task, units.centre, units.scale, policy)
     if isinstance(policy, VoronoiPolicy):
-        return own, TreeNumbers.one_leaf(own.cells(policy).coefficients)
+        return tunable, TreeNumbers.one_leaf(tunable.cells(policy).coefficients)
     if isinstance(policy, Tree):
-        return own, _of_cart(policy.model.tree_, own)
+        return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):
-        return own, _of_tree(policy, own)
+        return tunable, _of_tree(policy, tunable)
     if isinstance(policy, SmallNetwork):
         hidden, output = (np.vstack(layer) for layer in policy.layers)
-        return own, NetworkNumbers(hidden, own.coefficients(output))
+        return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
     raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
 
 

@@ -1,14 +1,12 @@
 """Linear maps in cells, fitted with the teacher's critics, after two published methods.
 
-Both are fitted to states (n, d) and actions (n, m) of a teacher. They raise ValueError for a teacher without critics,
-arrays of a wrong shape, numbers that are not finite, fewer than one cell, and a bad seed.
+Both are fitted to states (n, d) and actions (n, m) of a teacher that has critics.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from vsp.checks import check_count, check_data, check_seed
 from vsp.geometry import nearest
 from vsp.paper.baselines import kmeans_cells
 from vsp.policy import VoronoiPolicy
@@ -35,43 +33,44 @@ def critic_driven(
     cell with the largest total loss gets a second codeword, at the mean of the 1 % of its states that lose most, with a
     copy of its map. Codewords never move. The result has fewer than `cells` cells if no state loses value any more.
     """
-    check_seed(seed)
-    check_count("cells", cells)
-    _check_critics(teacher)
-    own_task, rng = get_task(task), np.random.default_rng(seed)
-    states, actions = check_data(states, actions, len(own_task.low), len(own_task.action_low))
+    task, rng = get_task(task), np.random.default_rng(seed)
     centre, scale = standard(states)
     points, best = (states - centre) / scale, teacher.value(states, actions)
     codewords, maps = np.zeros((1, len(centre))), np.zeros((1, len(centre) + 1, actions.shape[1]))
     while True:
-        own = nearest(codewords, points, "euclidean")
-        maps = trained(maps, own, points, actions, own_task, rng)
-        distilled = np.clip(linear_outputs(points, maps[own]), own_task.action_low, own_task.action_high)
+        cells_of = nearest(codewords, points, "euclidean")
+        maps = trained(maps, cells_of, points, actions, task, rng)
+        distilled = np.clip(linear_outputs(points, maps[cells_of]), task.action_low, task.action_high)
         lost = np.maximum(0.0, best - teacher.value(states, distilled))
         if len(maps) >= cells or not lost.any():
             break
-        cell, codeword = where_lost(points, own, lost)
+        cell, codeword = where_lost(points, cells_of, lost)
         codewords, maps = np.vstack([codewords, codeword]), np.concatenate([maps, maps[cell][None]])
     weights = maps[:, :-1] / scale[:, None]
     coefficients = np.concatenate([weights, maps[:, -1:] - (centre @ weights)[:, None]], axis=1)
     return VoronoiPolicy(codewords * scale + centre, coefficients, task=task, metric="euclidean", scale=scale)
 
 
-def where_lost(points: np.ndarray, own: np.ndarray, lost: np.ndarray) -> tuple[int, np.ndarray]:
+def where_lost(points: np.ndarray, cells_of: np.ndarray, lost: np.ndarray) -> tuple[int, np.ndarray]:
     """Return the cell with the largest total loss, and the mean (d,) of the share `WORST` of its points that lose most.
 
-    `points` (n, d) belong to the cells `own` (n,) and lose `lost` (n,).
+    `points` (n, d) belong to the cells `cells_of` (n,) and lose `lost` (n,).
     """
-    cell = int(np.bincount(own, lost).argmax())
-    rows = np.flatnonzero(own == cell)
+    cell = int(np.bincount(cells_of, lost).argmax())
+    rows = np.flatnonzero(cells_of == cell)
     worst = rows[np.argsort(-lost[rows], kind="stable")[: max(1, round(WORST * len(rows)))]]
     return cell, points[worst].mean(axis=0)
 
 
 def trained(
-    maps: np.ndarray, own: np.ndarray, points: np.ndarray, actions: np.ndarray, task: Task, rng: np.random.Generator
+    maps: np.ndarray,
+    cells_of: np.ndarray,
+    points: np.ndarray,
+    actions: np.ndarray,
+    task: Task,
+    rng: np.random.Generator,
 ) -> np.ndarray:
-    """Return `maps` (k, d + 1, m) of the cells `own` (n,) after Adam on the squared error of the clipped action.
+    """Return `maps` (k, d + 1, m) of the cells `cells_of` (n,) after Adam on the squared error of the clipped action.
 
     `points` (n, d) are standardised, `actions` (n, m) in the units of the task. `rng` draws the batches; the step size
     falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box would stop learning.
@@ -80,9 +79,9 @@ def trained(
     inputs = np.column_stack([points, np.ones(len(points))])
     for i in range(N_STEPS):
         rows = rng.integers(len(points), size=BATCH)
-        raw = linear_outputs(points[rows], maps[own[rows]])
+        raw = linear_outputs(points[rows], maps[cells_of[rows]])
         error = (np.clip(raw, task.action_low, task.action_high) - actions[rows]) / half
-        here = own[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
+        here = cells_of[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
         gradient = 2 / BATCH * np.einsum("kn,np,nm->kpm", here, inputs[rows], error, optimize=True)
         maps = maps - RATE * (1 - i / N_STEPS) * half * adam.step(gradient)
     return maps
@@ -97,20 +96,12 @@ def advantage_weighted(
     squares, weighted by the teacher's criticality relative to its largest value in the cell. A cell where no action
     costs anything keeps its unweighted map. With one cell, this is one weighted linear map.
     """
-    _check_critics(teacher)
     policy = kmeans_cells(states, actions, cells=cells, task=task, seed=seed)
-    states, actions = check_data(states, actions)
-    own, weights, coefficients = policy.cells(states), teacher.criticality(states), policy.coefficients.copy()
+    cells_of, weights, coefficients = policy.cells(states), teacher.criticality(states), policy.coefficients.copy()
     inputs = np.column_stack([states, np.ones(len(states))])
-    for i in np.unique(own):
-        here = own == i
+    for i in np.unique(cells_of):
+        here = cells_of == i
         if (most := weights[here].max()) > 0:
             root = np.sqrt(weights[here] / most)[:, None]
             coefficients[i] = np.linalg.lstsq(root * inputs[here], root * actions[here], rcond=None)[0]
     return VoronoiPolicy(policy.codewords, coefficients, task=policy.task, metric=policy.metric, scale=policy.scale)
-
-
-def _check_critics(teacher: Teacher) -> None:
-    if not hasattr(teacher, "value"):
-        name = type(teacher).__name__
-        raise ValueError(f"the teacher is a {name} without critics, expected one with, as from vsp.load_teacher")

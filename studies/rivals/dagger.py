@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from vsp.checks import check_seed
 from vsp.rollouts import Policy, rollout, score, visited_states
+from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
-
-
-@runtime_checkable
-class Rounds(Protocol):
-    """The settings that `dagger` reads; a `Tuned` has them."""
-
-    n_episodes: int  # episodes of the teacher for the first fit
-    n_corrections: int  # rounds of correction
-    n_correction_episodes: int  # episodes of the fitted policy per round
-    n_validation: int  # episodes that decide between fits
-    failure_penalty: float  # subtracted from the mean return per failed episode when fits are compared
-
+from vsp_beyond.few_cells.config import Tuned
 
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 
 
-def dagger(fits: Sequence[Fit], teacher: Policy, task: str, *, rounds: Rounds, seed: int) -> Policy:
+def dagger(fits: Sequence[Fit], teacher: Policy, task: str | Task, *, rounds: Tuned, seed: int) -> Policy:
     """Return the best of the policies fitted to the teacher's states, then also to states that fitted policies visit.
 
     `rounds` sets episodes, corrections and validation. All `fits` are tried in the first round, which helps if they
-    differ in their random numbers; only the one with the best first policy is corrected. Raises ValueError for a bad
-    seed or bad `rounds`.
+    differ in their random numbers; only the one with the best first policy is corrected.
     """
-    check_seed(seed)
-    if not isinstance(rounds, Rounds):
-        raise ValueError(f"rounds is {rounds!r}, expected the fields of Rounds, such as a Tuned has")
-    task, streams = get_task(task), np.random.SeedSequence(seed).spawn(2)
-    rng, validation_rng = (np.random.default_rng(stream) for stream in streams)
+    task = get_task(task)
+    rng, validation_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
     validation = task.start(validation_rng, rounds.n_validation)
     policy, states, best = teacher, np.zeros((0, len(task.low))), (-np.inf, None)
     for i in range(1 + rounds.n_corrections):

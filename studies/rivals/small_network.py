@@ -6,17 +6,13 @@ import warnings
 
 import numpy as np
 
-from vsp.checks import check_array, check_count, check_data, check_seed
 from vsp.rollouts import standard
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
 
 class SmallNetwork:
-    """One hidden layer of tanh units on standardised states, fitted by scikit-learn's L-BFGS.
-
-    Raises ValueError for arrays of a wrong shape, numbers that are not finite, fewer than one unit, and a bad seed.
-    """
+    """One hidden layer of tanh units on standardised states, fitted by scikit-learn's L-BFGS."""
 
     ITERATIONS = 500
 
@@ -25,9 +21,6 @@ class SmallNetwork:
         from sklearn.neural_network import MLPRegressor
 
         self.task = get_task(task)
-        states, actions = check_data(states, actions, len(self.task.low), len(self.task.action_low))
-        check_count("units", units)
-        check_seed(seed)
         how = {"activation": "tanh", "solver": "lbfgs", "max_iter": self.ITERATIONS, "max_fun": 2 * self.ITERATIONS}
         model = MLPRegressor(hidden_layer_sizes=(units,), random_state=seed, **how)
         self.centre, self.scale = standard(states)
@@ -38,7 +31,6 @@ class SmallNetwork:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
-        obs = check_array("observations", obs, (-1, len(self.centre)))
         (hidden, shift), (weights, bias) = self.layers
         raw = np.tanh((obs - self.centre) / self.scale @ hidden + shift) @ weights + bias
         return np.clip(raw, self.task.action_low, self.task.action_high), None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.checks import check_array, check_count, check_data, check_seed
 from vsp.rollouts import standard
 
 
@@ -22,9 +21,6 @@ class SoftTree:
     BALANCE = 0.03  # weight of the penalty on uneven nodes; halves with every level, falls to 0 during training
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, seed: int):
-        states, actions = check_data(states, actions)
-        check_count("leaves", leaves)
-        check_seed(seed)
         self.depth = int(np.log2(leaves))
         self.centre, self.scale = standard(states)
         rng = np.random.default_rng(seed)
@@ -40,7 +36,6 @@ class SoftTree:
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d)."""
-        obs = check_array("observations", obs, (-1, len(self.centre)))
         return self.values[self._leaf(self._inputs(obs))], None
 
     def _leaf(self, inputs: np.ndarray) -> np.ndarray:

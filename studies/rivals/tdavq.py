@@ -15,7 +15,6 @@ from itertools import product
 import numpy as np
 
 from vsp import geometry
-from vsp.checks import check_count, check_number, check_seed
 from vsp.tasks.base import RUNNING, Task
 from vsp.tasks.registry import get_task
 
@@ -26,7 +25,6 @@ EXPLORATION = 1.0, 0.1  # share of random actions at the beginning, and from the
 THRESHOLD = 2.0  # TD error, in units of the reward, that splits a cell
 N_SPLIT, N_MERGE = 20, 500  # steps between two passes
 LAST_SPLIT, LAST_MERGE = 0.5, 0.8  # shares of the steps after which there is no pass
-COARSE = {"min_distance": 0.15, "likeness": 1.0, "discount": 0.95}  # settings of `learn` that give few cells
 
 
 class DiscretePolicy:
@@ -48,24 +46,15 @@ class DiscretePolicy:
 
 
 def learn(
-    task: str | Task,
-    *,
-    seed: int,
-    n_steps: int = 20_000,
-    min_distance: float = 0.06,
-    likeness: float = 0.3,
+    task: str | Task, *, seed: int, n_steps: int = 20_000, min_distance: float = 0.06, likeness: float = 0.3,
     discount: float = 0.97,
-) -> DiscretePolicy:
+) -> DiscretePolicy:  # fmt: skip
     """Learn a policy from `n_steps` steps of `N_PARALLEL` episodes. The same arguments give the same policy.
 
     No two codewords are closer to each other than `min_distance` (in units of the state). Neighbours with the same best
     action are merged where no value differs by more than `likeness` (in units of the reward). A `discount` near 1 gives
     policies that circle between cells. Raises ValueError for a task that cannot be stepped in parallel.
     """
-    check_seed(seed)
-    check_count("n_steps", n_steps)
-    for name, value in (("min_distance", min_distance), ("likeness", likeness), ("discount", discount)):
-        check_number(name, value, least=0)
     task, rng = get_task(task), np.random.default_rng(seed)
     episodes, actions = ParallelEpisodes(task, rng), _actions(task)
     policy = DiscretePolicy(episodes.observations[:1], np.zeros((1, len(actions))), actions)
@@ -142,10 +131,10 @@ def split(
     for state, action, value in zip(states, chosen, targets):
         gaps = geometry.distances(state[None], policy.codewords, METRIC)[0]
         if gaps.min() >= min_distance:
-            own = policy.values[gaps.argmin()].copy()
-            own[action] = value
+            values = policy.values[gaps.argmin()].copy()
+            values[action] = value
             policy.codewords = np.vstack([policy.codewords, state])
-            policy.values = np.vstack([policy.values, own])
+            policy.values = np.vstack([policy.values, values])
 
 
 def merge(policy: DiscretePolicy, likeness: float) -> None:

@@ -1,7 +1,6 @@
 """Trees to compare with the Voronoi partition: CART, and model trees with axis-aligned or oblique splits.
 
 All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
-They raise ValueError for arrays of a wrong shape, numbers that are not finite, and fewer than one leaf.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from functools import partial
 
 import numpy as np
 
-from vsp.checks import check_array, check_count, check_data, check_seed
 from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
 from vsp.tasks.registry import get_task
@@ -52,8 +50,6 @@ class LinearTree:
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, constant: bool = False):
         self.task, self.constant = get_task(task), constant
-        states, actions = check_data(states, actions, len(self.task.low), len(self.task.action_low))
-        check_count("leaves", leaves)
         self.centre, self.scale = standard(states)
         inputs, self.nodes = self.inputs(states), [Node(np.arange(len(states)), 0)]
         least = 1e-9 * np.square(actions).sum()  # smaller gains are rounding errors
@@ -88,16 +84,16 @@ class LinearTree:
 
     def apply(self, inputs: np.ndarray) -> np.ndarray:
         """The leaf of each of the inputs (n, d), as an index of `nodes`. (n,)"""
-        found = np.zeros(len(inputs), dtype=np.intp)
+        nodes = np.zeros(len(inputs), dtype=np.intp)
         for i, node in enumerate(self.nodes):  # parents come before their children
             if node.children:
-                here = np.flatnonzero(found == i)
-                found[here] = np.take(node.children, node.split.right(inputs[here]))
-        return found
+                here = np.flatnonzero(nodes == i)
+                nodes[here] = np.take(node.children, node.split.right(inputs[here]))
+        return nodes
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
-        inputs = self.inputs(check_array("observations", obs, (-1, len(self.centre))))
+        inputs = self.inputs(obs)
         raw = linear_outputs(inputs, self.maps[self.apply(inputs)])
         return np.clip(raw, self.task.action_low, self.task.action_high), None
 
@@ -145,7 +141,6 @@ class ObliqueLinearTree(LinearTree):
         self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int, constant: bool = False,
         cuts: int = CUTS,
     ):  # fmt: skip
-        check_seed(seed)
         self._rng, self._cuts = np.random.default_rng(seed), cuts
         super().__init__(states, actions, leaves=leaves, task=task, constant=constant)
 
@@ -161,11 +156,11 @@ _SEARCHED, _FEW_CUTS, _TRIED, _ROUNDS = 2000, 31, 12, 4
 def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, cuts: int, constant: bool) -> Split:
     """Find the best split among directions of several kinds; perturb the best one in rounds, by less in each."""
     some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, cuts=_FEW_CUTS, constant=constant)
-    found = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
+    best = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
     for size in np.geomspace(1.0, 0.1, _ROUNDS):
-        moved = _unit(found.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
-        found = stump(inputs[some], actions[some], np.vstack([found.direction, moved]))
-    return _stump(inputs, actions, found.direction[None], cuts=cuts, constant=constant)
+        moved = _unit(best.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
+        best = stump(inputs[some], actions[some], np.vstack([best.direction, moved]))
+    return _stump(inputs, actions, best.direction[None], cuts=cuts, constant=constant)
 
 
 def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -175,12 +170,12 @@ def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generato
     centred, d = inputs - inputs.mean(axis=0), inputs.shape[1]
     covariance = centred.T @ centred + 1e-6 * len(inputs) * np.eye(d)
     maps = np.linalg.solve(covariance, centred.T @ actions)
-    found = [np.eye(d), np.linalg.eigh(covariance)[1].T, maps.T]
+    directions = [np.eye(d), np.linalg.eigh(covariance)[1].T, maps.T]
     if len(np.unique(actions, axis=0)) > 1:
         cluster = KMeans(2, n_init=1, random_state=int(rng.integers(2**31))).fit_predict(actions)
         gap = inputs[cluster == 1].mean(axis=0) - inputs[cluster == 0].mean(axis=0)
-        found.append(np.linalg.solve(covariance, gap)[None])
-    return _unit(np.vstack(found))
+        directions.append(np.linalg.solve(covariance, gap)[None])
+    return _unit(np.vstack(directions))
 
 
 def _unit(directions: np.ndarray) -> np.ndarray:

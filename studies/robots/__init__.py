@@ -7,8 +7,7 @@ with a few cells as its actor.
 from vsp.tasks import register_maker
 
 from . import bipedalwalker, halfcheetah
-from .fewest import fewest_numbers
-from .gait import phases, record_gait
+from .gait import record_gait
 from .imitation import imitate_pushed
 from .random_search import search_one_map
 from .settings import Walking, walking_preset

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.checks import check_seed
 from vsp.rollouts import Policy
 from vsp.teachers.teacher import Teacher
 from vsp_beyond.few_cells.units import Scaling
@@ -30,7 +29,6 @@ def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *,
     """
     import torch
 
-    check_seed(seed)
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     try:

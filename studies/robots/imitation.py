@@ -8,7 +8,6 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, visited_states
 from vsp.tasks.base import Task
@@ -46,7 +45,6 @@ def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: 
 
     `fit`: by default the closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed.
     """
-    check_seed(seed)
     task, fit = get_task(task), cells_fit(config) if fit is None else fit
     starts, pushes, fits, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     own = visited_states(teacher, task, task.start(starts, config.n_episodes))

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
@@ -50,7 +49,6 @@ def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPo
     Each round plays maps on both sides of the current one, in random directions. The map then moves along the `n_best`
     directions with the highest returns. Raises ValueError for a bad seed.
     """
-    check_seed(seed)
     task = get_task(task)
     forgiving, d, m = _forgiving(task), len(task.low), len(task.action_low)
     starts, noise, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3))

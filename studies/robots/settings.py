@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from vsp.checks import check_count, check_number
 from vsp.tasks import Task, get_task
-from vsp_beyond.few_cells.config import MOST, MOST_CELLS
 
 
 @dataclass(frozen=True)
 class Walking:
-    """How a robot's teacher is imitated and how the policy is tuned. Raises ValueError for a value out of range."""
+    """How a robot's teacher is imitated and how the policy is tuned."""
 
     n_cells: int
     """Cells of the policy."""
@@ -54,16 +52,6 @@ class Walking:
     """Step size along these directions, for returns scaled to unit deviation."""
     search_noise: float = 0.03
     """Standard deviation of the changes that are tried."""
-
-    def __post_init__(self) -> None:
-        check_count("n_cells", self.n_cells, most=MOST_CELLS)
-        for name in (field.name for field in fields(self) if field.type == "int" and field.name != "n_cells"):
-            check_count(name, getattr(self, name), least=int(name != "n_corrections"), most=MOST)
-        for name in (field.name for field in fields(self) if field.type == "float"):
-            check_number(name, getattr(self, name), least=0.0 if name in ("push", "gamma") else 1e-12)
-        check_number("gamma", self.gamma, least=0.0, most=1.0)
-        check_count("n_best", self.n_best, most=self.n_directions)
-        check_count("n_filling", self.n_filling, most=self.n_steps)
 
 
 # The walker's engine takes three times as long for a step. So TD3 takes half the steps, and the search for one map has

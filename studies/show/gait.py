@@ -1,4 +1,4 @@
-"""Draw a robot's gait as a stick figure, in the colour of the active cell, from recorded data alone."""
+"""Draw a robot's gait as a moving stick figure, in the colour of the active cell, from recorded data alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from vsp.show import style
 from vsp.show.animation import DPI, WIDTH, Animation, Stage, save_frames
 
 THICK = 3.0  # line width of the body, in points
-GAP = 1.1  # from one pose to the next in a strip, as a multiple of the widest pose
 ENDS = ("x0", "z0", "x1", "z1")
 
 
@@ -24,42 +23,16 @@ def body_lines(gait: pd.DataFrame) -> dict[str, np.ndarray]:
     return {name: gait[[f"{name} {end}" for end in ENDS]].to_numpy().reshape(-1, 2, 2) for name in names}
 
 
-def draw_pose(ax: Axes, lines: dict[str, np.ndarray], step: int, *, color, shift: float = 0.0) -> None:
-    """Draw the body in one step, centred at x = `shift` metres."""
+def draw_pose(ax: Axes, lines: dict[str, np.ndarray], step: int, *, color: str) -> None:
+    """Draw the body in one step, centred at x = 0."""
     parts = np.stack([ends[step] for ends in lines.values()])
-    parts[:, :, 0] += shift - parts[:, :, 0].mean()
+    parts[:, :, 0] -= parts[:, :, 0].mean()
     ax.add_collection(LineCollection(list(parts), colors=[color], linewidths=THICK, capstyle="round"))
 
 
 def cell_colors(gait: pd.DataFrame) -> dict[int, str]:
     """Return the colour of each cell that acts, in order of number; a number has the same colour in each figure."""
     return {int(cell): style.COLOURS[int(cell) % len(style.COLOURS)] for cell in np.unique(gait.cell)}
-
-
-def gait_strip(ax: Axes, gait: pd.DataFrame, steps: range, *, step_seconds: float) -> None:
-    """Draw poses side by side, each in the colour of its cell, with the time and the feet on the ground below.
-
-    Raises ValueError for steps that were not recorded.
-    """
-    if not len(steps) or min(steps) < 0 or max(steps) >= len(gait):
-        raise ValueError(f"steps are {steps}, expected some of the {len(gait)} recorded ones")
-    lines, colors = body_lines(gait), cell_colors(gait)
-    across = np.concatenate([ends[list(steps), :, 0] for ends in lines.values()], axis=1)
-    gap = GAP * float(np.ptp(across, axis=1).max())
-    for i, step in enumerate(steps):
-        draw_pose(ax, lines, step, color=colors[int(gait.cell[step])], shift=i * gap)
-    times = [f"{step_seconds * (step - steps[0]):.2f}\n{_feet_down(gait, step)}" for step in steps]
-    ax.set(xticks=np.arange(len(steps)) * gap, xticklabels=times, yticks=[], aspect="equal")
-    ax.set(xlabel="time (s); foot on the ground")
-    ax.axhline(0.0, color="0.6", zorder=0)
-    ax.set(xlim=(-gap / 2, (len(steps) - 0.5) * gap))
-    ax.spines["left"].set_visible(False)
-    _name_cells(ax, {cell: color for cell, color in colors.items() if cell in set(gait.cell[list(steps)])})
-
-
-def _feet_down(gait: pd.DataFrame, step: int) -> str:
-    feet = [foot for foot in ("back", "front") if gait[foot][step]]
-    return "both" if len(feet) == 2 else "".join(feet)
 
 
 def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
@@ -89,7 +62,9 @@ def save_gait(
     body.set(xticks=[], yticks=[])
     body.spines[["left", "bottom"]].set_visible(False)
     body.axhline(0.0, color="0.6", zorder=0)
-    _name_cells(body, colors)
+    marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell + 1}") for cell, color in colors.items()]
+    beside = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "handlelength": 1.0, "columnspacing": 1.0}
+    body.legend(handles=marks, ncol=len(marks), frameon=False, **beside)
     footfall(below, gait, step_seconds=step_seconds)
     stage = Stage(fig)
     if quick:
@@ -104,14 +79,3 @@ def save_gait(
 
     images = [stage.shoot(lambda step=step: paint(step)) for step in range(len(gait))]
     return save_frames(images, name, out=out, alt=alt, step=round(1000 * step_seconds), hold=round(1000 * step_seconds))
-
-
-def _name_cells(ax: Axes, colors: dict[int, str]) -> None:
-    marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell + 1}") for cell, color in colors.items()]
-    place = {
-        "loc": "lower right",
-        "bbox_to_anchor": (1.0, 1.0),
-        "handlelength": 1.0,
-        "columnspacing": 1.0,
-    }  # beside a title
-    ax.legend(handles=marks, ncol=len(marks), frameon=False, **place)

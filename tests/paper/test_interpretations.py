@@ -11,18 +11,18 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
 
-from vsp import distill
+from vsp.algorithms import distill
 from vsp.config import EXTENSIONS, Config, paper_preset
 from vsp.evaluation import fences, rollout_from_seed
 from vsp.paper import printed
 from vsp.paper import runs as runs_module
+from vsp.paper.readings import ALTERNATIVES, Readings, defaults
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, make_run, paper_experiment
 from vsp.paper.statistics import interval, resample, spread
 from vsp.paper.studies import interpretations
 from vsp.paper.studies.interpretations import (
     AS_PRINTED,
-    READINGS,
     SHOWN,
     as_intervals,
     distance,
@@ -30,13 +30,13 @@ from vsp.paper.studies.interpretations import (
     ranking,
     study,
 )
-from vsp.tasks import base
+from vsp.tasks import base, get_task
 
 CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer
 
 # What is tried
 
-ALONE = [(number, change) for number, changes in READINGS.items() for change in changes]
+ALONE = [(number, change) for number, changes in ALTERNATIVES.items() for change in changes]
 BEYOND = [("neighbours", "visited")]  # values of readings that are none of the paper's
 PRINTED = {*printed.printed_hyperparameters(SIMPLEGOAL)} - {"one_split"}  # T2 prints it, yet it is a reading (R4)
 
@@ -58,40 +58,41 @@ def forgotten(config, readings):
 
 
 def test_no_reading_is_forgotten():
-    assert forgotten(Config, READINGS) == []
+    assert forgotten(Config, ALTERNATIVES) == forgotten(Readings, ALTERNATIVES) == []
     assert not any((name, value) in BEYOND for _, change in ALONE for name, value in change.items())
 
 
 def test_readings_have_the_numbers_that_the_configuration_gives_them():
-    body = ast.parse(inspect.getsource(Config)).body[0].body
+    bodies = [ast.parse(inspect.getsource(kind)).body[0].body for kind in (Config, Readings)]
     number = {
         field.target.id: re.match(r"R\d+", text.value.value)[0]
+        for body in bodies
         for field, text in itertools.pairwise(body)
         if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and text.value.value.startswith("R")
     }
     assert len(number) > 15 and all(number[name] == key for key, change in ALONE for name in change)
-    assert list(READINGS) == sorted(READINGS, key=lambda key: int(key[1:]))
-    assert set(number.values()) == set(READINGS)
+    assert list(ALTERNATIVES) == sorted(ALTERNATIVES, key=lambda key: int(key[1:]))
+    assert set(number.values()) == set(ALTERNATIVES)
 
 
 def test_each_reading_changes_one_field_to_another_value():
-    default = paper_preset(SIMPLEGOAL)
+    goal, car = (defaults(paper_preset(task)) for task in TASKS)
     for _, change in ALONE:
         ((name, value),) = change.items()
-        assert getattr(default, name) != value and getattr(paper_preset(MOUNTAINCAR), name) == getattr(default, name)
+        assert goal[name] == car[name] != value
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_variants_are_experiments_that_differ(task):
     tried = interpretations.variants()
-    configs = {name: dataclasses.replace(paper_preset(task), **change) for name, change in tried.items()}
-    assert next(iter(tried)) == "default" and configs["default"] == paper_preset(task)
-    assert len(set(configs.values())) == len(configs) == 1 + len(ALONE) + 1 + 18
-    found = interpretations.experiments(tried)
-    assert found.keys() == {(name, task) for name in tried for task in TASKS}
-    usual = paper_experiment(task)
-    for name, config in configs.items():
-        assert found[name, task].provenance == dataclasses.replace(usual, config=config).provenance
+    found = {name: one for (name, other), one in interpretations.experiments(tried).items() if other == task}
+    assert list(found) == list(tried) and next(iter(tried)) == "default"
+    ids = {one.provenance["settings"] for one in found.values()}
+    assert len(ids) == len(found) == 1 + len(ALONE) + 1 + 18
+    assert found["default"].provenance == paper_experiment(task).provenance
+    for name, change in tried.items():
+        answers = defaults(found[name].config) | dataclasses.asdict(found[name].readings or Readings())
+        assert answers == defaults(paper_preset(task)) | change
 
 
 def test_combinations_take_all_their_parts():
@@ -115,8 +116,9 @@ def test_after_one_split_the_second_look_up_says_nothing(seed):
 
     def policies(**changes):
         for lookup in ("kept", "refreshed"):
-            config = tiny(n_epochs=60, n_freeze=5, max_pol_loss=1e-3, split_lookup=lookup, **changes)
-            policy, _ = distill(CurvedTeacher(), SIMPLEGOAL, config, seed=seed)
+            config = tiny(n_epochs=60, n_freeze=5, max_pol_loss=1e-3, **changes)
+            split = Readings(split_lookup=lookup).split
+            policy, _ = distill(CurvedTeacher(), get_task(SIMPLEGOAL), config, seed=seed, split=split)
             yield policy.codewords.tobytes() + policy.coefficients.tobytes()
 
     kept, refreshed = policies(one_split=True)

@@ -12,7 +12,6 @@ import pytest
 
 SITE = os.environ.get("SITE")
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-ON_A_MAC = "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome"
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "docs" / "extensions"))
 
@@ -41,14 +40,10 @@ def address():
 def browser():
     from playwright.sync_api import sync_playwright
 
-    found = [shutil.which(name) for name in (os.environ.get("CHROMIUM", ""), *CHROMIUM, ON_A_MAC)]
-    path = next(filter(None, found), None)
+    path = next(filter(None, map(shutil.which, (os.environ.get("CHROMIUM", ""), *CHROMIUM))), None)
     if path is None:
-        pytest.exit(
-            f"no browser found: tried {', '.join(CHROMIUM)}; install one (Debian: apt install chromium; macOS: "
-            "brew install --cask google-chrome) or say where it is: make test-site CHROMIUM=/path/to/chromium",
-            returncode=1,
-        )
+        tried = ", ".join(CHROMIUM)
+        pytest.exit(f"no browser found: tried {tried}; say where one is: make test-site CHROMIUM=/path", returncode=1)
     arguments = ["--no-sandbox"] if sys.platform == "linux" and os.geteuid() == 0 else []  # root has no sandbox there
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=arguments)

@@ -18,55 +18,24 @@ SOURCE = json.dumps(SCRIPT.read_text("utf-8"))
 LOADED = f"const vsp = await import(URL.createObjectURL(new Blob([{SOURCE}], {{type: 'text/javascript'}})))"
 PARITY = f"""async ([scene, which, encoded]) => {{
   {LOADED}
-  const bytes = Uint8Array.from(atob(encoded), one => one.charCodeAt(0)), numbers = new Float64Array(bytes.buffer)
+  const bytes = Uint8Array.from(atob(encoded), sign => sign.charCodeAt(0)), numbers = new Float64Array(bytes.buffer)
   const {{see, step}} = vsp.dynamics(scene.task.name), policy = vsp.ready(scene.policies[which])
-  const found = {{steps: 0, ties: 0, cells: 0, off: 0}}
+  const counts = {{steps: 0, ties: 0, cells: 0, off: 0}}
   for (let i = 0; i < numbers.length; i += 7) {{
     const [x, y, cell, to_x, to_y, reward, outcome] = numbers.subarray(i, i + 7), seen = see([x, y])
-    found.steps += 1
-    if (vsp.margin(policy, seen) < 1e-9) {{ found.ties += 1; continue }}
+    counts.steps += 1
+    if (vsp.margin(policy, seen) < 1e-9) {{ counts.ties += 1; continue }}
     const acted = vsp.act(scene, policy, seen), [to, paid, end] = step([x, y], acted.action)
     const off = [to[0] - to_x, to[1] - to_y, paid - reward].some(gap => Math.abs(gap) > 1e-9)
-    found.cells += acted.cell !== cell
-    found.off += off || end !== outcome
+    counts.cells += acted.cell !== cell
+    counts.off += off || end !== outcome
   }}
-  return found
+  return counts
 }}"""
 RETURNS = f"""async ([scene, starts]) => {{
   {LOADED}
   return scene.policies.map(vsp.ready).map(policy => starts.map(start => vsp.rollout(scene, policy, start).total))
 }}"""
-QUICK = f"""async ([scene, renewed]) => {{
-  {LOADED}
-  const root = document.body.appendChild(document.createElement("div")), times = []
-  const view = vsp.mount(root, scene)
-  await new Promise(requestAnimationFrame)
-  for (let i = 0; i < 60; i++) {{
-    const begun = performance.now()
-    view.asked = view.asked.map((value, axis) => value + (i % 2 ? 1 : -1) * (axis + 1) * 0.01)
-    view.redo(renewed)
-    times.push(performance.now() - begun)
-  }}
-  root.remove()
-  return times.sort((a, b) => a - b)[30]
-}}"""
-
-
-PLAYED = f"""async scene => {{
-  {LOADED}
-  const root = document.body.appendChild(document.createElement("div")), view = vsp.mount(root, scene)
-  await new Promise(resolve => setTimeout(resolve, 400))
-  const before = view.frames, begun = performance.now()
-  view.replay.start()
-  while (view.replay.playing && performance.now() - begun < 2000) await new Promise(requestAnimationFrame)
-  const pictures = view.frames - before, seconds = (performance.now() - begun) / 1000
-  view.replay.stop()
-  await new Promise(resolve => setTimeout(resolve, 600))
-  root.remove()
-  return [pictures, seconds, view.played]
-}}"""
-
-
 TEACHER = f"async ([scene, points]) => {{ {LOADED}; return points.map(point => vsp.teacherAt(scene, point)) }}"
 
 
@@ -105,8 +74,8 @@ def opened(explorers, browser, tmp_path_factory):
         return visits[-1]
 
     yield visit
-    for one in visits:
-        one.close()
+    for visit in visits:
+        visit.close()
 
 
 @pytest.fixture(scope="module")
@@ -118,9 +87,9 @@ def recorded(policy, task, starts):
     """Every step of these episodes: state (2), cell, next state (2), reward and outcome. (t, 7)"""
     state, steps = starts, []
     for _ in range(task.max_steps):
-        seen = task.see(state)
-        following, reward, outcome = task.step(state, policy.predict(seen)[0])
-        steps.append(np.column_stack([state, policy.cells(seen), following, reward, outcome]))
+        inputs = task.see(state)
+        following, reward, outcome = task.step(state, policy.predict(inputs)[0])
+        steps.append(np.column_stack([state, policy.cells(inputs), following, reward, outcome]))
         state = following[outcome == 0]
         if not len(state):
             break
@@ -131,34 +100,21 @@ def recorded(policy, task, starts):
 def test_each_step_is_pythons(desk, explorers, task):
     explorer, starts = explorers[task], vsp.start_states(task, 1000, 3)
     for i, policy in enumerate(explorer.policies.values()):
-        steps, found = recorded(policy, explorer.task, starts), {"steps": 0, "ties": 0, "cells": 0, "off": 0}
+        steps, totals = recorded(policy, explorer.task, starts), {"steps": 0, "ties": 0, "cells": 0, "off": 0}
         for part in np.array_split(steps, 1 + len(steps) // 100_000):
             counts = desk[task].page.evaluate(PARITY, [explorer.scene, i, base64.b64encode(part.tobytes()).decode()])
-            found = {name: found[name] + counts[name] for name in found}
-        assert found.pop("steps") == len(steps) > 5000 and found.pop("ties") < 10
-        assert found == {"cells": 0, "off": 0}
+            totals = {name: totals[name] + counts[name] for name in totals}
+        assert totals.pop("steps") == len(steps) > 5000 and totals.pop("ties") < 10
+        assert totals == {"cells": 0, "off": 0}
 
 
 @pytest.mark.parametrize("task", TASKS)
 def test_whole_episodes_return_what_pythons_do(desk, explorers, task):
     explorer, starts = explorers[task], vsp.start_states(task, 1000, 4)
-    found = desk[task].page.evaluate(RETURNS, [explorer.scene, starts.tolist()])
-    for policy, returns in zip(explorer.policies.values(), found):
+    totals = desk[task].page.evaluate(RETURNS, [explorer.scene, starts.tolist()])
+    for policy, returns in zip(explorer.policies.values(), totals):
         wanted = vsp.rollout(policy, task, starts).returns
         assert np.mean(returns) == pytest.approx(wanted.mean(), rel=1e-3)
-
-
-@pytest.mark.parametrize("renewed", [False, True], ids=["another state", "another policy"])
-@pytest.mark.parametrize("task", TASKS)
-def test_a_picture_takes_less_than_33_ms(desk, explorers, task, renewed):
-    assert desk[task].page.evaluate(QUICK, [explorers[task].scene, renewed]) < 33
-
-
-@pytest.mark.parametrize("task", TASKS[:2])
-def test_a_replay_shows_thirty_pictures_a_second(desk, explorers, task):
-    pictures, seconds, played = desk[task].page.evaluate(PLAYED, explorers[task].scene)
-    assert pictures > 20 and pictures / seconds >= 30
-    assert played == 400  # once nothing moves; meanwhile only as many as there is time for
 
 
 class Shown:
@@ -183,33 +139,35 @@ class Shown:
         box, inner = self.canvas.bounding_box(), self.canvas.bounding_box()["width"] - 52
         return box["x"] + 44 + x * inner, box["y"] + 8 + (1 - y) * (box["height"] - 42)
 
+    def drag(self, start, end):
+        self.page.mouse.move(*self.at(*start))
+        self.page.mouse.down()
+        self.page.mouse.move(*self.at(*end), steps=5)
+        self.page.mouse.up()
+
+    def results(self):
+        self.page.wait_for_timeout(500)
+        return re.search("Mean return from 400 starts.*", self.root.inner_text())[0]
+
 
 @pytest.fixture
 def shown(desk):
-    one = Shown(desk[SIMPLEGOAL])
-    one.root.get_by_label("policy", exact=True).select_option("0")
-    one.page.wait_for_timeout(400)
-    return one
+    explorer = Shown(desk[SIMPLEGOAL])
+    explorer.root.get_by_label("policy", exact=True).select_option("0")
+    explorer.page.wait_for_timeout(400)
+    return explorer
 
 
-def test_a_click_and_a_drag_choose_a_state(shown):
+def test_a_click_a_drag_and_keys_choose_a_state(shown):
     assert shown.changes(lambda: shown.page.mouse.click(*shown.at(0.3, 0.6))) == (True, True)
     assert "x = 0.30" in shown.root.inner_text()
-
-    def drag():
-        shown.page.mouse.move(*shown.at(0.3, 0.6))
-        shown.page.mouse.down()
-        shown.page.mouse.move(*shown.at(0.8, 0.55), steps=5)
-        shown.page.mouse.up()
-
-    assert shown.changes(drag) == (True, True)
+    assert shown.changes(lambda: shown.drag((0.3, 0.6), (0.8, 0.55))) == (True, True)
     assert "x = 0.80" in shown.root.inner_text()
-
-
-def test_arrow_keys_move_the_state(shown):
     shown.canvas.focus()
     assert shown.changes(lambda: shown.page.keyboard.press("ArrowLeft")) == (True, True)
     assert shown.changes(lambda: shown.page.keyboard.press("Shift+ArrowDown")) == (True, True)
+    assert shown.changes(lambda: shown.page.keyboard.press("Alt+ArrowUp")) == (False, False)  # the browser's
+    assert shown.changes(lambda: shown.page.mouse.click(*shown.at(0.8, 0.2), button="right")) == (False, False)
 
 
 def test_the_replay_goes_to_changes_plays_and_stops(shown):
@@ -229,30 +187,12 @@ def test_the_replay_goes_to_changes_plays_and_stops(shown):
 
 def test_a_codeword_is_dragged_and_a_coefficient_turned(shown, explorers):
     x, y = explorers[SIMPLEGOAL].scene["policies"][0]["codewords"][0]
-
-    def drag():
-        shown.page.mouse.move(*shown.at(x, y))
-        shown.page.mouse.down()
-        shown.page.mouse.move(*shown.at(0.5 * x + 0.25, 0.5 * y + 0.25), steps=4)
-        shown.page.mouse.up()
-
-    assert shown.changes(drag) == (True, True)
+    assert shown.changes(lambda: shown.drag((x, y), (0.5 * x + 0.25, 0.5 * y + 0.25))) == (True, True)
     assert "Cell 1 of" in shown.root.inner_text()
-    weight = shown.root.get_by_label("Δx: bias")
-    assert shown.changes(lambda: weight.fill("3")) == (True, True)
+    before = shown.results()
+    assert shown.changes(lambda: shown.root.get_by_label("Δx: bias").fill("9")) == (True, True)
+    assert shown.results() != before
     assert shown.changes(lambda: shown.root.get_by_role("button", name="reset").click()) == (True, True)
-
-
-def test_what_a_reader_changes_decides_the_returns(shown):
-    def results():
-        shown.page.wait_for_timeout(500)
-        return re.search("Mean return from 400 starts.*", shown.root.inner_text())[0]
-
-    shown.root.get_by_label("policy", exact=True).select_option("2")
-    before = results()
-    for label in ("Δx: bias", "Δy: bias"):
-        shown.root.get_by_label(label).fill("9")
-    assert results() != before
 
 
 def test_a_number_can_be_written_while_the_state_changes_its_cell(opened):
@@ -270,27 +210,20 @@ def test_a_number_can_be_written_while_the_state_changes_its_cell(opened):
     assert root.locator("legend").inner_text().endswith(re.search(r"Cell (\d+) of", root.inner_text())[1])
 
 
-def test_other_buttons_and_keys_are_the_browsers(shown):
-    shown.page.mouse.click(*shown.at(0.3, 0.6))
-    shown.page.wait_for_timeout(400)
-    assert shown.changes(lambda: shown.page.mouse.click(*shown.at(0.8, 0.2), button="right")) == (False, False)
-    shown.canvas.focus()
-    assert shown.changes(lambda: shown.page.keyboard.press("Alt+ArrowUp")) == (False, False)
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_the_teachers_action_is_as_near_as_is_said(desk, explorers, task):
     scene = explorers[task].scene
     points = np.random.default_rng(7).uniform(scene["plane"]["low"], scene["plane"]["high"], (5000, 2))
-    found = np.array(desk[task].page.evaluate(TEACHER, [scene, points.tolist()]))
-    gap = np.abs(found - vsp.load_teacher(task).predict(vsp.get_task(task).see(points))[0]).max(axis=1)
+    actions = np.array(desk[task].page.evaluate(TEACHER, [scene, points.tolist()]))
+    gap = np.abs(actions - vsp.load_teacher(task).predict(vsp.get_task(task).see(points))[0]).max(axis=1)
     assert np.mean(gap <= scene["teacher"]["usual"]) == pytest.approx(0.9, abs=0.015)
 
 
 def test_on_pendulum_the_smallest_change_may_pass_the_edge(desk, explorers):
     """As Python finds it: the angle goes on beyond the edge of the picture."""
     task, explorer, range_ = vsp.get_task(PENDULUM), explorers[PENDULUM], np.array([2 * np.pi, 16.0])
-    which, policy = next((i, one) for i, (name, one) in enumerate(explorer.policies.items()) if "faithful" in name)
+    which = next(i for i, name in enumerate(explorer.policies) if "faithful" in name)
+    policy = list(explorer.policies.values())[which]
     moves = np.linspace(-1, 1, 20001)[:, None]
     for point in np.array([[2.99, 7.53], *np.random.default_rng(0).uniform([-3.1, -7.9], [3.1, 7.9], (10, 2))]):
         least = []
@@ -305,19 +238,6 @@ def test_on_pendulum_the_smallest_change_may_pass_the_edge(desk, explorers):
         assert abs(float(gap)) == pytest.approx(range_[axis] * least[axis], abs=5e-3)
 
 
-def test_a_policy_without_a_run_has_no_replay(desk):
-    one = Shown(desk[PENDULUM])
-    assert not one.root.get_by_label("iteration").is_visible()
-    assert one.changes(lambda: one.page.mouse.click(*one.at(0.2, 0.8))) == (True, True)
-
-
-def test_on_a_phone_nothing_is_cut(opened):
-    visit = opened(SIMPLEGOAL, viewport={"width": 390, "height": 844}, has_touch=True)
-    assert visit.page.evaluate("document.documentElement.scrollWidth") <= 390
-    one = Shown(visit)
-    assert one.changes(lambda: visit.page.touchscreen.tap(*one.at(0.2, 0.3))) == (True, True)
-
-
 def test_with_little_motion_asked_for_the_player_goes_slowly(opened):
     visit = opened(SIMPLEGOAL, viewport={"width": 1200, "height": 900}, reduced_motion="reduce")
     root = visit.page.locator(".vsp-explorer")
@@ -327,21 +247,13 @@ def test_with_little_motion_asked_for_the_player_goes_slowly(opened):
     assert int(root.get_by_label("iteration").input_value()) <= 2
 
 
-def test_without_a_script_a_picture_stands_there(explorers, browser, tmp_path):
-    explorers[SIMPLEGOAL].save(tmp_path / "one.html")
-    page = browser.new_context(java_script_enabled=False).new_page()
-    page.goto((tmp_path / "one.html").as_uri())
-    assert page.locator(".vsp-explorer img").is_visible() and not page.locator("canvas").count()
-    page.context.close()
-
-
 def test_nothing_fails_and_everyone_can_use_it(desk):
     from axe_playwright_python.sync_playwright import Axe
 
     for visit in desk.values():
         assert visit.troubles == []
-        found = Axe().run(visit.page).response["violations"]
-        assert [one["id"] for one in found if one["impact"] in ("serious", "critical")] == []
+        violations = Axe().run(visit.page).response["violations"]
+        assert [rule["id"] for rule in violations if rule["impact"] in ("serious", "critical")] == []
 
 
 # Stored episodes
@@ -358,10 +270,8 @@ STORED = f"""async scene => {{
 
 @pytest.fixture(scope="module")
 def lander(browser, tmp_path_factory):
-    policy, folder = (
-        vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{LUNARLANDER}.policy"),
-        tmp_path_factory.mktemp("x"),
-    )
+    folder = tmp_path_factory.mktemp("lander")
+    policy = vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{LUNARLANDER}.policy")
     explorer = vsp.explore({"faithful": policy}, teacher=vsp.load_teacher(LUNARLANDER), axes=("x", "y"))
     explorer.save(folder / "lander.html")
     visit = Visit(browser, folder.as_uri() + "/", "lander.html", viewport={"width": 1200, "height": 900})
@@ -374,31 +284,24 @@ def test_in_stored_states_cell_and_action_are_pythons(lander):
     shown, explorer = lander
     policy = explorer.policies["faithful"]
     (episodes,) = shown.page.evaluate(STORED, explorer.scene)
-    for episode, found in zip(explorer.scene["policies"][0]["episodes"], map(np.array, episodes), strict=True):
-        states, sure = np.array(episode["states"]), found[:, -1] > 1e-9
-        assert np.array_equal(policy.cells(states)[sure], found[sure, 0]) and sure.mean() > 0.99
-        assert np.allclose(policy.predict(states)[0][sure], found[sure, 1:-1], atol=1e-9)
+    for episode, acted in zip(explorer.scene["policies"][0]["episodes"], map(np.array, episodes), strict=True):
+        states, sure = np.array(episode["states"]), acted[:, -1] > 1e-9
+        assert np.array_equal(policy.cells(states)[sure], acted[sure, 0]) and sure.mean() > 0.99
+        assert np.allclose(policy.predict(states)[0][sure], acted[sure, 1:-1], atol=1e-9)
 
 
-def test_a_click_keys_and_the_slider_choose_stored_states(lander):
+def test_a_click_and_the_slider_choose_stored_states_and_nothing_can_be_changed(lander):
     shown, _ = lander
     box = shown.canvas.bounding_box()
+    assert "Nothing can be changed here: the browser cannot play this task" in shown.root.inner_text()
+    assert shown.root.locator("fieldset").count() == 0 and not shown.root.get_by_label("iteration").is_visible()
     assert shown.changes(lambda: shown.page.mouse.click(box["x"] + 200, box["y"] + 300)) == (True, True)
-    shown.canvas.focus()
-    assert shown.changes(lambda: shown.page.keyboard.press("ArrowRight")) == (True, True)
-    assert shown.changes(lambda: shown.page.keyboard.press("ArrowUp")) == (True, True)
     assert shown.changes(lambda: shown.root.get_by_label("step", exact=True).fill("5")) == (True, True)
     assert "step 6 of" in shown.root.inner_text()
     shown.root.get_by_role("button", name="play").click()
     shown.page.wait_for_timeout(400)
     shown.root.get_by_role("button", name="pause").click()
     assert "step 6 of" not in shown.root.inner_text()
-
-
-def test_why_it_cannot_be_changed_is_said(lander):
-    text = lander[0].root.inner_text()
-    assert "Nothing can be changed here: the browser cannot play this task" in text and "the teacher's action" in text
-    assert lander[0].root.locator("fieldset").count() == 0
 
 
 def test_twenty_four_inputs_fit_on_a_phone(browser, tmp_path):
@@ -425,9 +328,5 @@ def test_results_are_hidden_until_the_reader_has_guessed(directive, browser, tmp
     root.get_by_role("button", name="guess", exact=True).click()
     visit.page.wait_for_timeout(400)
     text = root.inner_text()
-    assert (
-        "Mean return from 400 starts" in text
-        and "Your guess: 7." in text
-        and root.get_by_label("your guess").count() == 0
-    )
+    assert "Mean return from 400 starts" in text and "Your guess: 7." in text
     visit.close()

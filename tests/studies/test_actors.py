@@ -5,8 +5,7 @@ import pytest
 import torch
 from support import PENDULUM
 
-from studies.comparison.methods import Budget
-from studies.comparison.robot_methods import oblique_tree, trained_further
+from studies.comparison.makers import Budget, robot_tree, trained_further
 from studies.comparison.tuning import in_units
 from studies.rivals.trees import ObliqueLinearTree
 from studies.robots.actors import CLIP_SLOPE, SoftActor
@@ -85,6 +84,6 @@ def test_a_single_cell_can_be_trained_further():
 def test_a_tree_is_fitted_like_cells_and_trained_further():
     waits = replace(FEW, n_filling=FEW.n_steps, n_episodes=3, n_corrections=1, n_correction_episodes=2, n_states=500)
     budget = Budget(TEACHER, TASK, waits)
-    tree = oblique_tree(budget, 3, 0)
+    tree = robot_tree(budget, 3, 0)
     found = trained_further(budget, 3, 0, imitation=lambda *about: tree)
     assert len(found) == 3 and np.allclose(found.predict(STATES)[0], tree.predict(STATES)[0], atol=1e-3)

@@ -1,43 +1,50 @@
 import numpy as np
 import pandas as pd
-from drawn import named
+import pytest
 
-from studies.benchmarks import lookup
-from studies.show import benchmarks
-
-
-def test_times_over_dimension_mark_where_a_method_was_given_up(ax):
-    taken = {2: 1e-3, 6: 1.0, 8: np.nan, 11: np.nan}
-    rows = [("Delaunay", "euclidean", d, seconds) for d, seconds in taken.items()]
-    rows += [("kd-tree", "manhattan", d, 1e-2) for d in taken]
-    benchmarks.times_over_dimension(ax, pd.DataFrame(rows, columns=["method", "metric", "d", "seconds"]), limit=5.0)
-    lines = named(ax)
-    assert list(lines) == ["Delaunay", "kd-tree, Manhattan"] and lines["kd-tree, Manhattan"].get_linestyle() == "--"
-    assert lines["Delaunay"].get_xydata()[:2].tolist() == [[2, 1e-3], [6, 1.0]]
-    (cross,) = (line for line in ax.lines if line.get_marker() == "x")
-    assert cross.get_xydata().tolist() == [[8, 5.0]] and cross.get_color() == lines["Delaunay"].get_color()
-    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["2", "6", "8", "11"]
+from studies import benchmarks
+from studies.results import read_results
+from vsp import geometry
+from vsp_beyond.few_cells.units import Cells
 
 
-def test_every_measured_method_has_a_colour():
-    assert set(benchmarks._METHODS) == {method for method, _ in lookup.LOOKUPS} | set(lookup.GRAPHS)
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(benchmarks, "DIMENSIONS", (2, 9))
+    monkeypatch.setattr(benchmarks, "CODEWORDS", (100,))
+    monkeypatch.setattr(benchmarks, "VARIED", {"cells": (1, 2)})
+    monkeypatch.setattr(benchmarks, "FIT", {"dimensions": 3, "cells": 2, "states": 50})
 
 
-def test_kills_are_shares_of_the_undisturbed_time_and_failures_stand_out(ax):
-    frame = pd.DataFrame({"moment": [1.0, 2, 3], "again": [9.0, 8, 7], "undisturbed": 10.0, "wrong": [None, "x", None]})
-    benchmarks.kills(ax, frame)
-    line, held, other = ax.lines
-    assert held.get_xydata().tolist() == [[0.1, 0.9], [0.3, 0.7]] and other.get_xydata().tolist() == [[0.2, 0.8]]
-    assert set(line.get_ydata()) == {1} and ax.get_ylim()[0] == 0
-    ax.clear()
-    assert len(benchmarks.kills(ax, frame.assign(wrong=None)).lines) == 2
+def test_all_ways_to_look_up_agree_and_delaunay_ends_where_it_takes_long(few):
+    found = {tuple(about.values()): work() for about, work in benchmarks.look_ups()}
+    for d in (2, 9):
+        brute, product, tree = (found["look-up", d, name, 100] for name in ("cdist", "matrix product", "kd-tree"))
+        assert len(brute) == benchmarks.N_STATES and np.array_equal(brute, product) and np.array_equal(brute, tree)
+    graph, exact = (found["graph", 2, name, 100] for name in ("witnesses", "Delaunay"))
+    assert not (graph & ~exact).any() and ("graph", 9, "Delaunay", 100) not in found
 
 
-def test_times_of_fits_stand_beside_what_is_proportional(ax):
-    rows = [("cells", 1, 0.002), ("cells", 8, 0.01), ("states", 8, 0.5)]
-    benchmarks.fit_times(ax, pd.DataFrame(rows, columns=["varied", "cells", "seconds"]), "cells")
-    lines = named(ax)
-    assert lines["measured"].get_xydata().tolist() == [[1, 2], [8, 10]]
-    assert lines["proportional"].get_xydata().tolist() == [[1, 10 / 8], [8, 10]]
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "8"] and ax.get_xlabel() == "cells"
+def test_an_evaluation_is_that_of_the_loss(few):
+    (_, one), (about, two) = benchmarks.evaluations()
+    assert about == {"varied": "cells", "dimensions": 3, "cells": 2, "states": 50}
+    cells = two.args[0]
+    assert isinstance(cells, Cells) and len(cells.codewords) == 2 and len(one.args[0].codewords) == 1
+    assert np.isfinite(two()[0])
+
+
+def test_the_command_writes_both_tables(few, tmp_path, monkeypatch):
+    monkeypatch.setattr(benchmarks, "seconds", lambda work: 0.125)
+    monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path)])
+    benchmarks.main()
+    for name in ("lookup", "fits"):
+        made = pd.read_csv(tmp_path / f"data/beyond/{name}.csv")
+        assert list(made) == list(read_results(name)) and set(made["seconds"]) == {0.125}
+
+
+def test_the_kd_tree_pays_from_about_as_many_codewords_as_the_look_up_assumes():
+    times = read_results("lookup").query("d == 2").pivot(index="k", columns="method", values="seconds")
+    faster = times["kd-tree"] < times["cdist"]
+    assert (
+        not faster[times.index <= geometry.KDTREE_FROM / 4].any() and faster[times.index > geometry.KDTREE_FROM].all()
+    )

@@ -2,7 +2,7 @@ import functools
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher, examples, network_teacher
+from support import SIMPLEGOAL, CurvedTeacher, examples
 
 from studies.rivals import critics
 from studies.rivals.critics import advantage_weighted, critic_driven, trained, where_lost
@@ -133,13 +133,3 @@ def test_where_no_action_costs_anything_the_map_is_unweighted():
 def test_a_seed_is_a_policy(make, short):
     one, again, other = (make(*labelled(), cells=3, seed=seed) for seed in (1, 1, 2))
     assert one.to_json() == again.to_json() != other.to_json()
-
-
-@pytest.mark.parametrize("make", [critic_driven, advantage_weighted])
-@pytest.mark.parametrize(("teacher", "message"), [
-    (CurvedTeacher(), "the teacher is a CurvedTeacher without critics, expected one with"),
-    (network_teacher(SIMPLEGOAL), "the teacher has no critics, expected qf0.0.weight, ...: load a teacher"),
-])  # fmt: skip
-def test_a_teacher_without_critics_is_one_clear_error(make, teacher, message):
-    with pytest.raises(ValueError, match=message):
-        make(*labelled(), cells=2, teacher=teacher, task=SIMPLEGOAL, seed=0)

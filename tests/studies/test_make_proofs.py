@@ -9,7 +9,7 @@ import vsp_beyond
 from studies import make_proofs
 from studies.proofs.network import affine_outputs, teacher_steps_to_goal
 from studies.proofs.returns import mean_return, worst_start
-from vsp.paper.results import read_results, write_results
+from studies.results import read_results, write_results
 from vsp.tasks import GOAL
 from vsp_beyond.proofs import check
 
@@ -61,14 +61,14 @@ def test_the_teacher_does_what_is_proved_of_it():
 
 
 def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):
-    made, folder = [], tmp_path / "data"
+    made, folder = [], tmp_path / "data" / "beyond"
     policies = {"a": STRAIGHT, "b": TWO}
     makers = {name: lambda name=name: made.append(name) or policies[name] for name in policies}
     monkeypatch.setattr(make_proofs, "policies", lambda: makers)
     monkeypatch.setattr(make_proofs, "N_SAMPLED", 2000)
     monkeypatch.setattr(make_proofs, "_of_simplegoal_proof", lambda proof: {"goal": float(proof.areas["goal"])})
     assert make_proofs.certificates(tmp_path, 1) == made == ["a", "b"]
-    first = read_results("proofs", folder / "results")
+    first = read_results("proofs", folder)
     row = first.set_index("name").loc["a"]
     assert (row["goal"], row["longest"], row["sampled"]) == (0.87, 9, 2000)
     assert row["sampled_goal"] == pytest.approx(0.87, abs=0.03)
@@ -77,4 +77,4 @@ def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):
     assert make_proofs.certificates(tmp_path, 1) == [] and made == ["a", "b"]
     write_results(first[:1], "proofs", out=tmp_path)  # as somebody who deletes a row
     assert make_proofs.certificates(tmp_path, 1) == ["b"] and made == ["a", "b", "b"]
-    assert read_results("proofs", folder / "results")["name"].tolist() == ["a", "b"]
+    assert read_results("proofs", folder)["name"].tolist() == ["a", "b"]

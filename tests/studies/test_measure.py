@@ -5,7 +5,16 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import measure as measure_module
-from studies.comparison.measure import ERROR_SEED, REPORT_SEED, action_error, cost, measure
+from studies.comparison.measure import (
+    ERROR_SEED,
+    REPORT_SEED,
+    action_error,
+    common_states,
+    fidelity,
+    measure,
+    parameters_of,
+    sameness,
+)  # fmt: skip
 from studies.rivals import tdavq
 from studies.rivals.dagger import dagger
 from studies.rivals.hand_written import Heuristic
@@ -29,13 +38,12 @@ def test_what_is_reported_by_hand(monkeypatch):
     starts = start_states(task, 10, ERROR_SEED)
     assert row["error_own"] == action_error(policy, teacher, task, starts, by=policy)
     assert row["error_teacher"] == action_error(policy, teacher, task, starts, by=teacher) != row["error_own"]
-    assert (row["cells"], row["parameters"], row["operations"]) == (1, 6, 8)
+    assert (row["cells"], row["parameters"]) == (1, 6)
     own = measure(teacher, teacher, task)
     assert (own["error_teacher"], own["error_own"], own["cells"]) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_no_start_that_is_reported_was_chosen_on(seed):
+def test_no_start_that_is_reported_was_chosen_on(seed=0):
     """Neither by our method nor by DAgger: no start that they draw is one of those."""
     drawn, start = [], get_task(SIMPLEGOAL).start
 
@@ -68,19 +76,80 @@ def test_the_tail_is_the_mean_of_the_worst_hundredth():
     assert measure_module.worst(returns) == np.mean(range(10)) and measure_module.worst(returns[:3]) == 997.0
 
 
-def test_costs_by_hand():
-    assert cost(VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 2)), task=SIMPLEGOAL)) == (6, 8)
+def test_parameters_by_hand():
+    assert parameters_of(VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 2)), task=SIMPLEGOAL)) == 6
     three = VoronoiPolicy(np.arange(6.0).reshape(3, 2), np.zeros((3, 3, 2)), task=SIMPLEGOAL)
-    assert cost(three) == (18 + 6, 3 * 6 + 2 + 8)  # differences, sizes and sums per codeword; comparisons; two maps
+    assert parameters_of(three) == 18 + 6
     states = np.linspace(0, 1, 100)[:, None] * np.ones(2)
-    tree = Tree(states, (states > 0.5).astype(float), leaves=2)
-    assert cost(tree) == (2 * 2 + 2, 1.0)
-    assert cost(LinearTree(states, (states > 0.5).astype(float), leaves=2, task=SIMPLEGOAL)) == (12 + 2, 1.0 + 8)
-    both = ObliqueLinearTree(states, (states > 0.5).astype(float), leaves=2, task=SIMPLEGOAL, seed=0)
-    assert cost(both) == (12 + 3, 4.0 + 8)
-    assert cost(Heuristic()) == (12, 20)
-    discrete = tdavq.DiscretePolicy(np.zeros((3, 2)), np.zeros((3, 9)), np.zeros((9, 2)))
-    assert cost(discrete) == (3 * (2 + 2), 3 * 6 + 2)
-    parameters, operations = cost(load_teacher(SIMPLEGOAL))
-    assert parameters == 2 * 400 + 400 + 400 * 300 + 300 + 300 * 2 + 2
-    assert operations == 2 * (2 * 400 + 400 * 300 + 300 * 2)
+    about = {"leaves": 2, "task": SIMPLEGOAL}
+    assert parameters_of(Tree(states, (states > 0.5).astype(float), leaves=2)) == 2 * 2 + 2
+    assert parameters_of(LinearTree(states, (states > 0.5).astype(float), **about)) == 12 + 2
+    assert parameters_of(ObliqueLinearTree(states, (states > 0.5).astype(float), **about, seed=0)) == 12 + 3
+    assert parameters_of(tdavq.DiscretePolicy(np.zeros((3, 2)), np.zeros((3, 9)), np.zeros((9, 2)))) == 3 * (2 + 2)
+    assert parameters_of(Heuristic()) == 12
+    assert parameters_of(load_teacher(SIMPLEGOAL)) == 2 * 400 + 400 + 400 * 300 + 300 + 300 * 2 + 2
+
+
+# Likeness
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(measure_module, "N_REPORTED", 200)
+    monkeypatch.setattr(measure_module, "N_COMMON", 500)
+
+
+def constants(codewords, actions):
+    """A policy with one action per cell."""
+    maps = np.zeros((len(codewords), 3, 2))
+    maps[:, 2] = actions
+    return VoronoiPolicy(codewords, maps, task=get_task(SIMPLEGOAL))
+
+
+def test_the_same_cells_in_another_order_are_the_same(few):
+    left, right = [0.2, 0.5], [0.8, 0.5]
+    one, turned = constants([left, right], [[0, 0], [1, 1]]), constants([right, left], [[1, 1], [0, 0]])
+    (row,) = sameness({3: one, 5: turned}, CurvedTeacher(), get_task(SIMPLEGOAL)).to_dict("records")
+    assert row == {"seed": 3, "other": 5, "index": 1.0, "ratio": 0.0}
+
+
+def test_other_cells_and_actions_by_hand(few):
+    left, right, below, above = [0.2, 0.5], [0.8, 0.5], [0.5, 0.2], [0.5, 0.8]
+    one, other = constants([left, right], [[0, 0], [0, 0]]), constants([below, above], [[0, 0], [1, 0]])
+    teacher = constants([[0.5, 0.5]], [[0.0, 1.0]])
+    (row,) = sameness({0: one, 1: other}, teacher, get_task(SIMPLEGOAL)).to_dict("records")
+    upper = (common_states(teacher, get_task(SIMPLEGOAL))[:, 1] > 0.5).mean()
+    # Squared differences, summed over both actions: 1 in the upper half between the two; 1, and 1 more there, to it
+    assert row["ratio"] == pytest.approx(np.sqrt(upper) / (0.5 * (1 + np.sqrt(1 + upper)))) and row["index"] < 0.5
+
+
+def test_one_cell_has_no_index(few):
+    single = constants([[0.5, 0.5]], [[0, 0]])
+    rows = sameness(
+        {0: single, 1: constants([[0.2, 0.5], [0.8, 0.5]], [[0, 0], [1, 1]]), 2: single},
+        CurvedTeacher(),
+        get_task(SIMPLEGOAL),
+    )
+    assert rows["index"].isna().all() and rows["ratio"].tolist()[1] == 0.0 and len(rows) == 3
+
+
+def test_fidelity_by_hand(few):
+    teacher = constants([[0.2, 0.5], [0.8, 0.5]], [[0.5, 0.4], [-0.5, 0.4]])
+    states = common_states(teacher, get_task(SIMPLEGOAL))
+    wanted = teacher.predict(states)[0]
+    assert fidelity(teacher, teacher, get_task(SIMPLEGOAL))["r2"] == 1.0 and states.shape == (500, 2)
+    mean = constants([[0.5, 0.5]], [wanted.mean(axis=0)])
+    found = fidelity(mean, teacher, get_task(SIMPLEGOAL))  # its second action never varies
+    assert found["r2"] == pytest.approx(0.0) == found["r2_worst"] and found["off"] == 1.0
+
+
+def test_the_worst_coordinate_is_told(few):
+    teacher = constants([[0.2, 0.5], [0.8, 0.5]], [[0.8, 0.1], [-0.8, -0.1]])
+    half = constants([[0.2, 0.5], [0.8, 0.5]], [[0.8, 0.0], [-0.8, 0.0]])
+    found = fidelity(half, teacher, get_task(SIMPLEGOAL))
+    assert found["r2"] > 0.9 and found["r2_worst"] < 0.2 and found["off"] == 0.0
+
+
+def test_the_common_states_are_fresh_and_the_same_for_all(few):
+    one, again = (common_states(CurvedTeacher(), get_task(SIMPLEGOAL)) for _ in range(2))
+    assert np.array_equal(one, again)

@@ -96,8 +96,8 @@ def test_codewords_keep_their_distance(learned):
     assert gaps.min() >= 0.06 and 20 < len(learned) == len(learned.values) and learned.values.shape[1] == 9
 
 
-def test_coarse_settings_give_few_cells(learned):
-    coarse = learn(SIMPLEGOAL, seed=0, n_steps=4000, **tdavq.COARSE)
+def test_a_larger_distance_gives_fewer_cells_and_a_discount_lower_values(learned):
+    coarse = learn(SIMPLEGOAL, seed=0, n_steps=4000, min_distance=0.15, likeness=1.0, discount=0.95)
     assert 3 < len(coarse) < 0.5 * len(learned)
     near = learn(SIMPLEGOAL, seed=0, n_steps=500, discount=0.5)
     assert near.values.max() < 12 < learn(SIMPLEGOAL, seed=0, n_steps=500).values.max()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
 
-from studies.comparison.measure import cost
+from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import TreeNumbers, in_units, tuned
 from studies.rivals.hand_written import ZeroPolicy
 from studies.rivals.small_network import SmallNetwork
@@ -52,7 +52,7 @@ def test_the_numbers_act_as_the_policy_they_are_of(kind, task):
     expected = np.clip(policy.predict(other)[0], frame.task.action_low, frame.task.action_high)
     same = frame.policy(numbers.like(numbers.vector))
     assert np.allclose(same.predict(other)[0], expected, atol=1e-6)  # CART's borders are those of float32
-    assert cost(same) == cost(policy)
+    assert parameters_of(same) == parameters_of(policy)
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,10 @@ import pandas as pd
 
 from ..checks import check_choice
 from ..policy import VoronoiPolicy
-from ..run.atomic import ROOT
+from ..run.atomic import data_folder
 from ..run.listed import read_listed
 
-FOLDER = ROOT / "data" / "paper"
+FOLDER = data_folder("paper")
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0")
 PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # prefixes of the ids of printed values
 SUBJECTS = {"DRL": "teacher", "Ours": "distilled"}  # the paper's names, and ours

@@ -39,19 +39,6 @@ class PolicyClass:
     sizes: np.ndarray  # (q,) largest absolute value of each feature in the state box; 1 for raw features
     features: Callable[[np.ndarray], np.ndarray]  # states (..., d) to features (..., q)
 
-    # Computes one action from its parameters `row` and from `features`: the features and a final 1, INPUTS numbers
-    OUTPUT_IN_PYTHON = """
-def output(row, features):
-    return sum(w * f for w, f in zip(row, features))
-"""
-    OUTPUT_IN_C = """
-static double output(const double *row, const double *features) {
-    double sum = 0.0;
-    for (int i = 0; i < INPUTS; i++) sum += row[i] * features[i];
-    return sum;
-}
-"""
-
     def feature_code(self) -> str:
         """Return code of the features and a final 1, valid in C and Python. Raises ValueError for other code."""
         for code in self.code:

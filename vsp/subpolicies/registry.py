@@ -6,7 +6,6 @@ from ..checks import check_choice
 from ..tasks.base import Task
 from .base import PolicyClass
 from .linear import constant, linear, pid, quadratic
-from .network import network
 
 
 def policy_class(sub_policy: str, task: Task) -> PolicyClass:
@@ -16,4 +15,4 @@ def policy_class(sub_policy: str, task: Task) -> PolicyClass:
     return POLICY_CLASSES[sub_policy](task)
 
 
-POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic, "pid": pid, "network": network}
+POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic, "pid": pid}

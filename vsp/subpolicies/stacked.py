@@ -10,6 +10,13 @@ BETA1, BETA2, EPSILON = 0.9, 0.999, 1e-8  # Adam (Kingma & Ba 2015), its publish
 RIDGE = 1e-6  # weight of the current parameters in a fit, as a number of states
 
 
+def adam(gradient, mean, square, steps) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Adam's two moments after `gradient`, the last of `steps`, and the spread that divides its step."""
+    mean = BETA1 * mean + (1 - BETA1) * gradient
+    square = BETA2 * square + (1 - BETA2) * gradient**2
+    return mean, square, np.sqrt(square / (1 - BETA2**steps)) + EPSILON
+
+
 class Adam:
     """The steps of Adam for one array, before they are multiplied by the learning rate."""
 
@@ -20,9 +27,7 @@ class Adam:
     def step(self, gradient: np.ndarray) -> np.ndarray:
         """Return the step against which to move, from the next gradient."""
         self._steps += 1
-        self._mean = BETA1 * self._mean + (1 - BETA1) * gradient
-        self._square = BETA2 * self._square + (1 - BETA2) * gradient**2
-        spread = np.sqrt(self._square / (1 - BETA2**self._steps)) + EPSILON
+        self._mean, self._square, spread = adam(gradient, self._mean, self._square, self._steps)
         return self._mean / (1 - BETA1**self._steps) / spread
 
 
@@ -71,15 +76,13 @@ class SubPolicies:
         squared error of each minibatch before the step. (c,)
         """
         chosen = slice(None) if len(cells) == len(self.parameters) else cells  # all cells: views, no copies
-        theta, mean, square = self.parameters[chosen], self._mean[chosen], self._square[chosen]
+        theta, steps = self.parameters[chosen], self._steps[chosen] + 1
         outputs, pull_back = self.policy_class.batch(inputs, theta)
         error = outputs - actions
         gradient = (2.0 / error[0].size) * pull_back(error)
-        mean = BETA1 * mean + (1 - BETA1) * gradient
-        square = BETA2 * square + (1 - BETA2) * gradient**2
-        steps = self._steps[chosen] + 1
-        rate = (learning_rate / (1 - BETA1**steps))[:, None, None]
-        spread = np.sqrt(square / (1 - BETA2**steps)[:, None, None]) + EPSILON
+        counts = steps[:, None, None]
+        mean, square, spread = adam(gradient, self._mean[chosen], self._square[chosen], counts)
+        rate = learning_rate / (1 - BETA1**counts)
         self.parameters[chosen] = theta - rate * mean / spread / self._units
         self._mean[chosen], self._square[chosen], self._steps[chosen] = mean, square, steps
         return np.square(error).sum(axis=(1, 2)) / error[0].size

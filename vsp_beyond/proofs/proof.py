@@ -16,7 +16,8 @@ from vsp.policy import VoronoiPolicy
 from vsp.run import atomic, sealed
 from vsp.tasks import Task
 
-CERTIFICATES, RESULTS = atomic.ROOT / "data" / "proofs", atomic.ROOT / "data" / "results"
+RESULTS = atomic.ROOT / "data" / "beyond"
+CERTIFICATES = RESULTS / "proofs"
 METRICS = ("euclidean", "manhattan")
 
 
@@ -59,7 +60,7 @@ class Proof(ABC):
 
 
 def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
-    """Load the certificate data/proofs/NAME.json: return its policy and its whole content. Raises `DamagedFile`."""
+    """Load the certificate data/beyond/proofs/NAME.json: return its policy and its content. Raises `DamagedFile`."""
     content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
     numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
     return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content

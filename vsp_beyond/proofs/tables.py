@@ -1,4 +1,4 @@
-"""Tables and curves of what is proved, from data/results/proofs*.csv and the certificates."""
+"""Tables and curves of what is proved, from data/beyond/proofs*.csv and the certificates."""
 
 from __future__ import annotations
 

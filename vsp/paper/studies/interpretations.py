@@ -16,6 +16,7 @@ import pandas as pd
 from ...evaluation import rollout_from_seed
 from ...rollouts import Outcomes
 from .. import printed
+from ..readings import ALTERNATIVES, Readings
 from ..results import settings_id
 from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
 from ..statistics import percentile_interval, quartiles_from_fences, resample, spread
@@ -25,27 +26,6 @@ CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank t
 N_RESAMPLES = 1000  # per interval
 N_CONFIRMED = 5  # variants to check, in addition to the default and the nearest one of each task
 
-# Readings to try alone: fields of `Config` with values other than their defaults
-READINGS = {
-    "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
-    "R2": [{"split_lookup": "kept"}],
-    "R3": [{"split_metric": "euclidean"}],
-    "R4": [{"one_split": True}],
-    "R5": [{"periodic_reset": "off"}],
-    "R6": [{"merge_reset": "neighbours"}, {"merge_visits_removed": True}],
-    "R7": [
-        {"batch_size": 16}, {"batch_size": 256}, {"n_minibatches": 2}, {"n_minibatches": 5},
-        {"learning_rate": 3e-4}, {"learning_rate": 3e-3}, {"learning_rate": 1e-2},
-        {"initial": "zeros"}, {"adam_on_reset": "restart"},
-    ],
-    "R8": [{"scale": "box"}],
-    "R9": [{"neighbours": "lookup"}],
-    "R10": [{"split_loss": "clipped"}],
-    "R12": [{"merge_parameters": "weights"}],
-    "R13": [{"split_reset": "neighbours"}, {"split_neighbours": "new"}],
-    "R14": [{"loss_after_split": "kept"}],
-    "R15": [{"inclusive": True}],
-}  # fmt: skip
 # Readings to try in all combinations: they change the number of cells or how fast the maps learn
 FACTORS = {
     "R2": {"split_lookup": "kept"},
@@ -64,7 +44,7 @@ AS_PRINTED = {
 def variants() -> dict[str, dict]:
     """Return the variants by name: the default, each reading alone, the algorithms as printed, all combinations."""
     tried = {"default": {}}
-    tried |= {f"{number} {name_of(change)}": change for number, changes in READINGS.items() for change in changes}
+    tried |= {f"{number} {name_of(change)}": change for number, changes in ALTERNATIVES.items() for change in changes}
     tried["algorithms as printed"] = AS_PRINTED
     for size in range(2, len(FACTORS) + 1):
         for chosen in itertools.combinations(FACTORS, size):
@@ -82,11 +62,12 @@ def name_of(change: dict) -> str:
 def experiments(tried: dict[str, dict]) -> dict[tuple[str, str], Experiment]:
     """Return the paper's experiment with the readings of each variant, by name of the variant and task."""
     usual = {task: paper_experiment(task) for task in printed.TASKS}
-    return {
-        (name, task): dataclasses.replace(one, config=dataclasses.replace(one.config, **change))
-        for name, change in tried.items()
-        for task, one in usual.items()
-    }
+    made = {}
+    for (name, change), (task, one) in itertools.product(tried.items(), usual.items()):
+        passes = {field: value for field, value in change.items() if hasattr(Readings, field)}
+        config = dataclasses.replace(one.config, **{field: change[field] for field in change.keys() - passes.keys()})
+        made[name, task] = dataclasses.replace(one, config=config, readings=Readings(**passes) if passes else None)
+    return made
 
 
 # How far from the paper

@@ -1,0 +1,229 @@
+"""Separate the effect of the fit from that of the borders: what our cells owe to each.
+
+Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
+fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
+are fitted together, and cells that are grown greedily. It also has our cells, fitted from as many random starts.
+`ObliqueLinearTree` is the fourth combination.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize
+from threadpoolctl import threadpool_limits
+
+from vsp.paper.baselines import refit
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy
+from vsp.tasks.base import Task
+from vsp_beyond.few_cells import search
+from vsp_beyond.few_cells.anneal import temperature_unit
+from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling, joined
+
+from ..rivals.trees import ObliqueLinearTree, Split
+from .tuning import TreeNumbers, Tunable, in_units
+
+N_RANDOM = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
+N_GREEDY = 4  # additional descents, which start from greedy trees
+HOT = ((range(0, 2), 12), (range(2, 6), 4))  # stages, and how many descents from random trees are kept after them
+WARM = ((range(6, 12), 3), (range(12, search.N_STAGES), 1))  # the same, for these and the greedy trees together
+FEW_CUTS = 31  # quantiles at which a greedy tree may be split: enough for a start, since descents move thresholds
+CERTAIN = 40.0  # larger logits give shares of exactly 0 and 1 in float64
+
+
+# All numbers together
+
+
+@threadpool_limits.wrap(limits=1)
+def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
+    """Return the cells with the least error on states (n, d) and actions (n, m) that `search.least_error` finds."""
+    frame = Scaling.of(task, states)
+    labelled = LabelledStates(frame.inputs(states), frame.outputs(actions))
+    return frame.policy(search.least_error(labelled, size, random_starts(size), np.random.default_rng(seed)))
+
+
+@threadpool_limits.wrap(limits=1)
+def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> Tunable:
+    """Return the oblique tree with the least error on states (n, d) and actions (n, m).
+
+    The search is that of `search.least_error`. Descents from randomly split trees start at a high temperature. Greedy
+    trees are good already and join at a lower one. Descents keep the structure of a tree, and fit its directions,
+    thresholds and maps together. If no descent is better, the best greedy tree is returned.
+    """
+    rng, frame = np.random.default_rng(seed), Scaling.of(task, states)
+    some = search.spread(states / frame.scale, search.FEW, rng)
+
+    def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
+        seeds = rng.integers(2**31, size=n).tolist()
+        trees = [kind(states, actions, leaves=size, task=task, seed=s, cuts=FEW_CUTS) for s in seeds]
+        return [Tunable(*in_units(tree, frame), tree) for tree in trees]
+
+    def error(tree: Tunable) -> float:
+        return action_error(tree, frame, states, actions)
+
+    def kept(trees: list[Tunable], rounds: tuple) -> list[Tunable]:
+        for stages, n_kept in rounds:
+            ends = [descend(tree, states[some], actions[some], stages) for tree in trees]
+            trees = sorted(ends, key=error)[:n_kept]
+        return trees
+
+    greedy = grown(ObliqueLinearTree, N_GREEDY)
+    (best,) = kept(kept(grown(RandomTree, random_starts(size)), HOT) + greedy, WARM)
+    last = descend(best, states, actions, search.LAST, n_iterations=search.N_LAST)
+    return min([last, *greedy], key=error)
+
+
+def random_starts(size: int) -> int:
+    """Return how many descents start at random, for a policy with `size` cells or leaves."""
+    return max(8, N_RANDOM // size)
+
+
+class RandomTree(ObliqueLinearTree):
+    """An oblique tree with random splits: each lies between two states of a leaf, more often of a leaf with many."""
+
+    def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
+        """Return the border halfway between two random `inputs` (n, d), with a random gain."""
+        left, right = inputs[self._rng.integers(len(inputs), size=2)]
+        direction = (right - left) / (np.linalg.norm(right - left) or 1.0)
+        gain = self._rng.random() * len(inputs) * (left != right).any()
+        return Split(gain, direction, direction @ (left + right) / 2)
+
+
+def action_error(policy: Policy, frame: Scaling, states: np.ndarray, actions: np.ndarray) -> float:
+    """Return the mean squared difference of the policy's actions in states (n, d) from `actions` (n, m).
+
+    Actions are in units of half their range.
+    """
+    return float(np.square(frame.outputs(policy.predict(states)[0]) - frame.outputs(actions)).mean())
+
+
+def descend(
+    tree: Tunable, states: np.ndarray, actions: np.ndarray, stages: range, *, n_iterations: int = search.N_ITERATIONS
+) -> Tunable:
+    """Fit `tree` by L-BFGS on the expected loss, stage by stage, as `search.descend` fits cells.
+
+    The temperature is in units of half a cell's width. This makes a border as soft as one between two codewords.
+    """
+    labelled = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
+    numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
+    for stage in stages:
+        numbers = _cooler(labelled, numbers, unit, stage, n_iterations)
+    return Tunable(tree.frame, numbers, tree)
+
+
+def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:
+    temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
+    bases = search.uncorrelated(labelled, shares(tree, labelled.inputs[:, :-1], temperature))
+    vector, shape, cut = tree.vector, tree.maps.shape, tree.vector.size - tree.maps.size
+
+    def move(step: np.ndarray) -> TreeNumbers:
+        return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
+
+    def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
+        value, gradient = expected_loss(move(step), labelled, temperature, search.CLIP_SLOPES[stage])
+        by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
+        return value, joined([slope * gradient[:cut], by_maps])
+
+    options = {"maxiter": n_iterations, "maxcor": 20}
+    return move(minimize(loss, np.zeros(len(vector)), jac=True, method="L-BFGS-B", options=options).x)
+
+
+def shares(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
+    """Return the share of each of `states` (n, d) that belongs to each leaf: (leaves, n).
+
+    As the temperature goes to 0, a state belongs wholly to its own leaf. A share is a product over the nodes on the
+    path to the leaf. Each factor is a sigmoid of the state's distance beyond the threshold, in units of the
+    temperature.
+    """
+    return np.exp(_ways(tree) @ _turns(tree, states, temperature))
+
+
+def _ways(tree: TreeNumbers) -> np.ndarray:
+    """Return which turns lead to each leaf, first the left turns, then the right turns: (leaves, 2 nodes)."""
+    return np.hstack([tree.sides < 0, tree.sides > 0]).astype(np.float64)
+
+
+def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
+    """Return the log shares that turn left at each node, then those that turn right: (2 nodes, n)."""
+    logits = np.clip((tree.directions @ states.T - tree.thresholds[:, None]) / temperature, -CERTAIN, CERTAIN)
+    rest = np.log1p(np.exp(-np.abs(logits)))
+    return np.vstack([-np.maximum(logits, 0.0) - rest, np.minimum(logits, 0.0) - rest])
+
+
+def expected_loss(
+    tree: TreeNumbers, labelled: LabelledStates, temperature: float, clip_slope: float
+) -> tuple[float, np.ndarray]:
+    """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
+
+    This is `anneal.expected_loss` for trees. The gradient is with respect to `tree.vector`.
+    """
+    (n, m), (k, rows, _), states = labelled.actions.shape, tree.maps.shape, labelled.inputs[:, :-1]
+    raw = Cells(np.zeros((k, 0)), tree.maps).outputs(labelled.inputs)
+    limited = np.clip(raw, -1.0, 1.0)
+    error = limited + clip_slope * (raw - limited) - labelled.actions.T
+    losses = np.square(error).mean(axis=1)
+
+    ways, turns = _ways(tree), _turns(tree, states, temperature)
+    leaf_shares = np.exp(ways @ turns)
+    weighted = leaf_shares * losses
+
+    by_raw = (2 / (n * m)) * leaf_shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
+    by_maps = (by_raw.reshape(k * m, n) @ labelled.inputs).reshape(k, m, rows).transpose(0, 2, 1)
+    by_left, by_right = np.split(ways.T @ weighted, 2)
+    left, right = np.split(np.exp(turns), 2)
+    by_logits = (by_right * left - by_left * right) / (n * temperature)
+    return float(weighted.sum() / n), joined([by_logits @ states, -by_logits.sum(axis=1), by_maps])
+
+
+# One cell after the other
+
+
+@threadpool_limits.wrap(limits=1)
+def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
+    """Grow Voronoi cells as `ObliqueLinearTree` grows leaves, for states (n, d) and actions (n, m).
+
+    The cell whose best oblique split lowers the squared error most is split. Its codeword is replaced by the best of
+    `pairs`: two codewords, one on each side of the hyperplane. Then all states are assigned to their nearest codewords,
+    and all maps are refitted by least squares. Codewords never move later. Distances are Euclidean, between
+    standardised states. A split lowers the error of a tree; with Voronoi cells it may raise it, for it moves other
+    borders too. There are fewer than `size` cells if no split of a tree lowers the error.
+    """
+    frame, d, m = Scaling.of(task, states), states.shape[1], actions.shape[1]
+    points, least = frame.inputs(states)[:, :-1], 1e-9 * np.square(actions).sum()
+    tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # used only to search for splits
+
+    def fitted(codewords: np.ndarray) -> VoronoiPolicy:
+        empty = Cells(codewords, np.zeros((len(codewords), d + 1, m)))
+        return refit(frame.policy(empty), states, actions)
+
+    codewords = points.mean(axis=0)[None]
+    policy = fitted(codewords)
+    while len(codewords) < size:
+        cells = policy.cells(states)
+        splits = {i: tree.split(points[cells == i], actions[cells == i]) for i in np.unique(cells)}
+        i = max(splits, key=lambda cell: splits[cell].gain)
+        if splits[i].gain <= least:
+            break
+        others = np.delete(codewords, i, axis=0)
+        candidates = [np.vstack([others, pair]) for pair in pairs(codewords[i], points[cells == i], splits[i])]
+        policies = [fitted(candidate) for candidate in candidates]
+        best = int(np.argmin([action_error(each, frame, states, actions) for each in policies]))
+        codewords, policy = candidates[best], policies[best]
+    return policy
+
+
+def pairs(codeword: np.ndarray, points: np.ndarray, split: Split) -> list[np.ndarray]:
+    """Return pairs of codewords (2, d) that may replace `codeword`, left and right of the hyperplane of `split`.
+
+    The first pair is the means of the `points` (n, d) on either side. The others are the codeword, or either mean, with
+    its mirror image across the hyperplane: their border is the hyperplane itself.
+    """
+    right = split.right(points)
+    means = np.array([points[~right].mean(axis=0), points[right].mean(axis=0)])
+    mirrored = [np.array([point, _mirrored(point, split)]) for point in (codeword, *means)]
+    return [means, *mirrored]
+
+
+def _mirrored(point: np.ndarray, split: Split) -> np.ndarray:
+    direction = split.direction / np.square(split.direction).sum()
+    return point - 2 * (point @ split.direction - split.threshold) * direction

@@ -1,0 +1,104 @@
+"""Summarise how near policies come to the best possible return, and how near robots come to their teacher's.
+
+data/beyond/optimum.csv holds the returns of the best policies, from the start states used for all reported rows.
+Regret is the best possible mean return minus a policy's.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pandas as pd
+
+from vsp.paper.statistics import share_interval
+
+from ..results import read_results
+from .methods import PRESETS
+from .summary import INTERVAL, TUNED, method_summary, read_rows, teacher_of
+
+# Least mean return of a policy at the limit; for SimpleGoal, its largest distance below the best mean return
+NEAR = {"MountainCarContinuous-v0": 99.2, "Pendulum-v1": -141.0, "LunarLanderContinuous-v3": 290.0}
+GAP = {"SimpleGoal-v0": 0.015}
+SEARCHES = (TUNED, "our cells, 800 generations", "at the limit, from the teacher", "at the limit")
+WALKER = "robot's teacher"
+
+
+def best_mean(task: str, folder: str | os.PathLike | None = None) -> float:
+    """Return the highest possible mean return from the report starts, or NaN if it is not known."""
+    frame = read_results("optimum", folder)
+    return float(frame.loc[frame["task"] == task, "mean"].iloc[-1]) if task in set(frame["task"]) else np.nan
+
+
+def with_regret(table: pd.DataFrame, task: str) -> pd.DataFrame:
+    """Add a column regret to `table`: the best possible mean return minus the column mean.
+
+    It is "not known" for a task whose best return is not computed.
+    """
+    best = best_mean(task)
+    return table.assign(regret="not known" if np.isnan(best) else best - table["mean"])
+
+
+def references() -> pd.DataFrame:
+    """Return the computed best returns beside the teacher's, one row per task.
+
+    Columns: task; best (mean return of the best policy); error (difference of this mean between two grids; NaN where it
+    is exact); found, worst (lowest return of an episode), failing and longest, of the best policy as in `optimum`;
+    teacher (its mean return); regret (of the teacher).
+    """
+    table = []
+    for task, rows in read_results("optimum").groupby("task", sort=False):
+        last, teacher = rows.iloc[-1], teacher_of(read_rows(task))["mean"]
+        error = abs(rows["mean"].diff().iloc[-1]) if len(rows) > 1 else np.nan
+        about = {name: last[name] for name in ("found", "worst", "failing", "longest")}
+        table.append({"task": task, "best": last["mean"], "error": error, **about, "teacher": teacher})
+    return pd.DataFrame(table).assign(regret=lambda rows: rows["best"] - rows["teacher"])
+
+
+def near(task: str, folder: str | os.PathLike | None = None) -> float:
+    """Return the least mean return with which a policy of `task` counts as at the limit."""
+    return NEAR[task] if task in NEAR else best_mean(task, folder) - GAP[task]
+
+
+def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """Summarise the policies at the limit, one row per number of cells.
+
+    Columns: size, policies; mean, low and high (its 95 % interval), least (lowest mean return of a seed), regret (of
+    the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the policies that are
+    at the limit), near_low and near_high (its 95 % interval).
+    """
+    rows = read_rows(task, folder, table="limit")
+    by_size, is_near = rows.groupby("size"), rows["mean"] >= near(task, folder)
+    table = method_summary(rows).set_index("size").sort_index()[["policies", *INTERVAL]]
+    table = table.assign(least=by_size["mean"].min(), regret=best_mean(task, folder) - table["mean"])
+    table = table.assign(failing=by_size["failing"].max(), near=is_near.groupby(rows["size"]).mean())
+    bounds = [share_interval(int(part.sum()), len(part)) for _, part in is_near.groupby(rows["size"])]
+    table[["near_low", "near_high"]] = bounds
+    return table.reset_index()
+
+
+def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """Compare the `SEARCHES` by their start and their length, one row per search.
+
+    Columns: method, policies, mean, low, high (its 95 % interval), least (lowest mean return of a seed) and failing
+    (highest of a seed).
+    """
+    rows = pd.concat([read_rows(task, folder, table=table) for table in ("methods", "starts", "limit")])
+    rows = rows[(rows["size"] == PRESETS["limit"](task).n_cells) & rows["method"].isin(SEARCHES)]
+    table, by_method = method_summary(rows).set_index("method")[["policies", *INTERVAL]], rows.groupby("method")
+    table = table.assign(least=by_method["mean"].min(), failing=by_method["failing"].max())
+    return table.loc[list(SEARCHES)].reset_index()
+
+
+def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
+    """Summarise the policies of a robot, one row per method and size, the teacher first.
+
+    Columns: method, size, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return
+    of a seed), failing, share (mean divided by the teacher's mean return), r2 (the median) and parameters.
+    """
+    rows, kind = read_rows(task, folder, table="robots"), ["method", "size"]
+    teacher = rows.loc[rows["method"] == WALKER, "mean"].iloc[0]
+    extremes = rows.groupby(kind).agg(least=("mean", "min"), most=("mean", "max"), r2=("r2", "median"))
+    table = method_summary(rows).join(extremes, on=kind).assign(share=lambda means: means["mean"] / teacher)
+    columns = [*kind, "policies", *INTERVAL, "least", "most", "failing", "share", "r2", "parameters"]
+    return table.loc[(table["method"] != WALKER).sort_values(kind="stable").index, columns]

@@ -1,0 +1,110 @@
+"""What a user calls beyond the paper refuses what it cannot work with, as `test_properties` asks of `vsp`."""
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+from spoilt import Argument, actor, array, but_for_none, count, name, number, refuses, settings
+from support import MOUNTAINCAR, SIMPLEGOAL, Constant, CurvedTeacher, tiny
+
+import vsp
+import vsp_beyond
+from vsp_beyond.explain import RulePolicy, compare_maps, describe_rules, find_rules
+from vsp_beyond.optimum import best_policy, best_returns
+from vsp_beyond.proofs import largest_disturbance, steps_to_goal
+
+TUNED = vsp_beyond.Tuned(
+    n_cells=2, n_episodes=2, n_restarts=1, n_steps=4, n_corrections=1, n_correction_episodes=2, n_generations=1,
+    n_tuning_episodes=2, n_validation=2,
+)  # fmt: skip
+FAITHFUL = vsp_beyond.Faithful(
+    n_cells=2, tolerance=1.0, n_episodes=2, n_states=20, n_restarts=1, n_generations=1, n_tuning_episodes=2,
+    n_validation=2,
+)  # fmt: skip
+task, seed, teacher = name(SIMPLEGOAL), count(0, least=0), actor(CurvedTeacher())
+faithful = Argument(FAITHFUL, [3, "faithful", tiny(), TUNED, {}, np.nan])
+tuned = Argument(TUNED, [3, "tuned", tiny(), FAITHFUL, {}, np.nan])
+STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
+TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
+of_rules = {
+    "states": array(STATES, nonempty=True), "unseen": array(STATES, nonempty=True),
+    "agreement": number(0.75, least=0, most=1), "leaves": count(4, least=2),
+}  # fmt: skip
+PID = vsp.VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 1)), task=MOUNTAINCAR, sub_policy="pid")
+
+CASES = {
+    "Tuned": (vsp_beyond.Tuned, settings(TUNED, from_zero=("n_corrections", "n_generations"))),
+    "Faithful": (vsp_beyond.Faithful, settings(FAITHFUL, from_zero=("n_generations",), any_sign=("margin",))),
+    "tuned_preset": (vsp_beyond.tuned_preset, {"task": task}),
+    "faithful_preset": (vsp_beyond.faithful_preset, {"task": task, "n_cells": but_for_none(count(2))}),
+    "faithful": (vsp_beyond.faithful, {"agent": teacher, "task": task, "config": faithful, "seed": seed}),
+    "tuned": (vsp_beyond.tuned, {"agent": teacher, "task": task, "config": tuned, "seed": seed}),
+    "simplify": (
+        vsp_beyond.simplify,
+        {"teacher": teacher, "task": task, "config": tuned, "tolerance": number(1.0, least=0), "seed": seed},
+    ),
+    "explain.find_rules": (functools.partial(find_rules, TWO), of_rules),
+    "explain.describe_rules": (functools.partial(describe_rules, TWO), of_rules),
+    "explain.RulePolicy.predict": (RulePolicy(TWO, find_rules(TWO, STATES, STATES)[0]).predict, {"obs": array(STATES)}),
+    "explain.compare_maps": (
+        functools.partial(compare_maps, TWO, TWO, rng=np.random.default_rng(0)),
+        {"states": array(STATES), "scale": array([0.5, 0.25], free=(), also=[[1.0, 0.0], [-1.0, 1.0]])},
+    ),
+    "optimum.best_returns": (best_returns, {"starts": array(STATES)}),
+    "optimum.best_policy": (
+        best_policy,
+        {"task": task, "finer": number(0.5, least=0.1, most=10.0), "price": but_for_none(number(0.01, least=0.0))},
+    ),
+    "proofs.steps_to_goal": (
+        functools.partial(steps_to_goal, TWO),
+        {"disturbance": number(0.01, least=0.0, most=1.0), "n": count(20, most=4000)},
+    ),
+    "proofs.largest_disturbance": (
+        functools.partial(largest_disturbance, TWO),
+        {"n": count(10, most=4000), "tolerance": number(0.05, least=1e-6, most=0.1)},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_a_function_cannot_work_with_is_one_clear_error(case):
+    refuses(*CASES[case])
+
+
+def test_the_limit_refuses_before_it_searches():
+    good = {"task": SIMPLEGOAL, "config": TUNED, "seed": 0}
+    for argument, value in {"task": task, "config": tuned, "seed": seed, "teacher": teacher}.items():
+        for bad in value.bad if argument != "teacher" else value.bad[:-2]:
+            if bad is not None:
+                with pytest.raises(ValueError, match="expected|fails on"):
+                    vsp_beyond.at_the_limit(**good | {argument: bad})
+
+
+@pytest.mark.parametrize("policy", [PID, None, CurvedTeacher()])
+def test_only_linear_policies_are_proved(policy):
+    with pytest.raises(ValueError, match="expected"):
+        vsp_beyond.prove(policy)
+
+
+def test_what_explains_linear_policies_alone_refuses_others():
+    """The PID class of MountainCar has as many parameters as the linear one: nothing else would notice."""
+    for use in (
+        lambda: RulePolicy(PID, []),
+        lambda: compare_maps(PID, PID, np.zeros((1, 2)), scale=np.ones(2), rng=np.random.default_rng(0)),
+    ):
+        with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
+            use()
+
+
+def test_rewards_that_are_no_numbers_are_one_clear_error():
+    plain = vsp.get_task(SIMPLEGOAL)
+
+    def step(states, actions):
+        moved, rewards, outcomes = plain.step(states, actions)
+        return moved, np.full_like(rewards, np.nan), outcomes
+
+    with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
+        vsp_beyond.faithful(
+            Constant(-1.0, -1.0), dataclasses.replace(plain, name="Broken", step=step), FAITHFUL, seed=0
+        )

@@ -1,0 +1,91 @@
+"""The committed results of the paper and of its studies, and how they are written."""
+
+import pandas as pd
+import pytest
+from support import TASKS
+
+from vsp.paper.results import read_results, write_results
+from vsp.paper.runs import paper_experiment
+from vsp.paper.studies import interpretations, make_studies
+from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
+from vsp.paper.studies.teachers import SEEDS
+from vsp.run import listed
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_committed_summaries_of_the_runs_are_too(task):
+    made_with = read_results(task)[["settings", "teacher", "version"]].drop_duplicates()
+    assert made_with.to_dict("records") == [paper_experiment(task).provenance]
+
+
+@pytest.fixture(scope="module")
+def readings():
+    return read_results("readings")
+
+
+@pytest.fixture(scope="module")
+def teachers():
+    return read_results("teachers")
+
+
+def test_the_first_of_the_ranking_were_confirmed(readings):
+    chosen, confirmed = (readings[readings["phase"] == phase] for phase in ("choosing", "confirming"))
+    first = [name for name in ranking(chosen) if name != "default"][:N_CONFIRMED]
+    nearest = [ranking(chosen, task)[0] for task in TASKS]
+    expected = {(name, task) for name in ["default", *first, *nearest] for task in (*TASKS, "both")}
+    assert set(zip(confirmed["variant"], confirmed["task"])) == expected and len(confirmed) == len(expected)
+    assert (confirmed[confirmed["task"] != "both"]["runs"] == len(CONFIRMING)).all()
+    assert len(CONFIRMING) >= 10
+
+
+def test_distances_follow_from_the_other_columns(readings, teachers):
+    """So a changed measure of the distance shows, also where no run changed."""
+    shipped = teachers[teachers["teacher"] == "shipped"].groupby("task")[["teacher_mean", "teacher_std"]].first()
+    for row in readings[readings["task"] != "both"].to_dict("records"):
+        own = {"mean": shipped.at[row["task"], "teacher_mean"], "std": shipped.at[row["task"], "teacher_std"]}
+        away = distance(interpretations.standing(row, own), landmarks(row["task"]))
+        assert row["distance"] == pytest.approx(away, rel=1e-4)
+
+
+def test_both_studies_saw_the_same_runs(readings, teachers):
+    """The default reading and the shipped teacher share seeds, so one file must follow from the other."""
+    assert CHOOSING == SEEDS
+    for task in TASKS:
+        rows = teachers[(teachers["task"] == task) & (teachers["teacher"] == "shipped")]
+        chosen = readings[(readings["phase"] == "choosing") & (readings["variant"] == "default")]
+        row = chosen.set_index("task").loc[task]
+        assert (set(rows["checksum"]), set(rows["version"])) == ({row["teacher"]}, {row["version"]})
+        for name in ("mean", "cells", "goal", "pit", "truncated"):
+            assert rows[name].mean() == pytest.approx(row[name], abs=2e-6)
+        assert (rows["cells"].min(), rows["cells"].max()) == (row["cells_min"], row["cells_max"])
+        assert (rows["mean"] > rows["teacher_mean"]).mean() == pytest.approx(row["runs_above_teacher"])
+
+
+# On disk and on the command line
+
+
+def test_ids_are_read_as_they_were_written(tmp_path):
+    ids = {"settings": ["0123456789", "12345e6789"], "teacher": ["0000000001", None], "version": [1, None]}
+    frame = pd.DataFrame(ids).astype({"version": "Int64"})
+    write_results(frame.assign(mean=[1 / 3, 2.0]), "readings", out=tmp_path)
+    folder = tmp_path / "data" / "results"
+    text = b"settings,teacher,version,mean\n0123456789,0000000001,1,0.333333\n12345e6789,,,2.000000\n"
+    assert (folder / "readings.csv").read_bytes() == text
+    found = read_results("readings", folder)
+    assert found["settings"].tolist() == ["0123456789", "12345e6789"] and found["teacher"][0] == "0000000001"
+    assert found["version"][0] == 1 and found["version"].isna()[1]
+
+
+def test_make_study_writes_what_was_found(tmp_path, monkeypatch):
+    asked = {}
+
+    def studied(name):
+        frame = pd.DataFrame({"mean": [0.5]})
+        return lambda runs, *, jobs: (asked.update({name: (runs, jobs)}), frame)[1]
+
+    monkeypatch.setattr(make_studies, "STUDIES", {name: studied(name) for name in make_studies.STUDIES})
+    monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "3"])
+    make_studies.main()
+    assert asked == dict.fromkeys(("readings", "teachers"), (tmp_path / "build" / "study", 3))
+    names = [path.name for path in sorted((tmp_path / "data" / "results").iterdir())]
+    assert names == [listed.MANIFEST, "readings.csv", "teachers.csv"]

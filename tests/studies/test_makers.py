@@ -1,0 +1,92 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from support import SIMPLEGOAL, CurvedTeacher
+
+from studies.comparison import makers
+from studies.comparison.makers import Budget, corrected
+from studies.comparison.methods import FOUND, METHODS, methods_of
+from studies.rivals import critics
+from studies.rivals.soft_tree import SoftTree
+from vsp.paper import printed
+from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells.config import Tuned
+
+SMALL = Tuned(
+    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
+    n_generations=1, n_tuning_episodes=10, failure_penalty=100.0, n_validation=30,
+)  # fmt: skip
+SIZED = [name for name, method in methods_of(SIMPLEGOAL, "methods").items() if method.sizes != FOUND]
+
+
+class Critic(CurvedTeacher):
+    def value(self, obs, actions):
+        return -np.square(actions - self.predict(obs)[0]).sum(axis=1)
+
+    def criticality(self, obs):
+        return obs[:, 0]
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(SoftTree, "N_STEPS", 50)
+    monkeypatch.setattr(critics, "N_STEPS", 20)
+
+
+def make(name, size=3, seed=0, task=None):
+    method = METHODS[name]
+    return method.make(Budget(Critic(), task or get_task(SIMPLEGOAL), SMALL), size, seed, **method.settings)
+
+
+@pytest.mark.parametrize("name", SIZED)
+def test_every_method_gives_a_policy_of_its_size_for_the_same_episodes_of_the_teacher(name):
+    """The teacher plays 20 episodes and labels 20 of the policy's; who asks for no labels has 40 of the teacher's."""
+    played, start = [], get_task(SIMPLEGOAL).start
+    task = dataclasses.replace(get_task(SIMPLEGOAL), start=lambda rng, n: played.append(n) or start(rng, n))
+    policy = make(name, task=task)
+    assert len(policy) == (2 if name.startswith("soft tree") else 3)  # a power of two
+    played.remove(SMALL.n_validation)  # whose states nobody is fitted to
+    if name.startswith("our cells") and name != "our cells":
+        played.remove(SMALL.n_tuning_episodes)  # where no teacher is asked
+    corrections = name != "our cells, no correction"
+    assert sum(played) == (40 if corrections else 20)
+
+
+@pytest.mark.parametrize("name", ["critic-driven splitting", "advantage-weighted maps", "our cells, greedy fit"])
+def test_methods_that_imitate_alone_give_a_policy_of_their_size(name):
+    policy = make(name)
+    actions, _ = policy.predict(np.random.default_rng(0).random((5, 2)))
+    assert len(policy) == 3 and actions.shape == (5, 2) and np.abs(actions).max() <= 1 and len(make(name, 1)) == 1
+
+
+@pytest.mark.parametrize("name", ["our cells, tuned", "CART", "oblique tree, linear leaves, DAgger"])
+def test_seeds_matter_where_there_is_chance(name):
+    states = np.random.default_rng(0).random((200, 2))
+    one, again, other = (make(name, seed=seed).predict(states)[0] for seed in (1, 1, 2))
+    assert METHODS[name].chance and np.array_equal(one, again) and not np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(("by_chance", "seeds"), [(True, [10, 11, 10, 10]), (False, [5, 5, 5])])
+def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_corrected(monkeypatch, by_chance, seeds):
+    asked = []
+
+    def fit(states, actions, *, size, task, seed):
+        asked.append((seed, len(states)))
+        return printed.published_policy(SIMPLEGOAL)
+
+    monkeypatch.setitem(makers.FITS, "published", fit)
+    budget = Budget(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
+    corrected(budget, 3, 5, fit="published", rounds=2, by_chance=by_chance)
+    assert [seed for seed, _ in asked] == seeds
+    *first, second, third = [size for _, size in asked]
+    assert len(set(first)) == 1 and first[0] < second < third
+
+
+def test_an_ablation_changes_one_setting(monkeypatch):
+    asked = []
+    monkeypatch.setattr(makers, "distill_tuned", lambda teacher, task, config, *, seed: (asked.append(config), seed))
+    changed = [how for name, how in METHODS.items() if how.make is makers.our_cells and how.tasks]
+    for how in changed:
+        how.make(Budget(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL), 3, 7, **how.settings)
+    assert asked == [dataclasses.replace(SMALL, n_cells=3, **how.settings) for how in changed] and len(asked) == 7

@@ -1,0 +1,264 @@
+import dataclasses
+import shutil
+from collections import Counter
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER
+
+from studies import make_rows
+from studies.comparison import measure, methods, rows
+from studies.comparison.makers import Budget
+from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, TUNED_SIZES, UNTUNED, Table
+from studies.comparison.rows import Job, jobs_of, kept_job, make_all, make_row
+from studies.comparison.summary import read_rows
+from studies.robots import Walking
+from vsp.evaluation import start_states
+from vsp.paper import printed
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import rollout
+from vsp.run import atomic, sealed
+from vsp.tasks.registry import get_task
+from vsp.teachers.teacher import load_teacher
+from vsp_beyond.few_cells.config import Faithful, Tuned
+
+SMALL = Tuned(
+    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
+    n_generations=1, n_tuning_episodes=10, n_validation=20,
+)  # fmt: skip
+CART, CART_3 = Job(SIMPLEGOAL, "CART", 1, 0), Job(SIMPLEGOAL, "CART", 3, 1)
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """SimpleGoal has a table of two methods, with small settings and few starts."""
+    monkeypatch.setattr(measure, "N_REPORTED", 30)
+    monkeypatch.setattr(measure, "N_ERROR", 10)
+    monkeypatch.setitem(PRESETS, "tuned", lambda task: SMALL)
+    only(monkeypatch, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "teacher"), sizes=(0, 1, 3)))
+    return monkeypatch
+
+
+def only(patch, task, name, table):
+    """Leave one table of one task."""
+    patch.setattr(make_rows, "TABLES", {task: {name: table}})
+    patch.setitem(TABLES, task, {name: table})
+
+
+def command(patch, *arguments):
+    patch.setattr("sys.argv", ["x", *map(str, arguments), "--jobs", "1"])
+    make_rows.main()
+
+
+# What is compared
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
+    jobs = jobs_of(task)
+    assert len(set(jobs)) == len(jobs) == len({tuple(job.about().values()) for job in jobs})
+    for name, method in methods.methods_of(task, "methods").items():
+        sizes = (PRESETS["tuned"](task).n_cells,) if method.sizes == methods.OF_PRESET else method.sizes
+        seeds = range(20 if method.chance else 1)
+        made = {(job.size, job.seed) for job in jobs if job.method == name}
+        assert made == {(size, seed) for size in sizes for seed in seeds}
+
+
+def test_methods_that_know_one_task_are_not_asked_about_others():
+    known = {task: set(methods.methods_of(task, "methods")) for task in TASKS}
+    assert all(("rule of thumb" in known[task]) == (task in printed.TASKS) for task in TASKS)
+    assert [task for task in TASKS if "TD-AVQ" in known[task]] == [SIMPLEGOAL]
+    assert [task for task in TASKS if "heuristic" in known[task]] == [PENDULUM]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_every_rival_is_tuned_at_every_size_and_untuned_too(task):
+    jobs = jobs_of(task, "tuned")
+    for name in UNTUNED:
+        sizes = (0,) if name == "one linear map" else TUNED_SIZES
+        made = {(job.size, job.seed) for job in jobs if job.method == f"{name}, tuned"}
+        assert made == {(size, seed) for size in sizes for seed in range(7)}
+        assert METHODS[name].table == "methods" or any(job.method == name for job in jobs)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_other_teachers_are_distilled_at_the_size_of_the_preset(task):
+    jobs = jobs_of(task, "teachers")
+    assert {job.agent for job in jobs} == {1, 2} and len({tuple(job.about().values()) for job in jobs}) == len(jobs)
+    sizes = {(job.method, job.size) for job in jobs}
+    assert {("faithful", PRESETS["faithful"](task).n_cells), ("one linear map, tuned", 0)} <= sizes and len(sizes) == 5
+
+
+def test_a_table_differs_by_task_where_rows_take_long():
+    n = {task: Counter(job.size for job in jobs_of(task, "limit")) for task in TASKS}
+    assert n[SIMPLEGOAL] == {4: 20, 1: 3, 2: 3, 3: 3, 8: 3, 12: 3}
+    assert n[MOUNTAINCAR] == {3: 5, 4: 3} and n[PENDULUM] == {8: 10, 12: 3}
+    assert len(jobs_of(MOUNTAINCAR, "starts")) == 6
+    lander = {table: jobs_of(LUNARLANDER, table) for table in TABLES[LUNARLANDER]}
+    assert {table: len({job.seed for job in jobs}) for table, jobs in lander.items()} == {
+        "methods": 5, "tuned": 3, "faithful": 10, "limit": 2
+    }  # fmt: skip
+    assert [table for table, jobs in lander.items() if jobs[0].tail] == ["tuned", "faithful"]
+    assert {job.size for table in ("tuned", "faithful") for job in lander[table]} == {0, 1, 2, 4, 8}
+
+
+# What identifies a row
+
+
+def test_other_arguments_settings_teachers_and_versions_are_other_rows(small):
+    job, know = CART_3, lambda: tuple(job.about().values())
+    known = know()
+    changes = ({"method": "teacher"}, {"size": 2}, {"seed": 0}, {"agent": 1}, {"tail": True})
+    others = [dataclasses.replace(job, **change) for change in changes]
+    assert len({known, *(tuple(other.about().values()) for other in others)}) == 6
+    assert job.path("") != others[3].path("") and job.about() | {"teacher": ""} == others[3].about() | {"teacher": ""}
+    for change in ({"settings": {"depth": 3}}, {"version": 2}):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(METHODS, "CART", dataclasses.replace(METHODS["CART"], **change))
+            assert know() != known
+    small.setattr(measure, "VERSION", 2)
+    assert know() != known
+
+
+def test_a_row_depends_on_the_settings_that_its_method_reads(small):
+    names = ("CART", "CART, DAgger, tuned", "our cells, tuned", "our cells, one restart", "teacher")
+    jobs = [Job(SIMPLEGOAL, name, 3, 0) for name in names]
+    before = [job.provenance for job in jobs]
+    assert before[2]["settings"] != before[3]["settings"]
+    for change, changed in (
+        ({"n_steps": 99}, [False, False, True, True, False]),
+        ({"tuning_step": 0.2}, [False, True, True, True, False]),
+        ({"n_episodes": 99}, [True, True, True, True, False]),
+    ):
+        small.setitem(PRESETS, "tuned", lambda task, change=change: dataclasses.replace(SMALL, **change))
+        assert [job.provenance != known for job, known in zip(jobs, before)] == changed
+
+
+def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
+    slow = dataclasses.replace(get_task(SIMPLEGOAL), slowness=10)
+    small.setattr(rows, "get_task", lambda name: slow)
+    policy, played = VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), []
+    small.setattr(measure, "rollout", lambda *given: played.append(len(given[2])) or rollout(*given))
+    for name, whole in (("at the limit", True), ("CART", False)):
+        job = Job(SIMPLEGOAL, name, 3, 0)
+        assert job.whole == whole
+        measure.measure(policy, policy, slow, whole=job.whole)
+    assert played == [measure.N_REPORTED, measure.N_REPORTED // 10]
+    assert measure.settings(whole=True) == measure.settings() | {"whole": True}
+
+
+# Rows
+
+
+def test_a_row_holds_what_is_measured(small):
+    _, about = make_row(CART_3)
+    teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
+    policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
+    assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
+    assert all(about[name] == value for name, value in CART_3.about().items()) and about["seconds"] > 0
+    tailed = make_row(dataclasses.replace(CART_3, tail=True))[1]["row"]
+    assert tailed.pop("worst") <= tailed["mean"] and tailed == about["row"]
+
+
+def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
+    jobs = jobs_of(SIMPLEGOAL)
+    make_all(tmp_path, jobs)
+    frame, seconds = rows.rows(tmp_path, jobs)
+    assert frame["method"].tolist() == ["CART"] * 4 + ["teacher"] and (seconds["task"] == SIMPLEGOAL).all()
+    assert frame[["settings", "teacher", "version"]].to_dict("records") == [job.provenance for job in jobs]
+    made = []
+    small.setattr(rows, "make_row", lambda job: (made.append(job), make_row(job))[1])
+    jobs[2].path(tmp_path).unlink()
+    make_all(tmp_path, jobs)
+    assert made == [jobs[2]] and rows.rows(tmp_path, jobs)[0].equals(frame)
+
+
+@pytest.mark.parametrize(
+    ("of", "why"),
+    [(CART, "size 1, expected 3"), (dataclasses.replace(CART_3, seed=0), "seed 0, expected 1"),
+     (Job(SIMPLEGOAL, "teacher", 0, 0), "method 'teacher', expected 'CART'")],
+)  # fmt: skip
+def test_a_file_of_another_row_is_refused(small, tmp_path, of, why):
+    make_all(tmp_path, jobs_of(SIMPLEGOAL))
+    path = CART_3.path(tmp_path)
+    shutil.copy(of.path(tmp_path), path)
+    with pytest.raises(atomic.DamagedFile, match=f"{path.name}: made with {why}: delete it"):
+        rows.rows(tmp_path, jobs_of(SIMPLEGOAL))
+
+
+# Whole commands
+
+
+def test_the_command_writes_results_and_times_apart(small, tmp_path):
+    small.setattr(make_rows, "best_returns", lambda: pd.DataFrame({"seconds": [0.5]}))
+    command(small, "--out", tmp_path)
+    results = tmp_path / "data" / "beyond"
+    frame = read_rows(SIMPLEGOAL, results)
+    assert len(frame) == 5 == len(pd.read_csv(results / "methods_seconds.csv")) and "seconds" not in frame
+    assert (results / "optimum.csv").read_text() == "seconds\n0.500000\n"
+
+
+def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
+    quick = Faithful(
+        n_cells=2, tolerance=0.1, n_episodes=50, n_restarts=2, n_generations=1, n_tuning_episodes=5, n_validation=20
+    )
+    small.setitem(PRESETS, "faithful", lambda task: quick)
+    small.setattr(make_rows, "best_returns", lambda: pd.DataFrame())
+    only(small, SIMPLEGOAL, "faithful", Table(range(2), sizes=(1, 2), keeps="faithful"))
+    command(small, "--out", tmp_path)
+    frame, same = (pd.read_csv(tmp_path / f"data/beyond/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
+    assert frame["size"].tolist() == [1, 1, 2, 2] and frame["r2"].between(-1, 1).all() and (frame["cells"] <= 2).all()
+    assert same[["size", "seed", "other"]].to_numpy().tolist() == [[1, 0, 1], [2, 0, 1]]
+    assert np.isnan(same["index"][0]) and (same["ratio"] < 2).all()
+    kept = VoronoiPolicy.load(tmp_path / "data/beyond/faithful_SimpleGoal-v0.policy")
+    first = frame[(frame["size"] == 2) & (frame["seed"] == 0)].iloc[0]
+    starts = start_states(get_task(SIMPLEGOAL), measure.N_REPORTED, measure.REPORT_SEED)
+    assert rollout(kept, SIMPLEGOAL, starts).returns.mean() == pytest.approx(first["mean"], abs=1e-6)
+
+
+def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
+    small.setattr(make_rows, "LONG", (SIMPLEGOAL,))
+    small.setattr(rows, "LANDER", SIMPLEGOAL)
+    command(small, "--long", "--out", tmp_path)
+    results = tmp_path / "data" / "beyond"
+    _, about = sealed.load_arrays(results / "methods_SimpleGoal-v0.policy", kind="VoronoiPolicy")
+    assert 1 <= len(VoronoiPolicy.load(results / "methods_SimpleGoal-v0.policy")) <= SMALL.n_cells
+    assert about.items() >= rows.simplest_provenance(SIMPLEGOAL).items()
+    assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5 and not (results / "optimum.csv").exists()
+
+
+def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
+    walking = Walking(n_cells=2, n_episodes=1, n_corrections=0, n_states=300, n_restarts=1, n_validation=1)
+    small.setitem(PRESETS, "walking", lambda task: walking)
+    small.setattr(measure, "N_ERROR", 20)  # the walker is slow: a twentieth of them
+    small.setattr(rows, "CHEETAH", WALKER)
+    gait = pd.DataFrame({"step": range(3)})
+    small.setattr(rows, "record_gait", lambda policy, task, **how: gait.assign(cells=len(policy)))
+    only(small, WALKER, "robots", Table(range(1), methods=("cells", "robot's teacher"), sizes=(0, 2), keeps="cells"))
+    command(small, "--long", "--out", tmp_path)
+    made = {name: pd.read_csv(tmp_path / f"data/beyond/{name}_{WALKER}.csv") for name in ("robots", "gait")}
+    assert made["robots"]["method"].tolist() == ["cells", "robot's teacher"] and made["robots"]["r2"][1] == 1
+    assert made["gait"]["cells"].tolist() == [2] * 3 and made["gait"]["version"].tolist() == [rows.GAIT_VERSION] * 3
+    assert VoronoiPolicy.load(tmp_path / f"data/beyond/robots_{WALKER}.policy").task.name == WALKER
+
+
+def test_the_kept_policy_is_the_first_of_the_presets_size():
+    job = kept_job(WALKER, "robots")
+    assert (job.method, job.size, job.seed) == ("cells, trained further", 8, 0)
+    assert all(kept_job(task, "faithful") in jobs_of(task, "faithful") for task in (*TASKS, LUNARLANDER))
+
+
+# The best policies
+
+
+def test_the_best_returns_are_those_of_the_best_policies(monkeypatch):
+    """SimpleGoal's in closed form, others as played from coarse grids; of a task without a goal nothing fails."""
+    monkeypatch.setattr(measure, "N_REPORTED", 40)
+    monkeypatch.setattr(rows, "WAYS", ((SIMPLEGOAL, 1.0), (PENDULUM, 0.2), (PENDULUM, 0.4)))
+    frame = rows.best_returns()
+    assert frame["found"].tolist() == [rows.CLOSED, "72 × 73 points", "144 × 145 points"]
+    starts = start_states(get_task(SIMPLEGOAL), 40, measure.REPORT_SEED)
+    assert frame["mean"][0] == pytest.approx(np.maximum(10, 10 * np.hypot(*starts.T) + 9).mean(), abs=1e-12)
+    assert frame["failing"][0] == 0 and frame["failing"][1:].isna().all()
+    assert frame["mean"][1] <= frame["mean"][2] < 0 and (frame["longest"] <= [50, 200, 200]).all()

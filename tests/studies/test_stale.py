@@ -1,0 +1,106 @@
+"""The committed results were made with today's settings, teachers and versions; and what is stale."""
+
+import dataclasses
+import shutil
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
+
+from studies.comparison import rows, stale
+from studies.comparison.methods import METHODS, PRESETS, TASKS
+from studies.results import RESULTS
+from vsp.run import listed
+
+
+def test_the_committed_results_are_those_of_todays_settings_teachers_and_versions():
+    messages = stale.stale()
+    assert not messages, "\n".join(messages)
+
+
+def test_every_committed_row_and_policy_is_checked():
+    named = {name for name, _, _ in stale.committed()}
+    unchecked = {path.name for path in RESULTS.iterdir() if path.is_file()} - named - {listed.MANIFEST}
+    assert not [
+        name for name in unchecked if not name.startswith(("proofs", "lookup", "fits")) and "seconds" not in name
+    ]
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    """A copy of the committed results, to spoil."""
+    shutil.copytree(RESULTS, tmp_path / "beyond")
+    monkeypatch.setattr(stale, "RESULTS", tmp_path / "beyond")
+    monkeypatch.setattr("studies.results.RESULTS", tmp_path / "beyond")
+    return tmp_path / "beyond"
+
+
+def says(name, what, target="beyond"):
+    return f"data/beyond/{name} was made with other {what}: `make {target}` makes it anew"
+
+
+def test_a_missing_or_damaged_file_is_named(results):
+    (results / f"limit_{SIMPLEGOAL}.csv").unlink()
+    with open(results / f"starts_{MOUNTAINCAR}.csv", "ab") as file:
+        file.write(b"\n")
+    missing, damaged = stale.stale()
+    assert missing == f"data/beyond/limit_{SIMPLEGOAL}.csv is missing: `make beyond` makes it"
+    assert damaged.startswith(f"{results / f'starts_{MOUNTAINCAR}.csv'}: SHA-256 is ")
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda frame: frame.assign(version=9), "version"),
+        (lambda frame: frame.assign(teacher="0123456789"), "teacher"),
+        (lambda frame: frame.drop(columns="settings"), "settings"),
+        (lambda frame: frame.iloc[1:], "rows"),
+        (lambda frame: pd.concat([frame, frame[:1]]), "rows"),
+    ],
+    ids=["version", "teacher", "column", "row", "twice"],
+)
+def test_other_rows_are_stale(results, change, what):
+    path = results / f"demanded_{SIMPLEGOAL}.csv"
+    listed.write_listed(path, change(pd.read_csv(path, dtype=str)).to_csv(index=False))
+    assert stale.stale() == [says(path.name, what)]
+
+
+def raised(name):
+    return lambda patch: patch.setitem(METHODS, name, dataclasses.replace(METHODS[name], version=9))
+
+
+OF_CART = [says(f"methods_{task}.csv", "version") for task in TASKS]
+OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (raised("CART"), OF_CART),
+        (raised("TD-AVQ"), OF_CART[:1]),
+        (lambda patch: patch.setattr(rows, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
+        (lambda patch: patch.setattr(rows, "GAIT_VERSION", 9),
+         [says(f"gait_{CHEETAH}.csv", "version", "beyond-long")]),
+        (lambda patch: patch.setattr(rows, "SIMPLIFY_VERSION", 2),
+         [says(f"methods_{LUNARLANDER}.policy", "version", "beyond-long")]),
+    ],
+    ids=["CART", "TD-AVQ", "optimum", "gait", "simplify"],
+)  # fmt: skip
+def test_results_of_another_version_are_stale(monkeypatch, change, expected):
+    change(monkeypatch)
+    assert stale.stale() == expected
+
+
+def test_results_of_another_preset_are_stale(monkeypatch):
+    before, changed = PRESETS["tuned"], dataclasses.replace(PRESETS["tuned"](SIMPLEGOAL), n_steps=99)
+    monkeypatch.setitem(PRESETS, "tuned", lambda task: changed if task == SIMPLEGOAL else before(task))
+    assert stale.stale() == [says(f"{table}_{SIMPLEGOAL}.csv", "settings") for table in ("methods", "teachers")]
+
+
+def test_all_results_of_another_teacher_are_stale(monkeypatch):
+    other = SimpleNamespace(digest="f" * 64)
+    monkeypatch.setattr(rows, "_teacher", lambda task, agent: other)
+    monkeypatch.setattr(rows, "load_teacher", lambda task: other)
+    named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
+    assert named == [name for name, _, _ in stale.committed() if name != "optimum.csv"]

@@ -1,0 +1,122 @@
+"""Readings of Algorithms 2 and 3 that change the passes themselves: R2, R6, R13 and R14, for the study of the readings.
+
+The other open questions are fields of `Config`. With all defaults, the passes do what `vsp.algorithms` does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal, get_type_hints
+
+import numpy as np
+
+from ..config import Config, check_field
+from ..partition import Partition
+from ..rollouts import Episode
+
+# Every open question: fields of `Config` and `Readings` with values other than their defaults
+ALTERNATIVES = {
+    "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
+    "R2": [{"split_lookup": "kept"}],
+    "R3": [{"split_metric": "euclidean"}],
+    "R4": [{"one_split": True}],
+    "R5": [{"periodic_reset": "off"}],
+    "R6": [{"merge_reset": "neighbours"}, {"merge_visits_removed": True}],
+    "R7": [
+        {"batch_size": 16}, {"batch_size": 256}, {"n_minibatches": 2}, {"n_minibatches": 5},
+        {"learning_rate": 3e-4}, {"learning_rate": 3e-3}, {"learning_rate": 1e-2},
+        {"initial": "zeros"}, {"adam_on_reset": "restart"},
+    ],
+    "R8": [{"scale": "box"}],
+    "R9": [{"neighbours": "lookup"}],
+    "R10": [{"split_loss": "clipped"}],
+    "R12": [{"merge_parameters": "weights"}],
+    "R13": [{"split_reset": "neighbours"}, {"split_neighbours": "new"}],
+    "R14": [{"loss_after_split": "kept"}],
+    "R15": [{"inclusive": True}],
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Readings:
+    """How a splitting and a merging pass read the paper; `split` and `merge` are for `algorithms.distill`.
+
+    Raises ValueError for an unknown reading.
+    """
+
+    split_lookup: Literal["refreshed", "kept"] = "refreshed"
+    """R2. The codewords among which a splitting pass looks states up: all, including those that it has just added
+    (Algorithm 2 has line 4 inside the loop), or those that existed before the pass."""
+    merge_reset: Literal["survivor_and_neighbours", "neighbours"] = "survivor_and_neighbours"
+    """R6. Buffers that a merge resets: those of the survivor and its neighbours (prose), or of the neighbours only
+    (Algorithm 3)."""
+    merge_visits_removed: bool = False
+    """R6. Whether a cell removed earlier in the pass is still visited, as in Algorithm 3, which removes while it
+    iterates. If so, it may only remove cells that are visited later; otherwise equal cells would remove each other."""
+    split_reset: Literal["cell_and_neighbours", "neighbours"] = "cell_and_neighbours"
+    """R13. Buffers that a split resets: those of the neighbours and of the split cell, which still holds states of the
+    new cell, or those of the neighbours only (Algorithm 2)."""
+    split_neighbours: Literal["old", "new"] = "old"
+    """R13. Which neighbours a split resets: those of the split cell (prose: "of the old region") or of the new cell."""
+    loss_after_split: Literal["reset", "kept"] = "reset"
+    """R14. Whether the running loss restarts after a split. The paper does not state it. By default it restarts, since
+    the split already responds to the loss so far."""
+
+    def __post_init__(self) -> None:
+        for name, kind in get_type_hints(type(self)).items():
+            check_field(name, getattr(self, name), kind)
+
+    def split(
+        self, partition: Partition, episode: Episode, config: Config, rng: np.random.Generator
+    ) -> list[np.ndarray]:
+        """Algorithm 2 with these readings. Returns the new codewords, each (d,)."""
+        cells, losses = partition.cells(episode.states), np.zeros(len(episode.states))
+        previous, first, added = None, 0, []  # the running loss averages over the states from `first` on
+        for t, (state, action) in enumerate(zip(episode.states, episode.actions)):
+            i = cells[t]
+            if i != previous:
+                previous, first = i, t
+            losses[t] = partition.loss(i, state, action)
+            if losses[first : t + 1].mean() > config.max_pol_loss and partition.far(i, state):
+                before = partition.neighbours()[i]
+                j = partition.add(state, rng)
+                near = np.append(before, False) if self.split_neighbours == "old" else partition.neighbours()[j]
+                near[i] |= self.split_reset == "cell_and_neighbours"
+                partition.reset(near)
+                added.append(state.copy())
+                if config.one_split:
+                    break
+                if self.split_lookup == "refreshed":
+                    cells = partition.cells(episode.states)
+                if self.loss_after_split == "reset":
+                    first = t + 1
+        return added
+
+    def merge(self, partition: Partition, config: Config) -> list[np.ndarray]:
+        """Algorithm 3 with these readings. Returns the removed codewords."""
+        k, parameters = len(partition.codewords), partition.comparable_parameters()
+        alive = np.ones(k, dtype=bool)
+        for i in range(k):
+            if not alive[i] and not self.merge_visits_removed:
+                continue
+            members = alive.copy()
+            members[i] = True
+            near = np.zeros(k, dtype=bool)
+            near[members] = partition.neighbours_of(partition.codewords[members])[members[:i].sum()]
+            distances = np.abs(parameters - parameters[i]).max(axis=1)
+            similar = near & alive & (distances < config.min_param_distance)
+            if not alive[i]:
+                similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other
+            if similar.any():
+                alive = alive & ~similar
+                near[i] |= self.merge_reset == "survivor_and_neighbours"
+                partition.reset(near)
+        removed = list(partition.codewords[~alive])
+        partition.keep(alive)
+        return removed
+
+
+def defaults(config: Config) -> dict[str, object]:
+    """Return every field that answers an open question, with its value in `config` or the default pass."""
+    answers = {**asdict(config), **asdict(Readings())}
+    return {name: answers[name] for changes in ALTERNATIVES.values() for change in changes for name in change}
