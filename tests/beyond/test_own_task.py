@@ -158,19 +158,6 @@ def test_an_agent_with_a_memory_is_refused():
         vsp_beyond.faithful(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
 
 
-@pytest.mark.parametrize(
-    ("act", "why"),
-    [
-        (lambda obs: np.full((len(obs), 1), np.nan), "the policy's actions hold nan"),
-        (lambda obs: np.zeros((len(obs), 3)), r"actions have shape .*, expected .* for Tank-v0"),
-        (lambda obs: obs[:, 7:8], "actions have shape|fails on the 2 inputs of Tank-v0"),
-    ],
-)
-def test_a_pilot_that_does_not_fit_is_one_clear_error(act, why):
-    with pytest.raises(ValueError, match=why):
-        vsp_beyond.faithful(vsp.agent(act), "Tank-v0", LITTLE, seed=0)
-
-
 def test_a_task_that_never_ends_is_refused():
     gymnasium.register("Endless-v0", entry_point="own_tasks:Tank")
     try:

@@ -143,8 +143,3 @@ def test_rules_act_as_the_policy_where_they_agree(published):
     actions, none = RulePolicy(policy, rules).predict(unseen)
     assert none is None and np.allclose(actions[same], policy.predict(unseen)[0][same])
     assert not np.allclose(actions[~same], policy.predict(unseen)[0][~same])
-
-
-def test_no_states_are_refused():
-    with pytest.raises(ValueError, match="0 states and 9 unseen states"):
-        find_rules(constants([[0.5, 0.5]], [1]), np.zeros((0, 2)), uniform(9, 0))

@@ -26,8 +26,8 @@ def expected_seconds(task: Task, config: Faithful | Tuned) -> tuple[float, float
     d, m, k = len(task.low), len(task.action_low), config.n_cells
     candidates = config.n_generations * candidates_per_generation(k * (d + (d + 1) * m))
     taught, tuning = config.n_episodes + config.n_validation, candidates * config.n_tuning_episodes
-    fits, (quick, slow) = config.n_restarts * (k + 2), DESCENT
-    certain = taught  # it is not tuned if the closest cells return enough
+    # A `Faithful` is not tuned if the closest cells return enough
+    certain, fits, (quick, slow) = taught, config.n_restarts * (k + 2), DESCENT
     if isinstance(config, Tuned):
         certain, fits, (quick, slow) = taught + tuning, fits * config.n_steps / 1000, ANNEALING
     return certain * task.max_steps / most + fits * quick, (taught + tuning) * task.max_steps / least + fits * slow
