@@ -76,7 +76,7 @@ def evaluations() -> Iterator[tuple[dict, Callable[[], object]]]:
             (d, k, n), rng = size.values(), np.random.default_rng(0)
             inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
             cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
-            labelled = LabelledStates(inputs, np.clip(inputs @ cells.maps[0], -1.0, 1.0))
+            labelled = LabelledStates(inputs, np.clip(inputs @ cells.coefficients[0], -1.0, 1.0))
             about = {"temperature": TEMPERATURES[stage] * d, "clip_slope": CLIP_SLOPES[stage]}
             yield {"varied": varied, **size}, partial(whole_loss, cells, labelled, **about)
 

@@ -26,17 +26,17 @@ from vsp.tasks import simplegoal
 from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells.config import tuned_preset
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.proofs import check
+from vsp_beyond.proofs import check, prove
 from vsp_beyond.proofs.mountaincar import prove_mountaincar
-from vsp_beyond.proofs.mountaincar_reals import prove_reals
-from vsp_beyond.proofs.network import teacher_steps_to_goal
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
-from vsp_beyond.proofs.prove import prove
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .comparison.rows import simplest
+from .proofs.mountaincar_reals import prove_reals
+from .proofs.network import teacher_steps_to_goal
+from .proofs.returns import mean_return, worst_start
 from .results import BEYOND, RESULTS, read_results, write_results
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
@@ -120,10 +120,10 @@ def _proved(name: str, policy: VoronoiPolicy, path: Path, jobs: int | str) -> di
 
 
 def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
-    low, high = proof.mean_return()
+    (low, high), (_, least) = mean_return(proof.pieces), worst_start(proof.pieces)
     areas = {name: float(area) for name, area in proof.areas.items()}
     areas["failing_outside"] = float(proof.failing_outside)  # outside the pit
-    row = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": proof.worst_start()[1]}
+    row = {"pieces": len(proof.pieces), **areas, "mean_low": low, "mean_high": high, "least": least}
     outside = outside_pit(steps := steps_to_goal(proof.policy))
     row |= {"program": float((steps > 0)[outside].mean()), "program_steps": int(steps[outside].max())}
     return row | {"disturbance": largest_disturbance(proof.policy)}

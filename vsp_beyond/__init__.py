@@ -1,8 +1,8 @@
 """What goes beyond the paper: few cells that act like any agent or return much, and proofs of what they do.
 
-`faithful` and `tuned` distil an agent, `at_the_limit` searches for the highest return, `simplify` reduces cells and
-numbers, `prove` proves what a policy does from every start. Each has defaults for any task where that is possible.
-`few_cells`, `optimum`, `explain` and `proofs` hold the parts, `show` draws figures.
+`faithful` and `tuned` distil an agent, `at_the_limit` searches for the highest return: each has defaults for any task.
+`simplify` reduces cells and numbers, `prove` proves what a policy does from every start. `few_cells`, `optimum`,
+`explain` and `proofs` hold the parts, `show` draws figures.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
 from vsp.tasks import Task, get_task
 
-from .few_cells import Faithful, Tuned, faithful_preset, simplify, tuned_preset
-from .few_cells.duration import announcement
+from .few_cells import Faithful, Tuned, faithful_preset, limit_preset, simplify, tuned_preset
+from .few_cells.config import check_kind
+from .few_cells.duration import expected_time
 from .few_cells.faithful import distill_faithfully
-from .few_cells.limit import at_the_limit, limit_preset
+from .few_cells.limit import search_limit, whole_search
 from .few_cells.tuned import distill_tuned
 from .proofs import prove
 
@@ -24,7 +25,7 @@ def faithful(
     agent: Policy, task: str | Task, config: Faithful | None = None, *,
     n_cells: int | None = None, min_r2: float | None = None, seed: int,
 ) -> VoronoiPolicy:  # fmt: skip
-    """Distil `agent` to few cells that act like it and return as much, in any task. Prints the expected time.
+    """Distil `agent` to few cells that act like it and return as much, in any task. Prints how long it will take.
 
     `config` defaults to `faithful_preset(task)`. `n_cells` is the largest number of cells. Given `min_r2`, the policy
     has the highest return among those whose actions have at least this R² against the agent's. The same arguments give
@@ -36,14 +37,38 @@ def faithful(
         config = faithful_preset(task, n_cells=n_cells, min_r2=min_r2)
     elif (n_cells, min_r2) != (None, None):
         raise ValueError("n_cells and min_r2 are settings of config, expected either these or a config")
-    print(f"distilling for {task.name}: {announcement(agent, task, config)}")
+    check_kind(config, Faithful)
+    print(f"distilling for {task.name}: {expected_time(task, config)}")
     return distill_faithfully(agent, task, config, seed=seed)[0]
 
 
 def tuned(agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int) -> VoronoiPolicy:
-    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it.
+    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it. Prints how long it will
+    take.
 
     `config` defaults to `tuned_preset(task)`. The same arguments give the same policy. Raises ValueError if the agent
     does not fit the task.
     """
-    return distill_tuned(agent, task, tuned_preset(task) if config is None else config, seed=seed)[0]
+    task = get_task(task)
+    config = tuned_preset(task) if config is None else config
+    check_kind(config, Tuned)
+    agent = agent if config.criticality else as_agent(agent)  # which would hide the critics
+    print(f"distilling for {task.name}: {expected_time(task, config)}")
+    return distill_tuned(agent, task, config, seed=seed)[0]
+
+
+def at_the_limit(
+    task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None
+) -> VoronoiPolicy:
+    """Search for at most `config.n_cells` cells whose return is as high as possible. Prints how long it will take.
+
+    `config` defaults to `limit_preset(task)`. `teacher` defaults to the best policy if it is known, else to the shipped
+    teacher; for other tasks it is needed. For a task with a physics engine, which is played in fewer episodes, two
+    shorter searches follow, each from the result of the one before. The same arguments give the same policy. Raises
+    ValueError if the teacher does not fit the task, and without a teacher for a task that has none.
+    """
+    task = get_task(task)
+    config = limit_preset(task) if config is None else config
+    check_kind(config, Tuned)
+    print(f"searching for {task.name}: {expected_time(task, whole_search(task, config))}")
+    return search_limit(task, config, seed=seed, teacher=None if teacher is None else as_agent(teacher))

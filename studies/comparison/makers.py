@@ -20,7 +20,7 @@ from vsp.rollouts import Policy, visited_states
 from vsp.tasks.base import Task
 from vsp_beyond.few_cells.config import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
-from vsp_beyond.few_cells.limit import at_the_limit
+from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
@@ -69,9 +69,9 @@ def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
 
 
 def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -> Policy:
-    """Call `at_the_limit`, from the best policy where it is known, or with `by_teacher` from the teacher."""
+    """Call `search_limit`, from the best policy where it is known, or with `by_teacher` from the teacher."""
     teacher = budget.teacher if by_teacher else None
-    return at_the_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
+    return search_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
 
 
 # Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves

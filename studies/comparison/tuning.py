@@ -149,14 +149,14 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
     tunable = TunableFrame(frame.task, units.centre, units.scale, policy)
     if isinstance(policy, VoronoiPolicy):
-        return tunable, TreeNumbers.one_leaf(tunable.cells(policy).maps)
+        return tunable, TreeNumbers.one_leaf(tunable.cells(policy).coefficients)
     if isinstance(policy, Tree):
         return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):
         return tunable, _of_tree(policy, tunable)
     if isinstance(policy, SmallNetwork):
         hidden, output = (np.vstack(layer) for layer in policy.layers)
-        return tunable, NetworkNumbers(hidden, tunable.maps(output))
+        return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
     raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
 
 
@@ -166,7 +166,7 @@ def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:
     directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
     thresholds = np.array([split.threshold for split in splits])
     oblique = isinstance(tree, ObliqueLinearTree)
-    return TreeNumbers(sides, directions, thresholds, frame.maps(tree.maps[ends]), oblique, tree.constant)
+    return TreeNumbers(sides, directions, thresholds, frame.coefficients(tree.maps[ends]), oblique, tree.constant)
 
 
 def _of_cart(tree, frame: Scaling) -> TreeNumbers:

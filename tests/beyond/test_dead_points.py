@@ -8,12 +8,12 @@ import vsp
 from studies import comparison
 from vsp.paper.baselines import rule_of_thumb
 from vsp.tasks import GOAL, mountaincar
-from vsp_beyond.proofs import at_rest
+from vsp_beyond.proofs import at_rest, tables
 from vsp_beyond.proofs.dead_points import acceleration
 
 
-def policy_of(codewords, maps, **more):
-    return vsp.VoronoiPolicy(codewords, np.array(maps, float)[..., None], task=MOUNTAINCAR, **more)
+def policy_of(codewords, coefficients, **more):
+    return vsp.VoronoiPolicy(codewords, np.array(coefficients, float)[..., None], task=MOUNTAINCAR, **more)
 
 
 def test_the_acceleration_is_that_of_the_task():
@@ -22,30 +22,26 @@ def test_the_acceleration_is_that_of_the_task():
     assert np.allclose(moved[:, 1], acceleration(x, push), atol=1e-9)
 
 
-def test_one_map_without_push_at_rest_has_its_dead_point_at_the_bottom():
-    table = at_rest(rule_of_thumb(MOUNTAINCAR)[1])
-    assert len(table) == 1 and table["dead"].all() and table.loc[0, "g_low"] > 0 > table.loc[0, "g_high"]
-    bottom = np.array([[-np.pi / 6, 0.0]])
-    assert vsp.rollout(rule_of_thumb(MOUNTAINCAR)[1], MOUNTAINCAR, bottom).outcomes[0] != GOAL
+DOWNHILL = [[0, 0, 0.1], [0, 0, -0.1]]  # with the slope, on both sides of the bottom at -0.524
 
 
-def test_a_border_removes_it_and_so_does_a_strong_push():
-    pulls = [[0, 0, 0.1], [0, 0, -0.1]]  # with the slope, on both sides of the bottom at -0.524
-    border = policy_of([[-0.6236, 0], [-0.4236, 0]], pulls, metric="euclidean")
-    table = at_rest(border)
-    assert table["cell"].tolist() == [0, 1] and not table["dead"].any() and np.isclose(table.loc[0, "high"], -0.5236)
-    strong = policy_of([[0, 0]], [[0, 20, 0.7]])
-    assert not at_rest(strong)["dead"].any()
+@pytest.mark.parametrize(
+    ("policy", "dead"),
+    [(rule_of_thumb(MOUNTAINCAR)[1], [True]),  # no push at rest: its dead point is at the bottom
+     (policy_of([[-0.6236, 0], [-0.4236, 0]], DOWNHILL, metric="euclidean"), [False, False]),  # a border at the bottom
+     (policy_of([[-0.55, 0], [-0.45, 0]], DOWNHILL), [True, False]),  # one beside it
+     (policy_of([[0, 0]], [[0, 20, 0.7]]), [False]),  # a strong push
+     (vsp.VoronoiPolicy.load(comparison.RESULTS / f"limit_{MOUNTAINCAR}.policy"), [False, False])],
+)  # fmt: skip
+def test_borders_and_strong_pushes_remove_dead_points(policy, dead):
+    assert at_rest(policy)["dead"].tolist() == dead
 
 
-def test_a_border_at_the_wrong_place_leaves_it():
-    wrong = policy_of([[-0.55, 0], [-0.45, 0]], [[0, 0, 0.1], [0, 0, -0.1]])
-    assert at_rest(wrong)["dead"].tolist() == [True, False]
-
-
-def test_the_policy_at_the_limit_has_none():
-    best = vsp.VoronoiPolicy.load(comparison.RESULTS / f"limit_{MOUNTAINCAR}.policy")
-    assert not at_rest(best)["dead"].any() and len(at_rest(best)) > 1
+def test_a_car_at_its_dead_point_stays_there():
+    bottom = rule_of_thumb(MOUNTAINCAR)[1]
+    row = tables.dead_point_table({"12 v": bottom}).iloc[0]
+    assert row["dead point"] == pytest.approx(-np.pi / 6) and row["left"] > 0 > row["right"] and row["borders"] == 0
+    assert vsp.rollout(bottom, MOUNTAINCAR, np.array([[row["dead point"], 0.0]])).outcomes[0] != GOAL
 
 
 @given(st.integers(0, 2**31), st.sampled_from(["euclidean", "manhattan"]))
@@ -56,11 +52,24 @@ def test_the_parts_are_the_cells_of_the_policy(seed, metric):
     table, x = at_rest(policy), np.linspace(-0.599, -0.401, 400)
     assert table["low"].iloc[0] == -0.6 and table["high"].iloc[-1] == -0.4
     assert (table["high"][:-1].to_numpy() == table["low"][1:].to_numpy()).all()
-    own = table["cell"].to_numpy()[np.searchsorted(table["high"], x)]
-    assert (own == policy.cells(np.column_stack([x, np.zeros(400)]))).all()
+    cells = table["cell"].to_numpy()[np.searchsorted(table["high"], x)]
+    assert (cells == policy.cells(np.column_stack([x, np.zeros(400)]))).all()
 
 
 def test_other_policies_get_one_clear_error():
-    for other in (vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), "a name"):
-        with pytest.raises(ValueError, match="expected a VoronoiPolicy for Mountain"):
-            at_rest(other)
+    with pytest.raises(ValueError, match="expected a VoronoiPolicy for Mountain"):
+        at_rest(vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task=SIMPLEGOAL))
+
+
+# The other tables
+
+
+def test_tables_are_read_and_curves_are_those_of_the_certificates():
+    table = tables.simplegoal_table().set_index("policy")
+    assert table.loc["tuned", ["cells", "outside", "program"]].tolist() == [4, 0, 1] and len(table) == 8
+    assert ((table["failing"] - table["sampled"]).abs() < 1e-3).all()
+    assert tables.pendulum_table()["share"].is_monotonic_increasing and (tables.teacher_table()["minutes"] > 0).all()
+    starts, least = tables.least_returns()
+    assert (np.diff(starts) > 0).all() and -0.6 < starts[0] < starts[-1] < -0.4 and (least > 90).all()
+    steps = tables.pendulum_steps()
+    assert steps.shape == (1008, 1008) and steps.min() == -1

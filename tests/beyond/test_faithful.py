@@ -8,37 +8,42 @@ import vsp_beyond
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells import faithful
 from vsp_beyond.few_cells.anneal import squared_error
 from vsp_beyond.few_cells.config import Faithful
-from vsp_beyond.few_cells.faithful import among_states, by_visits, distill_faithfully, needed_only, variance
-from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
+from vsp_beyond.few_cells.faithful import among_states, by_visits, distill_faithfully, kept, needed_only
+from vsp_beyond.few_cells.units import Cells, LabelledStates
 
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
 )
+UNTUNED = dataclasses.replace(SMALL, n_generations=0)
 
 pytestmark = pytest.mark.filterwarnings("ignore:no policy of 3 cells")  # so little work finds less than was asked
 
 
+def distilled_by(**changes):
+    return distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(SMALL, **changes), seed=1)
+
+
 @pytest.fixture(scope="module")
 def distilled():
-    return distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)
+    return distilled_by()
 
 
-def r2(policy, teacher, seed=9):
-    task = get_task(SIMPLEGOAL)
-    states = visited_states(teacher, task, task.start(np.random.default_rng(seed), 300))
+def r2(policy, teacher):
+    states = visited_states(teacher, SIMPLEGOAL, get_task(SIMPLEGOAL).start(np.random.default_rng(9), 300))
     actions = teacher.predict(states)[0]
     return 1 - np.square(policy.predict(states)[0] - actions).mean() / actions.var(axis=0).mean()
 
 
 def test_it_acts_like_the_teacher_and_returns_what_it_returns(distilled):
     policy, history = distilled
-    own, ours = (rollout_from_seed(one, SIMPLEGOAL, 2000, seed=5).returns.mean() for one in (CurvedTeacher(), policy))
-    kept = history[history["kept"]]
-    assert ours > own - 0.1 and len(policy) <= 3 and len(kept) == 1
-    assert r2(policy, CurvedTeacher()) == pytest.approx(kept["r2"].item(), abs=0.02) and kept["r2"].item() > 0.95
+    teachers, ours = (
+        rollout_from_seed(actor, SIMPLEGOAL, 2000, seed=5).returns.mean() for actor in (CurvedTeacher(), policy)
+    )
+    best = history[history["kept"]]
+    assert ours > teachers - 0.1 and len(policy) <= 3 and len(best) == 1
+    assert r2(policy, CurvedTeacher()) == pytest.approx(best["r2"].item(), abs=0.02) and best["r2"].item() > 0.95
     assert list(history["stage"].unique()) == ["fit", "tune"]
 
 
@@ -51,76 +56,51 @@ def test_it_is_closer_than_what_is_tuned_for_the_return(distilled):
 
 
 def test_the_same_arguments_give_the_same_policy(distilled):
-    again, history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)
+    again, history = distilled_by()
     assert again.to_json() == distilled[0].to_json() and history.equals(distilled[1])
     other = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL.quick(), seed=2)[0]
     assert other.to_json() != again.to_json()
-
-
-def test_without_tuning_the_closest_imitation_is_kept():
-    config = dataclasses.replace(SMALL, n_generations=0, margin=100.0)  # that no policy reaches
-    with pytest.warns(UserWarning):
-        history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[1]
-    assert history[["stage", "kept"]].to_numpy().tolist() == [["fit", True]]
 
 
 # The choice between candidates
 
 
 @pytest.mark.parametrize(
-    ("gaps", "r2s", "kept"),
+    ("gaps", "r2s", "min_r2", "best"),
     [
-        ([-1.0, 0.0, -0.04], [0.9, 0.7, 0.8], 2),  # half of the tolerance is accepted
-        ([-1.0, -0.06, -0.5], [0.9, 0.7, 0.81], 2),  # nothing is accepted: the highest return of those that are near
-        ([0.5, 0.1, 3.0], [0.7, 0.9, 0.8], 1),  # beyond the teacher's, the return earns nothing
+        ([-1.0, 0.0, -0.04], [0.9, 0.7, 0.8], None, 2),  # the closest of those that return enough
+        ([0.5, 0.1, 3.0], [0.7, 0.9, 0.8], None, 1),  # beyond the teacher's, the return earns nothing
+        ([-1.0, -0.06, -0.5], [0.9, 0.7, 0.81], None, 2),  # none does: the highest return of those that are near
+        ([-0.5, 0.2, 3.0], [0.95, 0.91, 0.7], 0.9, 1),  # the highest return of those with this R²
+        ([-0.5, 0.2, 3.0], [0.7, 0.8, 0.6], 0.9, 1),  # none has it: the closest
     ],
 )
-def test_the_closest_of_those_that_return_enough_is_kept(gaps, r2s, kept):
-    judge = faithful._Judge.__new__(faithful._Judge)
-    judge.rows = [{"gap": gap, "r2": one} for gap, one in zip(gaps, r2s)]
-    judge._config, judge._cells, judge._least_gap = SMALL, ["a", "b", "c"], -0.05
-    assert judge.best == "abc"[kept] and judge.frame()["kept"].tolist() == [i == kept for i in range(3)]
+def test_which_candidate_is_kept(gaps, r2s, min_r2, best):
+    assert kept(np.array(r2s), np.array(gaps), least_gap=-0.05, min_r2=min_r2) == best
 
 
-@pytest.mark.parametrize(("r2s", "kept"), [([0.95, 0.91, 0.7], 1), ([0.7, 0.8, 0.6], 1)])
-def test_with_a_least_r2_the_highest_return_of_those_that_reach_it_is_kept(r2s, kept):
-    """If none reaches it, the closest."""
-    judge = faithful._Judge.__new__(faithful._Judge)
-    judge.rows = [{"gap": gap, "r2": one} for gap, one in zip([-0.5, 0.2, 3.0], r2s)]
-    judge._config, judge._cells, judge._least_gap = dataclasses.replace(SMALL, min_r2=0.9), ["a", "b", "c"], -0.05
-    assert judge.best == "abc"[kept]
-
-
-def test_what_is_asked_for_and_not_found_is_said():
-    config = dataclasses.replace(SMALL, n_generations=0)
+def test_a_shortfall_is_said_and_the_closest_imitation_kept():
     with pytest.warns(UserWarning, match=r"no policy of 3 cells that acts like .* returns enough: .* expected \+99.95"):
-        distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, margin=100.0), seed=1)
+        history = distilled_by(n_generations=0, margin=100.0)[1]
+    assert history[["stage", "kept"]].to_numpy().tolist() == [["fit", True]]
     with pytest.warns(UserWarning, match=r"no policy of 3 cells with R² 1 was found: the closest is kept, R² 0.9\d\d"):
-        distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, min_r2=1.0), seed=1)
+        distilled_by(n_generations=0, min_r2=1.0)
+    starts = get_task(SIMPLEGOAL).start(np.random.default_rng(np.random.SeedSequence(1).spawn(4)[2]), 200)
+    missed = 5.0 - 0.01 * rollout(CurvedTeacher(), SIMPLEGOAL, starts).returns.mean()
+    with pytest.warns(UserWarning, match=rf"expected \+{missed:.4g} or more"):  # half of 2 % of the teacher's return
+        distilled_by(n_generations=0, margin=5.0, tolerance=None)
 
 
 def test_a_lower_r2_buys_return(distilled):
     """On the way from the teacher's actions to the best return."""
-    config = dataclasses.replace(SMALL, min_r2=0.7, n_generations=40)
-    policy, history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)
-    kept = history[history["kept"]].iloc[0]
-    assert kept["r2"] >= 0.7 and kept["gap"] > distilled[1].loc[distilled[1]["kept"], "gap"].item() + 0.05
+    history = distilled_by(min_r2=0.7, n_generations=40)[1]
+    best = history[history["kept"]].iloc[0]
+    assert best["r2"] >= 0.7 and best["gap"] > distilled[1].loc[distilled[1]["kept"], "gap"].item() + 0.05
 
 
 def test_nothing_is_tuned_where_the_closest_cells_return_enough():
-    config = dataclasses.replace(SMALL, tolerance=1000.0)
-    history = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, config, seed=1)[1]
-    assert history["stage"].tolist() == ["fit"]
-    asked = distill_faithfully(CurvedTeacher(), SIMPLEGOAL, dataclasses.replace(config, min_r2=0.5), seed=1)[1]
-    assert "tune" in asked["stage"].tolist()  # the return is to be the highest
-
-
-def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():
-    frame, seen = Scaling.of(get_task(SIMPLEGOAL), np.random.default_rng(0).random((50, 2))), None
-    starts = get_task(SIMPLEGOAL).start(np.random.default_rng(0), 200)
-    judge = faithful._Judge(frame, CurvedTeacher(), seen, dataclasses.replace(SMALL, tolerance=None), starts)
-    own = rollout(CurvedTeacher(), SIMPLEGOAL, starts).returns.mean()
-    assert judge.tolerance == pytest.approx(0.02 * own)
+    assert distilled_by(tolerance=1000.0)[1]["stage"].tolist() == ["fit"]
+    assert "tune" in distilled_by(tolerance=1000.0, min_r2=0.5)[1]["stage"].tolist()  # for the highest return
 
 
 # What is made of the cells at the end
@@ -128,56 +108,57 @@ def test_without_a_tolerance_it_is_a_share_of_the_teachers_return():
 
 def test_a_cell_that_the_return_needs_stays(monkeypatch, distilled):
     """Though the error does not."""
-    first = Cells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))  # stands still
-    monkeypatch.setattr(faithful, "needed_only", lambda cells, seen: first)
-    assert len(distill_faithfully(CurvedTeacher(), SIMPLEGOAL, SMALL, seed=1)[0]) == len(distilled[0]) > 1
-    lenient = dataclasses.replace(SMALL, tolerance=1000.0)
-    assert len(distill_faithfully(CurvedTeacher(), SIMPLEGOAL, lenient, seed=1)[0]) == 1
+    still = Cells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))
+    monkeypatch.setattr("vsp_beyond.few_cells.faithful.needed_only", lambda cells, labelled: still)
+    assert len(distilled_by(n_generations=1)[0]) > 1 == len(distilled_by(tolerance=1000.0)[0])
 
 
 def on_a_line(codewords, values, states):
-    maps = np.zeros((len(values), 2, 1))
-    maps[:, 1, 0] = values
+    """Cells of constant values, and the states with the values of their cells."""
+    coefficients = np.stack([np.zeros(len(values)), values], axis=1)[..., None]
+    cells, states = Cells(np.array(codewords, dtype=float)[:, None], coefficients), np.asarray(states)[:, None]
     inputs = np.column_stack([states, np.ones(len(states))])
-    return Cells(np.array(codewords, dtype=float)[:, None], maps), inputs
+    return cells, LabelledStates(inputs, coefficients[cells.nearest(states), 1])
 
 
-def test_of_two_neighbours_with_one_map_one_goes():
-    states = np.linspace(0, 3, 31)
-    cells, inputs = on_a_line([0, 1, 3], [0.5, 0.5, -0.5], states)
-    seen = LabelledStates(inputs, np.where(states < 2, 0.5, -0.5)[:, None])
-    left = needed_only(cells, seen)
-    assert left.codewords.ravel().tolist() == [1.0, 3.0] and squared_error(seen, left) <= squared_error(seen, cells)
-
-
-def test_one_cell_is_left_where_all_hold_the_same_map_and_none_goes_that_is_needed():
-    states = np.linspace(0, 3, 31)
-    cells, inputs = on_a_line([0, 1, 3], [0.5, 0.5, 0.5], states)
-    assert len(needed_only(cells, LabelledStates(inputs, np.full((31, 1), 0.5))).codewords) == 1
-    cells, _ = on_a_line([0, 1.5, 3], [0.0, 0.4, 0.8], states)
-    own = cells.closeness(states[:, None]).argmax(axis=0)
-    assert len(needed_only(cells, LabelledStates(inputs, cells.maps[own, 1])).codewords) == 3
+@pytest.mark.parametrize(
+    ("codewords", "values", "needed"),
+    [
+        ([0, 1, 3], [0.5, 0.5, -0.5], [1, 3]),
+        ([0, 1, 3], [0.5, 0.5, 0.5], [3]),
+        ([0, 1.5, 3], [0, 0.4, 0.8], [0, 1.5, 3]),
+    ],
+)
+def test_of_neighbours_with_one_map_one_is_left(codewords, values, needed):
+    cells, labelled = on_a_line(codewords, values, np.linspace(0, 3, 31))
+    left = needed_only(cells, labelled)
+    assert left.codewords.ravel().tolist() == needed and squared_error(labelled, left) == 0.0
 
 
 def test_two_codewords_come_among_the_states_and_draw_the_same_border():
     rng = np.random.default_rng(0)
     states = rng.normal(size=(500, 3))
     cells = Cells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
-    seen = LabelledStates(np.column_stack([states, np.ones(500)]), np.zeros((500, 1)))
-    moved = among_states(cells, seen)
+    labelled = LabelledStates(np.column_stack([states, np.ones(500)]), np.zeros((500, 1)))
+    moved = among_states(cells, labelled)
     assert (moved.nearest(states) == cells.nearest(states)).all() and len(set(cells.nearest(states).tolist())) == 2
-    middle, across = moved.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]
-    assert np.abs(moved.codewords).max() < 4 and np.dot(middle - cells.codewords.mean(axis=0), across) == pytest.approx(
-        0
-    )
+    shift, across = moved.codewords.mean(axis=0) - cells.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]
+    assert np.abs(moved.codewords).max() < 4 and shift @ across == pytest.approx(0)
     three = Cells(rng.normal(size=(3, 3)), np.zeros((3, 4, 1)))
-    assert among_states(three, seen) is three
+    assert among_states(three, labelled) is three
 
 
 def test_the_most_visited_cell_comes_first():
-    cells, inputs = on_a_line([0, 5, 9], [0.1, 0.2, 0.3], np.array([0.0, 9.0, 9.1, 9.2, 5.0, 5.1]))
-    assert by_visits(cells, LabelledStates(inputs, np.zeros((6, 1)))).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
+    cells, labelled = on_a_line([0, 5, 9], [0.1, 0.2, 0.3], [0.0, 9.0, 9.1, 9.2, 5.0, 5.1])
+    assert by_visits(cells, labelled).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
 
 
-def test_a_constant_teacher_has_a_unit_to_divide_by():
-    assert variance(LabelledStates(np.ones((3, 2)), np.full((3, 1), 0.7))) == 1.0
+def test_a_teacher_that_never_varies_is_imitated():
+    """Its actions have no variance that the error could be measured in."""
+
+    class Still(CurvedTeacher):
+        def predict(self, obs):
+            return np.full((len(obs), 2), 0.7), None
+
+    history = distill_faithfully(Still(), SIMPLEGOAL, dataclasses.replace(UNTUNED, n_restarts=1), seed=0)[1]
+    assert history["r2"].item() == pytest.approx(1.0)

@@ -24,8 +24,8 @@ def rng():
 
 
 def test_of_a_linear_teacher_lime_finds_the_line():
-    found = local_map(Line(), SIMPLEGOAL, STATE, scale=SCALE, rng=rng())
-    assert np.allclose(found, LINE, atol=2e-3) and not np.allclose(found, LINE, atol=1e-6)  # the ridge shrinks a little
+    line = local_map(Line(), SIMPLEGOAL, STATE, scale=SCALE, rng=rng())
+    assert np.allclose(line, LINE, atol=2e-3) and not np.allclose(line, LINE, atol=1e-6)  # the ridge shrinks a little
     assert np.allclose(gradient_map(Line(), STATE, scale=SCALE), LINE, atol=1e-12)
 
 
@@ -37,9 +37,9 @@ def test_lime_by_hand():
     penalty = np.diag([1.0, 1.0, 0.0])
     wanted = np.linalg.solve((inputs.T * kernel) @ inputs + penalty, (inputs.T * kernel) @ actions)
     generator = np.random.default_rng(3)
-    found = local_map(CurvedTeacher(), SIMPLEGOAL, STATE, scale=SCALE, rng=generator, n=200)
-    assert np.allclose(found[:-1], wanted[:-1] / SCALE[:, None])
-    assert np.allclose(np.append(STATE, 1.0) @ found, wanted[-1])
+    line = local_map(CurvedTeacher(), SIMPLEGOAL, STATE, scale=SCALE, rng=generator, n=200)
+    assert np.allclose(line[:-1], wanted[:-1] / SCALE[:, None])
+    assert np.allclose(np.append(STATE, 1.0) @ line, wanted[-1])
 
 
 def test_the_gradient_by_hand():
@@ -47,29 +47,29 @@ def test_the_gradient_by_hand():
         def predict(self, obs):
             return obs[:, :1] ** 2 + 3 * obs[:, :1] * obs[:, 1:], None
 
-    found = gradient_map(Square(), STATE, scale=SCALE)
-    assert np.allclose(found[:2, 0], [2 * 0.6 + 3 * 0.4, 3 * 0.6])
-    assert np.append(STATE, 1.0) @ found == pytest.approx(0.6**2 + 3 * 0.6 * 0.4)
+    line = gradient_map(Square(), STATE, scale=SCALE)
+    assert np.allclose(line[:2, 0], [2 * 0.6 + 3 * 0.4, 3 * 0.6])
+    assert np.append(STATE, 1.0) @ line == pytest.approx(0.6**2 + 3 * 0.6 * 0.4)
 
 
-def test_the_frame_by_hand():
+def test_the_table_by_hand():
     task, cells = get_task(SIMPLEGOAL), np.random.default_rng(1).normal(size=(2, 3, 2))
     policy = VoronoiPolicy([[0.2, 0.2], [0.8, 0.8]], cells, task=SIMPLEGOAL)
     states = np.array([[0.1, 0.1], [0.9, 0.7]])
-    frame = compare_maps(policy, CurvedTeacher(), states, scale=SCALE, rng=rng())
-    assert frame.columns.tolist() == ["state", "action", "map", "x", "y", "bias", "error"]
-    assert len(frame) == 2 * 3 * 2 and set(frame["map"]) == {"gradient", "LIME", "cell"}
-    own = frame[frame["map"] == "cell"]
-    assert np.allclose(own[["x", "y", "bias"]], cells.transpose(0, 2, 1).reshape(4, 3))
+    table = compare_maps(policy, CurvedTeacher(), states, scale=SCALE, rng=rng())
+    assert table.columns.tolist() == ["state", "action", "map", "x", "y", "bias", "error"]
+    assert len(table) == 2 * 3 * 2 and set(table["map"]) == {"gradient", "LIME", "cell"}
+    of_cells = table[table["map"] == "cell"]
+    assert np.allclose(of_cells[["x", "y", "bias"]], cells.transpose(0, 2, 1).reshape(4, 3))
     generator = rng()
     local_map(CurvedTeacher(), SIMPLEGOAL, states[0], scale=SCALE, rng=generator)
     around = np.clip(states[0] + lime.NEAR * SCALE * generator.normal(size=(1000, 2)), task.low, task.high)
     gaps = np.clip(around @ cells[0, :2] + cells[0, 2], -1, 1) - CurvedTeacher().predict(around)[0]
-    assert np.allclose(own["error"][:2], np.sqrt((gaps**2).mean(axis=0)))
+    assert np.allclose(of_cells["error"][:2], np.sqrt((gaps**2).mean(axis=0)))
 
 
 def test_one_action_and_the_same_numbers_again():
     policy = VoronoiPolicy(np.zeros((1, 2)), np.ones((1, 3, 1)), task=MOUNTAINCAR)
-    one, same = (compare_maps(policy, policy, [[-0.5, 0.01]], scale=SCALE / 10, rng=rng()) for _ in range(2))
-    assert one.equals(same) and len(one) == 3 and one["action"].unique().tolist() == list(get_task(MOUNTAINCAR).outputs)
-    assert one.loc[one["map"] == "cell", "error"].item() == pytest.approx(0.0, abs=1e-12)
+    first, second = (compare_maps(policy, policy, [[-0.5, 0.01]], scale=SCALE / 10, rng=rng()) for _ in range(2))
+    assert first.equals(second) and len(first) == 3
+    assert first.loc[first["map"] == "cell", "error"].item() == pytest.approx(0.0, abs=1e-12)

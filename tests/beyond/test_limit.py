@@ -2,32 +2,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher
 
+import vsp_beyond
 from vsp.evaluation import start_states
+from vsp.policy import VoronoiPolicy
 from vsp.rollouts import rollout
-from vsp.tasks.base import GOAL
-from vsp.teachers.teacher import load_teacher
+from vsp.tasks import GOAL, get_task
 from vsp_beyond.few_cells import limit
-from vsp_beyond.few_cells.config import Faithful, faithful_preset, tuned_preset
-from vsp_beyond.few_cells.limit import at_the_limit, limit_preset
 from vsp_beyond.optimum import best_returns
 
 FEW = replace(
-    limit_preset(SIMPLEGOAL), n_episodes=100, n_restarts=1, n_steps=300, n_correction_episodes=50, n_generations=30,
-    n_tuning_episodes=100, n_validation=300,
+    vsp_beyond.limit_preset(SIMPLEGOAL), n_episodes=100, n_restarts=1, n_steps=300, n_correction_episodes=50,
+    n_generations=30, n_tuning_episodes=100, n_validation=300,
 )  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     monkeypatch.setattr(limit, "N_STARTS", 2)
-    few = Faithful(n_cells=4, n_episodes=100, n_restarts=2, n_validation=20)
+    monkeypatch.setattr(limit, "N_SLOW", 1)
+    few = vsp_beyond.Faithful(n_cells=4, n_episodes=100, n_restarts=2, n_validation=20)
     monkeypatch.setattr(limit, "faithful_preset", lambda task, n_cells: replace(few, n_cells=n_cells))
 
 
-def test_a_short_search_comes_near_the_best():
-    policy = at_the_limit(SIMPLEGOAL, FEW, seed=0)
+def test_a_short_search_comes_near_the_best(capsys):
+    policy = vsp_beyond.at_the_limit(SIMPLEGOAL, FEW, seed=0)
+    assert capsys.readouterr().out.count("\n") == 1
     starts = start_states(SIMPLEGOAL, 500, 7)
     result = rollout(policy, SIMPLEGOAL, starts)
     regret = (best_returns(starts) - result.returns)[result.outcomes == GOAL].mean()
@@ -35,54 +36,50 @@ def test_a_short_search_comes_near_the_best():
 
 
 def test_the_same_seed_gives_the_same_policy():
-    few = replace(FEW, n_steps=20, n_generations=5)
-    one, again, other = (at_the_limit(SIMPLEGOAL, few, seed=seed) for seed in (0, 0, 1))
-    assert np.array_equal(one.codewords, again.codewords) and np.array_equal(one.coefficients, again.coefficients)
-    assert not np.array_equal(one.coefficients, other.coefficients)
+    few, teacher = replace(FEW, n_steps=20, n_generations=5), CurvedTeacher()
+    policies = [vsp_beyond.at_the_limit(SIMPLEGOAL, few, seed=seed, teacher=teacher).to_json() for seed in (0, 0, 1)]
+    assert policies[0] == policies[1] != policies[2]
 
 
-def test_each_start_is_tuned_briefly_and_the_best_to_the_end(monkeypatch):
-    called, tuned, close = [], limit.distill_tuned, limit.distill_faithfully
+class Recorded:
+    """Stands in for the searches, which it notes: teacher, generations, and whether it starts from a policy."""
 
-    def recorded(teacher, task, config, *, seed, start=None):
-        called.append((config.n_generations, start is None))
-        return tuned(teacher, task, config, seed=seed, start=start)
+    def __init__(self, monkeypatch, task):
+        self.calls, d, m = [], len(get_task(task).low), len(get_task(task).action_low)
+        self.policy = VoronoiPolicy(np.zeros((1, d)), np.zeros((1, d + 1, m)), task=task)
+        for name in ("distill_tuned", "distill_faithfully"):
+            monkeypatch.setattr(limit, name, self)
 
-    monkeypatch.setattr(limit, "distill_tuned", recorded)
-    monkeypatch.setattr(
-        limit, "distill_faithfully", lambda *some, **more: called.append("close") or close(*some, **more)
-    )
-    at_the_limit(SIMPLEGOAL, replace(FEW, n_generations=10), seed=1)
-    assert called == ["close", (2, False), (2, True), (10, False)]
+    def __call__(self, teacher, task, config, *, seed, start=None):
+        self.calls.append((teacher, config.n_generations, start is not None, seed))
+        return self.policy, None
 
 
-def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one_or_any(monkeypatch):
-    taught, shipped = [], load_teacher(SIMPLEGOAL)
+@pytest.mark.parametrize(
+    ("task", "searches"),
+    [(SIMPLEGOAL, [(0, False), (2, True), (2, False), (10, True)]),
+     (LUNARLANDER, [(0, False), (2, True), (10, True), (4, True), (4, True)])],  # two more from the best
+)  # fmt: skip
+def test_each_start_is_tuned_briefly_and_the_best_to_the_end(monkeypatch, task, searches):
+    recorded = Recorded(monkeypatch, task)
+    config = replace(vsp_beyond.limit_preset(task), n_generations=10, n_validation=1)
+    assert vsp_beyond.at_the_limit(task, config, seed=0, teacher=CurvedTeacher()) is recorded.policy
+    assert [call[1:3] for call in recorded.calls] == searches
+    assert len({seed for *_, seed in recorded.calls}) == len(searches) - 1  # the first two share theirs
+
+
+@pytest.mark.parametrize(
+    ("task", "teacher"),
+    [(MOUNTAINCAR, ("best", MOUNTAINCAR, 3e-3)), (PENDULUM, ("best", PENDULUM, None)), (LUNARLANDER, "shipped")],
+)
+def test_the_teacher_is_the_best_policy_where_it_is_known_else_the_shipped_one(monkeypatch, task, teacher):
     monkeypatch.setattr(limit, "best_policy", lambda task, price: ("best", task.name, price))
-    monkeypatch.setattr(limit, "load_teacher", lambda task: ("shipped", task))
-    monkeypatch.setattr(limit, "_screened", lambda teacher, *rest, closest: taught.append(teacher) or 1 / 0)
-    for task, teacher in ((MOUNTAINCAR, None), (PENDULUM, None), (LUNARLANDER, None), (SIMPLEGOAL, shipped)):
-        with pytest.raises(ZeroDivisionError):
-            at_the_limit(task, seed=0, teacher=teacher)
-    assert taught == [("best", MOUNTAINCAR, 3e-3), ("best", PENDULUM, None), ("shipped", LUNARLANDER), shipped]
+    monkeypatch.setattr(limit, "load_teacher", lambda task: "shipped")
+    recorded = Recorded(monkeypatch, task)
+    vsp_beyond.at_the_limit(task, replace(vsp_beyond.limit_preset(task), n_validation=1), seed=0)
+    assert {call[0] for call in recorded.calls} == {teacher}
 
 
-def test_where_a_physics_engine_is_slow_fewer_starts_are_tuned_and_the_best_again(monkeypatch):
-    screened, tuned = [], []
-    monkeypatch.setattr(limit, "N_SLOW", 1)
-    monkeypatch.setattr(limit, "_screened", lambda *some, closest: screened.append(closest) or "policy")
-    monkeypatch.setattr(limit, "rollout", lambda *some: None)
-    monkeypatch.setattr(limit, "score", lambda *some: 0.0)
-    monkeypatch.setattr(limit, "_tuned", lambda policy, *rest: tuned.append(rest[-2:]) or policy)
-    assert at_the_limit(LUNARLANDER, seed=0) == "policy" and screened == [True]
-    whole = limit_preset(LUNARLANDER).n_generations
-    assert [config.n_generations for config, _ in tuned] == [whole, 0.4 * whole, 0.4 * whole]
-    assert len({seed for _, seed in tuned}) == 3
-
-
-def test_what_cannot_be_searched_is_refused():
-    with pytest.raises(ValueError, match="expected a Tuned"):
-        at_the_limit(SIMPLEGOAL, faithful_preset(SIMPLEGOAL), seed=0)
-    with pytest.raises(ValueError, match="seed is -1"):
-        at_the_limit(SIMPLEGOAL, seed=-1)
-    assert limit_preset(PENDULUM).n_generations > tuned_preset(PENDULUM).n_generations
+def test_without_a_known_teacher_one_is_needed():
+    with pytest.raises(ValueError, match="no teacher is known for BipedalWalker-v3: pass one as `teacher`"):
+        vsp_beyond.at_the_limit("BipedalWalker-v3", seed=0)

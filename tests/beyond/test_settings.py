@@ -1,89 +1,79 @@
+import ast
 import dataclasses
+import inspect
 
+import pandas as pd
 import pytest
-from support import LUNARLANDER, PENDULUM, TASKS
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
-import vsp_beyond
+from studies.comparison import RESULTS
 from vsp.config import Config
-from vsp_beyond import Faithful, Tuned
+from vsp_beyond import Faithful, Tuned, faithful_preset, limit_preset, tuned_preset
+from vsp_beyond.few_cells import duration
+from vsp_beyond.few_cells.limit import whole_search
+
+TRIED = (SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER)
 
 
-def test_tasks_that_were_tried_have_a_tuned_preset():
-    for task in (*TASKS, PENDULUM, LUNARLANDER):
-        assert isinstance(vsp_beyond.tuned_preset(task), Tuned) and vsp_beyond.tuned_preset(task).n_cells <= 5
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"n_cells": 0}, {"n_cells": 2.0}, {"n_restarts": 0}, {"n_corrections": -1}, {"n_generations": True},
-     {"clip_slope": 0}, {"final_temperature": 2.0}, {"learning_rate": float("nan")}, {"n_corrections": 0.0}],
-)  # fmt: skip
-def test_a_refinement_out_of_range_is_refused(change):
-    ((name, value),) = change.items()
-    with pytest.raises(ValueError, match=f"{name} is {value}, expected"):
-        Tuned(**{"n_cells": 3, **change})
-
-
-def test_parts_of_a_refinement_can_be_switched_off():
-    assert Tuned(n_cells=1, n_corrections=0, n_generations=0, failure_penalty=0).n_corrections == 0
-
-
-def test_a_quick_refinement_keeps_its_cells_and_what_is_off():
-    quick = Tuned(n_cells=3, n_generations=0).quick()
-    assert (quick.n_cells, quick.n_steps, quick.n_generations) == (3, 150, 0)
-    assert Tuned(n_cells=3, n_episodes=4).quick().n_episodes == 1
-
-
-def test_the_faithful_presets_have_few_cells():
-    for task in ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"):
-        assert isinstance(vsp_beyond.faithful_preset(task), Faithful) and vsp_beyond.faithful_preset(task).n_cells <= 8
-
-
-def test_any_task_has_faithful_settings_that_suit_its_size():
+@pytest.mark.parametrize("preset", [faithful_preset, tuned_preset, limit_preset])
+def test_any_task_has_settings_that_suit_its_size(preset):
     """A physics engine steps one state at a time: fewer episodes there."""
-    walker, pendulum = vsp_beyond.faithful_preset("BipedalWalker-v3"), vsp_beyond.faithful_preset("Pendulum-v1")
-    assert walker.n_episodes == 100 < pendulum.n_episodes and walker.n_tuning_episodes < pendulum.n_tuning_episodes
-    copy = dataclasses.replace(vsp.get_task("Pendulum-v1"), name="My-v0")
-    assert (
-        vsp_beyond.faithful_preset(copy).n_episodes == 300_000 // 200
-        and vsp_beyond.faithful_preset(copy).tolerance is None
+    assert all(preset(task).n_cells <= 8 for task in TRIED)
+    walker, like_pendulum = (
+        preset("BipedalWalker-v3"),
+        preset(dataclasses.replace(vsp.get_task(PENDULUM), name="My-v0")),
     )
+    assert walker.n_episodes == 100 < like_pendulum.n_episodes
+    assert walker.n_tuning_episodes < like_pendulum.n_tuning_episodes
+    assert all(limit_preset(task).n_generations > tuned_preset(task).n_generations for task in TRIED)
 
 
 def test_two_numbers_choose_a_faithful_policy():
-    config = vsp_beyond.faithful_preset("Pendulum-v1", n_cells=3, min_r2=0.9)
-    assert config == dataclasses.replace(vsp_beyond.faithful_preset("Pendulum-v1"), n_cells=3, min_r2=0.9)
+    config = faithful_preset(PENDULUM, n_cells=3, min_r2=0.9)
+    assert config == dataclasses.replace(faithful_preset(PENDULUM), n_cells=3, min_r2=0.9)
     with pytest.raises(ValueError, match="n_cells is 0, expected an integer from 1 to 1000"):
-        vsp_beyond.faithful_preset("Pendulum-v1", n_cells=0)
+        faithful_preset(PENDULUM, n_cells=0)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [{"n_cells": 0}, {"tolerance": 0}, {"tolerance": float("inf")}, {"margin": float("nan")}, {"n_restarts": True},
-     {"n_generations": -1}, {"failure_penalty": -1.0}, {"n_states": 10.0}, {"min_r2": 1.01}, {"n_cells": 10**9},
-     {"n_episodes": 10**12}],
-)  # fmt: skip
-def test_a_faithful_out_of_range_is_refused(change):
-    ((name, value),) = change.items()
-    with pytest.raises(ValueError, match=f"{name} is {value}, expected"):
-        Faithful(**{"n_cells": 3, "tolerance": 1.0, **change})
+def test_numbers_of_no_sense_are_refused():
+    with pytest.raises(ValueError, match="final_temperature is 2.0, expected at most initial_temperature = 1.0"):
+        Tuned(n_cells=3, final_temperature=2.0)
+    with pytest.raises(ValueError, match="n_episodes is 10{12}, expected"):
+        Faithful(n_cells=3, n_episodes=10**12)
 
 
-def test_a_quick_faithful_keeps_its_cells_and_what_is_off():
+def test_quick_keeps_the_cells_and_what_is_off():
+    quick = Tuned(n_cells=3, n_generations=0, n_corrections=0, failure_penalty=0).quick()
+    assert (quick.n_cells, quick.n_steps, quick.n_generations, quick.n_corrections) == (3, 150, 0, 0)
+    assert Tuned(n_cells=3, n_episodes=4).quick().n_episodes == 1
     quick = Faithful(n_cells=3, tolerance=1.0, n_generations=0, n_restarts=4).quick()
     assert (quick.n_cells, quick.n_restarts, quick.n_episodes, quick.n_generations) == (3, 1, 3000, 0)
 
 
 @pytest.mark.parametrize("kind", [Config, Tuned, Faithful])
 def test_every_field_says_what_it_is(kind):
-    import ast
-    import inspect
-
     body = ast.parse(inspect.getsource(kind)).body[0].body
     documented = {
         field.target.id
         for field, text in zip(body, body[1:])
         if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
     }
-    assert documented == {f.name for f in dataclasses.fields(kind)}
+    assert documented == {field.name for field in dataclasses.fields(kind)}
+
+
+# How long it will take
+
+
+@pytest.mark.parametrize("table", ["faithful_seconds", "faithful_seconds_long", "limit_seconds", "limit_seconds_long"])
+def test_committed_searches_took_as_long_as_is_said(table):
+    for row in pd.read_csv(RESULTS / f"{table}.csv").itertuples():
+        task = vsp.get_task(row.task)
+        preset = faithful_preset(task) if "faithful" in table else whole_search(task, limit_preset(task))
+        low, high = duration.expected_seconds(task, dataclasses.replace(preset, n_cells=row.size))
+        assert low < row.seconds < high, row
+
+
+def test_a_time_in_words():
+    words = [duration.in_words(seconds) for seconds in (0.3, 18.0, 89.0, 100.0, 7200.0)]
+    assert words == ["2 seconds", "18 seconds", "89 seconds", "2 minutes", "2 hours"]

@@ -18,26 +18,25 @@ CONFIG = Tuned(
 )  # fmt: skip
 
 
-def some(**changes):
+def some(codewords=((0.12345, 0.5), (0.75, 0.5))):
     coefficients = np.array([[[0.5, -2.0], [0.001, 3.0], [0.1, 0.0]], [[1.0, 1.0], [1.0, 1.0], [1.0, 0.25]]])
-    about = {"codewords": np.array([[0.12345, 0.5], [0.75, 0.5]]), "scale": np.array([0.1, 2.0]), **changes}
-    return VoronoiPolicy(coefficients=coefficients, task=SIMPLEGOAL, **about)
+    return VoronoiPolicy(np.array(codewords), coefficients, task=SIMPLEGOAL, scale=np.array([0.1, 2.0]))
 
 
 # Nearer codewords
 
 
-def far(k, task, metric="euclidean", seed=0):
+def far(k, task, metric="euclidean"):
     """k codewords far off whose borders run among the states."""
-    task, rng = get_task(task), np.random.default_rng(seed)
+    task, rng = get_task(task), np.random.default_rng(0)
     d, m = len(task.low), len(task.action_low)
     around = rng.normal(size=(k, d))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
-    maps, scale = rng.normal(size=(k, d + 1, m)), np.linspace(0.5, 1.0, d)
-    return VoronoiPolicy((0.1 + 50.0 * around) * scale, maps, task=task, metric=metric, scale=scale)
+    coefficients, scale = rng.normal(size=(k, d + 1, m)), np.linspace(0.5, 1.0, d)
+    return VoronoiPolicy((0.1 + 50.0 * around) * scale, coefficients, task=task, metric=metric, scale=scale)
 
 
-@pytest.mark.parametrize(("task", "k"), [(SIMPLEGOAL, 2), (SIMPLEGOAL, 3), (PENDULUM, 2), (PENDULUM, 3), (PENDULUM, 4)])
+@pytest.mark.parametrize(("task", "k"), [(SIMPLEGOAL, 2), (PENDULUM, 3), (PENDULUM, 4)])
 def test_codewords_come_nearer_and_no_border_moves(task, k):
     policy = far(k, task)
     states = np.random.default_rng(1).uniform(-1, 1, size=(5000, len(policy.scale)))
@@ -46,7 +45,8 @@ def test_codewords_come_nearer_and_no_border_moves(task, k):
     assert np.abs(near.codewords).max() < 0.1 * np.abs(policy.codewords).max()
     assert np.array_equal(near.coefficients, policy.coefficients) and np.array_equal(near.scale, policy.scale)
     gaps = near.codewords / near.scale
-    assert np.linalg.norm(gaps - gaps[0], axis=1).max() > 0.3  # and stay apart
+    assert np.linalg.norm(gaps - gaps[0], axis=1).max() > 0.3  # and do not meet
+    assert (gathered(policy, states[:1]).cells(states) == policy.cells(states)).all()  # around a single state
 
 
 def test_two_codewords_by_hand():
@@ -59,97 +59,74 @@ def test_two_codewords_by_hand():
 LINE = VoronoiPolicy([[0, 0], [1, 1], [3, 3]], np.zeros((3, 3, 2)), task=SIMPLEGOAL, metric="euclidean")
 
 
-@pytest.mark.parametrize(
-    "policy", [far(1, SIMPLEGOAL), far(4, SIMPLEGOAL), far(2, SIMPLEGOAL, metric="manhattan"), LINE]
-)
+@pytest.mark.parametrize("policy", [far(4, SIMPLEGOAL), far(2, SIMPLEGOAL, metric="manhattan"), LINE])
 def test_where_borders_have_no_common_point_nothing_moves(policy):
     assert gathered(policy, np.random.default_rng(0).random((50, 2))) is policy
 
 
-def test_codewords_gather_around_a_single_state():
-    policy = VoronoiPolicy([[0.2, 0.5], [0.8, 0.5]], np.zeros((2, 3, 2)), task=SIMPLEGOAL)
-    states = np.random.default_rng(0).random((50, 2))
-    assert (gathered(policy, [[0.5, 0.5]]).cells(states) == policy.cells(states)).all()
-
-
-# Pruning
+# Pruning and rounding
 
 
 def test_what_matters_least_goes_first():
     """In units of what an input does when it moves by one scale: 0.001 * 2 before 0.5 * 0.1 before 0.1 * 1."""
     asked = []
-    prune(some(), lambda one: asked.append(np.flatnonzero(one.coefficients.ravel() == 0).tolist()) or False)
+    prune(some(), lambda policy: asked.append(np.flatnonzero(policy.coefficients == 0).tolist()) or False)
     assert asked[:3] == [[2, 5], [0, 5], [4, 5]] and len(asked) == 11  # 5, which is zero, is not asked for
 
 
 def test_pruning_keeps_what_is_needed():
     needed = {(0, 0, 1), (1, 1, 0)}
-    bare = prune(some(), lambda one: all(one.coefficients[place] for place in needed))
+    bare = prune(some(), lambda policy: all(policy.coefficients[place] for place in needed))
     assert set(zip(*(axis.tolist() for axis in np.nonzero(bare.coefficients)))) == needed
     assert bare.coefficients[0, 0, 1] == -2.0 and np.array_equal(bare.codewords, some().codewords)
 
 
-# Rounding
-
-
 def test_rounding_by_hand():
-    short = rounded(some(codewords=np.array([[0.12345, 0.5], [0.75, 1234.5]])), 2)
+    short = rounded(some([[0.12345, 0.5], [0.75, 1234.5]]), 2)
     assert short.codewords.tolist() == [[0.12, 0.5], [0.75, 1200.0]] and short.scale.tolist() == [0.1, 2.0]
     assert short.coefficients[1, 2].tolist() == [1.0, 0.25] and rounded(some(), 1).coefficients[1, 2, 1] == 0.2
-
-
-def test_rounding_does_not_make_two_cells_one():
-    close = some(codewords=np.array([[0.501, 0.5], [0.502, 0.5]]))
+    close = some([[0.501, 0.5], [0.502, 0.5]])  # it does not make two cells one
     assert rounded(close, 2) is None and len(rounded(close, 3)) == 2
 
 
 # All of it
 
 
-@pytest.fixture(scope="module")
-def simple():
-    return simplify(PumpingTeacher(), MOUNTAINCAR, CONFIG, tolerance=5.0, seed=1)
-
-
-def test_it_returns_within_the_tolerance(simple):
-    policy, tried = simple
+def test_it_returns_within_the_tolerance_by_stages_in_order():
+    teacher = PumpingTeacher()
+    policy, tried = simplify(teacher, MOUNTAINCAR, CONFIG, tolerance=5.0, seed=1)
     starts = start_states(policy.task, 100, 1)
-    here, own = (score(rollout(one, policy.task, starts), 100.0) for one in (policy, PumpingTeacher()))
-    assert here >= own - 5.0
+    result, of_teacher = (rollout(actor, policy.task, starts) for actor in (policy, teacher))
+    assert score(result, 100.0) >= score(of_teacher, 100.0) - 5.0
+    assert tried.attrs == {"teacher": pytest.approx(of_teacher.returns.mean())}
     last = tried[tried["kept"]].iloc[-1]
     assert (last["cells"], last["nonzero"]) == (len(policy), np.count_nonzero(policy.coefficients))
-    assert last["mean"] == pytest.approx(rollout(policy, policy.task, starts).returns.mean())
-    assert tried.attrs == {"teacher": pytest.approx(rollout(PumpingTeacher(), policy.task, starts).returns.mean())}
-
-
-def test_the_stages_come_in_order(simple):
-    _, tried = simple
+    assert last["mean"] == pytest.approx(result.returns.mean())
     assert list(dict.fromkeys(tried["stage"])) == ["cells", "prune", "round"]
-    cells = tried[tried["stage"] == "cells"]
-    assert cells["cells"].tolist() == list(range(1, len(cells) + 1)) and cells["kept"].tolist()[-1]
-    assert not cells["kept"][:-1].any()
-    rounds = tried[tried["stage"] == "round"]
-    assert rounds["digits"].tolist() == list(range(1, len(rounds) + 1)) and not rounds["kept"][:-1].any()
+    for stage, column in (("cells", "cells"), ("round", "digits")):  # from the smallest on, to the first that suffices
+        rows = tried[tried["stage"] == stage]
+        assert rows[column].tolist() == list(range(1, len(rows) + 1)) and not rows["kept"][:-1].any()
     assert (tried.loc[tried["stage"] != "round", "digits"] == 0).all()
-
-
-def test_numbers_are_as_short_as_was_found(simple):
-    policy, tried = simple
-    digits = tried["digits"].iloc[-1]
     for values in (policy.codewords, policy.coefficients, policy.scale):
-        assert all(float(f"{value:.{digits}g}") == value for value in values.flat)
+        assert all(float(f"{value:.{tried['digits'].iloc[-1]}g}") == value for value in values.flat)
 
 
 def gain(value, k=1):
     """Push so many times the velocity, in k cells that do not differ."""
-    maps = np.tile([[[0.0], [value], [0.0]]], (k, 1, 1))
-    return VoronoiPolicy(np.arange(2.0 * k).reshape(k, 2), maps, task=MOUNTAINCAR)
+    coefficients = np.tile([[[0.0], [value], [0.0]]], (k, 1, 1))
+    return VoronoiPolicy(np.arange(2.0 * k).reshape(k, 2), coefficients, task=MOUNTAINCAR)
+
+
+def simplified(monkeypatch, policies, tolerance):
+    """Where tuning gives these policies, by the number of cells."""
+    monkeypatch.setattr(
+        module, "distill_tuned", lambda teacher, task, config, *, seed: (policies[config.n_cells], None)
+    )
+    return simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=tolerance, seed=0)
 
 
 def test_where_no_number_of_cells_will_do_the_best_goes_on(monkeypatch):
-    made = {1: gain(100.0), 2: gain(40.0, 2), 3: gain(80.0, 3)}
-    monkeypatch.setattr(module, "distill_tuned", lambda teacher, task, config, *, seed: (made[config.n_cells], None))
-    policy, tried = simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=0.0, seed=0)
+    policy, tried = simplified(monkeypatch, {1: gain(100.0), 2: gain(40.0, 2), 3: gain(80.0, 3)}, tolerance=0.0)
     cells = tried[tried["stage"] == "cells"]
     assert not cells["kept"].any() and cells["mean"].idxmax() == 1 and len(cells) == 3
     assert len(policy) == 2 and np.count_nonzero(policy.coefficients) <= 2
@@ -158,9 +135,8 @@ def test_where_no_number_of_cells_will_do_the_best_goes_on(monkeypatch):
 
 def test_the_tolerance_is_spent_once(monkeypatch):
     """The first size costs most of it. One digit, 20 for 16, would cost more than the rest."""
-    monkeypatch.setattr(module, "distill_tuned", lambda teacher, task, config, *, seed: (gain(16.0), None))
-    policy, tried = simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=1.5, seed=0)
+    policy, tried = simplified(monkeypatch, {1: gain(16.0)}, tolerance=1.5)
     starts = start_states(policy.task, CONFIG.n_validation, 0)
-    own, size, digit = (rollout(gain(g), policy.task, starts).returns.mean() for g in (12.0, 16.0, 20.0))
-    assert size - 1.5 < digit < own - 1.5 < size
+    teacher, size, digit = (rollout(gain(g), policy.task, starts).returns.mean() for g in (12.0, 16.0, 20.0))
+    assert size - 1.5 < digit < teacher - 1.5 < size
     assert policy.coefficients[0, 1, 0] == 16.0 and tried["digits"].iloc[-1] == 2

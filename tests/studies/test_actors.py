@@ -15,7 +15,7 @@ from studies.robots.settings import Walking
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.search import local_maps
+from vsp_beyond.few_cells.search import local_init
 from vsp_beyond.few_cells.units import Scaling
 
 TASK, TEACHER = get_task(PENDULUM), load_teacher(PENDULUM)
@@ -27,7 +27,7 @@ FEW = Walking(n_cells=3, n_validation=5, n_steps=160, n_filling=60, gamma=0.98)
 def pieces(kind):
     """A frame, the numbers of three linear maps, and the policy they make."""
     if kind == "cells":
-        cells = local_maps(FRAME.labelled(TEACHER, STATES), 3, np.random.default_rng(1))
+        cells = local_init(FRAME.labelled(TEACHER, STATES), 3, np.random.default_rng(1))
         return FRAME, cells, FRAME.policy(cells)
     tree = ObliqueLinearTree(STATES, TEACHER.predict(STATES)[0].astype(float), leaves=3, task=PENDULUM, seed=0)
     return *in_units(tree, FRAME), tree
@@ -75,7 +75,7 @@ def test_nothing_learns_until_the_replay_buffer_is_filled():
 
 
 def test_a_single_cell_can_be_trained_further():
-    one = FRAME.policy(local_maps(FRAME.labelled(TEACHER, STATES), 1, np.random.default_rng(1)))
+    one = FRAME.policy(local_init(FRAME.labelled(TEACHER, STATES), 1, np.random.default_rng(1)))
     waits = replace(FEW, n_filling=FEW.n_steps)
     found = trained_further(Budget(TEACHER, TASK, waits), 1, 0, imitation=lambda budget, size, seed: one)
     assert len(found) == 1 and np.allclose(found.coefficients, one.coefficients, atol=1e-5)

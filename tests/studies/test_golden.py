@@ -26,7 +26,7 @@ from vsp.run import kernels
 from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells import limit
 from vsp_beyond.few_cells.config import Faithful, Tuned
-from vsp_beyond.few_cells.limit import at_the_limit
+from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.simplification import simplify
 from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
@@ -134,7 +134,7 @@ def by_best_policies():
 
 
 def by_limit():
-    policy = at_the_limit(SIMPLEGOAL, SMALL, seed=0, teacher=TEACHERS[SIMPLEGOAL])
+    policy = search_limit(SIMPLEGOAL, SMALL, seed=0, teacher=TEACHERS[SIMPLEGOAL])
     return {"at length": AT_LENGTH["at the limit"], SIMPLEGOAL: actions(policy, SIMPLEGOAL)}
 
 

@@ -79,11 +79,11 @@ def compare_maps(
         }
         around = np.clip(state + NEAR * scale * rng.normal(size=(1000, len(state))), task.low, task.high)
         expected = np.asarray(teacher.predict(around)[0], dtype=np.float64)
-        for name, found in maps.items():
-            predicted = np.clip(around @ found[:-1] + found[-1], task.action_low, task.action_high)
+        for name, coefficients in maps.items():
+            predicted = np.clip(around @ coefficients[:-1] + coefficients[-1], task.action_low, task.action_high)
             errors = np.sqrt(np.square(predicted - expected).mean(axis=0))
-            for output, coefficients, error in zip(task.outputs, found.T, errors):
-                weights = dict(zip([*task.inputs, "bias"], coefficients))
+            for output, column, error in zip(task.outputs, coefficients.T, errors):
+                weights = dict(zip([*task.inputs, "bias"], column))
                 rows.append({"state": i, "action": output, "map": name, **weights, "error": error})
     return pd.DataFrame(rows)
 

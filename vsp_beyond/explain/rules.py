@@ -58,18 +58,18 @@ def describe_rules(
     A cell without a rule has one row with the rule "none". `attrs` has agreement, asked (the requested agreement),
     reached (whether the agreement is as high as requested), rules (their number) and digits (of the numbers in them).
 
-    Raises ValueError for arrays of a wrong shape, no states, `agreement` outside (0, 1], or fewer than 2 leaves.
+    Raises ValueError for arrays of a wrong shape, no states, `agreement` outside 0 to 1, or fewer than 2 leaves.
     """
     rules, digits = find_rules(policy, states, unseen, agreement=agreement, leaves=leaves)
     cells, rows = policy.cells(unseen), []
     for cell in range(len(policy)):
         inside = cells == cell
         known = {"cell": cell, "share": inside.mean()}
-        for rule in (own := [rule for rule in rules if rule.cell == cell]):
+        for rule in (of_cell := [rule for rule in rules if rule.cell == cell]):
             holds = rule.holds(unseen)
             scores = {"coverage": _share(holds, inside), "fidelity": _share(inside, holds)}
             rows.append({**known, "rule": rule.text(policy.task.inputs), **scores})
-        if not own:
+        if not of_cell:
             rows.append({**known, "rule": "none", "coverage": _share(~inside, inside), "fidelity": np.nan})
     frame = pd.DataFrame(rows).sort_values(["cell", "coverage"], ascending=[True, False], ignore_index=True)
     reached = float(np.mean(apply(rules, unseen) == cells))
@@ -90,16 +90,14 @@ def find_rules(
     states, unseen = check_array("states", states, (-1, d)), check_array("unseen", unseen, (-1, d))
     if not (len(states) and len(unseen)):
         raise ValueError(f"{len(states)} states and {len(unseen)} unseen states, expected at least one of each")
-    check_number("agreement", agreement)
-    if not 0 < agreement <= 1:
-        raise ValueError(f"agreement is {agreement}, expected a share above 0 and up to 1, such as 0.95")
+    check_number("agreement", agreement, least=0, most=1)
     check_count("leaves", leaves, least=2)
     cells = policy.cells(unseen)
-    rules, found = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
+    rules, best = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
     places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimal place of the range
     for digits in _DIGITS:
         short = _rounded(rules, digits + places)
-        if np.mean(apply(short, unseen) == cells) >= min(agreement, found):
+        if np.mean(apply(short, unseen) == cells) >= min(agreement, best):
             return short, digits
     return rules, digits
 
@@ -123,26 +121,24 @@ class RulePolicy:
 
 
 def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
-    """Return the cell of the rule that holds in each state (n, d). (n,) Raises ValueError if `rules` is empty."""
-    if not rules:
-        raise ValueError(f"rules are {rules!r}, expected at least one")
-    held = np.array([rule.holds(states) for rule in rules])
-    return np.array([rule.cell for rule in rules])[held.argmax(axis=0)]
+    """Return the cell of the rule that holds in each state (n, d). (n,)"""
+    holds = np.array([rule.holds(states) for rule in rules])
+    return np.array([rule.cell for rule in rules])[holds.argmax(axis=0)]
 
 
 def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:
     """Return the rules and the agreement of the smallest tree that agrees enough, else of the one that agrees most."""
     from sklearn.tree import DecisionTreeClassifier
 
-    best, found = None, -1.0
+    best, most_right = None, -1.0
     for leaves in range(2, most + 1):
         tree = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0).fit(states, cells)
         right = float(np.mean(tree.predict(unseen) == truth))
-        best, found = (tree, right) if right > found else (best, found)
+        best, most_right = (tree, right) if right > most_right else (best, most_right)
         if right >= agreement or tree.get_n_leaves() < leaves:  # it agrees enough, or nothing is left to split
             break
     d = states.shape[1]
-    return _merged(list(_leaves(best, 0, np.full(d, -np.inf), np.full(d, np.inf)))), found
+    return _merged(list(_leaves(best, 0, np.full(d, -np.inf), np.full(d, np.inf)))), most_right
 
 
 def _leaves(tree, node: int, low: np.ndarray, high: np.ndarray) -> Iterator[Rule]:
@@ -160,12 +156,12 @@ def _leaves(tree, node: int, low: np.ndarray, high: np.ndarray) -> Iterator[Rule
 
 def _merged(rules: list[Rule]) -> list[Rule]:
     """Describe the same regions by fewer boxes: merge two boxes of one cell that share a whole face."""
-    for i, one in enumerate(rules):
-        for j, other in enumerate(rules):
-            axes = np.flatnonzero((one.low != other.low) | (one.high != other.high))
-            if one.cell == other.cell and len(axes) == 1 and one.high[axes[0]] == other.low[axes[0]]:
+    for i, first in enumerate(rules):
+        for j, second in enumerate(rules):
+            axes = np.flatnonzero((first.low != second.low) | (first.high != second.high))
+            if first.cell == second.cell and len(axes) == 1 and first.high[axes[0]] == second.low[axes[0]]:
                 rest = [rule for k, rule in enumerate(rules) if k not in (i, j)]
-                return _merged([*rest, Rule(one.cell, one.low, other.high)])
+                return _merged([*rest, Rule(first.cell, first.low, second.high)])
     return sorted(rules, key=lambda rule: (rule.cell, *rule.low, *rule.high))
 
 

@@ -1,4 +1,4 @@
-"""Deterministic annealing (Rose 1998): gradient descent on the imitation error, of codewords and maps together."""
+"""Deterministic annealing (Rose 1998): gradient descent on the imitation error, of all numbers of cells together."""
 
 from __future__ import annotations
 
@@ -20,56 +20,56 @@ def warm(config: Tuned) -> Tuned:
     return replace(config, initial_temperature=heat, n_steps=max(1, config.n_steps // 2))
 
 
-def squared_errors(seen: LabelledStates, cells: Cells) -> np.ndarray:
+def squared_errors(labelled: LabelledStates, cells: Cells) -> np.ndarray:
     """Mean squared error of the limited action of every cell in every state. (k, n)"""
-    return np.square(np.clip(cells.outputs(seen.inputs), -1.0, 1.0) - seen.actions.T).mean(axis=1)
+    return np.square(np.clip(cells.outputs(labelled.inputs), -1.0, 1.0) - labelled.actions.T).mean(axis=1)
 
 
-def squared_error(seen: LabelledStates, cells: Cells) -> float:
-    """Mean squared error of the limited action of each state's own cell, over all states."""
-    own = cells.nearest(seen.inputs[:, :-1])
-    return float(squared_errors(seen, cells)[own, np.arange(len(own))].mean())
+def squared_error(labelled: LabelledStates, cells: Cells) -> float:
+    """Mean squared error of the limited action of each state's cell, over all states."""
+    nearest = cells.nearest(labelled.inputs[:, :-1])
+    return float(squared_errors(labelled, cells)[nearest, np.arange(len(nearest))].mean())
 
 
-def linear_init(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
-    """k codewords near states drawn from `seen`; every cell gets the least-squares map of all states."""
-    states, common = seen.inputs[:, :-1], np.linalg.lstsq(seen.inputs, seen.actions, rcond=None)[0]
+def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+    """k codewords near states drawn from `labelled`; every cell gets the least-squares coefficients of all states."""
+    states, common = labelled.inputs[:, :-1], np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
     codewords = states[rng.integers(len(states), size=k)] + 0.01 * rng.normal(size=(k, states.shape[1]))
     return Cells(codewords, np.tile(common, (k, 1, 1)))
 
 
-def random_init(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
-    """`linear_init` with a little noise in every map."""
-    cells = linear_init(seen, k, rng)
-    return Cells(cells.codewords, cells.maps + 0.1 * rng.normal(size=cells.maps.shape))
+def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+    """`linear_init` with a little noise in every coefficient."""
+    cells = linear_init(labelled, k, rng)
+    return Cells(cells.codewords, cells.coefficients + 0.1 * rng.normal(size=cells.coefficients.shape))
 
 
-def anneal(seen: LabelledStates, cells: Cells, config: Tuned, rng: np.random.Generator) -> Cells:
-    """Optimise codewords and maps by Adam while the temperature falls from the initial to the final one of `config`.
+def anneal(labelled: LabelledStates, cells: Cells, config: Tuned, rng: np.random.Generator) -> Cells:
+    """Optimise all numbers of `cells` by Adam while the temperature falls from the initial to the final of `config`.
 
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
     lower the temperature, the faster they fall. The last tenth of the steps stays at the final temperature.
     """
-    unit = temperature_unit(seen, len(cells.codewords))
+    unit = temperature_unit(labelled, len(cells.codewords))
     first, n_steps = config.initial_temperature, config.n_steps
-    theta, adam, draw = cells.vector, Adam(), seen.draw(config.batch_size, rng)
+    theta, adam, draw = cells.vector, Adam(), labelled.draw(config.batch_size, rng)
     for i in range(n_steps):
         done = i / n_steps
         temperature = unit * first * (config.final_temperature / first) ** min(1.0, done / 0.9)
         rows = draw()
-        batch = cells.like(theta), seen.inputs[rows], seen.actions[rows]
+        batch = cells.like(theta), labelled.inputs[rows], labelled.actions[rows]
         _, gradient = expected_loss(*batch, temperature=temperature, clip_slope=config.clip_slope)
         theta = theta - config.learning_rate * (1 - done) * adam.step(gradient)
     return cells.like(theta)
 
 
-def temperature_unit(seen: LabelledStates, k: int) -> float:
+def temperature_unit(labelled: LabelledStates, k: int) -> float:
     """Return the variance of the states inside one of k cells. At much higher temperatures, codewords collapse onto
     each other and stay there.
 
     A single state has no variance; its unit is 1.
     """
-    states = seen.inputs[:, :-1]
+    states = labelled.inputs[:, :-1]
     return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
 
 
@@ -80,7 +80,7 @@ def expected_loss(
 
     `inputs` (n, d + 1) and `actions` (n, m); the gradient is with respect to `cells.vector`.
     """
-    n, (k, rows, m), states = len(inputs), cells.maps.shape, inputs[:, :-1]
+    n, (k, rows, m), states = len(inputs), cells.coefficients.shape, inputs[:, :-1]
     raw = cells.outputs(inputs)
     limited = np.clip(raw, -1.0, 1.0)
     error = limited + clip_slope * (raw - limited) - actions.T
@@ -90,7 +90,7 @@ def expected_loss(
     loss = (shares * losses).sum(axis=0)
 
     by_raw = (2 / (n * m)) * shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
-    by_maps = (by_raw.reshape(k * m, n) @ inputs).reshape(k, m, rows).transpose(0, 2, 1)
+    by_coefficients = (by_raw.reshape(k * m, n) @ inputs).reshape(k, m, rows).transpose(0, 2, 1)
     by_closeness = shares * (losses - loss) * (2 / (n * temperature))
     by_codewords = by_closeness @ states - by_closeness.sum(axis=1)[:, None] * cells.codewords
-    return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_maps.ravel()])
+    return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_coefficients.ravel()])

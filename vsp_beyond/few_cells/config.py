@@ -1,4 +1,4 @@
-"""`Tuned`: the settings of `distill_tuned`, and its presets."""
+"""`Tuned` and `Faithful`: the settings of `distill_tuned` and `distill_faithfully`, and presets for any task."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_CELLS, MOST = 1000, 10**8  # largest plausible number of cells, and of anyt
 
 @dataclass(frozen=True)
 class Tuned:
-    """How `distill_tuned` finds a few cells and their maps together. Raises ValueError for a value out of range."""
+    """How `distill_tuned` finds a few cells, all their numbers together. Raises ValueError for a value out of range."""
 
     n_cells: int
     """Cells of the policy."""
@@ -62,7 +62,8 @@ class Tuned:
         for name, kind in get_type_hints(type(self)).items():
             value = getattr(self, name)
             optional = name.endswith("_penalty") or name in ("n_corrections", "n_generations")
-            if not (optional and _is_off(value, kind)):
+            off = optional and isinstance(value, int | kind) and not isinstance(value, bool) and value == 0
+            if not off:
                 check_field(name, value, kind)
         first, last = self.initial_temperature, self.final_temperature
         if last > first:
@@ -121,21 +122,17 @@ class Faithful:
         return _tenth(self, "n_episodes", "n_restarts", "n_generations", "n_validation")
 
 
-def _is_off(value: object, kind: type) -> bool:
-    """Return whether `value` is 0, which switches a part off."""
-    return value == 0 and isinstance(value, int | kind) and not isinstance(value, bool)
-
-
 def _tenth(config, *names: str):
     """Return `config` with a tenth of each of these numbers, at least 1 where the number is not 0."""
     values = {name: getattr(config, name) for name in names}
     return dataclasses.replace(config, **{name: value and max(1, value // 10) for name, value in values.items()})
 
 
-def check_faithful(config: Faithful) -> None:
-    """Raise ValueError unless `config` is a `Faithful`."""
-    if not isinstance(config, Faithful):
-        raise ValueError(f"config is {config!r}, expected a Faithful, such as faithful_preset('SimpleGoal-v0')")
+def check_kind(config: object, kind: type) -> None:
+    """Raise ValueError unless `config` is of `kind`, `Faithful` or `Tuned`."""
+    if not isinstance(config, kind):
+        preset = f"vsp_beyond.{kind.__name__.lower()}_preset('SimpleGoal-v0')"
+        raise ValueError(f"config is a {type(config).__name__}, expected a {kind.__name__}, such as {preset}")
 
 
 _FAITHFUL = {
@@ -166,25 +163,22 @@ def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: flo
     engine, which steps one state at a time.
     """
     task = get_task(task)
-    found = _FAITHFUL.get(task.name) or _by_size(task)
-    return dataclasses.replace(found, n_cells=found.n_cells if n_cells is None else n_cells, min_r2=min_r2)
+    config = _FAITHFUL.get(task.name) or _faithful_by_size(task)
+    return dataclasses.replace(config, n_cells=config.n_cells if n_cells is None else n_cells, min_r2=min_r2)
 
 
-def _by_size(task: Task) -> Faithful:
-    steps = 60_000 if task.one_by_one else 300_000  # of the teacher, if all episodes have the maximum length
-    episodes = min(max(100, steps // task.max_steps), 30_000)
+def _faithful_by_size(task: Task) -> Faithful:
     generations, tuning, validation = (40, 20, 200) if task.one_by_one else (100, 100, 1000)
     return Faithful(
-        n_cells=6, n_episodes=episodes, n_restarts=32 if len(task.low) <= 8 else 16, n_generations=generations,
+        n_cells=6, n_episodes=_episodes(task), n_restarts=32 if len(task.low) <= 8 else 16, n_generations=generations,
         n_tuning_episodes=tuning, n_validation=validation,
     )  # fmt: skip
 
 
-def check_tuned(config: Tuned) -> None:
-    """Raise ValueError unless `config` is a `Tuned`."""
-    if not isinstance(config, Tuned):
-        found = f"a {type(config).__name__}"
-        raise ValueError(f"config is {found}, expected a Tuned, such as vsp_beyond.tuned_preset('SimpleGoal-v0')")
+def _episodes(task: Task) -> int:
+    """Return how many episodes of the teacher are enough for a task without tested settings."""
+    steps = 60_000 if task.one_by_one else 300_000  # if all episodes have the maximum length
+    return min(max(100, steps // task.max_steps), 30_000)
 
 
 _TUNED = {
@@ -204,14 +198,17 @@ _TUNED = {
 
 
 def tuned_preset(task: str | Task) -> Tuned:
-    """Return the settings of `distill_tuned` for `task`, chosen for a high return.
+    """Return the settings of `distill_tuned` for any task, chosen for a high return.
 
-    Raises ValueError for a task without a preset.
+    For a task without tested settings, they follow from its size, as those of `faithful_preset` do.
     """
-    name = get_task(task).name
-    if name not in _TUNED:
-        raise ValueError(
-            f"no tuned settings for task {name!r}, expected one of {list(_TUNED)}: take "
-            f"vsp_beyond.faithful_preset({name!r}), or write a Tuned of your own"
-        )
-    return _TUNED[name]
+    task = get_task(task)
+    return _TUNED.get(task.name) or _tuned_by_size(task)
+
+
+def _tuned_by_size(task: Task) -> Tuned:
+    tuning, validation = (20, 200) if task.one_by_one else (60, 500)
+    return Tuned(
+        n_cells=4, n_episodes=min(_episodes(task), 500), n_correction_episodes=100, n_generations=60,
+        n_tuning_episodes=tuning, n_validation=validation,
+    )  # fmt: skip

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,7 +20,7 @@ from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
 from .anneal import squared_error
-from .config import Faithful, check_faithful
+from .config import Faithful, check_kind
 from .population import rollout_population
 from .search import least_error, moves, spread, uncorrelated
 from .tune import cma_es, is_snapshot
@@ -50,182 +49,183 @@ def distill_faithfully(
     most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does.
     """
     check_seed(seed)
-    check_faithful(config)
+    check_kind(config, Faithful)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     warn_outside(task, states)
-    frame = Scaling.of(task, states)
-    seen = frame.labelled(teacher, states[spread(states / frame.scale, config.n_states, init)])
-    judge = _Judge(frame, teacher, seen, config, task.start(validation, config.n_validation))
+    scaling = Scaling.of(task, states)
+    labelled = scaling.labelled(teacher, states[spread(states / scaling.scale, config.n_states, init)])
+    candidates = _Candidates(scaling, teacher, labelled, config, task.start(validation, config.n_validation))
 
-    cells = least_error(seen, config.n_cells, config.n_restarts, init)
-    judge.add("fit", cells)
-    if judge.goes_on:
-        some = seen.rows(spread(seen.inputs[:, :-1], TUNING_STATES, init))
-        config = replace(config, tolerance=judge.tolerance)
-        for tuned in _tune(frame, teacher, some, cells, config, search):
-            judge.add("tune", tuned)
-    if judge.shortfall:
-        warnings.warn(judge.shortfall, stacklevel=4)  # points at the caller of `vsp.distill`
-    cells, fewer = judge.best, needed_only(judge.best, seen)
-    if len(fewer.codewords) < len(cells.codewords) and judge.returns_enough(fewer):
+    cells = least_error(labelled, config.n_cells, config.n_restarts, init)
+    candidates.add("fit", cells)
+    if config.min_r2 is not None or candidates.shortfall:  # else tuning gains nothing
+        some = labelled.rows(spread(labelled.inputs[:, :-1], TUNING_STATES, init))
+        for tuned in _tune(candidates, teacher, some, cells, search):
+            candidates.add("tune", tuned)
+    if candidates.shortfall:
+        warnings.warn(candidates.shortfall, stacklevel=4)  # points at the caller of `vsp_beyond.faithful`
+    cells, fewer = candidates.best, needed_only(candidates.best, labelled)
+    if len(fewer.codewords) < len(cells.codewords) and candidates.returns_enough(fewer):
         cells = fewer
-    return frame.policy(by_visits(among_states(cells, seen), seen)), judge.frame()
+    return scaling.policy(by_visits(among_states(cells, labelled), labelled)), candidates.history()
 
 
-class _Judge:
-    """Chooses between candidates: the least error among those whose return is accepted.
+class _Candidates:
+    """Candidates with their R² and their gap: the mean return less penalties, minus the teacher's from the same
+    starts."""
 
-    If none is accepted, it chooses the highest return among those with at most `NEAR` times the error of the first,
-    which is the closest.
-    """
-
-    def __init__(self, frame: Scaling, teacher: Policy, seen: LabelledStates, config: Faithful, starts: np.ndarray):
-        self.rows, self._cells = [], []
-        self._frame, self._seen, self._config, self._starts = frame, seen, config, starts
-        own = rollout(teacher, frame.task, starts)
-        self._own = score(own, config.failure_penalty)
-        self.tolerance = config.tolerance or max(SHARE * abs(float(own.returns.mean())), 1e-9)
+    def __init__(
+        self, scaling: Scaling, teacher: Policy, labelled: LabelledStates, config: Faithful, starts: np.ndarray
+    ):
+        self._rows, self._cells = [], []
+        self.scaling, self._labelled, self.config, self._starts = scaling, labelled, config, starts
+        result = rollout(teacher, scaling.task, starts)
+        self._teacher_score = score(result, config.failure_penalty)
+        self.tolerance = config.tolerance or max(SHARE * abs(float(result.returns.mean())), 1e-9)
         self._least_gap = config.margin - 0.5 * self.tolerance
 
     def add(self, stage: str, cells: Cells) -> None:
-        r2 = 1.0 - squared_error(self._seen, cells) / variance(self._seen)
-        self.rows.append({"stage": stage, "r2": r2, "gap": self._gap(cells)})
+        r2 = 1.0 - squared_error(self._labelled, cells) / variance(self._labelled)
+        self._rows.append({"stage": stage, "r2": r2, "gap": self._gap(cells)})
         self._cells.append(cells)
 
     def _gap(self, cells: Cells) -> float:
-        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
-        return score(result, self._config.failure_penalty) - self._own
+        result = rollout(self.scaling.policy(cells), self.scaling.task, self._starts)
+        return score(result, self.config.failure_penalty) - self._teacher_score
 
     def returns_enough(self, cells: Cells) -> bool:
         """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
-        kept = self.rows[self._best]["gap"]
-        return self._gap(cells) >= (kept if self._config.min_r2 is not None else min(kept, self._least_gap))
+        gap = self._rows[self._kept]["gap"]
+        return self._gap(cells) >= (gap if self.config.min_r2 is not None else min(gap, self._least_gap))
 
     @property
-    def _best(self) -> int:
-        r2, gap = (np.array([row[name] for row in self.rows]) for name in ("r2", "gap"))
-        if self._config.min_r2 is not None:
-            return _first_by(gap, r2 >= self._config.min_r2, else_by=r2)
-        enough, near = gap >= self._least_gap, 1.0 - r2 <= NEAR * (1.0 - r2[0])
-        return _first_by(r2, enough, else_by=np.where(near, gap, -np.inf))
+    def _kept(self) -> int:
+        r2, gap = (np.array([row[name] for row in self._rows]) for name in ("r2", "gap"))
+        return kept(r2, gap, least_gap=self._least_gap, min_r2=self.config.min_r2)
+
+    @property
+    def best(self) -> Cells:
+        return self._cells[self._kept]
 
     @property
     def shortfall(self) -> str | None:
         """The requirement that no candidate meets, in words; None if one meets all."""
-        kept, cells, floor = self.rows[self._best], self._config.n_cells, self._config.min_r2
-        if floor is not None and kept["r2"] < floor:
-            return f"no policy of {cells} cells with R² {floor:g} was found: the closest is kept, R² {kept['r2']:.3f}"
-        if floor is None and kept["gap"] < self._least_gap:
-            what = f"{kept['gap']:+.4g} to the teacher's return less penalties, expected {self._least_gap:+.4g} or more"
-            return f"no policy of {cells} cells that acts like the teacher returns enough: the best has a gap of {what}"
+        best, k, min_r2 = self._rows[self._kept], self.config.n_cells, self.config.min_r2
+        if min_r2 is not None and best["r2"] < min_r2:
+            return f"no policy of {k} cells with R² {min_r2:g} was found: the closest is kept, R² {best['r2']:.3f}"
+        if min_r2 is None and best["gap"] < self._least_gap:
+            what = f"{best['gap']:+.4g} to the teacher's return less penalties, expected {self._least_gap:+.4g} or more"
+            return f"no policy of {k} cells that acts like the teacher returns enough: the best has a gap of {what}"
         return None
 
-    @property
-    def goes_on(self) -> bool:
-        """Whether tuning may gain: always with `min_r2`, else only if the closest cells do not return enough."""
-        return self._config.min_r2 is not None or self.rows[-1]["gap"] < self._least_gap
-
-    @property
-    def best(self) -> Cells:
-        return self._cells[self._best]
-
-    def frame(self) -> pd.DataFrame:
-        return pd.DataFrame(self.rows).assign(kept=np.arange(len(self.rows)) == self._best)
+    def history(self) -> pd.DataFrame:
+        return pd.DataFrame(self._rows).assign(kept=np.arange(len(self._rows)) == self._kept)
 
 
-def _first_by(value: np.ndarray, accepted: np.ndarray, *, else_by: np.ndarray) -> int:
-    """Return the accepted candidate with the highest value; if none is accepted, the one with the highest `else_by`."""
-    return int(np.where(accepted, value, -np.inf).argmax() if accepted.any() else else_by.argmax())
+def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | None) -> int:
+    """Return which candidate is kept, by the R² (c,) and the gap (c,) of all candidates. The first is the closest.
+
+    It is the one with the highest R² among those with a gap of at least `least_gap`. If there is none, it is the one
+    with the highest return among those with at most `NEAR` times the error of the first. With `min_r2`, it is the one
+    with the highest return among those with at least this R², or else the one with the highest R².
+    """
+    if min_r2 is not None:
+        accepted, value, instead = r2 >= min_r2, gap, r2
+    else:
+        near = 1.0 - r2 <= NEAR * (1.0 - r2[0])
+        accepted, value, instead = gap >= least_gap, r2, np.where(near, gap, -np.inf)
+    return int(np.where(accepted, value, -np.inf).argmax() if accepted.any() else instead.argmax())
 
 
-def variance(seen: LabelledStates) -> float:
+def variance(labelled: LabelledStates) -> float:
     """Return the mean squared error of the best constant, which R² is measured against; 1 if the teacher is
     constant."""
-    found = float(seen.actions.var(axis=0).mean())
-    return found if found > 1e-12 else 1.0
+    mean = float(labelled.actions.var(axis=0).mean())
+    return mean if mean > 1e-12 else 1.0
 
 
 def _tune(
-    frame: Scaling, teacher: Policy, seen: LabelledStates, cells: Cells, config: Faithful, rng: np.random.Generator
+    candidates: _Candidates, teacher: Policy, labelled: LabelledStates, cells: Cells, rng: np.random.Generator
 ) -> Iterator[Cells]:
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
     `SNAPSHOTS` times.
 
     Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
     """
-    move, _ = moves(cells, *_units(seen, cells))
-    whole = variance(seen)
-    step = np.sqrt(FIRST_STEP * max(squared_error(seen, cells), 1e-6) / cells.vector.size)
+    config, policy, task = candidates.config, candidates.scaling.policy, candidates.scaling.task
+    move, _ = moves(cells, *_units(labelled, cells))
+    whole = variance(labelled)
+    step = np.sqrt(FIRST_STEP * max(squared_error(labelled, cells), 1e-6) / cells.vector.size)
     search = cma_es(np.zeros(cells.vector.size), step, rng, diagonal=cells.vector.size > MANY)
-    pool = frame.task.start(rng, POOL * config.n_tuning_episodes)
-    own = rollout(teacher, frame.task, pool)
-    own = own.returns - config.failure_penalty * (own.outcomes != GOAL)
+    pool = task.start(rng, POOL * config.n_tuning_episodes)
+    result = rollout(teacher, task, pool)
+    scores = result.returns - config.failure_penalty * (result.outcomes != GOAL)
     for i in range(config.n_generations):
         rows, steps = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
-        starts, aim = pool[rows], own[rows].mean() + config.margin
-        candidates = [move(one) for one in steps]
-        results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
-        missed = np.array([aim - score(result, config.failure_penalty) for result in results])
-        errors = np.array([squared_error(seen, one) / whole for one in candidates])
-        search.tell(steps, _cost(errors, missed, config).tolist())
+        starts, target = pool[rows], scores[rows].mean() + config.margin
+        moved = [move(vector) for vector in steps]
+        results = rollout_population([policy(cells) for cells in moved], task, starts)
+        missed = np.array([target - score(result, config.failure_penalty) for result in results])
+        errors = np.array([squared_error(labelled, cells) / whole for cells in moved])
+        search.tell(steps, _cost(errors, missed, candidates.tolerance, config.min_r2).tolist())
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
 
 
-def _cost(errors: np.ndarray, missed: np.ndarray, config: Faithful) -> np.ndarray:
+def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: float | None) -> np.ndarray:
     """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,).
 
     It is the error plus a penalty for a missed return. With `min_r2`, it is the missed return plus a penalty for an
     error beyond it.
     """
-    if config.min_r2 is None:
-        return errors + PRICE / config.tolerance * np.maximum(0.0, missed)
-    return missed / config.tolerance + np.maximum(0.0, errors - (1.0 - config.min_r2)) / BEYOND
+    if min_r2 is None:
+        return errors + PRICE / tolerance * np.maximum(0.0, missed)
+    return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND
 
 
-def _units(seen: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
-    """Return bases of the maps and units of the codewords for `moves`, from the curvature of the error."""
-    own = cells.nearest(seen.inputs[:, :-1])
-    here, vector, units = squared_error(seen, cells), cells.vector, np.empty(cells.codewords.size)
+def _units(labelled: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+    """Return bases of the coefficients and units of the codewords for `moves`, from the curvature of the error."""
+    here, vector, units = squared_error(labelled, cells), cells.vector, np.empty(cells.codewords.size)
     for j in range(len(units)):
         nudge = np.zeros_like(vector)
         nudge[j] = NUDGE
-        more = sum(squared_error(seen, cells.like(vector + sign * nudge)) - here for sign in (1, -1))
+        more = sum(squared_error(labelled, cells.like(vector + sign * nudge)) - here for sign in (1, -1))
         units[j] = 1.0 / np.sqrt(max(0.0, 0.5 * more / NUDGE**2) + 1e-3)
-    return uncorrelated(seen, (own == np.arange(len(cells.codewords))[:, None]).astype(np.float64)), units
+    shares = cells.nearest(labelled.inputs[:, :-1]) == np.arange(len(cells.codewords))[:, None]
+    return uncorrelated(labelled, shares.astype(np.float64)), units
 
 
-def needed_only(cells: Cells, seen: LabelledStates) -> Cells:
+def needed_only(cells: Cells, labelled: LabelledStates) -> Cells:
     """Remove cells that the error does not need: the next codeword serves their states as well, as where two neighbours
     hold the same map."""
     while (k := len(cells.codewords)) > 1:
-        errors = [squared_error(seen, _without(cells, i)) for i in range(k)]
-        if min(errors) > squared_error(seen, cells):
+        errors = [squared_error(labelled, _without(cells, i)) for i in range(k)]
+        if min(errors) > squared_error(labelled, cells):
             break
         cells = _without(cells, int(np.argmin(errors)))
     return cells
 
 
 def _without(cells: Cells, i: int) -> Cells:
-    return Cells(np.delete(cells.codewords, i, axis=0), np.delete(cells.maps, i, axis=0))
+    return Cells(np.delete(cells.codewords, i, axis=0), np.delete(cells.coefficients, i, axis=0))
 
 
-def among_states(cells: Cells, seen: LabelledStates) -> Cells:
+def among_states(cells: Cells, labelled: LabelledStates) -> Cells:
     """Draw the same border between two cells by codewords among the states. Of the many pairs that draw it, choose the
     one around the mean state. With more codewords there is no such choice."""
     if len(cells.codewords) != 2:
         return cells
-    states, (one, other) = seen.inputs[:, :-1], cells.codewords
-    across = (other - one) / np.linalg.norm(other - one)
-    beyond = (states - (one + other) / 2) @ across  # signed distances from the border
+    states, (first, second) = labelled.inputs[:, :-1], cells.codewords
+    across = (second - first) / np.linalg.norm(second - first)
+    beyond = (states - (first + second) / 2) @ across  # signed distances from the border
     on_border = states.mean(axis=0) - beyond.mean() * across
-    return Cells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.maps)
+    return Cells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.coefficients)
 
 
-def by_visits(cells: Cells, seen: LabelledStates) -> Cells:
-    """Return the same cells, the one with the most states of `seen` first."""
-    visits = np.bincount(cells.nearest(seen.inputs[:, :-1]), minlength=len(cells.codewords))
+def by_visits(cells: Cells, labelled: LabelledStates) -> Cells:
+    """Return the same cells, the one with the most states of `labelled` first."""
+    visits = np.bincount(cells.nearest(labelled.inputs[:, :-1]), minlength=len(cells.codewords))
     order = np.argsort(-visits, kind="stable")
-    return Cells(cells.codewords[order], cells.maps[order])
+    return Cells(cells.codewords[order], cells.coefficients[order])

@@ -15,11 +15,11 @@ from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout, score
 from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
+from vsp.tasks.registry import get_task, task_names
 from vsp.teachers.teacher import load_teacher
 
 from ..optimum.references import TASKS, best_policy
-from .config import Tuned, check_tuned, faithful_preset, tuned_preset
+from .config import Tuned, faithful_preset, tuned_preset
 from .faithful import distill_faithfully
 from .tuned import distill_tuned
 
@@ -44,43 +44,43 @@ _LIMIT = {
 
 
 def limit_preset(task: str | Task) -> Tuned:
-    """Return the settings of `at_the_limit` for a task: those of `tuned_preset` with a longer search, and on some tasks
-    with other cells, steps and penalties.
-
-    Raises ValueError as `tuned_preset` does.
-    """
-    return replace(tuned_preset(task), **_LIMIT[get_task(task).name])
+    """Return the settings of `at_the_limit` for any task: those of `tuned_preset` with a longer search, and on some
+    tasks with other cells, steps and penalties."""
+    config, name = tuned_preset(task), get_task(task).name
+    return replace(config, **_LIMIT.get(name, {"n_generations": 3 * config.n_generations}))
 
 
-def at_the_limit(
-    task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None
-) -> VoronoiPolicy:
-    """Search for at most `config.n_cells` cells whose return is as high as possible. Same arguments, same policy.
-
-    `config` is `limit_preset(task)` by default. `teacher` is by default the best policy if it is known (on MountainCar
-    for the price `PRICE`), else the shipped teacher. For a task with a physics engine, which is played in fewer
-    episodes, two shorter searches follow, each from the result of the one before. Raises ValueError as
-    `distill_tuned` does.
-    """
+def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy | None = None) -> VoronoiPolicy:
+    """Do what `vsp_beyond.at_the_limit` does, without a word about the time."""
+    check_seed(seed)
     check_seed(seed)
     task = get_task(task)
-    config = limit_preset(task) if config is None else config
-    check_tuned(config)
     teacher = _best_teacher(task) if teacher is None else teacher
     n_starts = N_SLOW if task.one_by_one else N_STARTS
     last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts + N_AGAIN).tolist()
     brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, AGAIN))
-    screened = [_screened(teacher, task, brief, one, closest=i % 2 == 0) for i, one in enumerate(seeds[:n_starts])]
+    screened = [_screened(teacher, task, brief, seeds[i], closest=i % 2 == 0) for i in range(n_starts)]
     validation = task.start(np.random.default_rng(last), config.n_validation)
     best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
     best = _tuned(best, teacher, task, config, last)
-    for one in seeds[n_starts:] if task.one_by_one else ():
-        best = _tuned(best, teacher, task, again, one)
+    for seed in seeds[n_starts:] if task.one_by_one else ():
+        best = _tuned(best, teacher, task, again, seed)
     return best
 
 
+def whole_search(task: Task, config: Tuned) -> Tuned:
+    """Return settings of one search that takes as long as all of `search_limit`, for `expected_time`."""
+    n_starts, n_again = (N_SLOW, N_AGAIN) if task.one_by_one else (N_STARTS, 0)
+    n_generations = round((1 + SCREENING * n_starts + AGAIN * n_again) * config.n_generations)
+    return replace(config, n_generations=n_generations, n_restarts=config.n_restarts * n_starts)
+
+
 def _best_teacher(task: Task) -> Policy:
-    return best_policy(task, price=PRICE.get(task.name)) if task.name in TASKS else load_teacher(task.name)
+    if task.name in TASKS:
+        return best_policy(task, price=PRICE.get(task.name))
+    if task.name not in task_names():
+        raise ValueError(f"no teacher is known for {task.name}: pass one as `teacher`")
+    return load_teacher(task.name)
 
 
 def _screened(teacher: Policy, task: Task, config: Tuned, seed: int, *, closest: bool) -> VoronoiPolicy:

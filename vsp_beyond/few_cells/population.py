@@ -25,17 +25,17 @@ def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -
 def numbered(task: Task, n: int) -> Task:
     """Return `task` with a constant number below n appended to every start, state and observation."""
 
-    def own(states: np.ndarray) -> np.ndarray:
+    def without_number(states: np.ndarray) -> np.ndarray:
         return states[:, 0] if task.one_by_one else states[:, :-1]
 
     def begin(starts: np.ndarray) -> np.ndarray:
         return np.column_stack([task.begin(starts[:, :-1]), starts[:, -1]])
 
     def see(states: np.ndarray) -> np.ndarray:
-        return np.column_stack([task.see(own(states)), states[:, -1].astype(np.float64)])
+        return np.column_stack([task.see(without_number(states)), states[:, -1].astype(np.float64)])
 
     def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        moved, rewards, outcomes = task.step(own(states), actions)
+        moved, rewards, outcomes = task.step(without_number(states), actions)
         return np.column_stack([moved, states[:, -1]]), rewards, outcomes
 
     low, high, size = np.append(task.low, 0.0), np.append(task.high, n), 1 + (task.start_size or len(task.low))
@@ -52,7 +52,7 @@ class InTurn:
         """Actions (n, m) for observations and indices (n, d + 1)."""
         cuts = np.searchsorted(obs[:, -1], np.arange(1, len(self._policies)))
         parts = np.split(obs[:, :-1], cuts)
-        return np.concatenate([one.predict(part)[0] for one, part in zip(self._policies, parts)]), None
+        return np.concatenate([policy.predict(part)[0] for policy, part in zip(self._policies, parts)]), None
 
 
 class PolicyBatch:
@@ -62,8 +62,8 @@ class PolicyBatch:
     """
 
     def __init__(self, policies: list[VoronoiPolicy]):
-        self._one = policies[0]
-        self._one.check_linear()
+        self._first = policies[0]
+        self._first.check_linear()
         points = np.stack([policy.codewords / policy.scale for policy in policies])
         # The codeword c nearest to x has the largest 2 x·c - c·c: one product per policy
         self._closeness = np.concatenate([2 * points, -np.square(points).sum(axis=2, keepdims=True)], axis=2)
@@ -73,9 +73,9 @@ class PolicyBatch:
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations and indices (n, d + 1)."""
         states, policy = obs[:, :-1].astype(np.float64), obs[:, -1].astype(np.intp)
-        points = np.column_stack([states / self._one.scale, np.ones(len(states))])
+        points = np.column_stack([states / self._first.scale, np.ones(len(states))])
         cells, cuts = np.empty(len(states), dtype=np.intp), np.searchsorted(policy, np.arange(len(self._closeness) + 1))
         for closeness, begin, end in zip(self._closeness, cuts[:-1], cuts[1:]):
             cells[begin:end] = (points[begin:end] @ closeness).argmax(axis=1)
         raw = linear_outputs(states, self._coefficients[policy, cells])
-        return np.clip(raw, self._one.task.action_low, self._one.task.action_high), None
+        return np.clip(raw, self._first.task.action_low, self._first.task.action_high), None

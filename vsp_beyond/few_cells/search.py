@@ -26,14 +26,14 @@ AT_ONCE = 60_000  # size of the largest arrays in a loss: they fit into the cach
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(seen: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> Cells:
-    """Return the cells with the least `squared_error` on `seen` that `n_starts` descents find."""
-    some = seen.rows(spread(seen.inputs[:, :-1], FEW, rng))
-    live = [local_maps(some, n_cells, rng) for _ in range(n_starts)]
+def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> Cells:
+    """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find."""
+    some = labelled.rows(spread(labelled.inputs[:, :-1], FEW, rng))
+    live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
         ends = [descend(some, cells, stages) for cells in live]
-        live = sorted(ends, key=lambda cells: squared_error(seen, cells))[:n_kept]
-    return distinct(descend(seen, live[0], LAST, n_iterations=N_LAST))
+        live = sorted(ends, key=lambda cells: squared_error(labelled, cells))[:n_kept]
+    return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
 
 
 def distinct(cells: Cells) -> Cells:
@@ -41,7 +41,7 @@ def distinct(cells: Cells) -> Cells:
     their cells."""
     _, first = np.unique(cells.codewords, axis=0, return_index=True)
     first.sort()
-    return Cells(cells.codewords[first], cells.maps[first])
+    return Cells(cells.codewords[first], cells.coefficients[first])
 
 
 def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -54,74 +54,75 @@ def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
     return order[((np.arange(n) + rng.random(n)) * len(points) / n).astype(np.intp)]
 
 
-def local_maps(seen: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
-    """Place k codewords at states drawn from `seen`, each with the least-squares map of the states in its cell."""
-    d, inputs = seen.inputs.shape[1] - 1, seen.inputs
-    common = np.linalg.lstsq(inputs, seen.actions, rcond=None)[0]
+def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+    """Place k codewords at states drawn from `labelled`, each with the least-squares map of the states in its cell."""
+    d, inputs = labelled.inputs.shape[1] - 1, labelled.inputs
+    common = np.linalg.lstsq(inputs, labelled.actions, rcond=None)[0]
     codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
     cells = Cells(codewords, np.tile(common, (k, 1, 1)))
-    own = cells.nearest(inputs[:, :d])
+    nearest = cells.nearest(inputs[:, :d])
     for i in range(k):  # a weak pull to the map of all states, for cells with few states
-        rows = np.vstack([inputs[own == i], np.eye(d + 1)])
-        cells.maps[i] = np.linalg.lstsq(rows, np.vstack([seen.actions[own == i], common]), rcond=None)[0]
+        rows = np.vstack([inputs[nearest == i], np.eye(d + 1)])
+        actions = np.vstack([labelled.actions[nearest == i], common])
+        cells.coefficients[i] = np.linalg.lstsq(rows, actions, rcond=None)[0]
     return cells
 
 
-def descend(seen: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
+def descend(labelled: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
-    unit = temperature_unit(seen, len(cells.codewords))
+    unit = temperature_unit(labelled, len(cells.codewords))
     for stage in stages:
-        cells = _cooler(seen, cells, unit, stage, n_iterations)
+        cells = _descend_at(stage, labelled, cells, unit, n_iterations)
     return cells
 
 
-def _cooler(seen: LabelledStates, cells: Cells, unit: float, stage: int, n_iterations: int) -> Cells:
+def _descend_at(stage: int, labelled: LabelledStates, cells: Cells, unit: float, n_iterations: int) -> Cells:
     temperature = unit * TEMPERATURES[stage]
-    bases = uncorrelated(seen, cells.shares(seen.inputs[:, :-1], temperature))
+    bases = uncorrelated(labelled, cells.shares(labelled.inputs[:, :-1], temperature))
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = whole_loss(move(step), seen, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
+        value, gradient = whole_loss(move(step), labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
         return value, pull_back(gradient)
 
     options = {"maxiter": n_iterations, "maxcor": 20}
     return move(minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options).x)
 
 
-def whole_loss(cells: Cells, seen: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
+def whole_loss(cells: Cells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
     """Compute `expected_loss` of all states, some at a time."""
-    n, value, gradient = len(seen.inputs), 0.0, np.zeros(cells.vector.size)
-    step = max(1, AT_ONCE // (len(cells.maps) * seen.actions.shape[1]))
+    n, value, gradient = len(labelled.inputs), 0.0, np.zeros(cells.vector.size)
+    step = max(1, AT_ONCE // (len(cells.coefficients) * labelled.actions.shape[1]))
     for i in range(0, n, step):
-        inputs, actions = seen.inputs[i : i + step], seen.actions[i : i + step]
+        inputs, actions = labelled.inputs[i : i + step], labelled.actions[i : i + step]
         part, its_gradient = expected_loss(cells, inputs, actions, **about)
         value, gradient = value + len(inputs) / n * part, gradient + len(inputs) / n * its_gradient
     return value, gradient
 
 
-def uncorrelated(seen: LabelledStates, shares: np.ndarray) -> np.ndarray:
-    """Return bases of the maps in which a step of length 1 changes the mean squared output of a cell by about 1.
-    (k, p, p)
+def uncorrelated(labelled: LabelledStates, shares: np.ndarray) -> np.ndarray:
+    """Return bases of the coefficients in which a step of length 1 changes the mean squared output of a cell by
+    about 1. (k, p, p)
 
     `shares` (k, n): how much of each state belongs to each cell.
     """
-    p = seen.inputs.shape[1]
-    products = np.stack([(seen.inputs * share[:, None]).T @ seen.inputs for share in shares]) / len(seen.inputs)
+    inputs, p = labelled.inputs, labelled.inputs.shape[1]
+    products = np.stack([(inputs * share[:, None]).T @ inputs for share in shares]) / len(inputs)
     return np.linalg.cholesky(np.linalg.inv(products + RIDGE * np.eye(p)))
 
 
 def moves(cells: Cells, bases: np.ndarray, codeword_units: np.ndarray | float):
     """Return two functions: one from a step in these units to the moved cells, and one from a gradient with respect to
     `Cells.vector` to the gradient with respect to the step."""
-    cut, shape = cells.codewords.size, cells.maps.shape
+    cut, shape = cells.codewords.size, cells.coefficients.shape
 
     def move(step: np.ndarray) -> Cells:
         codewords = cells.codewords + (codeword_units * step[:cut]).reshape(cells.codewords.shape)
-        return Cells(codewords, cells.maps + bases @ step[cut:].reshape(shape))
+        return Cells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
 
     def pull_back(gradient: np.ndarray) -> np.ndarray:
-        by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
-        return np.concatenate([codeword_units * gradient[:cut], by_maps.ravel()])
+        by_coefficients = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
+        return np.concatenate([codeword_units * gradient[:cut], by_coefficients.ravel()])
 
     return move, pull_back

@@ -15,7 +15,7 @@ from vsp.run.progress import progress
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
-from .config import Tuned, check_tuned
+from .config import Tuned, check_kind
 from .tuned import distill_tuned
 
 N_VISITED = 100  # episodes that show where the states lie
@@ -35,12 +35,12 @@ def simplify(
     does, and for a tolerance below 0.
     """
     check_seed(seed)
-    check_tuned(config)
+    check_kind(config, Tuned)
     check_number("tolerance", tolerance, least=0)
     task = get_task(task)
     starts = start_states(task, config.n_validation, seed)
-    own = rollout(teacher, task, starts)
-    threshold = score(own, config.failure_penalty) - tolerance
+    of_teacher = rollout(teacher, task, starts)
+    threshold = score(of_teacher, config.failure_penalty) - tolerance
     tried = _Tried(task, starts, config.failure_penalty)
     policies = []
     for k in progress(range(1, config.n_cells + 1), "cells tried", total=config.n_cells, unit="sizes"):
@@ -51,15 +51,15 @@ def simplify(
     if tried.scores[best] < threshold:  # no number of cells suffices
         threshold = tried.scores[best] - tolerance
     states = visited_states(policies[best], task, starts[:N_VISITED])
-    policy = prune(gathered(policies[best], states), lambda one: tried.reaches(threshold, "prune", one))
+    policy = prune(gathered(policies[best], states), lambda pruned: tried.reaches(threshold, "prune", pruned))
     for digits in DIGITS:
         short = rounded(policy, digits)
         if short is not None and tried.reaches(threshold, "round", short, digits=digits):
             policy = short
             break
-    frame = pd.DataFrame(tried.rows)
-    frame.attrs["teacher"] = float(own.returns.mean())
-    return policy, frame
+    history = pd.DataFrame(tried.rows)
+    history.attrs["teacher"] = float(of_teacher.returns.mean())
+    return policy, history
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
@@ -110,14 +110,10 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
 def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     """Return the policy rounded to `digits` significant digits; None if two codewords become equal."""
     check_count("digits", digits)
-    parts = policy.codewords, policy.coefficients, policy.scale
-    codewords, coefficients, scale = (_significant(values, digits) for values in parts)
+    short = np.vectorize(lambda value: float(f"{value:.{digits}g}"))
+    codewords, coefficients, scale = map(short, (policy.codewords, policy.coefficients, policy.scale))
     distinct = len(np.unique(codewords, axis=0)) == len(codewords)
     return like(policy, codewords, coefficients, scale) if distinct else None
-
-
-def _significant(values: np.ndarray, digits: int) -> np.ndarray:
-    return np.array([float(f"{value:.{digits}g}") for value in values.flat]).reshape(values.shape)
 
 
 def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
@@ -137,7 +133,9 @@ class _Tried:
         """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
         result = rollout(policy, self._task, self._starts)
         self.scores.append(score(result, self._failure_penalty))
-        about = {"stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients)}
-        found = {"mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL)}
-        self.rows.append({**about, "digits": digits, **found, "kept": self.scores[-1] >= threshold})
+        self.rows.append({
+            "stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients), "digits": digits,
+            "mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL),
+            "kept": self.scores[-1] >= threshold,
+        })  # fmt: skip
         return self.rows[-1]["kept"]

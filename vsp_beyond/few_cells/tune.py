@@ -24,24 +24,24 @@ class Objective:
 
     failure_penalty: float
     error_penalty: float = 0.0
-    seen: LabelledStates | None = None  # the states of the teacher, for the error penalty
+    labelled: LabelledStates | None = None  # the states of the teacher, for the error penalty
 
     def score(self, result: Outcomes, cells: Cells) -> float:
         """Return the value for `cells` whose episodes ended as `result`."""
         value = score(result, self.failure_penalty)
-        return value - self.error_penalty * squared_error(self.seen, cells) if self.error_penalty else value
+        return value - self.error_penalty * squared_error(self.labelled, cells) if self.error_penalty else value
 
 
 class Candidates:
     """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
 
-    def __init__(self, frame: Scaling, starts: np.ndarray, objective: Objective):
+    def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
         self.rows, self.best, self.best_restart = [], None, 0
-        self._frame, self._starts, self._objective, self._best_score = frame, starts, objective, -np.inf
+        self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
 
     def add(self, stage: str, restart: int, cells: Cells) -> None:
         """Score `cells` from the validation starts."""
-        result = rollout(self._frame.policy(cells), self._frame.task, self._starts)
+        result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
         self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
         if (value := self._objective.score(result, cells)) > self._best_score:
@@ -49,7 +49,7 @@ class Candidates:
 
 
 def tune(
-    frame: Scaling, cells: Cells, config: Tuned, objective: Objective, rng: np.random.Generator
+    scaling: Scaling, cells: Cells, config: Tuned, objective: Objective, rng: np.random.Generator
 ) -> Iterator[Cells]:
     """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
 
@@ -57,11 +57,11 @@ def tune(
     """
     search = cma_es(cells.vector, config.tuning_step, rng)
     for i in range(config.n_generations):
-        starts = frame.task.start(rng, config.n_tuning_episodes)
+        starts = scaling.task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
         candidates = [cells.like(vector) for vector in vectors]
-        results = rollout_population([frame.policy(one) for one in candidates], frame.task, starts)
-        search.tell(vectors, [-objective.score(result, one) for result, one in zip(results, candidates)])
+        results = rollout_population([scaling.policy(cells) for cells in candidates], scaling.task, starts)
+        search.tell(vectors, [-objective.score(*pair) for pair in zip(results, candidates)])
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)
 

@@ -1,4 +1,4 @@
-"""`distill_tuned`: optimise a few codewords and their maps together, which the paper's method does not.
+"""`distill_tuned`: optimise a few codewords and their coefficients together, which the paper's method does not.
 
 Three parts: deterministic annealing on the teacher's actions, correction on the states that the policy itself visits,
 tuning on the return. A `Tuned` can switch off the last two.
@@ -19,7 +19,7 @@ from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
-from .config import Tuned, check_tuned
+from .config import Tuned, check_kind
 from .tune import Candidates, Objective, tune
 from .units import METRIC, Scaling
 
@@ -36,7 +36,7 @@ def distill_tuned(
     size or task, and for `criticality` with a teacher that has no critics.
     """
     check_seed(seed)
-    check_tuned(config)
+    check_kind(config, Tuned)
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
@@ -47,32 +47,32 @@ def distill_tuned(
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     warn_outside(task, states)
-    frame = Scaling.of(task, states)
+    scaling = Scaling.of(task, states)
     if start is not None and start.metric == METRIC:
-        frame = replace(frame, scale=start.scale)  # with another one the borders of `start` would move
-    seen = frame.labelled(teacher, states, criticality=config.criticality)
-    objective = Objective(config.failure_penalty, config.error_penalty, seen)
-    candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
+        scaling = replace(scaling, scale=start.scale)  # with another one the borders of `start` would move
+    labelled = scaling.labelled(teacher, states, criticality=config.criticality)
+    objective = Objective(config.failure_penalty, config.error_penalty, labelled)
+    candidates = Candidates(scaling, task.start(validation, config.n_validation), objective)
 
-    first = linear_init(seen, config.n_cells, init) if start is None else frame.cells(start)
+    first = linear_init(labelled, config.n_cells, init) if start is None else scaling.cells(start)
     candidates.add("line" if start is None else "start", 0, first)
     hot = config if start is None else replace(warm(config), n_steps=config.n_steps)
     for restart in range(config.n_restarts):
-        cells = random_init(seen, config.n_cells, init) if start is None else first
-        candidates.add("fit", restart, anneal(seen, cells, hot, batches))
+        cells = random_init(labelled, config.n_cells, init) if start is None else first
+        candidates.add("fit", restart, anneal(labelled, cells, hot, batches))
     cells = candidates.best
     for _ in range(config.n_corrections):
-        states = visited_states(frame.policy(cells), task, task.start(starts, config.n_correction_episodes))
-        seen = seen.with_more(frame.labelled(teacher, states, criticality=config.criticality))
-        cells = anneal(seen, cells, warm(config), batches)
+        states = visited_states(scaling.policy(cells), task, task.start(starts, config.n_correction_episodes))
+        labelled = labelled.with_more(scaling.labelled(teacher, states, criticality=config.criticality))
+        cells = anneal(labelled, cells, warm(config), batches)
         candidates.add("correct", candidates.best_restart, cells)
-    for cells in tune(frame, candidates.best, config, objective, search):
+    for cells in tune(scaling, candidates.best, config, objective, search):
         candidates.add("tune", candidates.best_restart, cells)
-    return frame.policy(candidates.best), pd.DataFrame(candidates.rows)
+    return scaling.policy(candidates.best), pd.DataFrame(candidates.rows)
 
 
 def _check_start(start: VoronoiPolicy, task: Task, config: Tuned) -> None:
     start.check_linear()
-    found, wanted = (len(start), start.task.name), (config.n_cells, task.name)
-    if found != wanted:
-        raise ValueError(f"start has {found[0]} cells for {found[1]}, expected n_cells = {wanted[0]} for {wanted[1]}")
+    k, name = len(start), start.task.name
+    if (k, name) != (config.n_cells, task.name):
+        raise ValueError(f"start has {k} cells for {name}, expected n_cells = {config.n_cells} for {task.name}")

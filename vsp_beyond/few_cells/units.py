@@ -25,7 +25,7 @@ class Scaling:
 
     @classmethod
     def of(cls, task: Task, states: np.ndarray) -> Scaling:
-        """Return the frame in which `states` (n, d) have mean 0 and deviation 1; a constant variable keeps its unit."""
+        """Return the scaling that gives `states` (n, d) mean 0 and deviation 1; a constant variable keeps its unit."""
         return cls(task, *standard(states))
 
     @property
@@ -52,24 +52,25 @@ class Scaling:
         """Convert `outputs` (n, m) to the units of the task, limited to its action range."""
         return np.clip(outputs, -1.0, 1.0) * self._half + self._middle
 
-    def maps(self, maps: np.ndarray) -> np.ndarray:
-        """Convert maps (..., p + 1, m) to actions into maps to `outputs`."""
-        return np.concatenate([maps[..., :-1, :] / self._half, self.outputs(maps[..., -1:, :])], axis=-2)
+    def coefficients(self, coefficients: np.ndarray) -> np.ndarray:
+        """Convert coefficients (..., p + 1, m) that give actions into coefficients that give `outputs`."""
+        weights, biases = coefficients[..., :-1, :], coefficients[..., -1:, :]
+        return np.concatenate([weights / self._half, self.outputs(biases)], axis=-2)
 
     def policy(self, cells: Cells) -> VoronoiPolicy:
         """Return `cells` as a policy in the units of the task."""
-        weights = cells.maps[:, :-1] * self._half / self.scale[:, None]
-        biases = cells.maps[:, -1] * self._half + self._middle - self.centre @ weights
+        weights = cells.coefficients[:, :-1] * self._half / self.scale[:, None]
+        biases = cells.coefficients[:, -1] * self._half + self._middle - self.centre @ weights
         coefficients = np.concatenate([weights, biases[:, None]], axis=1)
         codewords = cells.codewords * self.scale + self.centre
         return VoronoiPolicy(codewords, coefficients, task=self.task, metric=METRIC, scale=self.scale)
 
     def cells(self, policy: VoronoiPolicy) -> Cells:
-        """Return the codewords and maps of `policy` in these units."""
+        """Return the codewords and coefficients of `policy` in these units."""
         weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
         biases = biases + self.centre @ weights
-        maps = self.maps(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
-        return Cells((policy.codewords - self.centre) / self.scale, maps)
+        coefficients = self.coefficients(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
+        return Cells((policy.codewords - self.centre) / self.scale, coefficients)
 
     def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
         """Return `states` (n, d) with the teacher's actions and, if asked for, their criticality."""
@@ -85,19 +86,16 @@ def joined(parts: list[np.ndarray]) -> np.ndarray:
 
 def parted(vector: np.ndarray, like: list[np.ndarray]) -> list[np.ndarray]:
     """Split `vector` into parts of the shapes of those in `like`: the inverse of `joined`."""
-    found, start = [], 0
-    for part in like:
-        found.append(vector[start : start + part.size].reshape(part.shape))
-        start += part.size
-    return found
+    ends = np.cumsum([part.size for part in like])
+    return [vector[end - part.size : end].reshape(part.shape) for end, part in zip(ends, like)]
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Codewords and linear maps in scaled units."""
+    """Codewords and coefficients in scaled units."""
 
     codewords: np.ndarray  # (k, d)
-    maps: np.ndarray  # (k, d + 1, m): weights, then bias
+    coefficients: np.ndarray  # (k, d + 1, m): weights, then bias
 
     @property
     def vector(self) -> np.ndarray:
@@ -106,8 +104,8 @@ class Cells:
 
     @property
     def parts(self) -> list[np.ndarray]:
-        """Codewords, then maps."""
-        return [self.codewords, self.maps]
+        """Codewords, then coefficients."""
+        return [self.codewords, self.coefficients]
 
     def like(self, vector: np.ndarray) -> Cells:
         """Return cells of the same shape with the numbers of `vector`."""
@@ -135,8 +133,8 @@ class Cells:
     def outputs(self, inputs: np.ndarray) -> np.ndarray:
         """Return the actions of every cell for `inputs` (n, d + 1), not limited. (k, m, n): states along the last axis,
         for speed"""
-        k, rows, m = self.maps.shape
-        return (self.maps.transpose(0, 2, 1).reshape(k * m, rows) @ inputs.T).reshape(k, m, -1)
+        k, rows, m = self.coefficients.shape
+        return (self.coefficients.transpose(0, 2, 1).reshape(k * m, rows) @ inputs.T).reshape(k, m, -1)
 
 
 @dataclass(frozen=True)
@@ -154,8 +152,8 @@ class LabelledStates:
 
     def with_more(self, other: LabelledStates) -> LabelledStates:
         """Return these states, then those of `other`."""
-        pairs = ((self.inputs, other.inputs), (self.actions, other.actions), (self.criticality, other.criticality))
-        return LabelledStates(*(None if one is None else np.concatenate([one, more]) for one, more in pairs))
+        parts = zip(vars(self).values(), vars(other).values())
+        return LabelledStates(*(first if first is None else np.concatenate([first, second]) for first, second in parts))
 
     def draw(self, size: int, rng: np.random.Generator) -> Callable[[], np.ndarray]:
         """Return a function that draws `size` rows, with probabilities in proportion to the criticality."""

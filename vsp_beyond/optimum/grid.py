@@ -125,18 +125,20 @@ def _followed(moves: list, best: np.ndarray, values: np.ndarray) -> np.ndarray:
     return values
 
 
+@dataclass(frozen=True, eq=False)
 class GridPolicy:
     """A policy that takes the best action by the values of a grid, looking one step ahead."""
 
-    def __init__(
-        self, task: Task, grid: Grid, values: np.ndarray, actions: np.ndarray, state_of: Callable, price: float = 0.0
-    ):
-        self.grid, self._task, self._values, self._price = grid, task, values, price
-        self._actions, self._state_of = actions, state_of
+    task: Task
+    grid: Grid
+    values: np.ndarray  # (n,) at the points of the grid
+    actions: np.ndarray  # (a,) evenly spaced
+    state_of: Callable[[np.ndarray], np.ndarray]  # from observations (n, d) to states (n, 2)
+    price: float = 0.0  # per step
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, 1) for observations (n, d)."""
-        states = self._state_of(obs.astype(np.float64))
+        states = self.state_of(obs.astype(np.float64))
         parts = np.split(states, range(AT_ONCE, len(states), AT_ONCE))
         return np.concatenate([self._best(part) for part in parts])[:, None], None
 
@@ -146,21 +148,21 @@ class GridPolicy:
         The shape is (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible
         after its end.
         """
-        states, best = self._state_of(obs.astype(np.float64)), self.predict(obs)[0]
+        states, best = self.state_of(obs.astype(np.float64)), self.predict(obs)[0]
         return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
 
     def _best(self, states: np.ndarray) -> np.ndarray:
         """Return the action at the top of the parabola through the best action and its two neighbours. (n,)"""
-        n = len(self._actions)
-        offers = self._offers(np.tile(states, (n, 1)), np.repeat(self._actions, len(states))).reshape(n, -1)
+        n = len(self.actions)
+        offers = self._offers(np.tile(states, (n, 1)), np.repeat(self.actions, len(states))).reshape(n, -1)
         best, rows = offers.argmax(axis=0), np.arange(len(states))
         middle = np.clip(best, 1, n - 2)
         left, top, right = (offers[middle + shift, rows] for shift in (-1, 0, 1))
         bend = left - 2 * top + right
         inside = (best == middle) & (bend < 0)
         shift = np.where(inside, 0.5 * (left - right) / np.where(inside, bend, 1.0), 0.0)
-        return self._actions[best] + shift * (self._actions[1] - self._actions[0])
+        return self.actions[best] + shift * (self.actions[1] - self.actions[0])
 
     def _offers(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        after, rewards, outcomes = self._task.step(states, actions[:, None])
-        return rewards - self._price + (outcomes == RUNNING) * self.grid.at(after, self._values)
+        after, rewards, outcomes = self.task.step(states, actions[:, None])
+        return rewards - self.price + (outcomes == RUNNING) * self.grid.at(after, self.values)

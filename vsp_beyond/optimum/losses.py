@@ -24,12 +24,7 @@ def held(obs: np.ndarray) -> np.ndarray:
     return (np.abs(angle) < UPRIGHT) & (np.abs(velocity) < SLOW)
 
 
-def swung(obs: np.ndarray) -> np.ndarray:
-    """Return whether Pendulum is swinging up or falling in the observations (n, 3). (n,)"""
-    return ~held(obs)
-
-
-PENDULUM_REGIONS: dict[str, Region] = {"swing-up": swung, "hold": held}
+PENDULUM_REGIONS: dict[str, Region] = {"swing-up": lambda obs: ~held(obs), "hold": held}
 
 
 def losses(

@@ -18,7 +18,7 @@ import pandas as pd
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.mountaincar import TASK
 
-from .simplegoal import METRICS
+from .proof import check_provable
 
 LOW, HIGH = Fraction(-3, 5), Fraction(-2, 5)  # the starts
 PUSH, PULL = 0.0015, 0.0025
@@ -36,9 +36,7 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
     dead, whether the acceleration changes its sign between them, so that there is a dead point. Exact except for the
     rounding of g. Raises ValueError for a policy of another task or class, and for the metric "chebyshev".
     """
-    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric not in METRICS:
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, with one of {METRICS}")
-    policy.check_linear()
+    check_provable(policy, TASK)
     rows = []
     for low, high in pairwise(_borders(policy)):
         cell = min(range(len(policy)), key=lambda i: (_distance(policy, (low + high) / 2, i), i))
@@ -56,16 +54,16 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
 def _borders(policy: VoronoiPolicy) -> list[Fraction]:
     """Return the ends of the line of starts, and all places between at which two codewords are equally near. For the
     Manhattan distance, return also where the difference of two distances bends."""
-    found = {LOW, HIGH}
+    borders = {LOW, HIGH}
     for i, j in combinations(range(len(policy)), 2):
         bends = {Fraction(float(policy.codewords[k, 0])) for k in (i, j)} if policy.metric == "manhattan" else set()
         ends = sorted({LOW, HIGH} | {bend for bend in bends if LOW < bend < HIGH})
-        found |= set(ends)
+        borders |= set(ends)
         for low, high in pairwise(ends):
-            gap, other = (_distance(policy, x, i) - _distance(policy, x, j) for x in (low, high))
-            if gap * other < 0:  # the difference is linear between them
-                found.add(low + (high - low) * gap / (gap - other))
-    return sorted(found)
+            gap, gap_at_high = (_distance(policy, x, i) - _distance(policy, x, j) for x in (low, high))
+            if gap * gap_at_high < 0:  # the difference is linear between them
+                borders.add(low + (high - low) * gap / (gap - gap_at_high))
+    return sorted(borders)
 
 
 def _distance(policy: VoronoiPolicy, x: Fraction, i: int) -> Fraction:

@@ -33,14 +33,14 @@ def steps_into(target: np.ndarray, ways: Sequence[Way], most: int, *, periodic: 
     A box may have several ways, all of which can happen. `periodic`: the first coordinate is an angle, and rectangles
     may end up to one turn beyond the grid.
     """
-    found = np.zeros(target.shape, dtype=np.int32)
+    steps = np.zeros(target.shape, dtype=np.int32)
     for t in range(1, most + 1):
-        waiting = found == 0
+        waiting = steps == 0
         ways = [way.among(waiting.ravel()) for way in ways]
         if not (new := waiting & _all_within(target | ~waiting, ways, periodic)).any():
             break
-        found[new] = t
-    return found
+        steps[new] = t
+    return steps
 
 
 def invariant(inside: np.ndarray, ways: Sequence[Way], *, periodic: bool = False) -> np.ndarray:
@@ -77,9 +77,9 @@ def rectangles_within(count: np.ndarray, first: np.ndarray, last: np.ndarray) ->
 def _all_within(good: np.ndarray, ways: Sequence[Way], periodic: bool) -> np.ndarray:
     """Return the boxes from which all ways are safe and lead only into boxes that are `good`."""
     count = summed(~good, periodic=periodic)
-    found = np.zeros(good.size, dtype=bool)  # for a box without a way, nothing is known
+    within = np.zeros(good.size, dtype=bool)  # for a box without a way, nothing is known
     for way in ways:
-        found[way.boxes] = True
+        within[way.boxes] = True
     for way in ways:
-        found[way.boxes[~(rectangles_within(count, way.first, way.last) & way.safe)]] = False
-    return found.reshape(good.shape)
+        within[way.boxes[~(rectangles_within(count, way.first, way.last) & way.safe)]] = False
+    return within.reshape(good.shape)

@@ -25,7 +25,7 @@ from vsp.policy import VoronoiPolicy
 from vsp.run import workers
 from vsp.tasks.mountaincar import TASK
 
-from .proof import Proof
+from .proof import Proof, check_provable
 
 LEFT, RIGHT = -0.6, -0.4  # ends of the range of starts
 COSINE = 1e-15  # several times the difference between libraries
@@ -33,10 +33,10 @@ SUMS = 1e-15  # relative to the terms added up: more than float64 loses in four 
 TIES = 1e-12  # likewise, for distances
 BLOCK = 10_000  # observations at a time
 MOST = 20_000_000  # most states after the first step of a block; exceeded where the car hardly moves
+MOST_CELLS = 64  # in mountaincar.c
 MOST_WAYS = 10_000  # most states that one step may lead to
 COMPILE = ("-O2", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC")  # no fused multiply-add
 
-STATE = np.dtype([("x", "f4"), ("v", "f4"), ("ended", "i4")])
 ENDS = np.dtype([("least", "f8"), ("most", "f8"), ("longest", "i4"), ("left", "i4"), ("doubts", "i4")], align=True)
 
 
@@ -95,10 +95,10 @@ class MountainCarProof(Proof):
     def claim(self) -> dict:
         """The number `n` of observations, of states after the first step, and of episodes that do not arrive; the most
         steps, the lowest return, and bounds on the mean return."""
-        found = {name: sum(getattr(block, name) for block in self.blocks) for name in ("n", "n_states", "n_left")}
-        found |= {"longest": max(b.longest for b in self.blocks), "least": min(b.least for b in self.blocks)}
+        claim = {name: sum(getattr(block, name) for block in self.blocks) for name in ("n", "n_states", "n_left")}
+        claim |= {"longest": max(b.longest for b in self.blocks), "least": min(b.least for b in self.blocks)}
         means = ("mean_low", "mean_high")
-        return found | {name: sum(b.width * getattr(b, name) for b in self.blocks) for name in means}
+        return claim | {name: sum(b.width * getattr(b, name) for b in self.blocks) for name in means}
 
     def parts(self) -> list:
         """Return the blocks."""
@@ -111,11 +111,13 @@ def prove_mountaincar(policy: VoronoiPolicy, *, jobs: int | str = -1) -> Mountai
     `jobs` as in `vsp.run.workers`. Raises ValueError for a policy that is not made of linear
     maps and Euclidean cells for MountainCar, and for one with a start from which the car hardly moves.
     """
-    check_runnable(policy)
+    check_provable(policy, TASK, ["euclidean"])
+    if len(policy) > MOST_CELLS:
+        raise ValueError(f"the policy has {len(policy)} cells, expected at most {MOST_CELLS}")
     n = 1 + int(np.subtract(*_numbers(np.array([RIGHT, LEFT], dtype=np.float32))))
     work = [(policy, begin, min(BLOCK, n - begin)) for begin in range(0, n, BLOCK)]
-    found = dict(workers.results(run_block, work, "every start", jobs=jobs, total=len(work), unit="blocks"))
-    return MountainCarProof(policy, tuple(found[i] for i in range(len(work))))
+    blocks = dict(workers.results(run_block, work, "every start", jobs=jobs, total=len(work), unit="blocks"))
+    return MountainCarProof(policy, tuple(blocks[i] for i in range(len(work))))
 
 
 def run_block(policy: VoronoiPolicy, first: int, n: int) -> Block:
@@ -127,7 +129,7 @@ def run_block(policy: VoronoiPolicy, first: int, n: int) -> Block:
     np.minimum.at(least, owner, ends["least"])
     np.maximum.at(most, owner, ends["most"])
     widths = high - low
-    means = (float(widths @ one / widths.sum()) for one in (least, most))
+    means = (float(widths @ bound / widths.sum()) for bound in (least, most))
     sums = (int(ends[name].sum()) for name in ("doubts", "left"))
     longest, width = int(ends["longest"].max()), float(widths.sum() / (RIGHT - LEFT))
     return Block(first, n, len(states), *sums, longest, float(least.min()), *means, width)
@@ -150,7 +152,7 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     least = actions[0] * 0.0015 - 0.0025 * (np.cos(3 * high) + COSINE)
     doubt = (actions[1] - actions[0]) * 0.0015 + 0.005 * COSINE
     which, velocities = _between(least, most)
-    low, high, least, most, doubt = (one[which] for one in (low, high, least, most, doubt))
+    low, high, least, most, doubt = (values[which] for values in (low, high, least, most, doubt))
     above, below = (np.clip(_halfway(velocities, side), least, most) for side in (1, -1))
     steepness = 0.0075 * np.abs(np.sin(3 * low))
     begin = np.maximum(low, low + (most - above - doubt) / steepness * (1 - 1e-6) - 1e-12)
@@ -159,25 +161,6 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     which = which[again]
     rewards = -0.1 * np.square(actions).max(axis=0)
     return np.column_stack([positions, velocities[again]]), index[which], rewards[which]
-
-
-def step(states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-    """Make Gymnasium's step from float32 states (n, 2) with float64 actions (n,). Return a record array x, v, ended
-    (n,)."""
-    states, actions = np.ascontiguousarray(states, np.float32), np.ascontiguousarray(actions, np.float64)
-    after = np.empty(len(states), STATE)
-    addresses = (part.ctypes.data_as(ctypes.c_void_p) for part in (states, actions, after))
-    _compiled().step_all(ctypes.c_long(len(states)), *addresses)
-    return after
-
-
-def check_runnable(policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `policy` is made of linear maps and at most 64 Euclidean cells for MountainCar."""
-    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric != "euclidean":
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, with metric 'euclidean'")
-    policy.check_linear()
-    if len(policy) > 64:
-        raise ValueError(f"the policy has {len(policy)} cells, expected at most 64")
 
 
 @cache

@@ -11,19 +11,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from vsp.checks import check_count
 from vsp.policy import VoronoiPolicy
-from vsp.tasks.pendulum import TASK, see
+from vsp.tasks.pendulum import TASK
 
 from .grid import Way, around, invariant, steps_into
-from .proof import Proof
-from .robust import ROUNDING, SEEN, largest_tie, least_gap
+from .proof import Proof, check_provable
+from .robust import ROUNDING, SEEN, touches
 
 FASTEST, LIMIT = 8.0, 2.0  # largest angular velocity, rad/s; largest torque
 START_SPEED = 1.0  # rad/s, largest of the starts
 DT, FALL, PUSH = 0.05, 0.75, 0.15  # per step: seconds, and what sine and torque add to the angular velocity
+REACH = np.array([1.0, 1.0, FASTEST])  # the largest observations
 UPRIGHT = 0.5  # rad: a set "around upright" lies within this angle
 
 
@@ -57,12 +57,12 @@ class PendulumProof(Proof):
 
     def parts(self) -> list:
         """Return for each row its runs of boxes: steps (-1 in the set), length, steps, length, ..."""
-        found = []
+        runs = []
         for row in np.where(self.kept, -1, self.steps):
             begins = np.flatnonzero(np.diff(row, prepend=row[0] - 1))
             lengths = np.diff(begins, append=len(row))
-            found.append(np.column_stack([row[begins], lengths]).ravel().tolist())
-        return found
+            runs.append(np.column_stack([row[begins], lengths]).ravel().tolist())
+        return runs
 
 
 def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
@@ -71,7 +71,7 @@ def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
     Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
     for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
     """
-    check_swinging(policy)
+    check_provable(policy, TASK)
     check_count("n", n, most=8000)
     if n % 16:
         raise ValueError(f"n is {n}, expected a multiple of 16")
@@ -80,33 +80,6 @@ def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
     near = np.repeat((np.abs(angle) + np.pi / n < UPRIGHT)[:, None], n, axis=1)
     kept = invariant(near, ways, periodic=True)
     return PendulumProof(policy, kept, steps_into(kept, ways, TASK.max_steps, periodic=True))
-
-
-def equilibria(policy: VoronoiPolicy, *, n: int = 100_000) -> np.ndarray:
-    """Find angles (rad) at which a pendulum at rest stays, in increasing order: starts from which nothing moves.
-
-    The search looks between `n` angles, where the acceleration changes its sign within a cell. It is not proved to find
-    all. Raises ValueError as `prove_pendulum` does.
-    """
-    check_swinging(policy)
-    check_count("n", n, least=16)
-
-    def acceleration(angle: np.ndarray) -> np.ndarray:
-        states = np.column_stack([angle, np.zeros_like(angle)])
-        return FALL * np.sin(angle) + PUSH * policy.predict(see(states))[0][:, 0]
-
-    angles = np.linspace(-np.pi, np.pi, n) + 1e-7  # shifted, so that no root lies on one of them by symmetry
-    found, cells = acceleration(angles), policy.cells(see(np.column_stack([angles, np.zeros(n)])))
-    crossed = np.flatnonzero((np.sign(found[:-1]) != np.sign(found[1:])) & (cells[:-1] == cells[1:]))
-    pairs = zip(angles[crossed], angles[crossed + 1])
-    return np.array([brentq(lambda angle: acceleration(np.array([angle]))[0], *pair) for pair in pairs])
-
-
-def check_swinging(policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `policy` is made of linear maps for Pendulum, without the metric "chebyshev"."""
-    if not isinstance(policy, VoronoiPolicy) or policy.task.name != TASK.name or policy.metric == "chebyshev":
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {TASK.name}, not 'chebyshev'")
-    policy.check_linear()
 
 
 def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
@@ -137,8 +110,8 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
     limited = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
     at_limit = np.abs(new_speed) + speed_by > FASTEST  # there the new angle follows from the limited speed
     ends = [
-        np.where(at_limit, angle + side * half[0] + DT * one, new_angle + side * angle_by)
-        for side, one in zip((-1, 1), limited)
+        np.where(at_limit, angle + side * half[0] + DT * speed_there, new_angle + side * angle_by)
+        for side, speed_there in zip((-1, 1), limited)
     ]
     return Way(touched, *boxes_between(ends, limited, n), np.ones(len(touched), dtype=bool))
 
@@ -146,26 +119,18 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
 def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the first box between two angles and two speeds, and the exclusive end of these boxes, as in `Way`. Angles
     may be any number of turns away, but less than a turn apart."""
-    first, last = around(*((one / FASTEST + 1) * n / 2 + side * ROUNDING for one, side in zip(speeds, (-1, 1))), n)
-    begin, end = ((one / np.pi + 1) * n / 2 + side * ROUNDING * n for one, side in zip(angles, (-1, 1)))
+    first, last = around(*((end / FASTEST + 1) * n / 2 + side * ROUNDING for end, side in zip(speeds, (-1, 1))), n)
+    begin, end = ((end / np.pi + 1) * n / 2 + side * ROUNDING * n for end, side in zip(angles, (-1, 1)))
     begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
     turns = begin // n * n
     return np.stack([begin - turns, first]), np.stack([end - turns, last])
 
 
-def _touched(policy: VoronoiPolicy, cell: int, angles, speeds, half) -> np.ndarray:
+def _touched(policy: VoronoiPolicy, cell: int, angles: np.ndarray, speeds: np.ndarray, half: np.ndarray) -> np.ndarray:
     """Return the boxes of which a part may be in a cell, by the ranges of cosine, sine and speed."""
-    n, found, tie = len(angles), [], largest_tie(policy, np.array([1.0, 1.0, FASTEST]))
-    ranges = [(np.maximum(f(angles) - half[0], -1.0), np.minimum(f(angles) + half[0], 1.0)) for f in (np.cos, np.sin)]
-    for i in range(n):  # a row at a time
-        low, high = (
-            np.stack([np.full(n, ranges[0][side][i]), np.full(n, ranges[1][side][i]), speeds + sign * half[1]])
-            + sign * SEEN * FASTEST
-            for side, sign in ((0, -1), (1, 1))
-        )
-        row = np.ones(n, dtype=bool)
-        for other in range(len(policy)):
-            if other != cell:
-                row &= least_gap(policy, cell, other, low, high) <= tie
-        found.append(np.flatnonzero(row) + i * n)
-    return np.concatenate(found)
+    n, ends = len(angles), []
+    for sign in (-1, 1):
+        waves = np.clip(np.stack([np.cos(angles), np.sin(angles)]) + sign * half[0], -1.0, 1.0)
+        observed = np.vstack([np.repeat(waves, n, axis=1), np.tile(speeds + sign * half[1], n)])
+        ends.append(observed + sign * SEEN * FASTEST)
+    return np.flatnonzero(touches(policy, cell, *ends, REACH))

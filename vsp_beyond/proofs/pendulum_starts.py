@@ -18,8 +18,8 @@ from vsp.run.progress import progress
 from vsp.tasks.pendulum import TASK
 
 from .grid import rectangles_within, summed
-from .pendulum import DT, FALL, FASTEST, LIMIT, PUSH, PendulumProof, boxes_between
-from .robust import ROUNDING, SEEN, largest_tie, least_gap
+from .pendulum import DT, FALL, FASTEST, LIMIT, PUSH, REACH, PendulumProof, boxes_between
+from .robust import ROUNDING, SEEN, touches
 
 HALF_WAY = TASK.max_steps // 2  # most steps followed here; the grid proves the other half
 WIDEST = 0.1  # rad, or rad/s: a box with a larger half width is given up
@@ -142,23 +142,19 @@ def _limited(value: np.ndarray, slopes: np.ndarray, spread: np.ndarray, limit: f
 def _touched(policy: VoronoiPolicy, cell: int, boxes: Boxes) -> np.ndarray:
     """Return which boxes may have states in a cell, by the ranges of cosine, sine and speed. (m,)"""
     half, (angle, speed) = boxes.half, boxes.centre
-    seen = np.stack([np.cos(angle), np.sin(angle), speed])
+    observed = np.stack([np.cos(angle), np.sin(angle), speed])
     # A sine changes by at most its slope times the change of the angle, plus half the square of that change
-    change = [np.abs(slope) * half[0] + half[0] ** 2 / 2 for slope in (seen[1], seen[0])]
+    change = [np.abs(slope) * half[0] + half[0] ** 2 / 2 for slope in (observed[1], observed[0])]
     width = np.stack([*change, half[1]]) + SEEN * FASTEST
-    found, tie = np.ones(len(boxes), dtype=bool), largest_tie(policy, np.array([1.0, 1.0, FASTEST]))
-    for other in range(len(policy)):
-        if other != cell:
-            found &= least_gap(policy, cell, other, seen - width, seen + width) <= tie
-    return found
+    return touches(policy, cell, observed - width, observed + width, REACH)
 
 
 def _arrived(boxes: Boxes, good: np.ndarray) -> np.ndarray:
     """Return which boxes have all their states within proved boxes. (m,)"""
     half = boxes.half
-    angles, speeds = ([one - width, one + width] for one, width in zip(boxes.centre, half))
+    angles, speeds = ([middle - width, middle + width] for middle, width in zip(boxes.centre, half))
     return rectangles_within(good, *boxes_between(angles, speeds, good.shape[1] - 1))
 
 
 def _joined(parts: list[Boxes]) -> Boxes:
-    return Boxes(*(np.concatenate([getattr(part, one.name) for part in parts], axis=-1) for one in fields(Boxes)))
+    return Boxes(*(np.concatenate([getattr(part, field.name) for part in parts], axis=-1) for field in fields(Boxes)))

@@ -7,9 +7,9 @@ the polygon. So its numbers grow only with those of the lines, not with the numb
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from math import gcd, lcm
 
 Line = tuple[int, int, int]
@@ -74,12 +74,10 @@ def box(x: tuple[Fraction, Fraction], y: tuple[Fraction, Fraction]) -> Polygon:
     return Polygon(tuple(meet(edges[i - 1], edges[i]) for i in range(4)), tuple(edges))
 
 
-@lru_cache(maxsize=10_000)
-def line_of(numbers: tuple[Fraction, Fraction, Fraction]) -> Line:
-    """Return the line with coefficients in the ratio of `numbers`, in the smallest integers."""
-    fractions = [Fraction(number) for number in numbers]
-    common = lcm(*(number.denominator for number in fractions))
-    return reduced(tuple(number.numerator * (common // number.denominator) for number in fractions))
+def line_of(numbers: Sequence[Fraction]) -> Line:
+    """Return the line with coefficients in the ratio of the three `numbers`, in the smallest integers."""
+    common = lcm(*(number.denominator for number in numbers))
+    return reduced(tuple(number.numerator * (common // number.denominator) for number in numbers))
 
 
 def reduced(line: Line) -> Line:
@@ -88,9 +86,9 @@ def reduced(line: Line) -> Line:
     return tuple(number // shared for number in line)
 
 
-def meet(one: Line, other: Line) -> Corner:
+def meet(first: Line, second: Line) -> Corner:
     """Return the intersection of two lines that are not parallel."""
-    (a, b, c), (d, e, f) = one, other
+    (a, b, c), (d, e, f) = first, second
     w = a * e - b * d
     corner = (b * f - c * e, c * d - a * f, w)
     return corner if w > 0 else tuple(-number for number in corner)

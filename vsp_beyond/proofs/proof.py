@@ -6,14 +6,27 @@ from __future__ import annotations
 import json
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
+from vsp.checks import check_choice
 from vsp.policy import VoronoiPolicy
 from vsp.run import atomic, sealed
+from vsp.tasks import Task
 
-CERTIFICATES = atomic.ROOT / "data" / "beyond" / "proofs"
+RESULTS = atomic.ROOT / "data" / "beyond"
+CERTIFICATES = RESULTS / "proofs"
+METRICS = ("euclidean", "manhattan")
+
+
+def check_provable(policy: VoronoiPolicy, task: Task, metrics: Collection[str] = METRICS) -> None:
+    """Raise ValueError unless `policy` is a `VoronoiPolicy` of linear maps for `task`, with one of the `metrics`."""
+    if not isinstance(policy, VoronoiPolicy) or policy.task.name != task.name:
+        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy for {task.name}")
+    check_choice("the policy's metric", policy.metric, metrics)
+    policy.check_linear()
 
 
 @dataclass(frozen=True)

@@ -11,54 +11,54 @@ policy of 13 cells they have 115 digits after one step, and up to 1,400 after 16
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache
 from math import gcd, lcm
+
+import numpy as np
 
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import GOAL, PIT, RUNNING, TRUNCATED
 from vsp.tasks.simplegoal import TASK
 
 from .polygons import Line, Polygon, box, line_of, reduced
+from .proof import check_provable
 
 STRIDE, GOAL_EDGE = Fraction(1, 10), Fraction(1, 10)
 PIT_LOW, PIT_HIGH = Fraction(2, 5), Fraction(3, 5)
-METRICS = ("euclidean", "manhattan")
 MOST = 200_000  # most pieces: some minutes
 SQUARE = box((Fraction(0), Fraction(1)), (Fraction(0), Fraction(1)))
 
-Form = tuple[Fraction, Fraction, Fraction]  # p x + q y + r of a state (x, y)
-ONE = Fraction(1)
-X, Y = (Fraction(1), Fraction(0), Fraction(0)), (Fraction(0), Fraction(1), Fraction(0))
+Form = np.ndarray  # (3,) fractions p, q, r: p x + q y + r of a state (x, y)
+X, Y, ONE = np.array([[Fraction(i == j) for i in range(3)] for j in range(3)])
+IN_GOAL = [line_of(GOAL_EDGE * ONE - axis) for axis in (X, Y)]  # inside, a state is on the positive side of all
+IN_PIT = [line_of(form) for axis in (X, Y) for form in (axis - PIT_LOW * ONE, PIT_HIGH * ONE - axis)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
-    """The state as an affine function of the start (x, y): (a x + b y + c) / unit for each of its coordinates."""
+    """The state as an affine function of the start (x, y).
 
-    coordinates: tuple[Line, Line] = ((1, 0, 0), (0, 1, 0))
-    unit: int = 1
+    `matrix` (3, 3), of integers, times (x, y, 1) is (x', y', 1) times a positive integer, where (x', y') is the state.
+    """
+
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(3, dtype=int).astype(object))
 
     def pull(self, line: Line) -> Line:
         """Return the line of those starts whose states lie on `line`; (0, 0, 0) if all do."""
-        return reduced(self._combined(*line))
+        return reduced(tuple(np.array(line, dtype=object) @ self.matrix))
 
-    def moved(self, forms: tuple[Form, Form]) -> State:
-        """Return the state whose coordinates are `forms` of this one."""
-        common = lcm(*(number.denominator for form in forms for number in form))
-        found = [self._combined(*(int(number * common) for number in form)) for form in forms]
-        shared = gcd(unit := common * self.unit, *found[0], *found[1])
-        return State(tuple(tuple(number // shared for number in one) for one in found), unit // shared)
+    def moved(self, move: np.ndarray) -> State:
+        """Return the state after a `move`, a matrix (3, 3) as in a state."""
+        matrix = move @ self.matrix
+        return State(matrix // gcd(*matrix.flat))
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         """Return the state from one start, rounded."""
-        return tuple(a / self.unit * x + b / self.unit * y + c / self.unit for a, b, c in self.coordinates)
-
-    def _combined(self, p: int, q: int, r: int) -> Line:
-        (a, b, c), (d, e, f) = self.coordinates
-        return p * a + q * d, p * b + q * e, p * c + q * f + r * self.unit
+        unit = self.matrix[2, 2]
+        return tuple(a / unit * x + b / unit * y + c / unit for a, b, c in self.matrix[:2])
 
 
 @dataclass(frozen=True)
@@ -83,17 +83,15 @@ class Piece:
 
     def bounds(self) -> list[tuple[Fraction, Fraction]]:
         """Return the least and the largest value of each coordinate of the state."""
-        found = []
-        for a, b, c in self.state.coordinates:
-            values = [Fraction(a * x + b * y + c * w, self.state.unit * w) for x, y, w in self.starts.corners]
-            found.append((min(values), max(values)))
-        return found
+        states = self.state.matrix @ np.array(self.starts.corners, dtype=object).T  # (3, corners)
+        values = [[Fraction(value, unit) for value, unit in zip(row, states[2])] for row in states[:2]]
+        return [(min(row), max(row)) for row in values]
 
 
 def follow(policy: VoronoiPolicy, *, starts: Polygon = SQUARE, most: int = MOST) -> list[Piece]:
     """Cut `starts` into pieces and follow each to its end: at the goal, in the pit, or truncated.
 
-    Raises ValueError for a policy of another task or class, for a metric that is not in `METRICS`, and for more than
+    Raises ValueError for a policy of another task or class, for the metric "chebyshev", and for more than
     `most` pieces: a policy that wanders cuts the square ever finer.
     """
     loop, ended, running = Loop(policy), [], [Piece(starts)]
@@ -110,18 +108,39 @@ class Loop:
     """The closed loop of a policy and the task."""
 
     def __init__(self, policy: VoronoiPolicy):
-        check_provable(policy)
-        self.maps = [[tuple(_exact(numbers)) for numbers in one.T] for one in policy.coefficients]  # a form per action
+        check_provable(policy, TASK)
+        self.actions = _exact(policy.coefficients.transpose(0, 2, 1))  # (k, 2, 3): a form per action
         self.distance = Distance(policy)
 
     def advance(self, piece: Piece) -> Iterator[Piece]:
         """Cut `piece` by one step, and yield the parts after the step."""
         for part, cell in self.distance.cells(piece):
-            for acting, actions, limits in _clipped_both(part, self.maps[cell], -ONE, ONE):
-                wanted = [_sum(state, action, STRIDE) for state, action in zip((X, Y), actions)]
-                for moving, forms, walls in _clipped_both(acting, wanted, 0 * ONE, ONE):
+            for acting, limits in _by_sides(part, self.limits(cell)):
+                for moving, walls in _by_sides(acting, self.walls(cell, limits)):
+                    state = piece.state.moved(self.move(cell, limits, walls))
                     steps = (*piece.steps, Step(cell, limits, walls))
-                    yield from _ended(replace(moving, state=piece.state.moved(forms), before=piece.state, steps=steps))
+                    yield from _ended(replace(moving, state=state, before=piece.state, steps=steps))
+
+    @cache  # noqa: B019 - it lives as long as the proof
+    def limits(self, cell: int) -> list[tuple[Line, Line]]:
+        """Return for each action the lines on which it reaches its limits."""
+        return [(line_of(form + ONE), line_of(form - ONE)) for form in self.actions[cell]]
+
+    @cache  # noqa: B019
+    def walls(self, cell: int, limits: tuple[int, int]) -> list[tuple[Line, Line]]:
+        """Return for each coordinate of the next state the lines on which it reaches its walls."""
+        return [(line_of(form), line_of(form - ONE)) for form in self._next(cell, limits)]
+
+    @cache  # noqa: B019
+    def move(self, cell: int, limits: tuple[int, int], walls: tuple[int, int]) -> np.ndarray:
+        """Return the matrix of a step, as in `State`."""
+        forms = [max(side, 0) * ONE if side else form for side, form in zip(walls, self._next(cell, limits))]
+        forms = np.array([*forms, ONE])
+        return np.vectorize(int, otypes=[object])(lcm(*(number.denominator for number in forms.flat)) * forms)
+
+    def _next(self, cell: int, limits: tuple[int, int]) -> list[Form]:
+        actions = [side * ONE if side else form for side, form in zip(limits, self.actions[cell])]
+        return [axis + STRIDE * action for axis, action in zip((X, Y), actions)]
 
 
 class Distance:
@@ -129,8 +148,7 @@ class Distance:
     too."""
 
     def __init__(self, policy: VoronoiPolicy):
-        self.codewords = [_exact(codeword) for codeword in policy.codewords]
-        self.weights = [1 / scale for scale in _exact(policy.scale)]
+        self.codewords, self.weights = _exact(policy.codewords), 1 / _exact(policy.scale)
         self.metric = policy.metric
 
     def cells(self, piece: Piece) -> Iterator[tuple[Piece, int]]:
@@ -168,7 +186,7 @@ class Distance:
         sides = ()
         if self.metric == "manhattan":  # a distance is affine where no coordinate passes the codeword's
             for axis, value in ((axis, self.codewords[which][axis]) for axis in (0, 1) for which in (i, j)):
-                low, high = _split(piece, _minus((X, Y)[axis], value))
+                low, high = _split(piece, line_of((X, Y)[axis] - value * ONE))
                 if low and high:
                     yield from self._compared(low, i, j)
                     yield from self._compared(high, i, j)
@@ -181,32 +199,20 @@ class Distance:
             yield farther, j
 
     @cache  # noqa: B019 - it lives as long as the proof
-    def gap(self, i: int, j: int, sides: tuple[int, ...] = ()) -> Form:
-        """Return the distance (for "euclidean", the squared distance) to `i` minus that to `j`.
+    def gap(self, i: int, j: int, sides: tuple[int, ...] = ()) -> Line:
+        """Return the line of equal distance to `i` and `j`; on its positive side, `j` is nearer.
 
         `sides`, for "manhattan": on which side of each of the two codewords the first coordinate lies, then the second.
         """
-        found = (0 * ONE, 0 * ONE, 0 * ONE)
+        form = 0 * ONE
         for axis, weight in enumerate(self.weights):
             c, d = self.codewords[i][axis], self.codewords[j][axis]
             if self.metric == "euclidean":
-                found = _sum(found, (X, Y)[axis], 2 * weight**2 * (d - c), weight**2 * (c * c - d * d))
+                form = form + weight**2 * (2 * (d - c) * (X, Y)[axis] + (c * c - d * d) * ONE)
             else:
                 at_i, at_j = sides[2 * axis : 2 * axis + 2]
-                found = _sum(found, (X, Y)[axis], weight * (at_i - at_j), weight * (at_j * d - at_i * c))
-        return found
-
-
-def check_provable(policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `policy` is made of linear maps for SimpleGoal, with a metric of `METRICS`."""
-    if not isinstance(policy, VoronoiPolicy):
-        raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy: others have no cells to follow")
-    policy.check_linear()
-    if policy.task.name != TASK.name:
-        why = "whose steps are affine except for limits and walls: other tasks need their own proof"
-        raise ValueError(f"the policy is for {policy.task.name}, expected {TASK.name}, {why}")
-    if policy.metric not in METRICS:
-        raise ValueError(f"the policy has metric {policy.metric!r}, expected one of {METRICS}")
+                form = form + weight * ((at_i - at_j) * (X, Y)[axis] + (at_j * d - at_i * c) * ONE)
+        return line_of(form)
 
 
 def _ended(piece: Piece) -> Iterator[Piece]:
@@ -219,10 +225,10 @@ def _ended(piece: Piece) -> Iterator[Piece]:
             yield replace(rest, outcome=PIT if fell else RUNNING)
 
 
-def _within(piece: Piece, forms: list[Form]) -> Iterator[tuple[Piece, bool]]:
-    """Yield the parts of `piece` where a form is not positive, and the part where all forms are."""
-    for form in forms:
-        outside, piece = _split(piece, form)
+def _within(piece: Piece, lines: Sequence[Line]) -> Iterator[tuple[Piece, bool]]:
+    """Yield the parts of `piece` that are not on the positive side of a line, and the part on that of all lines."""
+    for line in lines:
+        outside, piece = _split(piece, line)
         if outside:
             yield outside, False
         if not piece:
@@ -230,51 +236,28 @@ def _within(piece: Piece, forms: list[Form]) -> Iterator[tuple[Piece, bool]]:
     yield piece, True
 
 
-def _clipped_both(piece: Piece, forms: list[Form], low: Fraction, high: Fraction):
-    """Yield the parts of `piece` by the limits that two forms reach: the part, the limited forms, and these limits."""
-    for first, x, at_x in _clipped(piece, forms[0], low, high):
-        for second, y, at_y in _clipped(first, forms[1], low, high):
-            yield second, (x, y), (at_x, at_y)
+def _by_sides(piece: Piece, lines: Sequence[tuple[Line, Line]]) -> Iterator[tuple[Piece, tuple[int, ...]]]:
+    """Yield the parts of `piece` by where they lie of each pair of `lines`: on the negative side of the first (-1),
+    between both (0), or on the positive side of the second (1)."""
+    if not lines:
+        yield piece, ()
+        return
+    low, high = lines[0]
+    below, rest = _split(piece, low)
+    between, above = _split(rest, high) if rest else (None, None)
+    for part, side in ((below, -1), (between, 0), (above, 1)):
+        if part:
+            yield from ((smaller, (side, *others)) for smaller, others in _by_sides(part, lines[1:]))
 
 
-def _clipped(piece: Piece, form: Form, low: Fraction, high: Fraction) -> Iterator[tuple[Piece, Form, int]]:
-    below, rest = _split(piece, _minus(form, low))
-    if below:
-        yield below, (0 * ONE, 0 * ONE, low), -1
-    if rest:
-        between, above = _split(rest, _minus(form, high))
-        if between:
-            yield between, form, 0
-        if above:
-            yield above, (0 * ONE, 0 * ONE, high), 1
-
-
-def _split(piece: Piece, form: Form) -> tuple[Piece | None, Piece | None]:
-    """Return the parts of `piece` where a form of the state is at most 0, and above 0; None for a part without area."""
-    line = piece.state.pull(line_of(form))
-    if line == (0, 0, 0):
+def _split(piece: Piece, line: Line) -> tuple[Piece | None, Piece | None]:
+    """Return the parts of `piece` whose states lie on the negative side of `line`, or on it, and on the positive side;
+    None for a part without area."""
+    pulled = piece.state.pull(line)
+    if pulled == (0, 0, 0):
         return piece, None
-    return tuple(part and replace(piece, starts=part) for part in piece.starts.cut(line))
+    return tuple(part and replace(piece, starts=part) for part in piece.starts.cut(pulled))
 
 
-def _sum(one: Form, other: Form, factor: Fraction, constant: Fraction = Fraction(0)) -> Form:
-    """one + factor * other + constant"""
-    a, b, c = (p + factor * q for p, q in zip(one, other))
-    return a, b, c + constant
-
-
-def _minus(form: Form, constant: Fraction) -> Form:
-    return form[0], form[1], form[2] - constant
-
-
-def _below(edge: Fraction, form: Form) -> Form:
-    """edge - form"""
-    return -form[0], -form[1], edge - form[2]
-
-
-IN_GOAL = [_below(GOAL_EDGE, axis) for axis in (X, Y)]  # inside, all of these are positive
-IN_PIT = [form for axis in (X, Y) for form in (_minus(axis, PIT_LOW), _below(PIT_HIGH, axis))]
-
-
-def _exact(numbers) -> list[Fraction]:
-    return [Fraction(float(number)) for number in numbers]
+def _exact(numbers: np.ndarray) -> np.ndarray:
+    return np.vectorize(Fraction, otypes=[object])(numbers)

@@ -11,8 +11,7 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
-from . import returns
-from .polygons import Polygon, line_of, total
+from .polygons import Polygon, total
 from .proof import Proof
 from .simplegoal import IN_PIT, Piece, follow
 
@@ -56,14 +55,6 @@ class SimpleGoalProof(Proof):
         """The number of steps of the longest episode."""
         return max(len(piece.steps) for piece in self.pieces)
 
-    def mean_return(self) -> tuple[float, float]:
-        """Return bounds on the mean return over all starts, at most 1e-6 apart."""
-        return returns.mean_return(self.pieces)
-
-    def worst_start(self) -> tuple[np.ndarray, float]:
-        """Return a start (2,) with the lowest return, to 1e-6, and this return."""
-        return returns.worst_start(self.pieces)
-
     @property
     def claim(self) -> dict:
         """The areas, as fractions, and the number of steps of the longest episode."""
@@ -85,8 +76,8 @@ def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
 
 def _in_pit(starts: Polygon) -> Polygon | None:
     """Return the part of `starts` inside the pit."""
-    for form in IN_PIT:
-        starts = starts and starts.cut(line_of(form))[1]
+    for line in IN_PIT:
+        starts = starts and starts.cut(line)[1]
     return starts
 
 

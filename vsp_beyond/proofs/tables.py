@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import brentq
 
 from vsp.paper.results import read_results
 from vsp.policy import VoronoiPolicy
@@ -12,8 +13,8 @@ from vsp.tasks import mountaincar
 
 from .check.mountaincar import edge
 from .check.pendulum import unpacked
-from .dead_points import at_rest
-from .proof import CERTIFICATES, load_certificate
+from .dead_points import acceleration, at_rest
+from .proof import RESULTS, load_certificate
 
 NAMES = {
     "simplegoal_paper": "the paper's, as published",
@@ -36,15 +37,12 @@ def simplegoal_table() -> pd.DataFrame:
     return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
     largest one under which all of these are proved to reach it.
     """
-    rows = _read("proofs").set_index("name").loc[list(NAMES)]
-    table = pd.DataFrame({"policy": rows.index.map(NAMES), "cells": rows["cells"].to_numpy()})
-    table["failing"] = (rows["pit"] + rows["left"]).to_numpy()
-    table["outside"] = rows["failing_outside"].to_numpy()
-    table["sampled"] = (rows["sampled_pit"] + rows["sampled_left"]).to_numpy()
-    table["steps"] = rows["longest"].to_numpy()
-    for column, source in (("mean", "mean_low"), ("program", "program"), ("disturbance", "disturbance")):
-        table[column] = rows[source].to_numpy()
-    return table
+    rows = read_results("proofs", RESULTS).set_index("name").loc[list(NAMES)]
+    failing, sampled = (rows[f"{prefix}pit"] + rows[f"{prefix}left"] for prefix in ("", "sampled_"))
+    rows = rows.assign(policy=rows.index.map(NAMES), failing=failing, sampled=sampled)
+    rows = rows.rename(columns={"failing_outside": "outside", "longest": "steps", "mean_low": "mean"})
+    columns = ["policy", "cells", "failing", "outside", "sampled", "steps", "mean", "program", "disturbance"]
+    return rows[columns].reset_index(drop=True)
 
 
 def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
@@ -57,12 +55,11 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
     for name, policy in policies.items():
         parts = at_rest(policy)
         dead = parts[parts["dead"]]
-        starts = mountaincar.start(np.random.default_rng(0), N_RETURNS)
-        found = rollout(policy, mountaincar.TASK, starts)
+        result = rollout(policy, mountaincar.TASK, mountaincar.start(np.random.default_rng(0), N_RETURNS))
         rows.append({
             "policy": name, "left": parts["g_low"].iloc[0], "right": parts["g_high"].iloc[-1],
             "borders": len(parts) - 1, "dead point": _zero(policy, dead.iloc[0]) if len(dead) else np.nan,
-            "mean return": found.returns.mean(), "failing": (found.lengths == mountaincar.TASK.max_steps).mean(),
+            "mean return": result.returns.mean(), "failing": (result.lengths == mountaincar.TASK.max_steps).mean(),
         })  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -70,14 +67,14 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
 def pendulum_table() -> pd.DataFrame:
     """Return what is proved of Pendulum by a grid, and by smaller and smaller boxes of starts. Columns: boxes (per
     axis, if all were so small), share of starts."""
-    return _read("proofs_grid")[["boxes", "share"]]
+    return read_results("proofs_grid", RESULTS)[["boxes", "share"]]
 
 
 def teacher_table() -> pd.DataFrame:
     """Return what is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit,
     steps (at most), minutes (computing time)."""
-    found = _read("proofs_teacher").rename(columns={"n": "boxes", "longest": "steps"})
-    return found.assign(minutes=found["seconds"] / 60).drop(columns="seconds")
+    rows = read_results("proofs_teacher", RESULTS).rename(columns={"n": "boxes", "longest": "steps"})
+    return rows.assign(minutes=rows["seconds"] / 60).drop(columns="seconds")
 
 
 def least_returns() -> tuple[np.ndarray, np.ndarray]:
@@ -95,16 +92,6 @@ def pendulum_steps() -> np.ndarray:
 
 def _zero(policy: VoronoiPolicy, part: pd.Series) -> float:
     """Find where the acceleration at rest is zero, in a part of the starts where it changes its sign."""
-    from scipy.optimize import brentq
-
-    from .dead_points import acceleration
-
-    def at(x: float) -> float:
-        return float(acceleration(x, policy.linear(np.array([x, 0.0]))[0]))
-
     inner = 1e-12 * (part["high"] - part["low"])
-    return brentq(at, part["low"] + inner, part["high"] - inner)
-
-
-def _read(name: str) -> pd.DataFrame:
-    return read_results(name, CERTIFICATES.parent)
+    ends = part["low"] + inner, part["high"] - inner
+    return brentq(lambda x: float(acceleration(x, policy.linear(np.array([x, 0.0]))[0])), *ends)

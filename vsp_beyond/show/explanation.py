@@ -45,12 +45,10 @@ def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
     if way:
         _arrow(ax, np.asarray(state), way, task.inputs)
     if outside:
-        ax.add_patch(Rectangle(task.low, *(task.high - task.low), **_FRAME))
+        style = {"fill": False, "lw": 0.6, "ls": "--", "edgecolor": OTHER, "zorder": 2, "label": "box of the states"}
+        ax.add_patch(Rectangle(task.low, *(task.high - task.low), **style))
     ax.set(xlim=x[0, [0, -1]], ylim=y[[0, -1], 0], xlabel=task.input_labels[0], ylabel=task.input_labels[1])
     return ax
-
-
-_FRAME = {"fill": False, "lw": 0.6, "ls": "--", "edgecolor": OTHER, "zorder": 2, "label": "box of the states"}
 
 
 def _way_out(why: Explanation, scale: np.ndarray) -> tuple[int, float, int] | None:
@@ -62,11 +60,11 @@ def _way_out(why: Explanation, scale: np.ndarray) -> tuple[int, float, int] | No
     return axis, float(changes[axis]), int(why.borders["cell"].iloc[axis])
 
 
-def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, own: int, behind: int | None) -> None:
-    """Draw the borders of all cells. Tint cell `own` in the policy's colour and cell `behind` in grey."""
+def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, cell: int, behind: int | None) -> None:
+    """Draw the borders of all cells. Tint cell `cell` in the policy's colour and cell `behind` in grey."""
     shades = np.ones((*x.shape, 4))
     shades[index == behind] = mpl.colors.to_rgba("0.91")
-    shades[index == own] = mpl.colors.to_rgba(_TINT)
+    shades[index == cell] = mpl.colors.to_rgba(_TINT)
     image(ax, x, y, shades, interpolation="nearest", zorder=0)
     cells(ax, x, y, index)
 

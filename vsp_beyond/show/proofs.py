@@ -27,7 +27,7 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
     faces = colours.to_rgba(np.asarray(steps, dtype=float))
     faces[~reached] = mpl.colors.to_rgba(FAILING)
     for chosen, width, order in ((reached, 0.1, 1), (~reached, 0.3, 2)):
-        shown = [polygon for polygon, one in zip(polygons, chosen) if one]
+        shown = [polygon for polygon, kept in zip(polygons, chosen) if kept]
         ax.add_collection(
             PolyCollection(shown, facecolors=faces[chosen], edgecolors=faces[chosen], linewidths=width, zorder=order,
                            antialiaseds=False, rasterized=True)

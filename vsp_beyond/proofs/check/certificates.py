@@ -41,7 +41,7 @@ def check_numbers(codewords: list, coefficients: list, scale: list, metric: str)
     """Raise `Refused` for numbers that are not finite, scales that are not positive, or a codeword without a map."""
     if len(codewords) != len(coefficients):
         raise Refused(f"the policy has {len(codewords)} codewords, but {len(coefficients)} maps")
-    numbers = [*scale, *(one for codeword in codewords for one in codeword)]
-    numbers += [one for rows in coefficients for row in rows for one in row]
+    numbers = [*scale, *(number for codeword in codewords for number in codeword)]
+    numbers += [number for rows in coefficients for row in rows for number in row]
     if not all(map(math.isfinite, numbers)) or min(scale) <= 0:
         raise Refused("the policy has numbers that are not finite, or a scale that is not positive")

@@ -26,18 +26,18 @@ def check_content(content: dict) -> dict:
     for block in blocks:
         counted = block["n"] <= block["n_states"] >= block["n_left"] >= 0
         if block["first"] != n or not 1 <= block["n"] <= BLOCK or not counted:
-            found = {name: block[name] for name in ("first", "n", "n_states", "n_left")}
-            raise Refused(f"a block is {found}, expected 1 to {BLOCK} observations from {n}, and as many states")
+            counts = {name: block[name] for name in ("first", "n", "n_states", "n_left")}
+            raise Refused(f"a block is {counts}, expected 1 to {BLOCK} observations from {n}, and as many states")
         n += block["n"]
     if n != magnitude(LOW) - magnitude(HIGH) + 1:
         raise Refused(f"the blocks have {n} observations, expected {magnitude(LOW) - magnitude(HIGH) + 1}")
     widths = [edge(block["first"] + block["n"], -1) - edge(block["first"], -1) for block in blocks]
-    found = {name: sum(block[name] for block in blocks) for name in ("n", "n_states", "n_left")}
-    found |= {"longest": max(block["longest"] for block in blocks), "least": min(block["least"] for block in blocks)}
+    proved = {name: sum(block[name] for block in blocks) for name in ("n", "n_states", "n_left")}
+    proved |= {"longest": max(block["longest"] for block in blocks), "least": min(block["least"] for block in blocks)}
     for name in ("mean_low", "mean_high"):
-        found[name] = sum(width * block[name] for width, block in zip(widths, blocks)) / sum(widths)
-    if set(claim) != set(found) or any(abs(claim[name] - found[name]) > SAME for name in found):
-        raise Refused(f"the blocks prove {found}, but the claim is {claim}")
+        proved[name] = sum(width * block[name] for width, block in zip(widths, blocks)) / sum(widths)
+    if set(claim) != set(proved) or any(abs(claim[name] - proved[name]) > SAME for name in proved):
+        raise Refused(f"the blocks prove {proved}, but the claim is {claim}")
     gaps = [played(policy, block) for block in blocks]
     deviation = math.sqrt(sum(gap * gap for gap in gaps) / len(gaps) / len(gaps))
     if abs(sum(gaps) / len(gaps)) > ERRORS * deviation + SAME:
@@ -106,5 +106,5 @@ def magnitude(value: float) -> int:
 def edge(i: int, side: int) -> float:
     """Return the left end (side -1) or right end (1) of the starts that are seen as the float32 number `i` from -0.6
     on."""
-    own, other = (-struct.unpack("f", struct.pack("I", magnitude(LOW) - j))[0] for j in (i, i + side))
-    return min(HIGH, max(LOW, (own + other) / 2))
+    here, there = (-struct.unpack("f", struct.pack("I", magnitude(LOW) - j))[0] for j in (i, i + side))
+    return min(HIGH, max(LOW, (here + there) / 2))

@@ -29,9 +29,9 @@ def check_content(content: dict) -> dict:
         raise Refused(f"the grid is {numbers.shape}, numbers are {numbers.min()} to {numbers.max()}")
     middle = (2 * (np.arange(n) + 0.5) / n - 1) * FASTEST
     starts = numbers[:, np.abs(middle) < 1.0]
-    found = {"n": n, "proved": int((starts != 0).sum()), "starts": starts.size, "longest": int(numbers.max())}
-    if claim != found:
-        raise Refused(f"the boxes prove {found}, but the claim is {claim}")
+    proved = {"n": n, "proved": int((starts != 0).sum()), "starts": starts.size, "longest": int(numbers.max())}
+    if claim != proved:
+        raise Refused(f"the boxes prove {proved}, but the claim is {claim}")
     angles = np.abs(np.pi * (2 * (np.arange(n) + 0.5) / n - 1))
     if (numbers[angles > 0.5] == -1).any():
         raise Refused("a box of the set is more than 0.5 rad from upright")
@@ -54,10 +54,10 @@ def check_row(policy: Policy, i: int, numbers: np.ndarray, worst: np.ndarray) ->
     boxes = np.flatnonzero(numbers)
     angle = (2 * np.array([i, i + 1]) / n - 1) * np.pi
     speed = (2 * np.stack([boxes, boxes + 1]) / n - 1) * FASTEST
-    allowed, found = np.maximum(numbers[boxes] - 1, 0), np.zeros(len(boxes), dtype=bool)
+    allowed, in_cell = np.maximum(numbers[boxes] - 1, 0), np.zeros(len(boxes), dtype=bool)
     for cell in range(len(policy.maps)):
         next_angle, next_speed, kept = policy.after(cell, angle, speed)
-        found[kept] = True
+        in_cell[kept] = True
         rows = np.floor((next_angle / np.pi + 1) * n / 2).astype(int)
         columns = np.floor((next_speed / FASTEST + 1) * n / 2).astype(int).clip(0, n - 1)
         rows -= rows[0] // n * n  # full turns
@@ -67,7 +67,7 @@ def check_row(policy: Policy, i: int, numbers: np.ndarray, worst: np.ndarray) ->
                 if (bad := worst[at] > allowed[kept]).any():
                     box = boxes[kept][bad][0]
                     raise Refused(f"box {i}, {box} has {numbers[box]}, but may lead to one with {worst[at][bad][0]}")
-    if not found.all():
+    if not in_cell.all():
         raise Refused(f"a box of row {i} is in no cell")
 
 
@@ -109,14 +109,14 @@ class Policy:
     def touches(self, cell: int, angle: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return which boxes (2, m) may hold a state that is nearest to the codeword of `cell`."""
         ranges = [ends + SIDES * FASTEST * SEEN for ends in (wave(1.0, 0.0, angle), wave(0.0, 1.0, angle), speed)]
-        found = np.ones(speed.shape[1], dtype=bool)
+        touched = np.ones(speed.shape[1], dtype=bool)
         for other in range(len(self.maps)):
             gap = 0.0
-            for values, own, rival, scale in zip(ranges, self.codewords[cell], self.codewords[other], self.scale):
-                ends = np.abs((values - own) / scale) ** self.power - np.abs((values - rival) / scale) ** self.power
-                gap = gap + ends.min(axis=0)
-            found &= (gap <= self.tie) | (other == cell)
-        return found
+            for values, codeword, rival, scale in zip(ranges, self.codewords[cell], self.codewords[other], self.scale):
+                near, far = (np.abs((values - place) / scale) ** self.power for place in (codeword, rival))
+                gap = gap + (near - far).min(axis=0)
+            touched &= (gap <= self.tie) | (other == cell)
+        return touched
 
 
 def wave(cosine: float, sine: float, angle: np.ndarray) -> np.ndarray:

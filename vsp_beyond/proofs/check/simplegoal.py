@@ -15,7 +15,7 @@ from .refused import Refused
 
 SQUARE = [(Fraction(x), Fraction(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 STRIDE, GOAL, PIT, N_STEPS = Fraction(1, 10), Fraction(1, 10), (Fraction(2, 5), Fraction(3, 5)), 50
-OWN = [(Fraction(1), Fraction(0), Fraction(0)), (Fraction(0), Fraction(1), Fraction(0))]  # the coordinates of a state
+AXES = [(Fraction(1), Fraction(0), Fraction(0)), (Fraction(0), Fraction(1), Fraction(0))]  # the coordinates of a state
 DOUBT = 1e-9  # relative to the numbers added up: far more than the rounding error
 SIDES = {"-": -1, "=": 0, "+": 1}
 
@@ -28,12 +28,12 @@ def check_content(content: dict) -> dict:
     for end, depth, area in followed(policy, corners, sorted((steps, end) for end, *steps in pieces), 0):
         areas[end] += area
         longest = max(longest, depth)
-    claim, found = content["claim"], {**{end: str(Fraction(area)) for end, area in areas.items()}, "longest": longest}
+    claim, proved = content["claim"], {**{end: str(Fraction(area)) for end, area in areas.items()}, "longest": longest}
     claimed = {name: str(Fraction(value)) for name, value in claim.items()}
     if sum(areas.values()) != 1:
         raise Refused(f"the pieces cover {float(sum(areas.values()))!r} of the square, expected all of it")
-    if claimed != {name: str(value) for name, value in found.items()}:
-        raise Refused(f"the pieces prove {found}, but the claim is {claim}")
+    if claimed != {name: str(value) for name, value in proved.items()}:
+        raise Refused(f"the pieces prove {proved}, but the claim is {claim}")
     return claim
 
 
@@ -74,9 +74,9 @@ class Form:
     def at(self, state) -> Fraction:
         """Return its value in a state."""
         *slopes, value = self.exact
-        for slope, one in zip(slopes, state):
+        for slope, coordinate in zip(slopes, state):
             if slope:
-                value += one if slope == 1 else slope * one
+                value += coordinate if slope == 1 else slope * coordinate
         return value
 
     def signs(self, polygon: list) -> list:
@@ -103,18 +103,18 @@ class Policy:
         self.codewords = [[Fraction(number) for number in codeword] for codeword in codewords]
         self.sizes = [float(s) for s in scale]
         self.rough = [[number / s for number, s in zip(codeword, scale)] for codeword in codewords]
-        self.maps = [[[Fraction(row[axis]) for row in one] for axis in (0, 1)] for one in coefficients]
+        self.maps = [[[Fraction(row[axis]) for row in rows] for axis in (0, 1)] for rows in coefficients]
 
     def step(self, polygons: list, step: str) -> list:
         """Return the parts of `polygons` that make this step, such as "3+=--", with the states after it."""
         number, limits, moves, stops, walls = self.plan(step)
         parts = [part for polygon in polygons for part in self.cell(polygon, number)]
-        for one in limits:
-            parts = limited(parts, *one)
-        parts = [moved(one, moves) for one in parts]
-        for one in stops:
-            parts = limited(parts, *one)
-        return [moved(one, walls) for one in parts] if walls else parts
+        for limit in limits:
+            parts = limited(parts, *limit)
+        parts = [moved(part, moves) for part in parts]
+        for stop in stops:
+            parts = limited(parts, *stop)
+        return [moved(part, walls) for part in parts] if walls else parts
 
     @cache  # noqa: B019 - it lives as long as the check
     def plan(self, step: str) -> tuple:
@@ -123,18 +123,18 @@ class Policy:
         if step[:-4] not in map(str, range(len(self.maps))):  # a cell has one spelling, so no start is counted twice
             raise Refused(f"a step is {step!r}, expected one in a cell from 0 to {len(self.maps) - 1}")
         number, sides = int(step[:-4]), [SIDES[sign] for sign in step[-4:]]
-        actions = [(0, 0, side) if side else one for one, side in zip(self.maps[number], sides)]
-        moves = [Form(*(a + STRIDE * b for a, b in zip(own, action))) for own, action in zip(OWN, actions)]
-        walls = [Form(0, 0, Fraction(side > 0)) if side else Form(*own) for own, side in zip(OWN, sides[2:])]
-        limits = [(*between(one, -1), side) for one, side in zip(self.maps[number], sides)]
-        stops = [(*between(own, 0), side) for own, side in zip(OWN, sides[2:])]
+        actions = [(0, 0, side) if side else form for form, side in zip(self.maps[number], sides)]
+        moves = [Form(*(a + STRIDE * b for a, b in zip(axis, action))) for axis, action in zip(AXES, actions)]
+        walls = [Form(0, 0, Fraction(side > 0)) if side else Form(*axis) for axis, side in zip(AXES, sides[2:])]
+        limits = [(*between(form, -1), side) for form, side in zip(self.maps[number], sides)]
+        stops = [(*between(axis, 0), side) for axis, side in zip(AXES, sides[2:])]
         return number, limits, moves, stops, walls if any(sides[2:]) else None
 
     def cell(self, polygon: list, number: int) -> list:
         """Return the convex parts of `polygon` in a cell."""
         parts = [polygon]
         for other in self.rivals(polygon, number):
-            parts = [part for one in parts for part in self.nearer(one, number, other)]
+            parts = [nearer for part in parts for nearer in self.nearer(part, number, other)]
         return parts
 
     def rivals(self, polygon: list, number: int) -> list[int]:
@@ -147,16 +147,16 @@ class Policy:
         if self.metric == "euclidean":
             return others
         ends = [(min(values) / s, max(values) / s) for values, s in zip(zip(*(p[2] for p in polygon)), self.sizes)]
-        own = [(abs(low - c), abs(high - c)) for (low, high), c in zip(ends, self.rough[number])]
-        found = []
+        at_ends = [(abs(low - c), abs(high - c)) for (low, high), c in zip(ends, self.rough[number])]
+        rivals = []
         for other in others:
             most, doubt = 0.0, DOUBT
-            for (low, high), (at_low, at_high), d in zip(ends, own, self.rough[other]):
+            for (low, high), (at_low, at_high), d in zip(ends, at_ends, self.rough[other]):
                 most += max(at_low - abs(low - d), at_high - abs(high - d))
                 doubt += DOUBT * (at_low + at_high + abs(d))
             if most >= -doubt:
-                found.append(other)
-        return found
+                rivals.append(other)
+        return rivals
 
     def nearer(self, polygon: list, number: int, other: int) -> list:
         """Return the convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
@@ -164,16 +164,16 @@ class Policy:
         if self.metric == "manhattan":  # between the coordinates of the codewords, distances are linear
             for axis in (0, 1):
                 for i in (number, other):
-                    (p, q, _), value = OWN[axis], self.codewords[i][axis]
-                    cut = [(halves(one, Form(p, q, -value)), at) for one, at in parts]
+                    (p, q, _), value = AXES[axis], self.codewords[i][axis]
+                    cut = [(halves(part, Form(p, q, -value)), at) for part, at in parts]
                     parts = [(half, (*at, side)) for both, at in cut for half, side in zip(both, (-1, 1)) if half]
-        found = []
-        for one, at in parts:
+        nearer = []
+        for part, at in parts:
             gap = self.gap(number, other, at)
-            tied = not any(gap.signs(one))
-            if half := (one if number < other else None) if tied else halves(one, gap)[0]:
-                found.append(half)
-        return found
+            tied = not any(gap.signs(part))
+            if half := (part if number < other else None) if tied else halves(part, gap)[0]:
+                nearer.append(half)
+        return nearer
 
     @cache  # noqa: B019 - it lives as long as the check
     def gap(self, number: int, other: int, at: tuple) -> Form:
@@ -202,9 +202,9 @@ def between(form, low: int) -> tuple[Form, Form]:
 def limited(polygons: list, above_low: Form, above_high: Form, side: int) -> list:
     """Return the parts below both (side -1), above both (side 1), or between (0)."""
     if side <= 0:
-        polygons = [part for one in polygons if (part := halves(one, above_low)[side + 1])]
+        polygons = [part for polygon in polygons if (part := halves(polygon, above_low)[side + 1])]
     if side >= 0:
-        polygons = [part for one in polygons if (part := halves(one, above_high)[side])]
+        polygons = [part for polygon in polygons if (part := halves(polygon, above_high)[side])]
     return polygons
 
 
@@ -231,14 +231,14 @@ def halves(polygon: list, form: Form) -> tuple[list | None, list | None]:
     if min(values) >= 0:
         return None, polygon
     low, high = [], []
-    for here, there, one, following in zip(values, values[1:] + values[:1], polygon, polygon[1:] + polygon[:1]):
+    for here, there, current, following in zip(values, values[1:] + values[:1], polygon, polygon[1:] + polygon[:1]):
         if here <= 0:
-            low.append(one)
+            low.append(current)
         if here >= 0:
-            high.append(one)
+            high.append(current)
         if here * there < 0:
             share = here / (here - there)
-            new = corner(*(tuple(p + share * (q - p) for p, q in zip(one[i], following[i])) for i in (0, 1)))
+            new = corner(*(tuple(p + share * (q - p) for p, q in zip(current[i], following[i])) for i in (0, 1)))
             low.append(new)
             high.append(new)
     return low, high
@@ -246,12 +246,12 @@ def halves(polygon: list, form: Form) -> tuple[list | None, list | None]:
 
 def area(polygons: list) -> Fraction:
     """The area of the starts."""
-    found = Fraction(0)
+    total = Fraction(0)
     for polygon in polygons:
         points = [start for start, _, _ in polygon]
-        found += sum(x * v - u * y for (x, y), (u, v) in zip(points, points[1:] + points[:1])) / 2
-    return found
+        total += sum(x * v - u * y for (x, y), (u, v) in zip(points, points[1:] + points[:1])) / 2
+    return total
 
 
-IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in OWN]  # inside, all of these are positive
-IN_PIT = [form for p, q, _ in OWN for form in (Form(p, q, -PIT[0]), Form(-p, -q, PIT[1]))]
+IN_GOAL = [Form(-p, -q, GOAL) for p, q, _ in AXES]  # inside, all of these are positive
+IN_PIT = [form for p, q, _ in AXES for form in (Form(p, q, -PIT[0]), Form(-p, -q, PIT[1]))]

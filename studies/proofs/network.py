@@ -1,4 +1,4 @@
-"""Prove for SimpleGoal's teacher, a ReLU network, what `robust` proves for a policy of linear maps.
+"""Prove for SimpleGoal's teacher, a ReLU network, what `vsp_beyond.proofs.robust` proves for a policy of linear maps.
 
 Over a box of states, every unit is an affine function of the state plus a bounded error. A ReLU that is on or off over
 the whole box adds no error. Otherwise it adds the error of the best line through its kink. (Affine arithmetic, as in
@@ -13,9 +13,8 @@ import numpy as np
 from vsp.checks import check_count
 from vsp.tasks.simplegoal import GOAL_EDGE, STRIDE, TASK
 from vsp.teachers.teacher import Teacher
-
-from .grid import steps_into
-from .robust import ROUNDING, way_to
+from vsp_beyond.proofs.grid import steps_into
+from vsp_beyond.proofs.robust import ROUNDING, way_to
 
 CHUNK = 8192  # boxes at a time: their units fit into a processor's cache
 BEND = 0.385  # half of the largest second derivative of tanh

@@ -16,8 +16,8 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.run import workers
 from vsp.tasks.mountaincar import FLAG, TASK
-
-from .mountaincar import LEFT, RIGHT, check_runnable
+from vsp_beyond.proofs.mountaincar import LEFT, RIGHT
+from vsp_beyond.proofs.proof import check_provable
 
 SWING = 0.0866  # rad per step, at the bottom: a velocity counts 1 / SWING times as much as a position
 BOTH = np.hypot(1.0, 1.0 / SWING)  # norm of an error of 1 in both coordinates
@@ -98,7 +98,7 @@ def prove_reals(policy: VoronoiPolicy, *, jobs: int | str = -1) -> list[Part]:
     `jobs` as in `vsp.run.workers`. Raises ValueError for a policy that is not made of linear
     maps and Euclidean cells for MountainCar.
     """
-    check_runnable(policy)
+    check_provable(policy, TASK, ["euclidean"])
     work = [(policy, low, high) for low, high in _cut(np.array([[LEFT, RIGHT]]), N_PARTS).tolist()]
     found = dict(workers.results(prove_part, work, "all starts", jobs=jobs, total=len(work), unit="parts"))
     return [found[i] for i in range(len(work))]

@@ -14,8 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
-
-from .simplegoal import Piece
+from vsp_beyond.proofs.simplegoal import Piece
 
 LAST = {GOAL: 10.0, PIT: -10.0, TRUNCATED: 0.0}
 MEAN_DISTANCE = (np.sqrt(2.0) + np.arcsinh(1.0)) / 3  # mean distance of the square's points from the origin

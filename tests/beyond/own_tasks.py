@@ -1,4 +1,4 @@
-"""Three environments as a reader would write them, each with a scripted pilot."""
+"""Two environments as a reader would write them, each with a scripted pilot."""
 
 import gymnasium
 import numpy as np
@@ -32,35 +32,10 @@ def dock_pilot(states):
     return np.clip(1.5 * (aim - place) - 1.8 * speed, -1, 1)
 
 
-class Arm(gymnasium.Env):
-    """Two joints, each with friction, reach a point. (angles, speeds, the point)"""
-
-    observation_space = gymnasium.spaces.Box(-10.0, 10.0, (6,), np.float32)
-    action_space = gymnasium.spaces.Box(-2.0, 2.0, (2,), np.float32)
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        goal = self.np_random.uniform(0.3, 1.2, size=2)
-        self.state = np.concatenate([goal + self.np_random.uniform(-1, 1, size=2), [0.0, 0.0], goal])
-        return self.state.astype(np.float32), {}
-
-    def step(self, action):
-        angles, speeds, goal = np.split(self.state, 3)
-        speeds = 0.9 * speeds + 0.1 * action
-        self.state = np.concatenate([angles + 0.1 * speeds, speeds, goal])
-        return self.state.astype(np.float32), -float(np.abs(angles - goal).sum()), False, False, {}
-
-
-def arm_pilot(states):
-    """A spring to the point, stiffer for the first joint, which is far from it."""
-    angles, speeds, goal = np.split(states, 3, axis=1)
-    return np.clip(np.array([8.0, 4.0]) * (goal - angles) - 2.0 * speeds, -2, 2)
-
-
 class Tank(gymnasium.Env):
     """A valve fills a tank that drains, the faster the fuller, up to a mark. (level, mark)"""
 
-    observation_space = gymnasium.spaces.Box(0.0, 2.0, (2,), np.float64)
+    observation_space = gymnasium.spaces.Box(0.0, 2.0, (2,), np.float32)
     action_space = gymnasium.spaces.Box(0.0, 1.0, (1,), np.float64)
 
     def reset(self, *, seed=None, options=None):
@@ -80,5 +55,5 @@ def tank_pilot(states):
     return np.clip(0.6 * np.sqrt(mark) + 3.0 * (mark - level), 0, 1)[:, None]
 
 
-for name, kind, steps in (("Dock-v0", Dock, 200), ("Arm-v0", Arm, 60), ("Tank-v0", Tank, 60)):
+for name, kind, steps in (("Dock-v0", Dock, 200), ("Tank-v0", Tank, 60)):
     gymnasium.register(name, entry_point=f"own_tasks:{kind.__name__}", max_episode_steps=steps)

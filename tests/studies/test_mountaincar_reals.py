@@ -4,9 +4,9 @@ from support import MOUNTAINCAR
 
 import vsp
 from studies import comparison
+from studies.proofs import mountaincar_reals
+from studies.proofs.mountaincar_reals import Loop, prove_part, started
 from vsp.tasks.mountaincar import TASK
-from vsp_beyond.proofs import mountaincar_reals
-from vsp_beyond.proofs.mountaincar_reals import Loop, prove_part, started
 
 CAR = vsp.VoronoiPolicy.load(comparison.RESULTS / f"limit_{MOUNTAINCAR}.policy")
 
