@@ -12,9 +12,7 @@ from studies.robots.actors import CLIP_SLOPE, SoftActor
 from studies.robots.choice import LONGER
 from studies.robots.further_training import train_further
 from studies.robots.settings import Walking
-from vsp.rollouts import rollout, visited_states
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
+from vsp import get_task, load_teacher, rollout, visited_states
 from vsp_beyond.few_cells.search import local_maps
 from vsp_beyond.few_cells.units import Scaling
 

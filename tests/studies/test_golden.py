@@ -20,14 +20,11 @@ from studies.comparison.methods import METHODS, OF_PRESET
 from studies.rivals import tdavq
 from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking
-from vsp import algorithms
+from vsp import algorithms, get_task
 from vsp.paper import beside
 from vsp.paper.runs import Experiment, Run
-from vsp.tasks.registry import get_task
+from vsp_beyond import Faithful, Tuned, at_the_limit, simplify
 from vsp_beyond.few_cells import limit
-from vsp_beyond.few_cells.config import Faithful, Tuned
-from vsp_beyond.few_cells.limit import at_the_limit
-from vsp_beyond.few_cells.simplification import simplify
 from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
 
