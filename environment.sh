@@ -25,7 +25,9 @@ if ! whole || test -e .venv/adding; then
   test ! -e .venv || echo '.venv is stale or not whole: it is made anew'
   echo "Setting up .venv with $python"
   rm -rf .venv && "$python" -m venv .venv
-  echo ../../../.. > "$(echo .venv/lib/python3*/site-packages)/vsp.pth" # relative: it is read in the locale's encoding
+  # Every Python of .venv finds the checkout and fixes its kernels as it starts; in ASCII, whatever the locale
+  fix='import sys; run = {}; exec(open(sys.prefix + "/../vsp/run/kernels.py").read(), run); run["fix"]()'
+  printf '%s\n' ../../../.. "$fix" > "$(echo .venv/lib/python3*/site-packages)/vsp.pth"
 fi
 for part in $(missing "$@"); do
   sed -n "/^## $part: /,/^## /p" environment.lock | tee .venv/adding | sed -n '1s/^## [a-z]*/Adding to .venv/p'

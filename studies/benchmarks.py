@@ -18,7 +18,7 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from vsp import geometry
-from vsp.run.machine import cpu_type
+from vsp.run import kernels
 from vsp_beyond.few_cells.search import CLIP_SLOPES, TEMPERATURES, whole_loss
 from vsp_beyond.few_cells.units import Cells, LabelledStates
 
@@ -99,7 +99,7 @@ def main() -> None:
     with threadpool_limits(1):
         for name, cases in (("lookup", look_ups), ("fits", evaluations)):
             frame = pd.DataFrame([{**about, "seconds": seconds(work)} for about, work in cases()])
-            write_results(frame.assign(machine=cpu_type()), name, out=out, float_format="%.4g")
+            write_results(frame.assign(machine=kernels.name()), name, out=out, float_format="%.4g")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,8 @@ from pathlib import Path
 
 import hypothesis
 import measured
-import pandas as pd
 import pytest
 from support import CurvedTeacher
-
-from vsp.run import listed
 
 hypothesis.settings.register_profile("vsp", derandomize=True, database=None, deadline=None, max_examples=60)
 hypothesis.settings.register_profile("many", parent=hypothesis.settings.get_profile("vsp"), max_examples=200)
@@ -58,15 +55,3 @@ def record(request, capsys):
         assert row["met"] == "yes" or why, text
 
     return record
-
-
-@pytest.fixture
-def keep(request):
-    """`keep(name, frame)` writes a table of its own, beside that of `record`."""
-
-    def keep(name: str, frame: pd.DataFrame) -> None:
-        if folder := request.config.getoption("record"):
-            text = frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
-            listed.write_listed(folder / f"{name}.csv", text)
-
-    return keep

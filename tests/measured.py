@@ -2,7 +2,7 @@
 
     python tests/measured.py build/measured data/results
 
-merges the tables of the first folder, where the tests write as they run, into those of the second. This waits until the
+merges the table of the first folder, where the tests write as they run, into that of the second. This waits until the
 tests have ended, because they compare what is made from data/results.
 """
 
@@ -13,17 +13,16 @@ from pathlib import Path
 
 import pandas as pd
 
-from vsp.run import listed
-from vsp.run.machine import cpu_type
+from vsp.run import kernels, listed
 
 COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
 TABLES = ["faults", "input", "same", "speed"]
 
 
 def machine() -> str:
-    """Processor, cores, memory and CPU type of this machine."""
+    """Processor, cores, memory and kernels of this machine."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
-    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({cpu_type()})"
+    return f"{_processor()}, {os.cpu_count()} cores, {memory:.0f} GB ({kernels.name()})"
 
 
 def _processor() -> str:
@@ -69,11 +68,7 @@ def merged(old: pd.DataFrame, new: pd.DataFrame) -> pd.DataFrame:
 
 def main() -> None:
     source, results = map(Path, sys.argv[1:])
-    for path in source.glob("*.csv"):
-        if path.name == "trust.csv":
-            write(results / path.name, merged(read(results / path.name), read(path)))
-        else:
-            listed.write_listed(results / path.name, listed.read_listed(path))
+    write(results / "trust.csv", merged(read(results / "trust.csv"), read(source / "trust.csv")))
 
 
 if __name__ == "__main__":

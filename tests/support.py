@@ -16,7 +16,6 @@ from vsp.geometry import nearest
 from vsp.partition import Partition
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
-from vsp.run.machine import cpu_type
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import Teacher
 
@@ -159,11 +158,6 @@ def distilled_elsewhere(task, *, teacher="shipped", config="paper", seed=0, ahea
 def threads(n):
     """The environment variables for n threads of everything that has any."""
     return {f"{name}_NUM_THREADS": str(n) for name in ("OMP", "OPENBLAS", "MKL", "VECLIB", "NUMEXPR")}
-
-
-def made_on() -> dict[str, str]:
-    """What golden numbers depend on. "AMD EPYC" alone would not do: some have AVX-512 and some have not."""
-    return {"cpu": cpu_type(), "numpy": np.__version__}
 
 
 def alive(pid: int) -> bool:

@@ -164,9 +164,6 @@ CASES = {
     "show.force_map": (on_axes(show.force_map), x_y | {"force": values_on_grid}),
     "show.grid": (show.grid, {"low": array(np.zeros(2), free=()), "high": array(np.ones(2), free=()), "resolution": n}),
     "show.histogram": (on_axes(show.histogram), {"returns": array(STATES[:, 0])}),
-    "show.learning_curve": (
-        on_axes(show.learning_curve), {"steps": array(STATES[:, 0], free=()), "means": array(STATES[:, 1], free=())},
-    ),
     "show.over_iterations": (on_axes(show.over_iterations, ylabel="cells"), {"values": array(STATES[:, 0])}),
     "show.run_means": (on_axes(show.run_means, teacher=0.5), {"means": array(STATES[:, 0])}),
 }  # fmt: skip

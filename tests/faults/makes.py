@@ -90,16 +90,10 @@ def until(condition, limit=60):
 
 def state_of_code() -> str:
     """Ten hexadecimal digits for all tracked files that decide the outputs, so that no result outlives its code."""
-    paths = [*ROOT.glob("vsp/**/*.py"), *ROOT.glob("notebooks/*.ipynb"), *ROOT.glob("data/[pt]*/**/MANIFEST.sha256")]
-    paths += [ROOT / "Makefile", ROOT / "environment.lock"]
+    parts = ("vsp", "vsp_beyond", "studies")
+    paths = [*(path for part in parts for path in ROOT.glob(f"{part}/**/*.py")), *ROOT.glob("notebooks/*.*")]
+    paths += [*ROOT.glob("data/**/MANIFEST.sha256"), ROOT / "Makefile", ROOT / "environment.lock"]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(paths))).hexdigest()[:10]
-
-
-def state_of_machinery() -> str:
-    """Ten hexadecimal digits for what decides what a kill leaves behind and what the next make does with it."""
-    paths = [ROOT / "Makefile", ROOT / "environment.sh", ROOT / "environment.lock", *sorted(ROOT.glob("vsp/run/*.py"))]
-    paths += [ROOT / "vsp" / "paper" / name for name in ("make_runs.py", "runs.py")]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()[:10]
 
 
 class Reference:
@@ -110,8 +104,7 @@ class Reference:
 
     def __init__(self, folder: Path):
         self.out, self.kept, self.note = folder / "out", folder / "reference", folder / "reference.json"
-        shown = hashlib.sha256((ROOT / "data" / "results" / "MANIFEST.sha256").read_bytes()).hexdigest()
-        if not self.note.exists() or json.loads(self.note.read_text())["shown"] != shown:
+        if not self.note.exists():
             for left in (self.out, self.kept):
                 shutil.rmtree(left, ignore_errors=True)
             make = figures(self.out)
@@ -119,7 +112,7 @@ class Reference:
             self.out.rename(self.kept)
             seconds = time.monotonic() - make.began
             took = {name: int(s) for name, s in re.findall(r"^(\w+)\.ipynb: done in (\d+) s", make.said, re.M)}
-            self.note.write_text(json.dumps({"seconds": seconds, "notebooks": took, "shown": shown}))
+            self.note.write_text(json.dumps({"seconds": seconds, "notebooks": took}))
         noted = json.loads(self.note.read_text())
         self.seconds, self.notebooks, self.tree = noted["seconds"], noted["notebooks"], tree(self.kept)
 
@@ -128,32 +121,5 @@ class Reference:
         shutil.rmtree(self.out, ignore_errors=True)
         shutil.copytree(self.kept, self.out)
         for name in without:
-            (self.out / "figures" / "executed" / f"{name}.ipynb").unlink()
+            next((self.out / "figures").rglob(f"executed/{name}.ipynb")).unlink()
         return self.out
-
-
-def lend_environment(checkout: Path) -> None:
-    """A .venv for a copy of the checkout: links to the files of ours, in a minute less than a new one takes."""
-    ours, theirs = ROOT / ".venv", checkout / ".venv"
-    packages = next(ours.glob("lib/python3*/site-packages"))
-    for folder in (ours, ours / "bin", packages):
-        there = theirs / folder.relative_to(ours)
-        there.mkdir(parents=True, exist_ok=True)
-        for path in folder.iterdir():
-            if path.name not in ("bin", "lib", "lib64", "note", "parts", "packages"):
-                (there / path.name).symlink_to(
-                    os.readlink(path) if path.name.startswith("python") and path.is_symlink() else path
-                )
-    for name in ("parts", "packages"):
-        shutil.copy(ours / name, theirs / name)
-    lock, _, *python = (ours / "note").read_text(encoding="utf-8").splitlines(keepends=True)
-    (theirs / "note").write_text("".join([lock, f"{checkout.resolve()}\n", *python]), encoding="utf-8")
-
-
-def copy_checkout(folder: Path) -> Path:
-    """All that git tracks, in `folder`."""
-    names = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT).decode().split("\0")
-    for name in filter(None, names):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, folder / name)
-    return folder

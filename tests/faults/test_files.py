@@ -6,23 +6,20 @@ import io
 import json
 import pickle
 import shutil
-import tracemalloc
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import measured
 import numpy as np
 import pytest
 import yaml
 from support import SIMPLEGOAL, TINY, CurvedTeacher
 
 import vsp
-from studies.comparison import read_rows
 from studies.comparison.rows import Job, make_row
-from vsp.paper import printed, results, runs
+from vsp.paper import results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
 from vsp.run.listed import MANIFEST, list_folder, read_carded, read_listed, read_table
@@ -82,19 +79,6 @@ def course(folder: Path) -> Path:
     return folder / "build" / "course" / build.MADE
 
 
-def figures(folder: Path) -> Path:
-    measured.add(folder / "trust.csv", measured.row("input", "a row", 1, "of 1", at_least=1))
-    return folder / "trust.csv"
-
-
-def of_paper(path: Path) -> object:
-    """What the module of printed values makes of a file in another folder."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(printed, "FOLDER", path.parent)
-        printed._parse.cache_clear()
-        return printed.printed_spread(SIMPLEGOAL)
-
-
 def of_study(path: Path) -> object:
     return results.read_results(path.stem, path.parent)
 
@@ -109,14 +93,7 @@ KINDS = {
     "weights without a manifest": Kind(  # whose checksum is on the card
         copied(WEIGHTS, CARD, manifest=False), vsp.load_teacher, tuple(one for one in PARSERS if one != "json.loads")
     ),
-    "numbers of the paper": Kind(copied("paper/spread.csv"), of_paper),
     "results of a study": Kind(copied("results/readings.csv"), of_study),
-    "results of the comparison": Kind(
-        copied(f"beyond/methods_{SIMPLEGOAL}.csv"), lambda path: read_rows(SIMPLEGOAL, path.parent)
-    ),
-    "summary of the runs": Kind(copied(f"results/{SIMPLEGOAL}.csv"), of_study),
-    "type of processor": Kind(copied("results/made_on.txt"), read_listed),
-    "measured figures": Kind(figures, read_table),
     "what the course has made": Kind(course, read_sealed),
 }
 TALLY = {}  # kind: refused, tried
@@ -163,23 +140,8 @@ def test_a_damaged_file_is_refused_before_it_is_parsed(name, tmp_path, monkeypat
     assert all(found)
 
 
-def test_of_a_damaged_manifest_the_named_file_is_refused(tmp_path):
-    folder = tmp_path / "results"
-    shutil.copytree(results.RESULTS, folder)
-    manifest, found = folder / MANIFEST, []
-    content = manifest.read_bytes()
-    names = [line.split()[1].decode() for line in content.splitlines()]
-    assert all(read_listed(folder / name) for name in names)
-    for place, damaged in damage(content):
-        manifest.write_bytes(damaged)
-        path = folder / names[content[:place].count(b"\n")]
-        found.append(refused(partial(read_listed, path)))
-    TALLY["manifest"] = sum(found), len(found)
-    assert all(found)
-
-
 def test_all_damage_is_refused(record):
-    assert TALLY.keys() == {*KINDS, "manifest"}, "the tests above did not all run"
+    assert TALLY.keys() == KINDS.keys(), "the tests above did not all run"
     good, tried = np.sum(list(TALLY.values()), axis=0)
     what = f"bit flips and truncations, {len(TALLY)} kinds of data file"
     record("input", what, good, f"of {tried}", at_least=tried, note="refused before they are parsed")
@@ -219,7 +181,7 @@ def notebook(parameters: str, **metadata) -> bytes:
     return nbformat.writes(nbformat.v4.new_notebook(cells=[cell], metadata=metadata)).encode()
 
 
-SUFFIXES = ("run", "row", "policy", "pt", "safetensors", "json", "csv", "zip", "yaml", "ipynb", "npz", "txt", "made")
+SUFFIXES = ("run", "pt", "safetensors", "json", "csv", "zip", "ipynb", "npz")
 
 
 def payloads(mark: Path, agent: bytes) -> dict[str, bytes]:
@@ -235,29 +197,21 @@ def payloads(mark: Path, agent: bytes) -> dict[str, bytes]:
     with zipfile.ZipFile(io.BytesIO(agent)) as archive:
         parts = {name.replace(".", "__"): archive.read(name) for name in archive.namelist()}
     about = {**json.loads(parts["data"]), "policy_class": {":type:": "x", ":serialized:": text}}
-    kwargs = {**about, "policy_kwargs": {":type:": "dict", ":serialized:": text}}
     card = {"task": SIMPLEGOAL, "sha256": hashlib.sha256(raw).hexdigest(), ":serialized:": text, "yaml": tag}
     found = {f"raw.{suffix}": raw for suffix in SUFFIXES} | {
         f"torch.{suffix}": saved for suffix in ("pt", "zip", "run")
     }
     found |= {
         "data.zip": as_zip(**parts | {"data": json.dumps(about).encode()}),
-        "kwargs.zip": as_zip(**parts | {"data": json.dumps(kwargs).encode()}),
-        "pickled_data.zip": as_zip(**parts | {"data": raw}),
         "policy.zip": as_zip(**parts | {"policy__pth": raw}),
-        "policy_torch.zip": as_zip(**parts | {"policy__pth": saved}),
         "variables.zip": as_zip(**parts | {"pytorch_variables__pth": saved}),
         "optimizer.zip": as_zip(**parts | {"actor__optimizer__pth": raw, "critic__optimizer__pth": saved}),
         "objects.npy": by(np.save, objects, allow_pickle=True),
         "objects.npz": by(lambda file: np.savez(file, codewords=objects)),
-        "objects.zip": by(lambda file: np.savez(file, data=objects)),
         "tag.yaml": tag.encode(),
-        "tag.json": json.dumps(tag).encode(),
-        "tag.ipynb": tag.encode(),
         "table.csv": f'key,settings,code,failing\n"{tag}",{text},{text},1\n'.encode(),
         "card.json": json.dumps(card).encode(),
         "card.safetensors": raw,
-        "metadata.ipynb": notebook("out = ''", vsp=tag, papermill={"parameters": tag, "state": text}),
         "parameters.ipynb": notebook(f"out = open({str(mark)!r}, 'w')"),
         "expression.ipynb": notebook(f"out = ''\n[open({str(mark)!r}, 'w')]"),
         "kernel.ipynb": notebook("out = ''", kernelspec={"name": tag, "display_name": tag, "argv": [tag]}),
@@ -322,7 +276,7 @@ def test_no_payload_runs(agent, tmp_path, listed, record):
     if listed:
         what = "files with pickles, YAML tags or code, through every loader"
         record("input", what, harmless, f"of {len(made)}", at_least=len(made), note="no code was run")
-    assert harmless == len(made) >= 20
+    assert harmless == len(made) >= 15
 
 
 def test_the_payloads_are_live(agent, tmp_path):
@@ -343,42 +297,3 @@ def test_the_payloads_are_live(agent, tmp_path):
         attack()
         assert mark.exists()
         mark.unlink()
-
-
-@pytest.mark.parametrize("member", ["data", "policy.pth"])
-def test_a_zip_that_claims_10_gb_is_refused(agent, tmp_path, member):
-    path = tmp_path / "claims.zip"
-    with zipfile.ZipFile(io.BytesIO(agent)) as old, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as new:
-        for name in old.namelist():
-            new.writestr(name, old.read(name))
-        new.getinfo(member).file_size = 10 * 2**30
-    with pytest.raises(DamagedFile, match="107374[0-9]* bytes unpacked, expected at most "):
-        vsp.load_teacher(path, SIMPLEGOAL)
-
-
-@pytest.mark.parametrize("deep", [False, True])
-def test_a_zip_that_unpacks_to_1_gb_is_refused(agent, tmp_path, deep):
-    """Whether the zip itself is one of zeros, or the zip in it that holds the tensors."""
-    path, zeros = tmp_path / "bomb.zip", bytes(2**24)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("data", "{}")
-        if not deep:
-            with archive.open("policy.pth", "w", force_zip64=True) as file:
-                for _ in range(64):
-                    file.write(zeros)
-        else:
-            inner = io.BytesIO()
-            with (
-                zipfile.ZipFile(inner, "w", zipfile.ZIP_DEFLATED) as tensors,
-                tensors.open("x/data.pkl", "w", force_zip64=True) as file,
-            ):
-                for _ in range(64):
-                    file.write(zeros)
-            archive.writestr("policy.pth", inner.getvalue())
-    tracemalloc.start()
-    try:
-        with pytest.raises(DamagedFile, match="107374[0-9]* bytes unpacked, expected at most "):
-            vsp.load_teacher(path, SIMPLEGOAL)
-        assert tracemalloc.get_traced_memory()[1] < 1.5e9
-    finally:
-        tracemalloc.stop()

@@ -6,29 +6,20 @@ import subprocess
 import sys
 from pathlib import Path
 
-TESTS = Path(__file__).parents[1]
+import pytest
+
+WHAT = {
+    "test_properties.py": "bad arguments of the public functions of a reader",
+    "test_codewords.py": "codewords: one, two, collinear, nearly equal, a grid, d = 1 to 8, permuted",
+}
 
 
-def with_many_cases(file: str) -> tuple[int, str]:
-    """How many of its tests passed with the profile that has 200 cases, and the last line of what pytest says."""
+@pytest.mark.parametrize("file", WHAT)
+def test_many_cases(record, file):
     command = [sys.executable, "-m", "pytest", "-q", "--hypothesis-profile=many", file]
-    done = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, env=os.environ | {"MPLBACKEND": "Agg"})
+    folder, environment = Path(__file__).parents[1], os.environ | {"MPLBACKEND": "Agg"}
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=environment)
     last = done.stdout.strip().splitlines()[-1]
-    return (int(re.search(r"(\d+) passed", last)[1]) if done.returncode == 0 else 0), last
-
-
-def test_properties_of_public_functions(record):
-    sys.path.insert(0, str(TESTS))
-    from test_properties import CASES
-
-    passed, last = with_many_cases("test_properties.py")
-    what, n = "bad arguments of the public functions of a reader", len(CASES)
-    note = "a typed error, never a silent result; each argument spoilt in every way" if passed else last
-    record("input", what, n if passed else 0, f"of {n} functions", at_least=n, note=note)
-
-
-def test_codewords(record):
-    passed, last = with_many_cases("test_codewords.py")
-    what = "codewords: one, two, collinear, nearly equal, a grid, d = 1 to 8, permuted"
-    note = "no crash, symmetric; up to 200 cases each" if passed else last
-    record("input", what, passed, f"of {passed} tests", at_least=max(passed, 1), note=note)
+    passed, failed = (int((re.search(rf"(\d+) {word}", last) or [0, 0])[1]) for word in ("passed", "failed"))
+    note = "up to 200 cases each" if not failed else last
+    record("input", WHAT[file], passed, f"of {passed + failed} tests", at_least=max(passed + failed, 1), note=note)

@@ -1,10 +1,31 @@
 """Commands as a user gives them, each in a process of its own."""
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 from subprocess import PIPE
 
+import pytest
+from support import write_story
+
 from vsp.run.atomic import ROOT
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "run"))
+from test_kernels import FIXED, PROBE, caller, needs_avx2  # noqa: F401 (caller is a fixture)
+
+
+@needs_avx2
+@pytest.mark.parametrize("how", ["papermill", "run_notebook"])
+def test_the_kernel_of_a_notebook_is_fixed_whatever_a_caller_sets(tmp_path, caller, how):  # noqa: F811
+    story = write_story(tmp_path, PROBE)
+    command = [sys.executable, "-m", "vsp.run.run_notebook", story, "--out", tmp_path]
+    if how == "papermill":
+        (tmp_path / "figures/executed").mkdir(parents=True)
+        command = [sys.executable, "-m", "papermill", story, tmp_path / "figures/executed/story.ipynb"]
+    subprocess.run(command, cwd=ROOT, env=caller, check=True, capture_output=True)
+    cells = json.loads((tmp_path / "figures/executed/story.ipynb").read_text("utf-8"))["cells"]
+    assert json.loads("".join(cells[-1]["outputs"][0]["text"])) == FIXED
 
 
 def test_one_runs_by_plain_papermill_from_the_root(tmp_path):

@@ -10,7 +10,6 @@ import pytest
 from support import alive, until
 from support import write_story as write
 
-from vsp.run import run_notebook
 from vsp.run.atomic import ROOT
 
 DRAW = """\
@@ -64,20 +63,6 @@ def test_end_by_signal_ends_kernel(tmp_path):
     assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
 
 
-def test_a_killed_kernel_ends_the_other_notebooks_of_this_make(tmp_path):
-    """Which make would wait for, however long."""
-    started = "(Path(out).parents[3] / 'started').touch()\nimport time\ntime.sleep(120)"
-    other = write(tmp_path, DRAW, started).rename(tmp_path / "other.ipynb")
-    command = [sys.executable, "-m", "vsp.run.run_notebook", other, "--out", tmp_path]
-    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
-    until((tmp_path / "started").exists)
-    killed = write(tmp_path, DRAW, "import os\nos.kill(os.getpid(), 9)")
-    with pytest.raises(SystemExit) as end:
-        run_notebook.main([str(killed), "--out", str(tmp_path)])
-    assert "did not end: DeadKernelError" in end.value.code
-    assert "other.ipynb: interrupted" in process.communicate(timeout=30)[1]
-
-
 def test_an_end_by_signal_ends_the_workers_too(tmp_path):
     """Else they would wait for ever, with open pipes, to hand over their next run.
 
@@ -118,5 +103,5 @@ list(results(wait, [(np.zeros(10**6), n) for n in range(4)], "work", jobs=2, tot
     process.wait()
     left = [*Path("/dev/shm").glob(f"joblib*_{process.pid}_*"), *(tmp_path / "tmp").iterdir()]
     for semaphore in Path("/dev/shm").glob(f"sem.loky-{process.pid}-*"):
-        semaphore.unlink()  # as `locks` does for a command that holds a lock
+        semaphore.unlink()
     assert left == []

@@ -5,9 +5,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL
 
 from vsp.paper import audit
 from vsp.paper import printed as printed_module
-from vsp.paper.audit import findings, protocol
-from vsp.paper.audit import policies as printed_policies
-from vsp.paper.printed import _read, linear_policies, printed_values, published_policy
+from vsp.paper.printed import _read, linear_policies, printed_values
 from vsp.paper.statistics import Part, least_std, mean_range, quarters, remaining_mean, remaining_std
 
 TASK = {"sg": SIMPLEGOAL, "mc": MOUNTAINCAR}
@@ -23,16 +21,11 @@ VERDICTS = {
     "Shares and moments of outliers": HOLDS,
     "Numbers printed twice": HOLDS,
     "Returns within the limits of the tasks": HOLDS,
-    "SimpleGoal: the similar spread and the slight decrease, by the table": OPEN,
     "T3 and T4: coefficients rounded to four digits": CONTRADICTS,
-    "T3: a row without x, a codeword in the pit": OPEN,
-    "T4: colours against the force": OPEN,
     "T3: pairs closer than the thresholds": OPEN,
     "T4: pairs closer than the thresholds": OPEN,
-    "T3 and T4: outputs beyond the limits of actions": OPEN,
     "Dimensions of states and actions": CONTRADICTS,
     "MountainCar: truncation": OPEN,
-    "Training steps: a dot for thousands, elsewhere for decimals": OPEN,
     "Which iterations may change the partition": CONTRADICTS,
 }
 IN_DOUBT = {
@@ -90,13 +83,6 @@ def test_what_is_in_doubt_exists(found):
     assert IN_DOUBT <= set(printed_values()["id"])
 
 
-def test_frame(found):
-    frame = audit.audit_table(list(found.values()))
-    assert frame.columns.tolist() == ["number", "finding", "printed", "arithmetic", "verdict"]
-    assert frame["number"].tolist() == list(range(1, len(VERDICTS) + 1))
-    assert frame["finding"].tolist() == list(VERDICTS) and frame["verdict"].tolist() == list(VERDICTS.values())
-
-
 @pytest.mark.parametrize(
     ("title", "numbers"),
     [
@@ -106,7 +92,6 @@ def test_frame(found):
             "SimpleGoal: coverage and outliers of the distilled policies",
             ["86.98 %", "86.17 %", "1175", "80000 episodes", "68933", "73933"],
         ),
-        ("SimpleGoal: coverage and outliers of the distilled policies", ["std 1.491 (1.633", "std 2.754 (1.647"]),
         ("Coverage and moments of the other columns", ["1 - 24/1000 = 97.6 %", "1 - 3130/40000 = 92.175 %"]),
         ("Coverage and moments of the other columns", ["1 - 0/1000 = 100 %", "mean 16.801 (", "std 2.737 ("]),
         # (94.130 - 93.313)/4 = 0.20425; 93.313 + 1.5 * 0.20425 = 93.619375; 93.403 - 1.5 * 0.145 = 93.1855
@@ -124,23 +109,13 @@ def test_frame(found):
         ("Shares and moments of outliers", ["2291/3130 = 73.195 %", "839/3130 = 26.805 %", "of at most 0.204"]),
         ("Numbers printed twice", ["26 of 26"]),
         ("Returns within the limits of the tasks", ["= 23.142", "22.798", "16.599 of 16.65", "71.050"]),
-        # 8.436/3.117 = 2.706; 5.348/4.145 = 1.290; 16.599 - 12.657 = 3.942; 16.956 - 15.382 = 1.574
-        (
-            "SimpleGoal: the similar spread and the slight decrease, by the table",
-            ["2.71", "1.29", "3.942", "1.26 std", "23.7 %", "1.574"],
-        ),
         # 13 * 2 + 13 * 6 - 2 numbers in T3, 32 * 5 in T4
         ("T3 and T4: coefficients rounded to four digits", ["Of 262 numbers 6 have 4 decimals (all 2 to 4)"]),
-        ("T3: a row without x, a codeword in the pit", ["1 of 13 rows", "1 of 13 codewords"]),
-        ("T4: colours against the force", ["LimeGreen 0.804 to 1.000", "Goldenrod and LimeGreen", "Violet -0.629"]),
         # |0.891 - 0.826| + |0.628 - 0.460| = 0.065 + 0.168 = 0.233
         ("T3: pairs closer than the thresholds", ["of 78 pairs", "manhattan: 1 (rows 1-2)", "euclidean: 12 ("]),
         ("T4: pairs closer than the thresholds", ["of 496 pairs", "manhattan: 8 (", "neighbours: 4 (rows 3-8,"]),
-        # row 2 of T3, second output: -1.087 * 0.826 - 1.370 * 0.460 - 0.319 = -1.847
-        ("T3 and T4: outputs beyond the limits of actions", ["9 of 26", "1.847", "10 of 32", "1.011"]),
         ("Dimensions of states and actions", ["[2, 2]", "[2, 1]"]),
         ("MountainCar: truncation", ["1000 and 999", "71.050"]),
-        ("Training steps: a dot for thousands, elsewhere for decimals", ["500 steps, 10 episodes", "not 500000"]),
         ("Which iterations may change the partition", ["4000, 1000, 5000 - 20 = 4980", "1600, 400, 2000 - 50 = 1950"]),
     ],
 )
@@ -164,19 +139,13 @@ QUARTILES = {f"mc_spread_ours_{name}": text for name, text in QUARTILES.items()}
         ("The same rule for outliers in every column", {"sg_drl_outliers_max": "8.0"}, HOLDS),
         ("SimpleGoal: what the teacher's outliers are", {"sg_drl_outliers_std": "4.5"}, OPEN),
         ("Shares and moments of outliers", {"mc_ours_outliers_below_share": "73.25"}, CONTRADICTS),
-        ("Shares and moments of outliers", {"mc_ours_outliers_above_std": "0.3"}, CONTRADICTS),
         ("Numbers printed twice", {"sg_ours_mean": "12.658"}, CONTRADICTS),
-        ("Numbers printed twice", {"mc_cells": "31"}, CONTRADICTS),
-        ("Numbers printed twice", {"sg_spread_drl_iqr": "4.2"}, CONTRADICTS),
         ("Returns within the limits of the tasks", {"sg_spread_ours_max": "23.2"}, CONTRADICTS),
-        ("Returns within the limits of the tasks", {"sg_spread_drl_mean": "16.7"}, CONTRADICTS),
-        ("Returns within the limits of the tasks", {"mc_spread_ours_min": "-5"}, CONTRADICTS),
         ("MountainCar: truncation", {"mc_max_steps": "999"}, HOLDS),
-        ("Training steps: a dot for thousands, elsewhere for decimals", {"sg_training_steps": "500000"}, HOLDS),
     ],
 )
 def test_another_number_another_verdict(found, alter, title, numbers, verdict):
-    check = dict(zip(found, findings._CHECKS))[title]
+    check = dict(zip(found, audit.CHECKS))[title]
     alter(numbers)
     finding = check()
     assert finding.title == title and finding.verdict == verdict != VERDICTS[title]
@@ -187,18 +156,15 @@ def test_other_tables_other_verdicts(monkeypatch):
     def put(name, other):
         monkeypatch.setattr(printed_module, name, lambda *task: other)
 
-    values, policies, published = printed_values(), linear_policies(MOUNTAINCAR), published_policy(MOUNTAINCAR)
+    values, policies = printed_values(), linear_policies(MOUNTAINCAR)
     cells = values["id"].str.contains("_cell_")
     values.loc[cells, "paper"] = values.loc[cells, "value"].map("{:.4f}".format)
     put("printed_values", values)
-    assert printed_policies.printed_digits().verdict == HOLDS
+    assert audit.printed_digits().verdict == HOLDS
     put("linear_policies", policies.assign(G_printed=policies["F_printed"]))
-    assert printed_policies.dimensions().verdict == HOLDS
-    put("published_policy", published)
-    put("linear_policies", policies.replace("LimeGreen", "Goldenrod"))
-    assert printed_policies.mountaincar_colours().verdict == HOLDS
+    assert audit.dimensions().verdict == HOLDS
     put("printed_hyperparameters", {"n_epochs": 8, "n_split": 4, "n_freeze": 4})
-    assert protocol.frozen_iterations().verdict == HOLDS
+    assert audit.frozen_iterations().verdict == HOLDS
 
 
 # Rounding of the printed values decides nothing
@@ -207,14 +173,6 @@ def test_other_tables_other_verdicts(monkeypatch):
 def corners(numbers):
     """Every way to be half a unit of the third decimal beside each of `numbers`."""
     return itertools.product(*((number - 0.0005, number + 0.0005) for number in numbers))
-
-
-@pytest.mark.parametrize(("n", "possible"), [(80_000, False), (85_000, True)])
-def test_rounding_does_not_decide_on_the_coverage(n, possible):
-    for mean, std, out_mean, out_std in corners([12.657, 8.436, -8.042, 1.830]):
-        out = [Part(11067, out_mean, out_std, -11.79, 1.192)]
-        groups = quarters(n, [1.192, 12.298, 15.382, 17.646, 22.798], below=11067)
-        assert (remaining_std(n, mean, std, out) >= least_std(remaining_mean(n, mean, out), groups) + 0.05) == possible
 
 
 def test_rounding_does_not_decide_on_the_quartiles():

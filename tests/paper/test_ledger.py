@@ -21,7 +21,7 @@ from vsp.paper.statistics import interval
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.run.notebook import nbformat
-from vsp.tasks import mountaincar, registry, simplegoal
+from vsp.tasks import registry, simplegoal
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 from vsp.tasks.registry import _TASKS, get_task
 
@@ -71,12 +71,6 @@ def test_every_printed_value_has_one_row_a_verdict_and_a_cell(book):
     assert book.columns.tolist() == ledger.COLUMNS
 
 
-def test_every_result_of_text_and_tables_is_computed_here(book, results):
-    ids = set(book["id"][book["id"].str.contains(RESULT)])
-    computed = [ledger.measured(task, results[task], n_resamples=2).index for task in TASKS]
-    assert not ids.difference(*computed, ledger._settings(results))
-
-
 def test_the_values_that_nothing_here_compares_with_are_these(book):
     rows = book[book["here"].isna() & ~book["id"].str.contains("_cell_|_outliers_")]
     assert rows["id"].tolist() == [
@@ -85,17 +79,6 @@ def test_the_values_that_nothing_here_compares_with_are_these(book):
     ]  # fmt: skip
     assert set(rows["verdict"]) == {UNCHECKED, CONTRADICTED}
     assert set(book[book["id"].str.contains("_cell_")]["verdict"]) == {UNCHECKED}
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_what_text_and_table_print_is_one_result(book, by_id, task):
-    shown = set(results_of(book, task)["id"])
-    text = by_id.index[by_id.index.str.match(f"{PREFIX[task]}_(drl|ours)_")]
-    twins = {id: f"{id[:2]}_spread{id[2:]}" for id in text}
-    for id, twin in twins.items():
-        assert (id in shown) != (twin in shown)
-        if twin in by_id.index:
-            assert by_id.loc[id, ["here", "low", "high"]].equals(by_id.loc[twin, ["here", "low", "high"]])
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -110,15 +93,6 @@ def test_results_of_a_task_are_there_once_the_teachers_first(book, task):
     text = rows["id"][~rows["id"].str.contains("_spread_")]
     assert len(rows) == 2 * 9 + len(text) and f"{PREFIX[task]}_cells" in set(text)
     assert len(text) == {SIMPLEGOAL: 5 + 5, MOUNTAINCAR: 1 + 9}[task] + 1  # what the text says of outliers
-
-
-def test_parts_are_settings_results_and_coefficients(book):
-    """A result is something with an interval, or something of which nothing was there to be measured."""
-    results = book[book["part"] == "results"]
-    assert (results["low"].notna() == results["here"].notna()).all()
-    assert book[book["part"] != "results"]["low"].isna().all() and book["low"].isna().equals(book["high"].isna())
-    assert (book["part"].eq("coefficients") == book["id"].str.contains("_cell_")).all()
-    assert set(book["part"]) == {"settings", "results", "coefficients"}
 
 
 def test_counts_by_hand():
@@ -143,22 +117,13 @@ def test_cells_are_cells_of_the_notebooks_that_hold_code(book):
         assert id in cells[number], place
 
 
-@pytest.mark.parametrize(
-    ("cell", "ids"),
-    [
-        ("04, text-numbers", ["sg_ours_mean", "mc_drl_outliers"]),
-        ("04, simplegoal-spread", ["sg_spread_drl_q1"]),
-        ("04, mountaincar-spread", ["mc_spread_ours_coverage"]),
-        ("04, hyperparameters", ["mc_hyper_n_split"]),
-        ("03, runs", ["sg_caption_policies", "mc_text_drl_episodes"]),
-        ("03, best", ["sg_caption_cells", "mc_cells"]),
-        ("05, replay", ["mc_cell_1_F_x"]),
-        ("05, ledger", ["sg_goal_reward", "state_dimensions"]),
-        ("01, scores", ["sg_training_steps"]),
-    ],
-)
-def test_cells_by_hand(cell, ids):
-    assert {ledger.cell(id) for id in ids} == {cell}
+def test_cells_by_hand():
+    cells = {
+        "sg_ours_mean": "04, text-numbers", "sg_spread_drl_q1": "04, simplegoal-spread",
+        "mc_hyper_n_split": "04, hyperparameters", "mc_text_drl_episodes": "03, runs", "sg_caption_cells": "03, best",
+        "mc_cell_1_F_x": "05, replay", "sg_goal_reward": "05, ledger", "sg_training_steps": "01, scores",
+    }  # fmt: skip
+    assert {id: ledger.cell(id) for id in cells} == cells
 
 
 # The rules
@@ -175,42 +140,24 @@ ROOT2 = np.sqrt(2)
 @pytest.mark.parametrize(
     ("row", "expected"),
     [
-        (row("M2", np.nan, value=np.nan), UNCHECKED),
         (row("13", np.nan), UNCHECKED),
-        (row("1000", 1000.0), REPRODUCED),
-        (row("1000", 999.0), DIFFERS),
         (row("0.1", 0.1 + 1e-12), REPRODUCED),  # a setting found by taking a step
         (row("0.1", 0.1001), DIFFERS),
-        (row("0", 0.0), REPRODUCED),
-        (row("-0.1", 0.1), DIFFERS),
-        (row("no", 0.0, 0.0, 0.0, value=0.0), REPRODUCED),
         (row("no", 1.0, 0.0, 1.0, value=0.0), REPRODUCED),
         # the interval [9, 12] of 10.00 reaches from 10 - √2 to 10 + 2 √2, and half a unit of 0.001 further
         (row("8.586", 10.0, 9.0, 12.0), REPRODUCED),
         (row("8.585", 10.0, 9.0, 12.0), DIFFERS),
         (row("12.828", 10.0, 9.0, 12.0), REPRODUCED),
         (row("12.829", 10.0, 9.0, 12.0), DIFFERS),
-        (row("9", 10.0, 9.0, 12.0), REPRODUCED),
-        (row("8", 10.0, 9.0, 12.0), DIFFERS),  # up to 8.086 without decimals
-        (row("12.9%", 10.0, 9.0, 12.0), DIFFERS),  # 12.85 and more, against 12.828
         (row("12.8%", 10.0, 9.0, 12.0), REPRODUCED),
         # no width: half a unit alone
         (row("10.00", 10.004, 10.004, 10.004), REPRODUCED),
         (row("10.00", 10.006, 10.006, 10.006), DIFFERS),
-        (row("10.0", 10.006, 10.006, 10.006), REPRODUCED),
-        (row("-11.790", -10.0, -10.5, -9.0), DIFFERS),
     ],
 )
 def test_verdicts_by_hand(row, expected):
     assert verdict(row) == expected
     assert verdict(row, in_doubt=True) == CONTRADICTED
-
-
-@pytest.mark.parametrize(
-    ("printed", "unit"), [("12.30", 0.01), ("86.17%", 0.01), ("100", 1), ("100%", 1), ("-10.0", 0.1), ("no", 1)]
-)
-def test_the_last_digit_by_hand(printed, unit):
-    assert ledger.last_digit(printed) == pytest.approx(unit)
 
 
 def test_verdicts_of_the_book_are_those_of_the_rules(book):
@@ -252,19 +199,12 @@ def differing(results):
     ("change", "expected"),
     [
         (lambda patch: patch(simplegoal, "GOAL_EDGE", 0.12), ["sg_goal_x_high", "sg_goal_y_high"]),
-        (lambda patch: patch(simplegoal, "PIT_LOW", 0.3), ["sg_pit_x_low", "sg_pit_y_low"]),
-        (lambda patch: alter(patch, SIMPLEGOAL, max_steps=51), ["sg_max_steps"]),
-        (lambda patch: alter(patch, MOUNTAINCAR, high=np.array([0.6, 0.08])), ["mc_velocity_high"]),
         (
             lambda patch: alter(patch, SIMPLEGOAL, step=partial(simplegoal.step, goal_reward="add")),
             ["sg_goal_reward", "sg_pit_reward"],
         ),
-        (
-            lambda patch: alter(patch, MOUNTAINCAR, step=lambda s, a: cost_of_the_cube(s, a)),
-            ["mc_force_reward_exponent"],
-        ),
     ],
-    ids=["goal", "pit", "steps", "box", "reward", "cost"],
+    ids=["goal", "reward"],
 )
 def test_another_setting_differs(results, monkeypatch, change, expected):
     """What is compared is what the code does: rewards are found by taking a step."""
@@ -275,11 +215,6 @@ def test_another_setting_differs(results, monkeypatch, change, expected):
 
 def alter(patch, task, **changes):
     patch(registry, "_TASKS", _TASKS | {task: dataclasses.replace(get_task(task), **changes)})
-
-
-def cost_of_the_cube(states, actions):
-    moved, rewards, codes = mountaincar.step(states, actions)
-    return moved, np.where(codes == GOAL, 100.0, 0.0) - 0.1 * np.abs(actions[:, 0]) ** 3, codes
 
 
 # Results
@@ -316,17 +251,6 @@ def test_intervals_resample_runs_and_for_the_teacher_starts(results, task):
     assert frame.loc[f"{prefix}_ours_mean"].tolist() == frame.loc[f"{prefix}_spread_ours_mean"].tolist()
 
 
-def test_more_resamples_change_the_intervals_alone(book, results):
-    more = ledger.ledger_table(results, n_resamples=90)
-    same = ["id", "task", "where", "quantity", "subject", "paper", "here", "cell"]
-    assert as_bytes(more[same]) == as_bytes(book[same]) and not more["low"].equals(book["low"])
-
-
-def test_the_same_results_give_the_same_rows(book, results):
-    again = ledger.ledger_table(dict(reversed(results.items())), n_resamples=N_RESAMPLES)
-    assert as_bytes(again) == as_bytes(book)
-
-
 # Made by hand
 
 
@@ -336,7 +260,7 @@ def run(seed, returns, *, codes=None, cells=1, validation=0.0):
     codewords = np.linspace(0.0, 0.9, cells)[:, None] * np.ones(2)
     policy = VoronoiPolicy(codewords, np.zeros((cells, 3, 2)), task=SIMPLEGOAL)
     played = Outcomes(returns, np.ones(len(returns), dtype=int), codes)
-    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0, "a processor")
+    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0)
 
 
 TEACHER = Outcomes(np.array([5.0, 5.0, 5.0, 1.0]), np.ones(4, dtype=int), np.array([GOAL, GOAL, GOAL, TRUNCATED]))
@@ -372,14 +296,6 @@ def test_what_the_paper_leaves_out_by_hand():
     }  # fmt: skip
 
 
-def test_a_tie_beats_nobody():
-    same = dataclasses.replace(BY_HAND, runs=[run(0, TEACHER.returns), run(1, TEACHER.returns)])
-    here = ledger.left_out_by_quartiles(same, n_resamples=5)["here"]
-    assert (
-        here["probability that a run beats its teacher"] == here["probability that an episode beats the teacher's"] == 0
-    )
-
-
 @pytest.mark.parametrize("task", TASKS)
 def test_what_the_paper_leaves_out_has_its_intervals(results, task):
     frame, means = ledger.left_out_by_quartiles(results[task], n_resamples=500), results[task].returns.mean(axis=1)
@@ -392,14 +308,6 @@ def test_what_the_paper_leaves_out_has_its_intervals(results, task):
     assert found[["here", "low", "high"]].tolist() == pytest.approx([trim_mean(means, 0.25), *expected])
     fewer = ledger.left_out_by_quartiles(results[task], n_resamples=60)
     assert fewer["here"].equals(frame["here"]) and not fewer[["low", "high"]].equals(frame[["low", "high"]])
-
-
-def test_the_cells_of_the_best_run_are_those_of_the_best_on_the_validation_starts():
-    here, low, high = ledger._best_cells(BY_HAND)
-    assert here == 5 and low < 5 and high == 5  # runs 1, 2, 0, 3 in this order, of 5, 4, 3, 9 cells
-    draws = np.random.default_rng(0).integers(4, size=(10_000, 4))
-    best = [{1: 5, 2: 4, 0: 3, 3: 9}[min(drawn, key=[1, 2, 0, 3].index)] for drawn in draws]
-    assert (low, high) == tuple(np.percentile(best, [2.5, 97.5]))
 
 
 # Gaps
@@ -448,11 +356,3 @@ def test_what_lies_inside_the_band_is_reproduced(here, below, above, number, dig
         assert found == REPRODUCED
     if abs(gap) > 1.001 * ROOT2 + 1:
         assert found == DIFFERS
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_gaps_of_the_book(book, task):
-    found, shown = largest_gaps(results_of(book, task)), results_of(book, task)
-    compared = shown[shown["low"].notna()]
-    assert len(found) == len(compared) > 18 and found.index.is_unique
-    assert found["verdict"].tolist() == compared["verdict"].tolist()

@@ -41,12 +41,6 @@ def test_hyperparameters():
     assert type(printed_hyperparameters(SIMPLEGOAL)["n_epochs"]) is int
 
 
-def test_value():
-    text = printed_text_numbers()["value"].dropna()
-    assert {id: printed_value(id) for id in text.index} == text.to_dict()
-    assert (printed_value("sg_text_policies"), printed_value("mc_text_policies")) == (40, 85)  # the text swaps them
-
-
 def test_text_numbers_are_what_is_printed():
     frame = printed_text_numbers()
     assert not (frame[["task", "quantity", "subject", "printed", "where"]] == "").any(axis=None)
@@ -57,13 +51,6 @@ def test_text_numbers_are_what_is_printed():
         else:
             assert row["value"] == spelled.get(id) or row["value"] == float(row["printed"].rstrip("%")), id
         assert (row["unit"] == "percent") == row["printed"].endswith("%"), id
-
-
-def test_text_numbers_of_one_task():
-    frame = printed_text_numbers(SIMPLEGOAL)
-    assert set(frame["task"]) == {SIMPLEGOAL, "both"}
-    both = (frame["task"] == "both").sum()
-    assert len(frame) + len(printed_text_numbers(MOUNTAINCAR)) - both == len(printed_text_numbers()) == 99
 
 
 def test_tdavq_comparison():
@@ -113,14 +100,6 @@ def test_every_printed_value_is_there_once(printed):
     assert kinds.value_counts().to_dict() == {"text": 99, "spread": 2 * 2 * 9, "hyper": 2 * 9, "cell": coefficients}
 
 
-def test_values_of_text_and_captions_are_among_the_printed(printed):
-    text = printed_text_numbers()
-    rows = printed.loc[text.index]
-    assert rows["paper"].tolist() == text["printed"].tolist() and rows["where"].tolist() == text["where"].tolist()
-    assert np.array_equal(rows["value"], text["value"], equal_nan=True)
-    assert rows[["task", "quantity", "subject"]].equals(text[["task", "quantity", "subject"]])
-
-
 @pytest.mark.parametrize(("task", "prefix"), [(SIMPLEGOAL, "sg"), (MOUNTAINCAR, "mc")])
 def test_values_of_the_tables_are_among_the_printed(printed, task, prefix):
     for subject, who in (("drl", "DRL"), ("ours", "Ours")):
@@ -156,11 +135,6 @@ def test_printed_values_keep_the_papers_digits(printed):
     }  # fmt: skip
     assert {id: printed.at[id, "paper"] for id in spelled} == spelled
     assert printed.index[printed["value"].isna()].tolist() == ["machine_chip", "pytorch_version", "python_version"]
-
-
-def test_ids_of_the_spread_tables():
-    assert printed_module.spread_id(SIMPLEGOAL, "ours", "Median/Q2") == "sg_spread_ours_median"
-    assert printed_module.spread_id(MOUNTAINCAR, "drl", "Coverage") == "mc_spread_drl_coverage"
 
 
 def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():

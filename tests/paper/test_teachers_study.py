@@ -6,10 +6,9 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, tiny
 
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import runs
-from vsp.paper.beside import teacher_data
-from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, load_runs, paper_experiment
 from vsp.paper.studies import teachers as teachers_module
+from vsp.paper.studies.simpler import teacher_data
 from vsp.paper.studies.teachers import experiments, linear_error, study, teacher_summary, teachers, variance_shares
 from vsp.tasks import base
 from vsp.teachers.teacher import SHIPPED, load_teacher
@@ -41,11 +40,6 @@ def test_shares_by_hand():
     assert found["share"] == pytest.approx(between / (between + 17 / 3))
 
 
-def test_a_share_is_cut_at_zero():
-    found = shares([[1, 3], [3, 1], [2, 2]])
-    assert (found["between"], found["share"]) == (0, 0) and found["within"] == pytest.approx(4 / 3)
-
-
 def test_groups_without_spread_have_no_share():
     with pytest.raises(ValueError, match="no variance within the groups, expected values that differ"):
         shares([[1, 1], [2, 2]])
@@ -58,7 +52,7 @@ def test_the_interval_of_the_share_holds_the_truth():
     assert all(0 <= one["share_low"] <= one["share"] <= one["share_high"] <= 1 for one in found)
 
 
-@pytest.mark.parametrize("groups", ["aab", "aabbb", "aaaa", "abc"])
+@pytest.mark.parametrize("groups", ["aab", "aaaa", "abc"])
 def test_groups_are_of_one_size(groups):
     with pytest.raises(ValueError, match="sizes of the groups are {'a': .*expected two or more groups of one size"):
         variance_shares(pd.Series(np.arange(float(len(groups)))), pd.Series(list(groups)))
@@ -154,11 +148,3 @@ def test_the_summary_by_hand():
     assert found.columns.tolist() == ["task", *columns]
     assert found.loc["b", columns].tolist() == pytest.approx([9, 0.5, 5, 1, 5, 2**0.5, 11.5, 0.25])
     assert found.loc["a", columns].tolist() == [8, 0.3, 7, 2, 1, 0, 4, 0]
-
-
-def test_the_committed_study_can_be_taken_apart():
-    frame = read_results("teachers")
-    for _, rows in frame.groupby("task"):
-        found = variance_shares(rows["mean"] - rows["teacher_mean"], rows["teacher"])
-        assert 0 <= found["share_low"] <= found["share"] <= found["share_high"] <= 1
-    assert teacher_summary(frame)["teacher"].tolist() == [name for task in TASKS for name in teachers(task)]

@@ -1,7 +1,5 @@
 """Sealed files come back exactly, or are refused before anything is parsed."""
 
-import os
-
 import numpy as np
 import pytest
 
@@ -32,21 +30,14 @@ def test_one_flipped_bit_or_another_length_is_found(tmp_path):
     save_arrays(path, ARRAYS, ABOUT)
     content = path.read_bytes()
     flipped = [bytes([*content[:n], content[n] ^ 1 << n % 8, *content[n + 1 :]]) for n in range(len(content))]
-    cut = [content[:n] for n in (0, 1, 63, 64, 65, 66, 200, len(content) - 1)]
-    for damaged in [*flipped, *cut, content + b"\0"]:
+    cut = [content[:n] for n in (0, 64, 65, 66, len(content) - 1)]
+    for damaged in [*flipped, *cut, content + b"\0", b"of another origin"]:
         path.write_bytes(damaged)
         with pytest.raises(
             DamagedFile, match="x: damaged.* SHA-256 is [0-9a-f]{64}, its first line .*delete it"
         ) as found:
             load_arrays(path, kind="Thing")
         assert "\n" not in str(found.value)
-
-
-@pytest.mark.parametrize("content", [b"hello", b"{}", os.urandom(5000), b"PK\x03\x04" + bytes(100)])
-def test_a_file_of_another_origin_is_refused(tmp_path, content):
-    (tmp_path / "x").write_bytes(content)
-    with pytest.raises(DamagedFile):
-        load_arrays(tmp_path / "x", kind="Thing")
 
 
 def test_another_kind_is_named(tmp_path):
@@ -66,14 +57,11 @@ def safetensors(about: str) -> bytes:
     [
         b"",
         b"\x80\x04N.",
-        b"\xff" * 8,
-        (2).to_bytes(8, "little") + b"{}",
         (2).to_bytes(8, "little") + b"[]",
-        safetensors("[]"),
         safetensors("null"),
         safetensors("[" * 100_000),
     ],
-    ids=range(8),
+    ids=range(5),
 )
 def test_a_seal_alone_does_not_make_a_file_ours(tmp_path, payload):
     write_sealed(tmp_path / "x", payload)

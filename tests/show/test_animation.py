@@ -1,7 +1,6 @@
 import base64
 import functools
 import html
-import io
 import re
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
-from vsp.show.animation import Stage, png, save_frames
+from vsp.show.animation import Stage, save_frames
 from vsp.show.style import panels
 
 mpl.use("Agg")
@@ -57,26 +56,6 @@ def test_what_fails_is_not_in_the_next_shot():
     assert np.array_equal(theatre.shoot(lambda: None), plain)
 
 
-def test_a_shot_is_the_figure_drawn_in_full():
-    """Two routes, but for the edges of the axes' lines, which a shot draws twice."""
-    theatre, axes = stage()
-    shot = theatre.shoot(lambda: axes[0].plot([0.1, 0.9], [0.1, 0.9], lw=5))
-    other, (left, _) = stage()
-    left.plot([0.1, 0.9], [0.1, 0.9], lw=5)
-    other.stand()
-    assert (other.shoot(lambda: None) != shot).any(axis=2).mean() < 0.01
-    assert (theatre.shoot(lambda: None) != shot).any(axis=2).mean() > 0.01
-
-
-def test_what_lies_on_top_does_not_depend_on_the_order_of_painting():
-    def paint(order):
-        for colour in order:
-            axes[0].fill_between([0, 1], 0, 1, color=colour, zorder={"red": 2, "blue": 3}[colour])
-
-    theatre, axes = stage()
-    assert np.array_equal(theatre.shoot(lambda: paint(["red", "blue"])), theatre.shoot(lambda: paint(["blue", "red"])))
-
-
 def test_a_quick_run_is_marked_on_every_shot():
     (plain, _), (marked, _) = stage(), stage()
     marked.watermark()
@@ -91,14 +70,6 @@ def test_a_quick_run_is_marked_on_every_shot():
         for one, axes in ((covered, left), (hidden, right))
     )
     assert (over != under).any()  # on top of what is painted
-
-
-def test_a_png_has_the_pixels_and_no_date():
-    image = np.random.default_rng(0).integers(256, size=(30, 40, 3), dtype=np.uint8)
-    image //= 128  # few colours: none is lost
-    found = png(image)
-    assert np.array_equal(np.asarray(Image.open(io.BytesIO(found)).convert("RGB")), image)
-    assert b"tIME" not in found and b"tEXt" not in found
 
 
 def frames():

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import support
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 
 from studies.comparison import measure, rows
@@ -21,15 +20,16 @@ from studies.rivals import tdavq
 from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking
 from vsp import algorithms, get_task
-from vsp.paper import beside
 from vsp.paper.runs import Experiment, Run
+from vsp.paper.studies import simpler
+from vsp.run import kernels
 from vsp_beyond import Faithful, Tuned, at_the_limit, simplify
 from vsp_beyond.few_cells import limit
 from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "methods.json"
-# Of actions on another type of processor, where sums are rounded differently. There a split or a long descent may go
+# Of actions where kernels are not fixed, so that sums are rounded differently. There a split or a long descent may go
 # elsewhere; so of the sensitive methods the median difference is compared
 TOLERANCE, LOOSE = 1e-6, 0.1
 SENSITIVE = [
@@ -115,8 +115,8 @@ def by_simplest():
 def beside_a_run():
     one = Experiment(SIMPLEGOAL, tiny(n_epochs=30, n_freeze=5), TEACHERS[SIMPLEGOAL], n_episodes=20)
     policy, _ = algorithms.distill(one.teacher, get_task(SIMPLEGOAL), one.config, seed=0)
-    run = Run(0, policy, None, 0.0, np.zeros(1), 0, 0, "")
-    return {kind: actions(fitted, SIMPLEGOAL) for kind, fitted in beside.fit(one, run).items()}
+    run = Run(0, policy, None, 0.0, np.zeros(1), 0, 0)
+    return {kind: actions(fitted, SIMPLEGOAL) for kind, fitted in simpler.fit(one, run).items()}
 
 
 def by_measure():
@@ -145,7 +145,7 @@ CASES = {
     if method.table != "demanded" and method.sizes != OF_PRESET and name not in UNGUARDED
 } | {
     "simplest": (by_simplest, rows.SIMPLIFY_VERSION),
-    "beside": (beside_a_run, beside.VERSION),
+    "beside": (beside_a_run, simpler.VERSION),
     "measure": (by_measure, measure.VERSION),
     "best returns": (by_best_policies, rows.OPTIMUM_VERSION),
     "at the limit": (by_limit, limit.VERSION),
@@ -163,12 +163,12 @@ def test_results_are_those_of_the_version(name, request):
     make, version = CASES[name]
     found, every = json.loads(json.dumps(make())), json.loads(GOLDEN.read_text(encoding="utf-8"))
     if request.config.getoption("--remake-golden") and version > every.get(name, {"version": 0})["version"]:
-        every[name] = {"version": version, "made on": support.made_on(), "found": found}
+        every[name] = {"version": version, "found": found}
         lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
         GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     kept = every[name]
     within = (LOOSE, np.median) if name in SENSITIVE else (TOLERANCE, np.max)
-    if kept["made on"] == support.made_on() and "trained further" not in name:  # torch differs within a type
+    if kernels.fixed() and "trained further" not in name:  # torch has kernels of its own
         within = 0, np.max
     advice = f"it differs from version {kept['version']}: raise the version of {name} and run with --remake-golden"
     assert version == kept["version"] and close(found, kept["found"], *within), advice

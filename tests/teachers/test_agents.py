@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from support import PENDULUM, SIMPLEGOAL, CurvedTeacher
+from support import PENDULUM, SIMPLEGOAL, CurvedTeacher, tiny
 
-import vsp_beyond
+import vsp
 from vsp.teachers.agents import agent
 
 STATES = np.random.default_rng(0).random((50, 2))
@@ -15,8 +15,8 @@ def straight(obs):
 def test_a_function_is_a_teacher():
     actions, state = agent(straight).predict(STATES)
     assert state is None and np.array_equal(actions, np.full((50, 2), -0.5))
-    policy = vsp_beyond.tuned(agent(straight), SIMPLEGOAL, vsp_beyond.Tuned(n_cells=1, n_generations=0).quick(), seed=0)
-    assert np.allclose(policy.predict(STATES)[0], -0.5, atol=1e-6)
+    policy, _ = vsp.distill(agent(straight), SIMPLEGOAL, tiny(initial="zeros", n_epochs=400), seed=0)
+    assert np.allclose(policy.predict(STATES)[0], -0.5, atol=0.1)
 
 
 def test_what_predicts_is_asked_as_it_is():
@@ -24,7 +24,7 @@ def test_what_predicts_is_asked_as_it_is():
     assert np.array_equal(one.predict(STATES)[0], CurvedTeacher().predict(STATES)[0]) and agent(one) is one
 
 
-@pytest.mark.parametrize("algorithm", ["PPO", "SAC", "TD3"])
+@pytest.mark.parametrize("algorithm", ["PPO", "TD3"])
 def test_agents_of_stable_baselines_act_without_dice(algorithm):
     import stable_baselines3
 

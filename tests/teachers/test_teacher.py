@@ -50,9 +50,7 @@ def layer(inputs, outputs, weight=0.0):
     ("weights", "message"),
     [
         (layer(3, 2), "3 inputs and 2 outputs, SimpleGoal-v0 has 2 and 2"),
-        (layer(2, 1), "2 inputs and 1 outputs, SimpleGoal-v0 has 2 and 2"),
         ({}, r"expected the tensors of a TD3 or DDPG actor"),
-        ({"mu.weight": layer(2, 2)["mu.0.weight"]}, r"expected the tensors of a TD3 or DDPG actor"),
         ({"mu.0.weight": layer(2, 2)["mu.0.weight"]}, "mu.0.bias"),
         (layer(2, 2, np.nan), "nan.*expected finite"),
         ({**layer(2, 2), "mu.0.bias": np.full(2, 1e300)}, r"mu.0.bias hold 1e\+300, expected .* at most 1000000"),
@@ -83,7 +81,7 @@ def test_a_path_loads_as_the_name_does(copied):
     assert own.digest == shipped.digest == load_teacher(str(copied), SIMPLEGOAL).digest and own.task is shipped.task
 
 
-@pytest.mark.parametrize("position", [0, 9, 1000, 700_000, -1])
+@pytest.mark.parametrize("position", [0, 1000, -1])
 def test_damaged_weights_are_refused(copied, position):
     content = copied.read_bytes()
     altered = bytearray(content)
@@ -104,22 +102,10 @@ def test_missing_weights_or_card_are_named(copied, tmp_path):
         load_teacher(tmp_path / "agent.zip", SIMPLEGOAL)
 
 
-def test_a_teacher_of_another_task_is_refused(copied):
-    with pytest.raises(ValueError, match="2 inputs and 2 outputs, MountainCarContinuous-v0 has 2 and 1"):
-        load_teacher(copied, MOUNTAINCAR)
-
-
-@pytest.mark.parametrize("card", [{}, {"task": "SimpelGoal-v0"}, {"task": None}])
-def test_a_card_without_a_known_task_is_one_clear_error(copied, card):
-    listed.write_carded(copied, copied.read_bytes(), card)
+def test_a_card_without_a_known_task_is_one_clear_error(copied):
+    listed.write_carded(copied, copied.read_bytes(), {"task": "SimpelGoal-v0"})
     with pytest.raises(ValueError, match="task"):
         load_teacher(copied)
-
-
-def test_sealed_bytes_that_are_no_safetensors_are_refused(tmp_path):
-    listed.write_carded(tmp_path / "x.safetensors", b"not tensors", {"task": SIMPLEGOAL})
-    with pytest.raises(DamagedFile, match="x.safetensors"):
-        load_teacher(tmp_path / "x.safetensors")
 
 
 # Zips of Stable-Baselines3
@@ -130,11 +116,11 @@ def agents(tmp_path_factory):
     """Untrained agents, by name, and the zips that Stable-Baselines3 saved."""
     import gymnasium
     import torch
-    from stable_baselines3 import DDPG, PPO, SAC, TD3
+    from stable_baselines3 import DDPG, SAC, TD3
 
     def untrained(algorithm, task=SIMPLEGOAL, **network):
-        memory = {} if algorithm is PPO else {"buffer_size": 10}
-        return algorithm("MlpPolicy", gymnasium.make(task), seed=0, policy_kwargs=network, device="cpu", **memory)
+        about = {"seed": 0, "device": "cpu", "buffer_size": 10}
+        return algorithm("MlpPolicy", gymnasium.make(task), policy_kwargs=network, **about)
 
     folder, small = tmp_path_factory.mktemp("agents"), {"net_arch": [16, 12]}
     made = {
@@ -145,16 +131,13 @@ def agents(tmp_path_factory):
         "tanh": untrained(TD3, **small, activation_fn=torch.nn.Tanh),
         "leaky": untrained(TD3, **small, activation_fn=torch.nn.LeakyReLU),
         "sac": untrained(SAC, **small),
-        "ppo": untrained(PPO, **small),
     }
     for name, agent in made.items():
         agent.save(folder / f"{name}.zip")
     return made, folder
 
 
-@pytest.mark.parametrize(
-    ("name", "task"), [("td3", SIMPLEGOAL), ("small", SIMPLEGOAL), ("car", MOUNTAINCAR), ("ddpg", SIMPLEGOAL)]
-)
+@pytest.mark.parametrize(("name", "task"), [("td3", SIMPLEGOAL), ("car", MOUNTAINCAR), ("ddpg", SIMPLEGOAL)])
 def test_a_zip_predicts_as_stable_baselines_does(agents, name, task):
     made, folder = agents
     teacher = load_teacher(folder / f"{name}.zip", task)
@@ -170,10 +153,8 @@ def test_a_zip_predicts_as_stable_baselines_does(agents, name, task):
     [
         ("td3", None, "name the task of the agent"),
         ("td3", MOUNTAINCAR, "2 inputs and 2 outputs, MountainCarContinuous-v0 has 2 and 1"),
-        ("td3", "SimpelGoal-v0", "did you mean"),
         ("tanh", SIMPLEGOAL, "activation is .*Tanh.*, expected ReLU"),
         ("leaky", SIMPLEGOAL, "activation is .*LeakyReLU.*, expected ReLU"),
-        ("ppo", SIMPLEGOAL, "expected the tensors of a TD3 or DDPG actor"),
         ("sac", SIMPLEGOAL, "expected the tensors of a TD3 or DDPG actor"),
     ],
 )
@@ -239,11 +220,8 @@ def test_a_payload_in_the_data_of_a_zip_is_not_run(agents, tmp_path):
 
 @pytest.mark.parametrize(
     "parts",
-    [
-        {"data": None}, {"data": b"{"}, {"data": b"[]"}, {"data": b"3"},
-        {"policy_pth": None}, {"policy_pth": b""}, {"policy_pth": b"zzz"},
-    ],
-)  # fmt: skip
+    [{"data": None}, {"data": b"[]"}, {"policy_pth": b"zzz"}],
+)
 def test_a_zip_without_its_parts_is_refused(agents, tmp_path, parts):
     with pytest.raises(DamagedFile, match="x.zip"):
         load_teacher(rewritten(agents[1] / "small.zip", tmp_path / "x.zip", **parts), SIMPLEGOAL)
@@ -334,22 +312,6 @@ def test_an_altered_description_of_the_tensors_is_refused_or_harmless(agents, tm
             assert np.isfinite(load_teacher(bad, SIMPLEGOAL).predict(np.ones((1, 2)))[0]).all()
 
 
-def test_a_damaged_zip_is_refused_or_harmless(agents, tmp_path):
-    """Truncated: refused. One bit: refused with a clear error, or outside what is read and without effect."""
-    content, path = (agents[1] / "small.zip").read_bytes(), tmp_path / "x.zip"
-    expected = load_teacher(agents[1] / "small.zip", SIMPLEGOAL).digest
-    for size in np.linspace(0, len(content) - 1, 12, dtype=int):
-        path.write_bytes(content[:size])
-        with pytest.raises(DamagedFile):
-            load_teacher(path, SIMPLEGOAL)
-    for position in np.linspace(0, len(content) - 1, 400, dtype=int):
-        path.write_bytes(content[:position] + bytes([content[position] ^ 1 << position % 8]) + content[position + 1 :])
-        try:
-            assert load_teacher(path, SIMPLEGOAL).digest == expected, position
-        except ValueError as error:
-            assert "x.zip" in str(error), position
-
-
 # Criticality
 
 
@@ -369,11 +331,6 @@ def test_criticality_is_the_value_of_the_own_action_over_that_of_the_worst():
     assert np.array_equal(flat.criticality(states), np.zeros(3)) and flat.criticality(states).dtype == np.float64
 
 
-def test_without_critics_criticality_is_not_known():
-    with pytest.raises(ValueError, match="no critics, expected qf0.0.weight"):
-        linear_agent().criticality(np.zeros((1, 2)))
-
-
 def test_the_value_of_an_action_is_that_of_the_lower_critic():
     states, actions = np.array([[0.2, 0.4], [0.5, 0.5]]), np.array([[0.5, -1.0], [0.0, 0.25]])
     both = linear_agent(qf0=[0, 0, 2, -1], qf1=[1, 0, 0, 0])  # 2 a - b and x
@@ -389,9 +346,3 @@ def test_values_are_of_actions_in_the_units_of_the_task():
     actor = {"mu.0.weight": np.zeros((1, 2)), "mu.0.bias": np.zeros(1)}
     critic = {"qf0.0.weight": np.array([[0.0, 0.0, 1.0]]), "qf0.0.bias": np.zeros(1)}
     assert Teacher(actor, task, critic=critic).value(np.zeros((3, 2)), [[2.0], [4.0], [5.0]]).tolist() == [-1, 0, 0.5]
-
-
-def test_criticality_of_a_shipped_teacher():
-    """Beside the pit a wrong action costs the way into it; far from it, hardly more than time."""
-    near, far = load_teacher(SIMPLEGOAL).criticality(np.array([[0.35, 0.5], [0.9, 0.05]]))
-    assert near > far > 0

@@ -1,7 +1,6 @@
 """The reproduction of the paper: its printed values, the rerun and its tables, the ledger, the audit, the studies."""
 
 from .audit import audit_findings, audit_table, mean_inside
-from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison
 from .ledger import N_RESAMPLES, largest_gaps, ledger_table, left_out_by_quartiles, results_of, verdict_counts
 from .printed import (
     SHORT,
@@ -13,8 +12,8 @@ from .printed import (
     printed_value,
     published_policy,
 )
+from .results import read_results
 from .runs import EVALUATION_SEED, N_EPISODES, paper_results
-from .shown import show_table
 from .statistics import interval, quartiles_from_fences, spread
 from .tables import (
     equation_table,
@@ -23,6 +22,7 @@ from .tables import (
     run_overview,
     save_table,
     show_policy,
+    show_table,
     spread_table,
     teacher_beside_runs,
     text_number_table,

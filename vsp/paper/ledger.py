@@ -20,12 +20,11 @@ from __future__ import annotations
 
 from functools import partial
 
-import gymnasium
 import numpy as np
 import pandas as pd
 
 from ..config import paper_preset
-from ..tasks import base, registry, simplegoal
+from ..tasks import base, mountaincar, registry, simplegoal
 from . import audit, printed
 from .runs import SHARES, Results
 from .statistics import interval, outlier_numbers, resample, share_interval, spread
@@ -49,9 +48,9 @@ def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES)
     `here` is the rerun's value, NaN where there is none; `low` and `high` are NaN for settings. Column `cell` names the
     notebook and the cell that computes it.
     """
-    found = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"]).assign(low=np.nan, high=np.nan)
-    parts = [found, *(measured(task, result, n_resamples=n_resamples) for task, result in results.items())]
-    frame = printed.printed_values().join(pd.concat(parts), on="id")
+    settings = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"])
+    parts = [measured(task, result, n_resamples=n_resamples) for task, result in results.items()]
+    frame = printed.printed_values().join(pd.concat([settings, *parts]), on="id")
     doubted = audit.in_doubt()
     frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
     frame["wide"] = _wide(frame)
@@ -94,27 +93,20 @@ def last_digit(printed: str) -> float:
 
 def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
     """Return the rerun's results under the ids of the paper's values: columns here, low, high (95 %)."""
-    rows = {}
+    rows, prefix = {}, printed.PREFIX[task]
     for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
         here = outlier_numbers(returns) | spread(returns)
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
-        fewest, most = bounds["outliers"]
-        bounds["outliers"] = np.floor(fewest), np.ceil(most)
+        bounds["outliers"] = np.floor(bounds["outliers"].iloc[0]), np.ceil(bounds["outliers"].iloc[1])
         for name in bounds.columns.intersection(list(here)):
-            known = not np.isnan(here[name])  # an empty set of outliers has no mean
-            row = (here[name], *bounds[name]) if known else (np.nan, np.nan, np.nan)
-            rows[f"{printed.PREFIX[task]}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
-    cells = _best_cells(result)
-    rows |= {f"{printed.PREFIX[task]}_{name}": cells for name in ("cells", "caption_cells")}
-    return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
-
-
-def _best_cells(result: Results) -> tuple[float, float, float]:
-    """Return the cells of the best run, and their interval when the best is chosen from resampled runs."""
+            row = here[name], *bounds[name]
+            row = row if row[0] == row[0] else (np.nan, np.nan, np.nan)  # an empty set of outliers has no mean
+            rows[f"{prefix}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
     runs = np.array([(run.validation_mean, len(run.policy)) for run in result.runs])
-    low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])
-    return len(result.best.policy), low, high
+    ends = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])  # the best of resampled runs
+    rows[f"{prefix}_cells"] = rows[f"{prefix}_caption_cells"] = len(result.best.policy), *ends
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
 
 
 def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
@@ -149,40 +141,41 @@ def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _settings(results: dict[str, Results]) -> dict[str, float]:
     """Return the rerun's settings under the ids of the paper's: limits, rewards, hyperparameters, counts."""
-    found = _environments() | {"initial_subpolicies": float(results[printed.TASKS[0]].runs[0].cells[0])}
+    settings = _environments() | {"initial_subpolicies": float(results[printed.TASKS[0]].runs[0].cells[0])}
     for task, result in results.items():
         prefix, (runs, episodes) = printed.PREFIX[task], result.returns.shape
         counts = {"policies": runs, "episodes_per_policy": episodes, "total_episodes": runs * episodes}
         counts["drl_episodes"] = len(result.teacher_returns)
-        found |= {f"{prefix}_{place}{name}": n for place in ("", "caption_", "text_") for name, n in counts.items()}
-        found |= {name: counts[name] for name in ("episodes_per_policy", "drl_episodes")}
-        found[f"{prefix}_algorithm_runs"] = runs
-        found[f"{prefix}_training_steps"] = result.experiment.teacher.card["recipe"]["steps"]
+        settings |= {f"{prefix}_{place}{name}": n for place in ("", "caption_", "text_") for name, n in counts.items()}
+        settings |= {name: counts[name] for name in ("episodes_per_policy", "drl_episodes")}
+        settings[f"{prefix}_algorithm_runs"] = runs
+        settings[f"{prefix}_training_steps"] = result.experiment.teacher.card["recipe"]["steps"]
         for name in printed.printed_hyperparameters(task):
-            found[f"{prefix}_hyper_{name}"] = float(getattr(paper_preset(task), name))
-    return found
+            settings[f"{prefix}_hyper_{name}"] = float(getattr(paper_preset(task), name))
+    return settings
 
 
 def _environments() -> dict[str, float]:
     """Return limits and rewards of both tasks; rewards are measured by taking steps."""
     goal, car = (registry.get_task(task) for task in printed.TASKS)
-    found = {"state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps}
-    for axis, name in enumerate("xy"):
-        found[f"sg_size_{name}"] = goal.high[axis] - goal.low[axis]
-        found |= {f"sg_goal_{name}_high": simplegoal.GOAL_EDGE, f"sg_stride_{name}": simplegoal.STRIDE}
-        found |= {f"sg_pit_{name}_low": simplegoal.PIT_LOW, f"sg_pit_{name}_high": simplegoal.PIT_HIGH}
-    for axis, name in enumerate(("position", "velocity")):
-        found |= {f"mc_{name}_low": car.low[axis], f"mc_{name}_high": car.high[axis]}
-    for name, task in (("sg_action", goal), ("mc_force", car)):
-        found |= {f"{name}_low": task.action_low[0], f"{name}_high": task.action_high[0]}
-    found["sg_reward_factor"] = _reward(goal, [0.5, 0.0], [-1.0, 0.0]) / simplegoal.STRIDE
-    found["sg_goal_reward"] = _reward(goal, [0.15, 0.0], [-1.0, 0.0])
-    found["sg_pit_reward"] = _reward(goal, [0.35, 0.5], [1.0, 0.0])
     full, half = (_reward(car, [-0.5, 0.0], [force]) for force in (1.0, 0.5))
-    found |= {"mc_force_reward_factor": full, "mc_force_reward_exponent": np.log2(full / half)}
-    found["mc_goal_reward"] = _reward(car, [0.449, 0.07], [0.0])
-    found["mc_goal_position"] = gymnasium.make(car.name).unwrapped.goal_position
-    return found
+    settings = {
+        "state_dimensions": len(goal.low), "sg_max_steps": goal.max_steps, "mc_max_steps": car.max_steps,
+        "sg_reward_factor": _reward(goal, [0.5, 0.0], [-1.0, 0.0]) / simplegoal.STRIDE,
+        "sg_goal_reward": _reward(goal, [0.15, 0.0], [-1.0, 0.0]),
+        "sg_pit_reward": _reward(goal, [0.35, 0.5], [1.0, 0.0]), "mc_force_reward_factor": full,
+        "mc_force_reward_exponent": np.log2(full / half), "mc_goal_reward": _reward(car, [0.449, 0.07], [0.0]),
+        "mc_goal_position": mountaincar.FLAG,
+    }  # fmt: skip
+    for axis, name in enumerate("xy"):
+        settings[f"sg_size_{name}"] = goal.high[axis] - goal.low[axis]
+        settings |= {f"sg_goal_{name}_high": simplegoal.GOAL_EDGE, f"sg_stride_{name}": simplegoal.STRIDE}
+        settings |= {f"sg_pit_{name}_low": simplegoal.PIT_LOW, f"sg_pit_{name}_high": simplegoal.PIT_HIGH}
+    for axis, name in enumerate(("position", "velocity")):
+        settings |= {f"mc_{name}_low": car.low[axis], f"mc_{name}_high": car.high[axis]}
+    for name, task in (("sg_action", goal), ("mc_force", car)):
+        settings |= {f"{name}_low": task.action_low[0], f"{name}_high": task.action_high[0]}
+    return settings
 
 
 def _reward(task: base.Task, state: list[float], action: list[float]) -> float:
@@ -218,23 +211,24 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     """
     from scipy.stats import trim_mean  # here: it takes long to import
 
-    own, means, middle = result.teacher_returns, result.returns.mean(axis=1), partial(trim_mean, proportiontocut=0.25)
+    teacher, means = result.teacher_returns, result.returns.mean(axis=1)
     cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
-    rows = {
-        "interquartile mean of the runs": (means, middle, own.mean()),
-        "probability that an episode beats the teacher's": ((result.returns > own).mean(axis=1), np.mean, np.nan),
+    measures = {
+        "interquartile mean of the runs": (means, partial(trim_mean, proportiontocut=0.25), teacher.mean()),
+        "probability that an episode beats the teacher's": ((result.returns > teacher).mean(axis=1), np.mean, np.nan),
     }
     for name, code in SHARES.items():
-        ours, teacher = (result.outcomes == code).mean(axis=1), np.mean(result.teacher_outcomes.outcomes == code)
         if name != "pit" or task.name == "SimpleGoal-v0":  # MountainCar has no pit
-            rows[f"share of episodes: {name}"] = ours, np.mean, teacher
+            shares = (result.outcomes == code).mean(axis=1)
+            teachers = np.mean(result.teacher_outcomes.outcomes == code)
+            measures[f"share of episodes: {name}"] = shares, np.mean, teachers
     for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
-        rows[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
-    found = {}
-    for name, (values, statistic, teacher) in rows.items():
-        ends = interval(values, statistic, vectorized=True, n_resamples=n_resamples)
-        found[name] = (statistic(values, axis=0), *ends, teacher)
-    beats, n = int(np.sum(means > own.mean())), len(means)
-    found["probability that a run beats its teacher"] = (beats / n, *share_interval(beats, n), np.nan)
-    frame = pd.DataFrame.from_dict(found, orient="index", columns=["here", "low", "high", "teacher"])
+        measures[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
+    rows = {
+        name: (statistic(values, axis=0), *interval(values, statistic, vectorized=True, n_resamples=n_resamples), value)
+        for name, (values, statistic, value) in measures.items()
+    }
+    beats, n = int(np.sum(means > teacher.mean())), len(means)
+    rows["probability that a run beats its teacher"] = (beats / n, *share_interval(beats, n), np.nan)
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high", "teacher"])
     return frame.astype(float).rename_axis("statistic")

@@ -1,13 +1,11 @@
-"""`make runs`: make the distillations that the paper reports, and fit simpler policies to compare them with."""
+"""`make runs`: make the distillations that the paper reports."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from ..run import atomic, command, workers
-from ..run.locks import file_lock, terminate_peers
-from .beside import N_BESIDE, QUICK_BESIDE, kept_comparison
+from ..run import command
 from .runs import N_RUNS, paper_results
 
 
@@ -18,20 +16,10 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="make a few short runs, as a test")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
-    out, jobs = Path(arguments.out), arguments.jobs
-    runs, locks = out / "data" / "runs", out / "build" / "locks"
-    with file_lock(locks / "runs", f"makes runs in {out}"):
-        for left in runs.rglob(atomic.TEMPORARY):
-            left.unlink(missing_ok=True)  # left by a process that was killed
-        try:
-            for task in N_RUNS:
-                results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
-                n_runs = QUICK_BESIDE if arguments.quick else N_BESIDE
-                kept_comparison(results, n_runs, runs=runs, jobs=jobs)
-                print(f"{task}: {len(results.runs)} runs and their comparison are complete", flush=True)
-        except workers.WorkerDied:
-            terminate_peers(locks)  # else make waits minutes for its notebooks
-            raise
+    for task in N_RUNS:
+        runs = Path(arguments.out) / "data" / "runs"
+        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs)
+        print(f"{task}: {len(results.runs)} runs are complete", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ A row of a table and a run file state their provenance:
 - version: the method's version number in the code, raised by hand when the same arguments give other results;
 - the seed, where a result has one.
 
-`studies.comparison.stale` compares them with the current ones.
+`vsp.paper.studies.stale` and `studies.comparison.stale` compare them with the current ones.
 """
 
 from __future__ import annotations
@@ -71,7 +71,10 @@ def read_results(name: str, folder: str | os.PathLike | None = None) -> pd.DataF
     return listed.read_table(Path(folder or RESULTS) / f"{name}.csv", dtype=_TYPES)
 
 
-def write_results(frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str = "%.6f") -> None:
-    """Write OUT/data/results/NAME.csv atomically, and list it in the manifest of its folder."""
+def write_results(frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str | None = "%.6f") -> None:
+    """Write OUT/data/results/NAME.csv atomically, and list it in the manifest of its folder.
+
+    `float_format`: of all floats; None: as many digits as they have.
+    """
     text = frame.to_csv(index=False, float_format=float_format, lineterminator="\n")
     listed.write_listed(Path(out) / "data" / "results" / f"{name}.csv", text)

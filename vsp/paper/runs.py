@@ -22,7 +22,6 @@ from ..evaluation import rollout_from_seed
 from ..policy import VoronoiPolicy
 from ..rollouts import Outcomes
 from ..run import sealed
-from ..run.machine import cpu_type
 from ..tasks.base import GOAL, PIT, TRUNCATED
 from ..tasks.registry import get_task
 from ..teachers.teacher import Teacher, load_teacher
@@ -47,7 +46,6 @@ class Run:
     cells: np.ndarray  # number of cells after each iteration
     splits: int
     merges: int
-    cpu: str  # type of the CPU that made it
 
 
 @dataclass(frozen=True)
@@ -119,27 +117,18 @@ def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], 
     arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
     arrays |= {**asdict(result), "cells": np.array(history.cells)}
     changes = [event.kind for event in history.events]
-    about = {
-        "kind": "Run",
-        **experiment.about(seed),
-        "settings in full": experiment.settings,
-        "validation_mean": float(validation.returns.mean()),
-        "splits": changes.count("split"),
-        "merges": changes.count("merge"),
-        "cpu": cpu_type(),
-    }
-    return arrays, about
+    about = {"validation_mean": float(validation.returns.mean())}
+    about |= {f"{kind}s": changes.count(kind) for kind in ("split", "merge")}
+    return arrays, {"kind": "Run", **experiment.about(seed), "settings in full": experiment.settings, **about}
 
 
 def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
     """Read one run. Raises `atomic.DamagedFile`, also for a run of another experiment or of a seed not in its name."""
     arrays, about = load_made(path, "Run", experiment.about(int(Path(path).stem)))
-    codewords, coefficients, scale = (arrays.pop(name) for name in ("codewords", "coefficients", "scale"))
-    form = experiment.config.sub_policy
-    policy = VoronoiPolicy(codewords, coefficients, scale=scale, task=experiment.task, sub_policy=form)
-    cells = arrays.pop("cells")
-    known = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges", "cpu")}
-    return Run(policy=policy, outcomes=Outcomes(**arrays), cells=cells, **known)
+    parameters = {name: arrays.pop(name) for name in ("codewords", "coefficients", "scale")}
+    policy = VoronoiPolicy(**parameters, task=experiment.task, sub_policy=experiment.config.sub_policy)
+    counts = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
+    return Run(policy=policy, cells=arrays.pop("cells"), outcomes=Outcomes(**arrays), **counts)
 
 
 def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:
@@ -191,15 +180,11 @@ def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jo
 
 @threadpool_limits.wrap(limits=1)  # the same order of sums, also without the thread limit of `make`
 def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
-    """Return the teacher's episodes from the shared start states, stored beside the runs.
-
-    Another CPU type rounds a network's sums differently, so an episode may end elsewhere. Tables made from the stored
-    file stay the same.
-    """
+    """Return the teacher's episodes from the shared start states, stored beside the runs."""
     path, about = experiment.folder(runs) / "teacher.run", experiment.about(EVALUATION_SEED)
     if not path.exists():
-        own = rollout_from_seed(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
-        sealed.save_arrays(path, asdict(own), {"kind": "Teacher", **about})
+        played = rollout_from_seed(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
+        sealed.save_arrays(path, asdict(played), {"kind": "Teacher", **about})
     return Outcomes(**load_made(path, "Teacher", about)[0])
 
 

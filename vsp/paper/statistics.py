@@ -10,7 +10,6 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from decimal import Decimal
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -35,10 +34,10 @@ def spread(returns: np.ndarray) -> dict[str, float]:
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
     lower, upper = fences(q1, q3)
     below, above, moments = returns < lower, returns > upper, _moments(returns)
-    found = {name: moments[name] for name in ("min", "max", "mean", "std")}
-    found |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
-    found |= {"coverage": 1.0 - (below | above).mean(), "lower_fence": lower, "upper_fence": upper}
-    return found | {"outliers_below": int(below.sum()), "outliers_above": int(above.sum())}
+    numbers = {name: moments[name] for name in ("min", "max", "mean", "std")}
+    numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
+    numbers |= {"coverage": 1.0 - (below | above).mean(), "lower_fence": lower, "upper_fence": upper}
+    return numbers | {"outliers_below": int(below.sum()), "outliers_above": int(above.sum())}
 
 
 def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
@@ -47,13 +46,13 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     Means, standard deviations and ranges of an empty set are NaN. Raises ValueError as `spread` does.
     """
     facts, returns = spread(returns), np.ravel(returns)
-    below = returns[returns < facts["lower_fence"]]
-    above = returns[returns > facts["upper_fence"]]
-    outside = np.concatenate([below, above])
+    lower, upper = facts["lower_fence"], facts["upper_fence"]
+    sides = {"below": returns[returns < lower], "above": returns[returns > upper]}
+    outside = np.concatenate([*sides.values()])
     numbers = {name: facts[name] for name in ("mean", "std", "min", "max")}
-    numbers |= {"whisker_low": facts["lower_fence"], "whisker_high": facts["upper_fence"], "outliers": len(outside)}
+    numbers |= {"whisker_low": lower, "whisker_high": upper, "outliers": len(outside)}
     numbers |= {f"outliers_{name}": value for name, value in _moments(outside).items()}
-    for side, values in (("below", below), ("above", above)):
+    for side, values in sides.items():
         moments = _moments(values)
         numbers[f"outliers_{side}_share"] = 100 * len(values) / len(outside) if len(outside) else np.nan
         numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
@@ -102,12 +101,12 @@ def interval(
     )
 
 
-def share_interval(found: int, n: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share when `found` of `n` were observed (Clopper & Pearson 1934)."""
+def share_interval(count: int, n: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share when `count` of `n` were observed (Clopper & Pearson 1934)."""
     from scipy.stats import binomtest
 
-    interval = binomtest(found, n).proportion_ci(method="exact")
-    return interval.low, interval.high
+    low, high = binomtest(count, n).proportion_ci(method="exact")
+    return low, high
 
 
 def crossed_interval(values: np.ndarray) -> tuple[float, float]:
@@ -122,23 +121,21 @@ def crossed_interval(values: np.ndarray) -> tuple[float, float]:
     return percentile_interval(np.einsum("rn,rn->r", policies @ values, starts) / values.size)
 
 
-def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0, jobs: int = -1) -> pd.DataFrame:
+def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -> pd.DataFrame:
     """Bootstrap all statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
 
     Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
-    that a resample leaves empty is NaN. `jobs` threads (-1: one per core) give the same numbers as one. Raises
-    ValueError if there are no returns, or some are not finite.
+    that a resample leaves empty is NaN. Raises ValueError if there are no returns, or some are not finite.
     """
     returns = check_array("returns", returns, (-1, -1))
     if not returns.size:
         raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
     draws = bootstrap_draws(len(returns), n_resamples, seed)
     sample = _SortedReturns(np.ascontiguousarray(returns))
-    batches = [draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH)]
-    work = (delayed(sample.statistics)(batch) for batch in batches)
-    with threadpool_limits(1):
-        found = Parallel(n_jobs=jobs, prefer="threads")(work)  # NumPy's loops run in parallel in threads
-    return pd.DataFrame({name: np.concatenate([batch[name] for batch in found]) for name in found[0]})
+    batches = (draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH))
+    with threadpool_limits(1):  # NumPy's loops run in parallel in threads
+        columns = Parallel(n_jobs=-1, prefer="threads")(delayed(sample.statistics)(batch) for batch in batches)
+    return pd.DataFrame({name: np.concatenate([batch[name] for batch in columns]) for name in columns[0]})
 
 
 _BATCH = 25  # resamples at a time, so that their arrays stay in the cache
@@ -161,33 +158,37 @@ class _SortedReturns:
         self.until = np.pad(in_block.cumsum(axis=1), ((0, 0), (1, 0))).astype(float)
         means = returns.mean(axis=1)
         squares = np.square(returns - means[:, None]).sum(axis=1)
-        self.by_policy = _Parts(np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1))
+        self.by_policy = np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1)
 
     def statistics(self, draws: np.ndarray) -> dict[str, np.ndarray]:
         """Return the columns of `resample`, for the resamples that draw these policies (r, p)."""
         counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
         q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
         lower, upper = fences(q1, q3)
-        below, above = self._outliers(counts, lower, upper)
-        drawn = self.by_policy._replace(size=counts * self.by_policy.size, squares=counts * self.by_policy.squares)
-        parts = {"": drawn, "outliers_below_": below, "outliers_above_": above}
-        parts["outliers_"] = _Parts(*(np.hstack(pair) for pair in zip(below, above)))
-        numbers = {prefix + name: x for prefix, part in parts.items() for name, x in part.moments().items()}
-        outliers = (below.size + above.size)[:, 0]
+        n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
+        places = np.arange(max(1, low.max()))  # outliers of any resample
+        below = self._part(places, counts[:, self.policy[places]] * (places < low[:, None]))
+        places = np.arange(min(n - 1, high.min()), n)
+        above = self._part(places, counts[:, self.policy[places]] * (places >= high[:, None]))
+        size, mean, squares, least, most = self.by_policy
+        parts = {"": (counts * size, mean, counts * squares, least, most), "outliers_below_": below}
+        parts |= {"outliers_above_": above, "outliers_": tuple(np.hstack(pair) for pair in zip(below, above))}
+        numbers = {prefix + name: x for prefix, part in parts.items() for name, x in _pooled(*part).items()}
+        outliers = (below[0] + above[0])[:, 0]
         some = np.where(outliers > 0, outliers, np.nan)
-        numbers |= {"outliers_below_share": 100 * below.size[:, 0] / some}
-        numbers |= {"outliers_above_share": 100 * above.size[:, 0] / some}
+        numbers["outliers_below_share"], numbers["outliers_above_share"] = (
+            100 * part[0][:, 0] / some for part in (below, above)
+        )
         numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
-        return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / len(self.values))}
+        return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / n)}
 
     def _quantiles(self, counts: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
         """Interpolate linearly between order statistics, as `np.percentile` does; return an array (r,) per share."""
-        until = counts @ self.until
-        found = []
+        until, quantiles = counts @ self.until, []
         for place in np.multiply(shares, len(self.values) - 1):
             below, above = (self._ranked(counts, until, rank) for rank in (math.floor(place), math.ceil(place)))
-            found.append(below + (place - math.floor(place)) * (above - below))
-        return found
+            quantiles.append(below + (place - math.floor(place)) * (above - below))
+        return quantiles
 
     def _ranked(self, counts: np.ndarray, until: np.ndarray, rank: int) -> np.ndarray:
         """Return the value of this rank (0: smallest) in each resample; `until`: values before each block. (r,)"""
@@ -197,42 +198,27 @@ class _SortedReturns:
         passed = np.take_along_axis(until, block, axis=1) + inside <= rank
         return self.values[block[:, 0] * self.block + passed.sum(axis=1)]
 
-    def _outliers(self, counts: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[_Parts, _Parts]:
-        """Summarise the returns below and above the fences (r,) of each resample."""
-        n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
-        below, above = np.arange(max(1, low.max())), np.arange(min(n - 1, high.min()), n)  # in any resample
-        return (
-            self._part(below, counts[:, self.policy[below]] * (below < low[:, None])),
-            self._part(above, counts[:, self.policy[above]] * (above >= high[:, None])),
-        )
-
-    def _part(self, places: np.ndarray, weights: np.ndarray) -> _Parts:
-        """Summarise the sorted returns at `places` (k,), each counted `weights` (r, k) times."""
+    def _part(self, places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the arguments (r, 1) of `_pooled` of the sorted returns at `places` (k,), counted `weights` (r, k)."""
         values, size, there = self.values[places], weights.sum(axis=1), weights > 0
         mean = values[0] + np.einsum("rk,k->r", weights, values - values[0]) / np.maximum(1, size)
         squares = np.einsum("rk,rk->r", weights, np.square(values - mean[:, None]))
-        low, high = values[there.argmax(axis=1)], values[::-1][there[:, ::-1].argmax(axis=1)]
-        return _Parts(*(x[:, None] for x in (size, mean, squares, low, high)))
+        least, most = values[there.argmax(axis=1)], values[::-1][there[:, ::-1].argmax(axis=1)]
+        return tuple(x[:, None] for x in (size, mean, squares, least, most))
 
 
-class _Parts(NamedTuple):
-    """Summary of parts of resamples: arrays (r, parts), or (parts,) for numbers that all resamples share."""
+def _pooled(size, mean, squares, least, most) -> dict[str, np.ndarray]:
+    """Return moments and range of the parts of each resample together, NaN where all are empty. (r,)
 
-    size: np.ndarray  # where it is 0, the other fields mean nothing
-    mean: np.ndarray
-    squares: np.ndarray  # sum of squared deviations from the mean
-    low: np.ndarray
-    high: np.ndarray
-
-    def moments(self) -> dict[str, np.ndarray]:
-        """Return moments and range of all parts together, NaN where all are empty. (r,)"""
-        n = self.size.sum(axis=1)
-        mean = (self.size * self.mean).sum(axis=1) / np.maximum(1, n)
-        squares = (self.squares + self.size * np.square(self.mean - mean[:, None])).sum(axis=1)
-        least = np.where(self.size > 0, self.low, np.inf).min(axis=1)
-        most = np.where(self.size > 0, self.high, -np.inf).max(axis=1)
-        found = {"mean": mean, "std": np.sqrt(squares / np.maximum(1, n - 1)), "min": least, "max": most}
-        return {name: np.where(n > 0, x, np.nan) for name, x in found.items()}
+    All arguments are (r, parts), or (parts,) where all resamples share them; `squares` are sums of squared deviations
+    from the mean.
+    """
+    n = size.sum(axis=1)
+    centre = (size * mean).sum(axis=1) / np.maximum(1, n)
+    total = (squares + size * np.square(mean - centre[:, None])).sum(axis=1)
+    low, high = np.where(size > 0, least, np.inf).min(axis=1), np.where(size > 0, most, -np.inf).max(axis=1)
+    moments = {"mean": centre, "std": np.sqrt(total / np.maximum(1, n - 1)), "min": low, "max": high}
+    return {name: np.where(n > 0, x, np.nan) for name, x in moments.items()}
 
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): `count` values lie in [low, high]

@@ -1,10 +1,14 @@
-"""Tables: frames in, LaTeX (booktabs) and CSV out. The CSV holds the numbers, the LaTeX the text for readers."""
+"""The tables of the paper beside the rerun's, and tables for readers.
+
+`save_table` writes CSV, which holds the numbers, and LaTeX (booktabs), which holds the text for readers: headings in
+words, percentages, each interval in one column, no row numbers.
+"""
 
 from __future__ import annotations
 
+import math
 import os
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib as mpl
@@ -15,20 +19,25 @@ from ..checks import check_array, check_count
 from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
-from ..run import atomic, listed
-from ..show.captions import caption_of
+from ..run import atomic
+from ..show.captions import caption_of, file_of, headings
 from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .readings import defaults
 from .results import write_results
 from .runs import SHARES, Experiment, Results, Run, outcome_shares
-from .shown import as_text, present, show_table
 from .statistics import interval, outlier_numbers, spread
 
 if TYPE_CHECKING:
     from IPython.display import HTML
 
 PAGE = 40  # rows that fit on one page
+MISSING = "–"  # where there is no number
+INTERVAL = "95 % interval"
+QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting", "hyperparameter"}
+
+
+# Tables for readers
 
 
 def save_table(
@@ -37,21 +46,115 @@ def save_table(
 ) -> HTML:  # fmt: skip
     """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
-    A name such as "beyond/read" stands for OUT/figures/beyond/tables/read.csv and .tex.
-
-    `shown` replaces the whole table for readers: a part of it, or equations as LaTeX code. The default `caption` is in
-    notebooks/captions.toml. The LaTeX needs the packages booktabs and xcolor, and longtable for more than `PAGE` rows.
+    A name "beyond/x" writes OUT/figures/beyond/tables/x. `shown` replaces the whole table for readers: a part of it, or
+    equations as LaTeX code. The default `caption` is in notebooks/captions.toml. The LaTeX needs the packages booktabs
+    and xcolor, and longtable for more than `PAGE` rows.
     """
-    folder, _, stem = name.rpartition("/")
-    path, shown = Path(out) / "figures" / folder / "tables" / stem, frame if shown is None else shown
+    path, shown = file_of("tables", name, out), frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
     atomic.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
     about, code = caption_of("tables", name, text=caption), as_text(present(shown)).map(_escape).rename(columns=_escape)
     place = {"environment": "longtable"} if len(code) > PAGE else {"position": "t", "position_float": "centering"}
     styled = code.style.hide(axis="index")
-    body = styled.to_latex(hrules=True, caption=_escape(about.text), label=f"tab:{stem}", **place)
+    body = styled.to_latex(hrules=True, caption=_escape(about.text), label=f"tab:{path.name}", **place)
     atomic.write_text(path.with_suffix(".tex"), body)
     return show_table(shown, name, caption=caption)
+
+
+def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
+    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml."""
+    from IPython.display import HTML
+
+    above = caption_of("tables", name, text=caption).to_html("caption")
+    with pd.option_context("display.max_colwidth", None):
+        page = as_text(present(frame)).to_html(index=False, border=0)
+    return HTML(page.replace(">", f">\n  {above}", 1) if above else page)
+
+
+def present(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame for readers.
+
+    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among other
+    values), and shares become percentages. `low` and `high` become one column of text, and headings are in words. Where
+    each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
+    """
+    index = frame.index
+    if index.names != [None] or (len(index) and isinstance(index[0], str)):
+        frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
+    frame = frame.reset_index(drop=True).apply(_in_words)
+    frame = _counts(frame) if QUANTITIES & {*frame} else frame
+    for name in frame:
+        if re.sub(r"_(low|high)$", "", str(name)) in headings()["percent"]:
+            frame[name] = [MISSING if np.isnan(value) else f"{100 * value:.3g}" for value in frame[name].astype(float)]
+    for low in [name for name in frame if re.search(r"(^|[_ ])low$", str(name))]:
+        about = low.removesuffix("low")
+        ends = as_text(frame[[low, f"{about}high"]]).set_axis(["low", "high"], axis=1)
+        joined = (ends["low"] + " to " + ends["high"]).where(ends["low"] != MISSING, MISSING)
+        heading = f"{_heading(about[:-1])}: {INTERVAL}" if about else INTERVAL
+        frame = frame.assign(**{low: joined}).drop(columns=f"{about}high").rename(columns={low: heading})
+    return frame.rename(columns=_heading)
+
+
+def _in_words(column: pd.Series) -> pd.Series:
+    no = "" if column.map(lambda value: isinstance(value, bool | np.bool_)).all() else "no"
+
+    def word(value: object) -> object:
+        if isinstance(value, bool | np.bool_):
+            return "yes" if value else no
+        return re.sub(r"^(\w+?)(Continuous)?-v\d$", r"\1", value) if isinstance(value, str) else value
+
+    return column.map(word)
+
+
+def _counts(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame with integers in the rows that have no other numbers."""
+    numbers = frame.map(lambda value: isinstance(value, float) and math.isfinite(value))
+    whole = (~numbers | frame.where(numbers, 0.0).map(lambda value: value == int(value))).all(axis=1)
+    counts = numbers.mul(whole, axis=0)
+    return frame.astype(object).mask(counts, frame.where(counts, 0).map(int))
+
+
+def _heading(column: str) -> str:
+    return (headings()["words"] | headings()["percent"]).get(column, column)
+
+
+def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
+    """Return the frame as text.
+
+    Floats have `digits` decimals, or fewer if these hold the whole column. From 100 on they have fewer, so that five
+    digits remain. All else stays as it is, apart from thousands separators.
+    """
+    check_count("digits", digits, least=0)
+    return frame.apply(lambda column: column.map(lambda value: _text(value, min(digits, _decimals(column)))))
+
+
+def _decimals(column: pd.Series) -> int:
+    """Return the fewest decimals that hold all floats of a column, at most 9: counts are floats if one is missing."""
+    values = np.array([value for value in column if isinstance(value, float) and math.isfinite(value)])
+    return next((n for n in range(9) if (values.round(n) == values).all()), 9)
+
+
+def _text(value: object, digits: int) -> str:
+    if not isinstance(value, float):
+        return f"{value:,}" if isinstance(value, int | np.integer) and abs(value) >= 10_000 else str(value)
+    if np.isnan(value):
+        return MISSING
+    if value and abs(value) < 0.001:
+        return np.format_float_positional(value, 2, fractional=False)
+    before = int(math.log10(abs(value))) + 1 if abs(value) >= 100 and math.isfinite(value) else 2
+    thousands = "," if abs(value) >= 10_000 else ""
+    return f"{value:{thousands}.{max(digits - before + 2, 0)}f}"
+
+
+def _escape(text: str) -> str:
+    """Escape text for LaTeX and typeset minus signs; mathematics between dollars stays as it is."""
+    parts = re.split(r"(\$[^$]*\$|\\textcolor.*?}} )", text)
+    parts[::2] = [re.sub(r"([_%&])", r"\\\1", part) for part in parts[::2]]
+    parts[::2] = [re.sub(r"(?<![\w.)-])-(?=\d)", "$-$", part) for part in parts[::2]]
+    return "".join(parts)
+
+
+# The paper's tables
 
 
 def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
@@ -87,22 +190,27 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: boo
     return pd.DataFrame(rows)
 
 
+def _patch(force: float) -> str:
+    colour = mpl.colors.to_hex(mpl.colormaps[FORCE_MAP]((force + 1) / 2)).lstrip("#").upper()
+    return rf"\textcolor[HTML]{{{colour}}}{{\rule{{1.2em}}{{1.4ex}}}} "
+
+
 def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
     """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
 
     `digits`: decimals of the numbers; None: as many as they have. Raises ValueError unless the sub-policies are linear.
     """
     policy.check_linear()
-    frame, task = equation_table(policy, digits=digits), policy.task
-    where = "Each row holds where its codeword is the nearest" if len(policy) > 1 else "One map for all states"
-    units = (
-        "" if (policy.scale == 1).all() else f" of states divided by ({', '.join(f'{u:.3g}' for u in policy.scale)})"
-    )
-    distance = f" ({policy.metric.capitalize()} distance{units})" if len(policy) > 1 else ""
-    limits = ", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in
-                       zip(task.outputs, task.action_low, task.action_high))  # fmt: skip
-    about = f"{caption} {where}{distance}. Limits: {limits}.".strip()
-    return show_table(frame if len(policy) > 1 else frame.drop(columns="codeword"), caption=about)
+    frame, task, where = equation_table(policy, digits=digits), policy.task, "One map for all states"
+    if len(policy) > 1:
+        sizes = ", ".join(f"{size:.3g}" for size in policy.scale)
+        units = "" if (policy.scale == 1).all() else f" of states divided by ({sizes})"
+        where = f"Each row holds where its codeword is the nearest ({policy.metric.capitalize()} distance{units})"
+    else:
+        frame = frame.drop(columns="codeword")
+    limits = zip(task.outputs, task.action_low, task.action_high)
+    limits = ", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in limits)
+    return show_table(frame, caption=f"{caption} {where}. Limits: {limits}.".strip())
 
 
 def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
@@ -110,14 +218,14 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
 
     Coverage is in percent.
     """
-    printed, columns = printed_spread(task), {}
-    teacher, runs = _returns(teacher, runs)
-    for name, values in (("drl", teacher), ("ours", runs)):
-        here = spread(values) | {"median/q2": spread(values)["median"]}
-        found = [here[metric.lower()] * (100 if metric == "Coverage" else 1) for metric in printed.index]
-        label = {"drl": "teacher", "ours": "distilled"}[name]
-        columns |= {f"{label}, paper": printed[name].to_numpy(), f"{label}, here": found}
-    return pd.DataFrame({"metric": printed.index, **columns})
+    printed = printed_spread(task)
+    table = pd.DataFrame({"metric": printed.index})
+    for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), _returns(teacher, runs)):
+        here = spread(values)
+        here |= {"coverage": 100 * here["coverage"], "median/q2": here["median"]}
+        table[f"{label}, paper"] = printed[name].to_numpy()
+        table[f"{label}, here"] = [here[metric.lower()] for metric in printed.index]
+    return table
 
 
 def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
@@ -125,23 +233,21 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
-    known, rows = printed_text_numbers(check_task(task)), []
+    known, prefix = printed_text_numbers(check_task(task)), PREFIX[task]
     teacher, runs = _returns(teacher, runs)
     check_count("cells", cells)
-    printed = known["value"]
-    for subject, values in (("drl", teacher), ("ours", runs)):
-        numbers = outlier_numbers(values)
-        if subject == "ours":
-            means = runs.mean(axis=1)
-            numbers |= {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
-            numbers["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
-        rows += [(task, f"{PREFIX[task]}_{subject}_{name}", value) for name, value in numbers.items()]
-    rows.append((task, f"{PREFIX[task]}_cells", cells))
-    rows = [(task, name, _like(printed.get(name, np.nan), value), value) for task, name, value in rows]
-    frame = pd.DataFrame(rows, columns=["task", "id", "paper", "here"], dtype=object)
-    for place, column in ((2, "subject"), (3, "quantity")):
-        frame.insert(place, column, frame["id"].map(known[column]).fillna(""))
-    return frame
+    means = runs.mean(axis=1)
+    distilled = outlier_numbers(runs) | {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
+    distilled["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
+    here = {f"{prefix}_drl_{name}": value for name, value in outlier_numbers(teacher).items()}
+    here |= {f"{prefix}_ours_{name}": value for name, value in distilled.items()} | {f"{prefix}_cells": cells}
+    frame = pd.DataFrame({"task": task, "id": [*here]})
+    for column in ("subject", "quantity"):
+        frame[column] = frame["id"].map(known[column]).fillna("")
+    printed = [known["value"].get(name, np.nan) for name in here]
+    counts = [isinstance(value, int) and not np.isnan(other) for value, other in zip(here.values(), printed)]
+    frame["paper"] = pd.Series([int(x) if count else float(x) for x, count in zip(printed, counts)], dtype=object)
+    return frame.assign(here=pd.Series([*here.values()], dtype=object))
 
 
 def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -149,22 +255,7 @@ def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndar
     return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
 
 
-def _like(printed: float, here: float) -> float | int:
-    """Return the paper's value, as an integer if the rerun's is a count."""
-    return int(printed) if isinstance(here, int) and not np.isnan(printed) else float(printed)
-
-
-def _escape(text: str) -> str:
-    """Escape text for LaTeX and typeset minus signs; mathematics between dollars stays as it is."""
-    parts = re.split(r"(\$[^$]*\$|\\textcolor.*?}} )", text)
-    parts[::2] = [re.sub(r"([_%&])", r"\\\1", part) for part in parts[::2]]
-    parts[::2] = [re.sub(r"(?<![\w.)-])-(?=\d)", "$-$", part) for part in parts[::2]]
-    return "".join(parts)
-
-
-def _patch(force: float) -> str:
-    colour = mpl.colors.to_hex(mpl.colormaps[FORCE_MAP]((force + 1) / 2)).lstrip("#").upper()
-    return rf"\textcolor[HTML]{{{colour}}}{{\rule{{1.2em}}{{1.4ex}}}} "
+# The runs
 
 
 def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
@@ -177,11 +268,16 @@ def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def write_summary(results: Results, *, out: str | os.PathLike) -> None:
+    """Write the summary of the runs to OUT/data/results/TASK.csv."""
+    write_results(run_summary(results.runs, results.experiment), results.experiment.task, out=out)
+
+
 def run_overview(results: Results) -> pd.DataFrame:
     """Return mean, lowest and highest value over the runs, one row per property of a run."""
     frame = run_summary(results.runs, results.experiment).rename(columns={"mean": "mean return"})
-    found = frame[["cells", "splits", "merges", "mean return", *SHARES]].agg(["mean", "min", "max"]).T
-    return found.set_axis(["mean over runs", "lowest", "highest"], axis=1)
+    table = frame[["cells", "splits", "merges", "mean return", *SHARES]].agg(["mean", "min", "max"]).T
+    return table.set_axis(["mean over runs", "lowest", "highest"], axis=1)
 
 
 def teacher_beside_runs(results: Results) -> dict[str, float]:
@@ -202,11 +298,3 @@ def teacher_beside_runs(results: Results) -> dict[str, float]:
         "runs above the teacher": np.mean(means > teacher.mean()),
         "lowest run": means.min(), "median run": np.median(means), "highest run": means.max(),
     }  # fmt: skip
-
-
-def write_summary(results: Results, *, out: str | os.PathLike) -> None:
-    """Write the summary of the runs to OUT/data/results/TASK.csv, and the CPU types that made them to made_on.txt."""
-    folder, task = Path(out) / "data" / "results", results.experiment.task
-    write_results(run_summary(results.runs, results.experiment), task, out=out)
-    cpus = sorted({run.cpu for run in results.runs})
-    listed.write_listed(folder / "made_on.txt", "".join(f"{cpu}\n" for cpu in cpus))

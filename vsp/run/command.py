@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+import signal
 import sys
 from collections.abc import Iterator
 
-from .atomic import DamagedFile, MissingFile, one_line
-from .locks import sigterm_as_interrupt
+from .atomic import DamagedFile, MissingFile, disk_remedy
 
 JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # help text of --jobs
 
@@ -30,21 +30,24 @@ def jobs(text: str) -> int | str:
 
 
 @contextlib.contextmanager
-def in_one_line(what: str = "") -> Iterator[None]:
+def in_one_line(what: str = "the command") -> Iterator[None]:
     """End a command and its workers with a one-line message, without traceback, for errors that its user can fix.
 
     These are a damaged or missing file, a full or read-only disk, an interrupt or SIGTERM, and every `CommandError`.
-    `what` names the work, and precedes messages that do not name it.
+    `what` names the work.
     """
-    sigterm_as_interrupt()
-    begin = f"error: {what}: " if what else "error: "
+    signal.signal(signal.SIGTERM, _interrupt)  # all code that started kernels or workers then ends them
     try:
         yield
     except KeyboardInterrupt:
-        sys.exit(f"{begin}interrupted. Finished files stay on disk: run the same command to resume.")
-    except CommandError as error:
+        sys.exit(f"error: {what}: interrupted. Finished files stay on disk: run the same command to resume.")
+    except (CommandError, DamagedFile, MissingFile) as error:
         sys.exit(f"error: {error}")
-    except (DamagedFile, MissingFile) as error:
-        sys.exit(f"{begin}{error}")
     except OSError as error:
-        sys.exit(f"{begin}{one_line(error)}")
+        if not (remedy := disk_remedy(error.errno)):
+            raise
+        sys.exit(f"error: {what}: {error.filename2 or error.filename or 'a file'}: {error.strerror}: {remedy}")
+
+
+def _interrupt(signum: int, frame: object) -> None:
+    raise KeyboardInterrupt

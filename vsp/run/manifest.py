@@ -9,9 +9,7 @@ from .atomic import ROOT
 from .command import in_one_line
 from .listed import MANIFEST, list_folder
 
-FOLDERS = tuple(
-    ROOT / "data" / name for name in ("paper", "teachers", "teachers/short", "results", "beyond", "beyond/proofs")
-)
+FOLDERS = sorted(manifest.parent for manifest in (ROOT / "data").rglob(MANIFEST))
 
 
 def main() -> None:

@@ -25,13 +25,14 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from .atomic import ROOT, atomic_path, disk_hint, read_bytes, remove_leftovers, write_text
+from .atomic import ROOT, disk_remedy, read_bytes, write_text
 from .command import CommandError, in_one_line
 from .listed import MANIFEST, list_file
-from .locks import file_lock, terminate_peers
+from .locks import file_lock
 from .notebook import NotebookNode, nbformat
 
 KERNEL = "python3"
+EXECUTED = "figures/executed"
 KERNEL_FOLDERS = {  # folders a kernel writes to, by variable; the next run removes what a killed one left
     "TMPDIR": "tmp",
     "JOBLIB_TEMP_FOLDER": "tmp",
@@ -52,15 +53,10 @@ _SYSTEM_ERROR = re.compile(r"\[Errno (\d+)\] ")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _MENDABLE = ("DamagedFile", "MissingFile", "WorkerDied", "UnlikeWorker", "NoScheduler")  # a user can fix these
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
-_WIDGET_STATE = "application/vnd.jupyter.widget-state+json"
 
 
 class NotebookError(CommandError):
     """A notebook that did not run to its end without an error; the message names it and the cell."""
-
-
-class KernelDied(NotebookError):
-    """A notebook whose kernel was killed."""
 
 
 def run_notebook(
@@ -69,14 +65,15 @@ def run_notebook(
     *,
     parameters: dict[str, object] | None = None,
     expect: Sequence[str] = (),
+    executed: str = EXECUTED,
     timeout: int = 1800,
 ) -> list[str]:
     """Run `notebook` with `parameters` and move the files that it made to `out`. Returns those that changed there.
 
-    `expect` names files, relative to `out`, that the notebook must make. `timeout` is in seconds per cell. An executed
-    copy, without anything that varies between runs, goes to figures/executed. Runs of the same notebook into the same
-    `out` wait for each other. Raises NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk;
-    the earlier files of `out` then stay.
+    `expect` names files, relative to `out`, that the notebook must make. An executed copy, without anything that varies
+    between runs, goes to the folder `executed` in `out`. `timeout` is in seconds per cell. Raises CommandError if
+    another process runs the same notebook into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for
+    a full or read-only disk; the earlier files of `out` then stay.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
@@ -94,8 +91,10 @@ def run_notebook(
         staging = work / "out"
         try:
             staging.mkdir()
-            cells = _execute(notebook, source, values, work, timeout)
-            _write_copy(source, cells, staging / "figures" / "executed" / notebook.name)
+            cells = _execute(notebook, source, {**values, "out": str(staging)}, work, timeout)
+            for where, cell in cells.items():
+                _check_shown(where, cell, (str(out), str(ROOT), sys.prefix))
+            _write_copy(source, list(cells.values()), staging / executed / notebook.name)
             _check_files(notebook, staging, expect)
             return _publish(staging, out)
         finally:
@@ -133,65 +132,47 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
             )
 
 
-def _execute(notebook: Path, source: NotebookNode, values: dict, work: Path, timeout: int) -> list[NotebookNode]:
-    """Run the notebook by papermill with the parameters `values`, but with `work`/out as `out`. Returns code cells."""
-    import papermill
-    from papermill.engines import papermill_engines
+def _execute(
+    notebook: Path, source: NotebookNode, values: dict[str, object], work: Path, timeout: int
+) -> dict[str, NotebookNode]:
+    """Run a copy of the notebook with the parameters `values`. Returns its code cells by a name for messages."""
+    from jupyter_client import AsyncKernelManager
+    from nbclient import NotebookClient
+    from nbclient.exceptions import CellExecutionError
 
-    seen: list[NotebookNode] = []  # the running notebook, which shows how far it came
-    papermill_engines.register("vsp", _engine(seen, work, timeout))
-    stopped: Exception | None = None
-    try:
-        papermill.execute_notebook(
-            copy.deepcopy(source),
-            None,
-            {**values, "out": str(work / "out")},
-            engine_name="vsp",
-            kernel_name=KERNEL,
-            language="python",
-            cwd=notebook.parent,  # as in JupyterLab
-            progress_bar=sys.stderr.isatty(),
-        )
-    except papermill.PapermillExecutionError:
-        pass  # a cell failed: its outputs hold the error
-    except Exception as error:
-        if disk_hint(getattr(error, "errno", None)):
-            raise
-        stopped = error
-    code = [cell for one in seen for cell in one.cells if cell.cell_type == "code"]
-    cells = [cell for cell in code if "injected-parameters" not in cell.metadata.get("tags", [])]
-    firsts = [cell.source.strip().partition("\n")[0] for cell in cells]
+    running = copy.deepcopy(source)
+    code = [cell for cell in running.cells if cell.cell_type == "code"]
+    firsts = [cell.source.strip().partition("\n")[0] for cell in code]
     names = [f"{notebook.name}, code cell {number} ({first})" for number, first in enumerate(firsts, 1)]
-    begun = [(name, cell) for name, cell in zip(names, cells) if cell.metadata.papermill.get("start_time")]
-    if stopped:
-        kind = KernelDied if "Kernel died" in str(stopped) else NotebookError  # in a cell, or before the first
-        where = begun[-1][0] if begun else notebook.name
-        raise kind(f"{where} did not end: {type(stopped).__name__}: {stopped}") from stopped
-    for name, cell in zip(names, cells):
-        _check_cell(name, cell, values["out"])
-    widgets = seen[0].metadata.get("widgets", {}).get(_WIDGET_STATE, {}).get("state", {})
-    for widget in widgets.values():  # an `Output` widget captures the errors of its block
-        _check_errors(f"{notebook.name}: a widget", widget["state"].get("outputs", []))
-    return cells
-
-
-def _engine(seen: list[NotebookNode], work: Path, timeout: int) -> type:
-    """Return an engine for papermill with a kernel of this Python. It appends the running notebook to `seen`."""
-    from papermill.clientwrap import PapermillNotebookClient
-    from papermill.engines import NBClientEngine
-
-    class Engine(NBClientEngine):
-        @classmethod
-        def execute_managed_notebook(cls, nb_man, kernel_name, **_):
-            seen.append(nb_man.nb)
-            quiet = ["--log-level=CRITICAL"]  # no log messages of the kernel on standard error
-            client = PapermillNotebookClient(nb_man, kernel_name=kernel_name, timeout=timeout, extra_arguments=quiet)
-            manager = client.create_kernel_manager()
-            manager.connection_file = str(work / "kernel.json")
-            manager.kernel_spec_manager.kernel_dirs = []  # no kernel of another Python, whatever is installed
-            return client.execute(env=_environment(work))
-
-    return Engine
+    (parameters,) = (cell for cell in code if "parameters" in cell.metadata.get("tags", []))
+    parameters.source += "".join(f"\n{name} = {value!r}" for name, value in values.items())
+    kernels = AsyncKernelManager(kernel_name=KERNEL, connection_file=str(work / "kernel.json"))
+    kernels.kernel_spec_manager.kernel_dirs = []  # no kernel of another Python, whatever is installed
+    client = NotebookClient(
+        running,
+        km=kernels,
+        timeout=timeout,
+        resources={"metadata": {"path": str(notebook.parent)}},  # as in JupyterLab
+        extra_arguments=["--log-level=CRITICAL"],  # no log messages of the kernel on standard error
+    )
+    where = notebook.name
+    try:
+        with client.setup_kernel(env=_environment(work), cleanup_kc=True):
+            for where, cell in zip(names, code):  # noqa: B007 (for the message below)
+                client.execute_cell(cell, running.cells.index(cell))
+    except CellExecutionError:
+        pass  # the outputs of the cell hold the error
+    except Exception as error:
+        if disk_remedy(getattr(error, "errno", None)):
+            raise
+        raise NotebookError(f"{where} did not end: {type(error).__name__}: {error}") from error
+    for where, cell in zip(names, code):
+        for output in cell.outputs:
+            if output["output_type"] == "error":
+                raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
+        if cell.source.strip() and cell.execution_count is None:
+            raise NotebookError(f"{where} never ran")
+    return dict(zip(names, code))
 
 
 def _environment(work: Path) -> dict[str, str]:
@@ -205,38 +186,26 @@ def _environment(work: Path) -> dict[str, str]:
     return environment | KERNEL_SETTINGS
 
 
-def _check_cell(where: str, cell: NotebookNode, out: str) -> None:
-    """Raise NotebookError if the cell failed or shows something that differs between runs or machines."""
-    _check_errors(where, cell.outputs)
-    if cell.source.strip() and cell.execution_count is None:
-        raise NotebookError(f"{where} never ran")
-    for output in cell.outputs:
-        shown = output.get("text") or json.dumps(output.get("data", {}))
-        if found := _VARIES.search(shown):
-            raise NotebookError(
-                f"{where} shows {found[0]!r}, which differs between runs: fix the warning, or end with `;`"
-            )
-        for folder in (out, str(ROOT), sys.prefix):
-            if folder in shown:
-                raise NotebookError(f"{where} shows a folder of this machine: {folder}")
-
-
-def _check_errors(where: str, outputs: list[NotebookNode]) -> None:
-    for output in outputs:
-        if output["output_type"] == "error":
-            raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
-
-
 def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookError:
     """Return the error in one line if a user can fix it, such as a damaged file, else with the traceback."""
     number = _SYSTEM_ERROR.match(message)
-    if kind in _MENDABLE:
-        end = ""
-    elif number and (hint := disk_hint(int(number[1]))):
-        end = f": {hint}"
-    else:
-        end = "\n" + _COLOUR.sub("", traceback)
-    return NotebookError(f"{where} failed: {kind}: {message}{end}")
+    remedy = disk_remedy(int(number[1])) if number else None
+    if kind in _MENDABLE or remedy:
+        return NotebookError(": ".join(filter(None, (f"{where} failed: {kind}: {message}", remedy))))
+    return NotebookError(f"{where} failed: {kind}: {message}\n{_COLOUR.sub('', traceback)}")
+
+
+def _check_shown(where: str, cell: NotebookNode, folders: Sequence[str]) -> None:
+    """Raise NotebookError if the cell shows something that differs between runs or machines, such as `folders`."""
+    for output in cell.outputs:
+        shown = output.get("text") or json.dumps(output.get("data", {}))
+        if varying := _VARIES.search(shown):
+            raise NotebookError(
+                f"{where} shows {varying[0]!r}, which differs between runs: fix the warning, or end with `;`"
+            )
+        for folder in folders:
+            if folder in shown:
+                raise NotebookError(f"{where} shows a folder of this machine: {folder}")
 
 
 def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> None:
@@ -284,8 +253,8 @@ def _check_files(notebook: Path, staging: Path, expect: Sequence[str]) -> None:
 
 def _publish(staging: Path, out: Path) -> list[str]:
     """Move each staged file to its place in `out`; a file with the same bytes stays untouched. Results are listed."""
-    found = (path.relative_to(staging).as_posix() for path in staging.rglob("*") if path.is_file())
-    names = sorted(name for name in found if Path(name).name != MANIFEST)
+    staged = (path.relative_to(staging).as_posix() for path in staging.rglob("*") if path.is_file())
+    names = sorted(name for name in staged if Path(name).name != MANIFEST)
     same = {name for name in names if (out / name).is_file() and filecmp.cmp(staging / name, out / name, shallow=False)}
     changed = [name for name in names if name not in same]
     for folder in {(out / name).parent for name in changed}:  # check all folders before moving any file: all or nothing
@@ -293,22 +262,11 @@ def _publish(staging: Path, out: Path) -> list[str]:
         if not os.access(folder, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
     for name in changed:
-        _move(staging / name, out / name)
+        os.replace(staging / name, out / name)
     for name in names:
         if name.startswith("data/results/"):
             list_file(out / name)  # unchanged files too: a run may have been killed before this line
     return changed
-
-
-def _move(path: Path, target: Path) -> None:
-    try:
-        os.replace(path, target)
-    except OSError as error:
-        if error.errno != errno.EXDEV:
-            raise
-        remove_leftovers(target)
-        with atomic_path(target) as beside:  # figures/ or data/ are on another disk
-            shutil.copyfile(path, beside)
 
 
 def _value(text: str) -> object:
@@ -326,19 +284,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", default=".", help="folder for figures/ and data/results/ (%(default)s)")
     parser.add_argument("-p", dest="parameters", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"))
     parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files in OUT that it must make")
+    parser.add_argument("--executed", default=EXECUTED, help="folder in OUT for the executed copy (%(default)s)")
     parser.add_argument("--timeout", type=int, default=1800, help="seconds per cell (%(default)s)")
-    given = parser.parse_args(arguments)
-    began, name = time.monotonic(), Path(given.notebook).name
+    options = vars(parser.parse_args(arguments))
+    began, notebook = time.monotonic(), options.pop("notebook")
+    name = Path(notebook).name
     with in_one_line(name):
         print(f"{name}: running", flush=True)
-        parameters = {key: _value(text) for key, text in given.parameters}
-        try:
-            changed = run_notebook(
-                given.notebook, given.out, parameters=parameters, expect=given.expect, timeout=given.timeout
-            )
-        except KernelDied:
-            terminate_peers(Path(given.out) / "build" / "locks")  # else make would wait minutes for the others
-            raise
+        options["parameters"] = {key: _value(text) for key, text in options["parameters"]}
+        changed = run_notebook(notebook, options.pop("out"), **options)
         files = f"{len(changed)} file{'s' * (len(changed) != 1)}"
         print(f"{name}: done in {time.monotonic() - began:.0f} s, {files} changed", flush=True)
 

@@ -8,26 +8,22 @@ import os
 
 import numpy as np
 
-from .atomic import DamagedFile, atomic_path, read_bytes, remedies
+from .atomic import DamagedFile, atomic_path, read_bytes, remedy
 
 
 def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
     """Write one line with the SHA-256 of `payload`, then `payload`, atomically."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(hashlib.sha256(payload).hexdigest().encode() + b"\n")
-        file.write(payload)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload)
 
 
 def read_sealed(path: str | os.PathLike) -> bytes:
     """Return the payload of a file that `write_sealed` wrote. Raises `MissingFile` or `DamagedFile`."""
     content = read_bytes(path)
     seal, payload = content[:65], content[65:]
-    found = hashlib.sha256(payload).hexdigest()
-    if seal != found.encode() + b"\n":
-        raise DamagedFile(
-            f"{path}: damaged, or no file of vsp (its SHA-256 is {found}, its first line says {seal!r}): "
-            + remedies(path, "delete it if `make` makes it, else save it again")
-        )
+    digest = hashlib.sha256(payload).hexdigest()
+    if seal != digest.encode() + b"\n":
+        raise _damaged(path, f"damaged, or no file of vsp (its SHA-256 is {digest}, its first line says {seal!r})")
     return payload
 
 
@@ -53,13 +49,14 @@ def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.nda
         arrays = load(payload)
         header = json.loads(payload[8 : 8 + int.from_bytes(payload[:8], "little")])
         about = json.loads(header["__metadata__"]["about"])
-        found = about.get("kind")
+        stated = about.get("kind")
     except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
-        raise DamagedFile(
-            f"{path}: right checksum, but `save_arrays` did not write it: {error!r:.300}: {remedies(path, 'delete it')}"
-        ) from error
-    if found != kind:
-        raise DamagedFile(
-            f"{path}: holds a {found!r}, expected a {kind!r}: {remedies(path, 'delete it or name another')}"
-        )
+        raise _damaged(path, f"right checksum, but `save_arrays` did not write it: {error!r:.300}") from error
+    if stated != kind:
+        raise _damaged(path, f"holds a {stated!r}, expected a {kind!r}")
     return arrays, about
+
+
+def _damaged(path: str | os.PathLike, what: str) -> DamagedFile:
+    remedies = filter(None, ("delete it if `make` makes it, else save it again", remedy(path)))
+    return DamagedFile(f"{path}: {what}: {'; '.join(remedies)}")

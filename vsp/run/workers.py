@@ -14,14 +14,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from . import kernels
 from .atomic import ROOT
 from .command import CommandError
 from .listed import MANIFEST
-from .machine import cpu_type
 from .progress import progress
 
 ANSWER = 10  # seconds to wait for the answer of a scheduler
@@ -56,14 +55,10 @@ def results(
         return
     done = total - len(arguments)
     try:
-        for result in progress(_finished(work, arguments, jobs), label, total=total, unit=unit, done=done):
+        for result in progress(_as_they_end(work, arguments, jobs), label, total=total, unit=unit, done=done):
             yield result
             done += 1
     except Exception as error:
-        if type(error).__name__ == "TimeoutError" and isinstance(jobs, str):
-            raise NoScheduler(
-                f"the Dask scheduler at {jobs!r} has no workers, expected one or more: start some"
-            ) from error
         if type(error).__name__ not in ("TerminatedWorkerError", "KilledWorker"):  # loky's and Dask's
             raise
         how = re.search(r"\{(.*)\}", str(error))
@@ -73,10 +68,10 @@ def results(
         ) from error
 
 
-def _finished(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> Iterator[tuple[int, object]]:
+def _as_they_end(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> Iterator[tuple[int, object]]:
     from joblib import Parallel, delayed, parallel_config
 
-    calls = [delayed(_call)(identity(), work, i, *one) for i, one in enumerate(arguments)]
+    calls = [delayed(_call)(identity(), work, i, *given) for i, given in enumerate(arguments)]
     with contextlib.ExitStack() as stack:
         if isinstance(jobs, str):
             client = stack.enter_context(_client(jobs))
@@ -88,48 +83,46 @@ def _finished(work: Callable, arguments: Sequence[tuple], jobs: int | str) -> It
         yield from Parallel(return_as="generator_unordered")(calls)
 
 
-def _call(expected: dict[str, str], work: Callable, i: int, *one) -> tuple[int, object]:
-    if (found := identity()) != expected:
+def _call(expected: dict[str, str], work: Callable, i: int, *given) -> tuple[int, object]:
+    if (here := identity()) != expected:
         raise UnlikeWorker(
-            f"the worker on {platform.node()} has {found}, expected {expected}: give it the same checkout and .venv"
+            f"the worker on {platform.node()} has {here}, expected {expected}: give it the same checkout and .venv"
         )
     with threadpool_limits(1):  # the same sums in the same order on any machine
-        return i, work(*one)
+        return i, work(*given)
 
 
 @cache
 def identity() -> dict[str, str]:
-    """Return what determines a result besides its arguments: code, teachers, processor type, and package versions."""
-    code = hashlib.sha256(b"".join(path.read_bytes() for path in _deciding_files())).hexdigest()[:10]
-    found = {"code": code, "processor": cpu_type(), "python": platform.python_version()}
-    for name in PACKAGES:
-        with contextlib.suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
-
-
-def _deciding_files() -> list[Path]:
-    """Return the paths of all code of the package and of the manifests of the teachers."""
+    """Return what determines a result besides its arguments: code, teachers, kernels, and package versions."""
     parts = [ROOT / part for part in ("vsp", "vsp_beyond", "studies")]
     code = [path for part in parts for kind in ("*.py", "*.c") for path in sorted(part.rglob(kind))]
-    return [*code, *sorted((ROOT / "data" / "teachers").rglob(MANIFEST))]
+    code += sorted((ROOT / "data" / "teachers").rglob(MANIFEST))
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in code)).hexdigest()[:10]
+    known = {"code": digest, "kernels": kernels.name(), "python": platform.python_version()}
+    for name in PACKAGES:
+        with contextlib.suppress(PackageNotFoundError):
+            known[name] = version(name)
+    return known
 
 
 def _client(address: str):
     try:
         from distributed import Client
+
+        client = Client(address, timeout=ANSWER, set_as_default=False)
+        client.wait_for_workers(1, timeout=ANSWER)
     except ImportError as error:
         raise NoScheduler(f"{address!r} asks for a Dask cluster, which needs the package `distributed`") from error
-    try:
-        return Client(address, timeout=ANSWER, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError) as error:  # TimeoutError is an OSError
         raise NoScheduler(
-            f"no Dask scheduler answers at {address!r}, expected one as in tcp://host:8786: {error}"
+            f"no Dask scheduler with workers answers at {address!r}, expected one as in tcp://host:8786: {error}"
         ) from error
+    return client
 
 
 def _shared(arguments: Sequence[tuple]) -> list:
     """Return the arguments that several jobs share, such as a teacher. Every worker gets them once."""
-    objects = {id(part): part for one in arguments for part in one if not isinstance(part, int | str)}
-    counts = Counter(id(part) for one in arguments for part in one)
+    objects = {id(part): part for given in arguments for part in given if not isinstance(part, int | str)}
+    counts = Counter(id(part) for given in arguments for part in given)
     return [part for key, part in objects.items() if counts[key] > 1]

@@ -13,7 +13,6 @@ from .returns import (
     by_group,
     histogram,
     intervals,
-    learning_curve,
     ledger_gaps,
     margin,
     over_iterations,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -17,7 +16,7 @@ from PIL import Image
 
 from ..run import atomic
 from . import style
-from .captions import Caption, caption_of
+from .captions import Caption, caption_of, file_of
 
 WIDTH = 6.0  # inches
 DPI, COLOURS = 120, 64  # dots per inch of a GIF, and the size of its palette
@@ -42,8 +41,7 @@ class Stage:
 
     def watermark(self) -> None:
         """Mark all shots as those of a quick run, as `save_figure` does."""
-        about = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
-        self.fig.text(0.5, 0.5, "quick run", animated=True, **about)  # drawn last, by each shot
+        style.watermark(self.fig, animated=True)  # drawn last, by each shot
 
     def shoot(self, paint: Callable[[], object]) -> np.ndarray:
         """Return the figure with what `paint` draws into its axes, as uint8 (height, width, 3)."""
@@ -96,24 +94,22 @@ def save_frames(
 
     `step`: milliseconds per frame; `hold`: milliseconds of the last frame.
     """
-    path, about = Path(out) / "figures" / name, caption_of("figures", name, alt=alt)
-    with atomic.atomic_path(path.with_suffix(".gif")) as temporary:
-        write_gif(temporary, images, step=step, hold=hold)
-    with atomic.atomic_path(path.with_suffix(".png")) as temporary:
-        temporary.write_bytes(png(images[-1]))
-    return Animation(path.with_suffix(".gif").read_bytes(), path.with_suffix(".png").read_bytes(), about)
+    path, about = file_of("figures", name, out), caption_of("figures", name, alt=alt)
+    animation = Animation(_gif(images, [step] * (len(images) - 1) + [hold]), png(images[-1]), about)
+    for form, content in (("gif", animation.gif), ("png", animation.still)):
+        with atomic.atomic_path(path.with_suffix(f".{form}")) as temporary:
+            temporary.write_bytes(content)
+    return animation
 
 
-def write_gif(path: Path, images: list[np.ndarray], *, step: int, hold: int) -> None:
-    """Write images (height, width, 3) with one common palette, so that each frame stores only the pixels that changed.
-
-    `step`: milliseconds per frame; `hold`: milliseconds of the last frame.
-    """
+def _gif(images: list[np.ndarray], durations: list[int]) -> bytes:
+    """Encode images with one common palette, so that each frame stores only the pixels that changed."""
     some = Image.fromarray(np.concatenate([images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]))
     colours = np.reshape(some.quantize(COLOURS).getpalette(), (-1, 3))
     colours[(colours > 247).all(axis=1)] = 255  # the background stays white
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
     frames = [Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    durations = [step] * (len(frames) - 1) + [hold]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=False)
+    file = io.BytesIO()
+    frames[0].save(file, "gif", save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=False)
+    return file.getvalue()

@@ -1,4 +1,4 @@
-"""Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml.
+"""Numbers, captions and alternative texts of figures and tables, from notebooks/captions.toml, and headings.
 
 That file lists them in the order of the notebooks, so that code cells contain only code.
 """
@@ -6,14 +6,16 @@ That file lists them in the order of the notebooks, so that code cells contain o
 from __future__ import annotations
 
 import html
+import os
 import tomllib
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from ..checks import check_choice
 from ..run import ROOT
 
-BOOK = ROOT / "notebooks" / "captions.toml"
+BOOK, HEADINGS = ROOT / "notebooks" / "captions.toml", ROOT / "notebooks" / "headings.toml"
 KINDS = {"figures": "Figure", "tables": "Table"}
 
 
@@ -30,16 +32,26 @@ class Caption(NamedTuple):
         return f"<{tag}>{label}{html.escape(self.text, quote=False)}</{tag}>" if self.text else ""
 
 
+def _parsed(path: Path) -> dict[str, dict]:
+    return tomllib.loads(path.read_text("utf-8")) if path.exists() else {}
+
+
+@cache
+def headings() -> dict[str, dict[str, str]]:
+    """Return the headings of columns in notebooks/headings.toml: of shares ("percent"), and of others ("words")."""
+    return {"words": {}, "percent": {}} | _parsed(HEADINGS)
+
+
 @cache
 def _book() -> dict[tuple[str, str], Caption]:
     """Return all captions by kind and name. Each notebook numbers its figures and its tables separately."""
-    found = {}
-    for notebook, kinds in (tomllib.loads(BOOK.read_text("utf-8")) if BOOK.exists() else {}).items():
+    captions = {}
+    for notebook, kinds in _parsed(BOOK).items():
         for kind, entries in kinds.items():
             for number, (name, about) in enumerate(entries.items(), 1):
                 label = f"{KINDS[kind]} {int(notebook[:2])}.{number}"
-                found[kind, name] = Caption(label, about["caption"], about.get("alt", ""))
-    return found
+                captions[kind, name] = Caption(label, about["caption"], about.get("alt", ""))
+    return captions
 
 
 def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None = None) -> Caption:
@@ -49,7 +61,13 @@ def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None
     """
     check_choice("kind", kind, KINDS)
     known = _book().get((kind, name), Caption("", ""))
-    found = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
-    if kind == "figures" and not found.alt:
+    caption = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
+    if kind == "figures" and not caption.alt:
         raise ValueError(f"figure {name!r} has no alternative text: pass alt= or add it to notebooks/{BOOK.name}")
-    return found
+    return caption
+
+
+def file_of(kind: str, name: str, out: str | os.PathLike) -> Path:
+    """Return the path, without suffix: figures/x or figures/tables/x; for "beyond/x" figures/beyond/(tables/)x."""
+    place = Path(out) / "figures" / name
+    return place if kind == "figures" else place.parent / kind / place.name

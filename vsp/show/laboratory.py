@@ -14,9 +14,7 @@ from ..algorithms import distill
 from ..config import PAPER_TASKS, Config, paper_preset
 from ..policy import VoronoiPolicy
 from ..rollouts import Policy, rollout
-from ..tasks import GOAL
-from ..tasks.base import Task
-from ..tasks.registry import get_task
+from ..tasks import GOAL, Task, get_task
 from . import page
 from .explorer import Explorer, scene_of
 from .explorer.scene import N_STARTS, starts_of, to_json
@@ -35,8 +33,7 @@ class Laboratory:
     """Laboratory: distil again whenever a setting changes, explore the policy, and compare it with earlier trials.
 
     `config` holds the initial settings, by default the paper's preset. Raises ValueError for tasks other than the
-    paper's, for a `Tuned`, for sub-policies that are not linear or constant, and for a teacher that cannot act in
-    the task.
+    paper's, for sub-policies that are not linear or constant, and for a teacher that cannot act in the task.
     """
 
     ready, busy = "Change a setting to distil again; this takes about a second.", "distilling …"
@@ -45,14 +42,12 @@ class Laboratory:
         self.teacher, self.task, self.seed = Remembered(teacher), get_task(task), seed
         if self.task.name not in PAPER_TASKS:  # a run of others takes long
             raise ValueError(f"task is {self.task.name}, expected one of {list(PAPER_TASKS)}")
-        rollout(teacher, dataclasses.replace(self.task, max_steps=1), self.task.start(np.random.default_rng(0), 1))
         self.config = paper_preset(self.task) if config is None else config
-        if not isinstance(self.config, Config):
-            raise ValueError(f"config is a {type(self.config).__name__}, expected a Config, which splits cells")
-        if self.config.sub_policy not in DRAWN:
-            raise ValueError(f"config.sub_policy is {self.config.sub_policy!r}, expected one of {list(DRAWN)}")
+        if not isinstance(self.config, Config) or self.config.sub_policy not in DRAWN:
+            raise ValueError(f"config is {self.config!r}, expected a Config whose sub_policy is one of {list(DRAWN)}")
+        self._teacher_result = _judge(teacher, self.task)
+        self._teacher_scene = scene_of({}, self.task, teacher)["teacher"]
         self.trials: list[tuple[Config, VoronoiPolicy, dict]] = []
-        self._own, self._asked = _judge(self.teacher, self.task), None
         self.settings = {name: self._slider(name) for name in REACH}
         about = {"options": DRAWN, "description": "sub-policy", **_LABELS}
         self.settings["sub_policy"] = widgets.Dropdown(value=self.config.sub_policy, **about)
@@ -60,12 +55,14 @@ class Laboratory:
         self.status, self.text = widgets.HTML(self.ready), widgets.HTML(layout={"flex": "1 1 440px", "min_width": "0"})
         self.explorer = View()
         self._put(self.trial({}))
-        beside = widgets.VBox([*self.settings.values(), self.back, self.status], layout={"max_width": "100%"})
-        above = widgets.HBox([beside, self.text], layout={"flex_flow": "row wrap"})
+        controls = widgets.VBox([*self.settings.values(), self.back, self.status], layout={"max_width": "100%"})
+        above = widgets.HBox([controls, self.text], layout={"flex_flow": "row wrap"})
         self.view = widgets.VBox([above, self.explorer])
         self.view.add_class("vsp-controls")
         self.back.on_click(self._go_back)
-        self._listen(True)
+        self._listening = True
+        for control in self.settings.values():
+            control.observe(self._answer, names="value")
 
     def _slider(self, name: str) -> widgets.Widget:
         """A slider over the range in `REACH`: logarithmic for a loss, linear for a distance."""
@@ -77,26 +74,24 @@ class Laboratory:
             return widgets.FloatLogSlider(value, min=low, max=high, step=0.5, readout_format=".1e", **about)
         return widgets.FloatSlider(value, min=low, max=high, step=value / 10, readout_format=".3f", **about)
 
-    def _listen(self, on: bool) -> None:
-        for control in self.settings.values():
-            (control.observe if on else control.unobserve)(self._answer, names="value")
-
     def _go_back(self, _=None) -> None:
         """Reset all settings at once, as a single trial."""
-        self._listen(False)
+        self._listening = False
         for name, control in self.settings.items():
             control.value = getattr(self.config, name)
-        self._listen(True)
+        self._listening = True
         self._answer()
 
     def _answer(self, _=None) -> None:
         """Show the trial of the current settings. Show errors in the status too: Jupyter hides those of callbacks."""
+        if not self._listening:
+            return
         self.status.value = self.busy
         try:
             self._put(self.trial({name: control.value for name, control in self.settings.items()}))
         except BaseException as error:  # also KeyboardInterrupt
-            said = html.escape(f"{type(error).__name__}: {error}")
-            self.status.value = f"<b>failed</b>: {said}. The picture below is trial {self._shown + 1}."
+            message = html.escape(f"{type(error).__name__}: {error}")
+            self.status.value = f"<b>failed</b>: {message}. The picture below is trial {self._shown + 1}."
             raise
         self.status.value = self.ready
 
@@ -125,40 +120,34 @@ class Laboratory:
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="trial"))
 
     def _put(self, place: int) -> None:
-        """Show a trial."""
-        table = self._newest(place).to_html(float_format="{:.4g}".format, border=0, index=False)
+        """Show a trial: the explorer, and a table of trials in which an arrow marks it."""
         scene = to_json(self.scene(place))
-        self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{table}</div>'
+        table = self.to_frame().iloc[self._places(place)].reset_index()
+        table["trial"] = [f"→\N{NO-BREAK SPACE}{n}" if n == place + 1 else str(n) for n in table["trial"]]
+        table.columns = [name.replace("_", " ") for name in table]  # heads that can wrap
+        page = table.to_html(float_format="{:.4g}".format, border=0, index=False)
+        self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{page}</div>'
         self.explorer.scene, self._shown = scene, place
 
     def words(self, place: int) -> str:
         """Describe the results of a trial and of the teacher."""
-        _, policy, result = self.trials[place]
-        cells = "1 cell" if len(policy) == 1 else f"{len(policy)} cells"
+        (_, policy, result), teacher = self.trials[place], self._teacher_result
         return (
-            f"Trial {place + 1}: {cells}, mean return {result['mean']:.2f}; {result['failures'] or 'none'} of "
-            f"{N_STARTS} starts fail to reach the goal. The teacher: mean return {self._own['mean']:.2f}, "
-            f"{self._own['failures'] or 'no'} failures."
+            f"Trial {place + 1}: {len(policy)} cell{'s' * (len(policy) > 1)}, mean return {result['mean']:.2f}; "
+            f"{result['failures'] or 'none'} of {N_STARTS} starts fail to reach the goal. The teacher: mean return "
+            f"{teacher['mean']:.2f}, {teacher['failures'] or 'no'} failures."
         )
 
     def _places(self, place: int) -> list[int]:
         """Return the indices of the newest trials and of the one at `place`, the newest first."""
-        rows = sorted({*range(len(self.trials))[-SHOWN:]} - {place})[-(SHOWN - 1) :] + [place]
-        return sorted(rows, reverse=True)
-
-    def _newest(self, place: int) -> pd.DataFrame:
-        """Return the table of these trials. An arrow marks the one at `place`; headers without underscores can wrap."""
-        table = self.to_frame().iloc[self._places(place)].reset_index()
-        table["trial"] = table["trial"].astype(str).replace(str(place + 1), f"→\N{NO-BREAK SPACE}{place + 1}")
-        return table.rename(columns=lambda name: name.replace("_", " "))
+        newest = [n for n in reversed(range(len(self.trials))) if n != place][: SHOWN - 1]
+        return sorted([*newest, place], reverse=True)
 
     def scene(self, place: int) -> dict:
         """Return the explorer's scene: the trial at `place` first, then the other trials of the table."""
         places = [place, *(other for other in self._places(place) if other != place)]
         policies = {f"trial {other + 1}": _as_linear(self.trials[other][1]) for other in places}
-        if self._asked is None:
-            self._asked = scene_of(policies, self.task, self.teacher)["teacher"]
-        return scene_of(policies, self.task) | {"teacher": self._asked}
+        return scene_of(policies, self.task) | {"teacher": self._teacher_scene}
 
     def _ipython_display_(self) -> None:
         first = Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher)
@@ -167,10 +156,8 @@ class Laboratory:
 
 def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
     """Return the policy with linear maps; a constant becomes a map with zero weights."""
-    if policy.policy_class.name == "linear":
-        return policy
-    d, k, m = len(policy.task.low), len(policy), len(policy.task.outputs)
-    maps = np.concatenate([np.zeros((k, d, m)), policy.coefficients], axis=1)
+    weights = np.zeros((len(policy), len(policy.task.low) + 1 - policy.coefficients.shape[1], len(policy.task.outputs)))
+    maps = np.concatenate([weights, policy.coefficients], axis=1)
     return VoronoiPolicy(policy.codewords, maps, task=policy.task, metric=policy.metric, scale=policy.scale)
 
 

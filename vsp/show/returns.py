@@ -1,4 +1,4 @@
-"""Figures of returns: distributions, intervals, learning curves, the ledger.
+"""Figures of returns: distributions, intervals, the ledger.
 
 seaborn is imported where it is used: the import takes a second, and most notebooks do not need it.
 """
@@ -66,15 +66,6 @@ def histogram(ax: Axes, returns: np.ndarray, *, bound: float | None = None) -> A
     ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}{most}")
     ax.set(xlabel="return per episode", ylabel="episodes")
     ax.legend(frameon=False, loc="upper left")
-    return ax
-
-
-def learning_curve(ax: Axes, steps: np.ndarray, means: np.ndarray) -> Axes:
-    """Plot the mean return of the teacher over its training steps."""
-    steps = check_array("steps", steps, (-1,))
-    means = check_array("means", means, steps.shape)
-    ax.plot(steps / 1000, means, color=TEACHER)
-    ax.set(xlabel="training steps (thousands)", ylabel="mean return")
     return ax
 
 

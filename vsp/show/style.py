@@ -9,7 +9,6 @@ import base64
 import html
 import io
 import os
-from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -19,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..run import atomic
-from .captions import Caption, caption_of
+from .captions import Caption, caption_of, file_of
 
 TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
 COLOURS = (  # seaborn's "colorblind" palette, written out: importing seaborn takes a second
@@ -86,11 +85,17 @@ class Picture:
         return self.about.alt
 
 
+def watermark(fig: Figure, **options) -> None:
+    """Mark a figure as that of a quick run."""
+    look = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
+    fig.text(0.5, 0.5, "quick run", **look, **options)
+
+
 def save_figure(
     fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str | None = None,
     caption: str | None = None,
 ) -> Picture:  # fmt: skip
-    """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show.
+    """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show; NAME may be "beyond/x".
 
     `alt` describes the figure for readers who cannot see it; both files contain it. By default `alt` and
     `caption` come from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
@@ -98,13 +103,13 @@ def save_figure(
     """
     about = caption_of("figures", name, text=caption, alt=alt)
     if quick:
-        fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
-    path = Path(out) / "figures" / name
+        watermark(fig)
+    path = file_of("figures", name, out)
     undated = {"CreationDate": None, "Creator": None, "Producer": None}
     said = (("pdf", {"Subject": about.alt, **undated}), ("png", {"Description": about.alt, "Software": None}))
     for form, metadata in said:
         drawn = io.BytesIO()  # on a full disk, matplotlib's PDF writer would replace the disk's error by one of zlib's
-        fig.savefig(drawn, format=form, metadata={"Title": name, **metadata})
+        fig.savefig(drawn, format=form, metadata={"Title": path.name, **metadata})
         with atomic.atomic_path(path.with_suffix(f".{form}")) as temporary:
             temporary.write_bytes(drawn.getvalue())
     plt.close(fig)

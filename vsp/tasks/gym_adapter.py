@@ -22,7 +22,7 @@ CONTINUOUS = "linear maps give continuous actions, so choose another environment
 
 
 @dataclass
-class _Live:
+class _Episode:
     """A running episode: an environment and its last observation."""
 
     env: gymnasium.Env
@@ -36,15 +36,15 @@ def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
 
 def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
     """Return a freshly reset environment per start. (n,) objects"""
-    live = np.empty(len(starts), dtype=object)
+    episodes = np.empty(len(starts), dtype=object)
     for i, (seed,) in enumerate(starts):
         env = gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)  # no step limit: the caller counts
-        live[i] = _Live(env, env.reset(seed=int(seed))[0])
-    return live
+        episodes[i] = _Episode(env, env.reset(seed=int(seed))[0])
+    return episodes
 
 
 def _see_live(states: np.ndarray) -> np.ndarray:
-    return np.array([live.observation for live in states], dtype=np.float64)
+    return np.array([episode.observation for episode in states], dtype=np.float64)
 
 
 def _step_live(
@@ -55,12 +55,13 @@ def _step_live(
     An episode that the environment cuts off by itself counts as one that reached the step limit.
     """
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
-    for i, (live, action) in enumerate(zip(states, actions)):
-        live.observation, rewards[i], ended, cut, info = live.env.step(action.astype(live.env.action_space.dtype))
+    for i, (episode, action) in enumerate(zip(states, actions)):
+        action = action.astype(episode.env.action_space.dtype)
+        episode.observation, rewards[i], ended, cut, info = episode.env.step(action)
         if ended and outcome is None:
             outcomes[i] = ENDED
         elif ended:
-            outcomes[i] = GOAL if outcome(live.observation, rewards[i], info) else PIT
+            outcomes[i] = GOAL if outcome(episode.observation, rewards[i], info) else PIT
         elif cut:
             outcomes[i] = TRUNCATED
     return states, rewards, outcomes
@@ -84,17 +85,17 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
 
 def _made(name: str, outcome: Outcome | None) -> Task:
     env = gymnasium.make(name)
-    seen, acts, most = env.observation_space, env.action_space, env.spec.max_episode_steps
+    observations, actions, max_steps = env.observation_space, env.action_space, env.spec.max_episode_steps
     env.close()
-    for what, space, remedy in (("observations", seen, FLATTEN), ("actions", acts, CONTINUOUS)):
+    for what, space, remedy in (("observations", observations, FLATTEN), ("actions", actions, CONTINUOUS)):
         if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
             raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension: {remedy}")
-    if not (np.isfinite(acts.low).all() and np.isfinite(acts.high).all()):
-        raise ValueError(f"actions of {name} are {acts}, expected limits: gymnasium.wrappers.RescaleAction sets them")
-    if most is None:
+    if not actions.is_bounded():
+        raise ValueError(f"actions of {name} are {actions}, expected limits, as gymnasium.wrappers.RescaleAction sets")
+    if max_steps is None:
         raise ValueError(f"{name} has no step limit, expected one: pass max_episode_steps to gymnasium.register")
-    box = (np.asarray(limit, dtype=np.float64) for limit in (seen.low, seen.high, acts.low, acts.high))
-    return live_task(name, *box, max_steps=most, outcome=outcome)
+    box = [limit.astype(np.float64) for space in (observations, actions) for limit in (space.low, space.high)]
+    return live_task(name, *box, max_steps=max_steps, outcome=outcome)
 
 
 def live_task(
@@ -105,20 +106,8 @@ def live_task(
 
     Each episode opens the environment when it begins.
     """
-    inputs = tuple(f"s{i}" for i in range(len(low)))
+    inputs, outputs = tuple(f"s{i}" for i in range(len(low))), tuple(f"a{j}" for j in range(len(action_low)))
     return Task(
-        name=name,
-        inputs=inputs,
-        outputs=tuple(f"a{j}" for j in range(len(action_low))),
-        input_labels=inputs,
-        low=low,
-        high=high,
-        action_low=action_low,
-        action_high=action_high,
-        max_steps=max_steps,
-        start=_draw_seeds,
-        step=partial(_step_live, outcome),
-        see=_see_live,
-        begin=partial(begin_live, name),
-        start_size=1,
-    )
+        name, inputs, outputs, inputs, low, high, action_low, action_high, max_steps, start=_draw_seeds,
+        step=partial(_step_live, outcome), see=_see_live, begin=partial(begin_live, name), start_size=1,
+    )  # fmt: skip

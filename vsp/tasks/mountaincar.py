@@ -48,10 +48,5 @@ TASK = Task(
     max_steps=999,
     start=start,
     step=step,
-    signals=Signals(
-        ("e", "ė"),
-        signals,
-        (f"{FLAG} - state[0]", "-state[1]"),
-        (FLAG + 1.2, 0.07),
-    ),
+    signals=Signals(("e", "ė"), signals, (f"{FLAG} - state[0]", "-state[1]"), (FLAG + 1.2, 0.07)),
 )

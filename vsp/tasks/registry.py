@@ -46,9 +46,9 @@ def get_task(name: str | Task) -> Task:
     """
     if isinstance(name, Task):
         return name
-    if isinstance(name, str) and (found := _TASKS.get(name) or _ADDED.get(name)):
-        return found
     _check_registered(name)
+    if name in _TASKS or name in _ADDED:
+        return _TASKS.get(name) or _ADDED[name]
     return _LATER.get(name, partial(gymnasium_task, name))()
 
 
@@ -58,19 +58,16 @@ def _check_registered(name: str) -> None:
         raise ValueError(f"task is a {type(name).__name__}, expected a name or a Task: are the arguments in order?")
     if name in gymnasium.registry:
         return
-    ours = task_names()
-    near = difflib.get_close_matches(name, ours) or difflib.get_close_matches(name, gymnasium.registry, cutoff=0.75)
+    known = task_names()
+    near = difflib.get_close_matches(name, known) or difflib.get_close_matches(name, gymnasium.registry, cutoff=0.75)
     guess = f"did you mean {near[0]!r}?" if near else "if it is yours, import what registers it"
-    raise ValueError(f"unknown task {name!r}, expected one of {ours} or of Gymnasium's registry; {guess}")
+    raise ValueError(f"unknown task {name!r}, expected one of {known} or of Gymnasium's registry; {guess}")
 
 
 def register(
-    name: str,
-    *,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
+    name: str, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
     outcome: Outcome | None = None,
-) -> Task:
+) -> Task:  # fmt: skip
     """Add an environment of Gymnasium's registry to vsp's tasks, for this process. Returns its `Task`.
 
     `inputs` and `outputs` name its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
@@ -93,10 +90,9 @@ def _names(what: str, given: Sequence[str] | None, plain: tuple[str, ...]) -> tu
     if given is None:
         return plain
     names = () if isinstance(given, str) else tuple(given)
-    if len(names) != len(plain) or len({name for name in names if isinstance(name, str) and name}) != len(plain):
-        raise ValueError(f"{what} are {given!r}, expected {len(plain)} different names")
-    if "bias" in names:
-        raise ValueError(f"{what} are {given!r}, expected none called 'bias', the name of the constant in tables")
+    distinct = {name for name in names if isinstance(name, str) and name not in ("", "bias")}
+    if len(names) != len(plain) or len(distinct) != len(plain):
+        raise ValueError(f"{what} are {given!r}, expected {len(plain)} different names, none of them 'bias'")
     return names
 
 
@@ -106,9 +102,6 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     If no such environment is registered, the task has no dynamics: its policy can act, but no episode can run. Raises
     ValueError if the environment of that name has another box.
     """
-    for names, low, high in ((inputs, box["low"], box["high"]), (outputs, box["action_low"], box["action_high"])):
-        if not all(isinstance(one, str) for one in names) or not low.shape == high.shape == (len(names),):
-            raise ValueError(f"the names {names} have limits {low} and {high}, expected two each")
     labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
     try:
         known = get_task(name)
@@ -118,14 +111,12 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     for limit in BOX:
         if not np.array_equal(getattr(known, limit), box[limit]):
             raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, but {box[limit]} in the file")
-    same = (known.inputs, known.outputs) == (labels["inputs"], labels["outputs"])
-    return known if same else replace(known, **labels)
+    return known if (known.inputs, known.outputs) == (tuple(inputs), tuple(outputs)) else replace(known, **labels)
 
 
 def _absent(name: str, *_) -> NoReturn:
-    raise ValueError(
-        f"{name} is not registered here, so its policy can act but no episode can run: import what registers it"
-    )
+    what = "is not registered here, so its policy can act but no episode can run: import what registers it"
+    raise ValueError(f"{name} {what}")
 
 
 def render(name: str, state: np.ndarray) -> np.ndarray:

@@ -42,7 +42,8 @@ class Teacher:
             raise ValueError(
                 f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
             )
-        self._critics = [layers for i in range(2) if (layers := _layers(critic or {}, f"qf{i}"))]
+        self._critic = critic or {}
+        self._critics = [layers for i in range(2) if (layers := _layers(self._critic, f"qf{i}"))]
         inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
         d, m = len(self.task.low), len(self.task.action_low)
         if (inputs, outputs) != (d, m):
@@ -71,9 +72,9 @@ class Teacher:
         """
         states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self._half))), dtype=np.float32)
-        own = (self.predict(states)[0] - self._centre) / self._half
-        worst = np.min([self._value(states, np.broadcast_to(corner, own.shape)) for corner in corners], axis=0)
-        return np.maximum(self._value(states, own) - worst, 0.0).astype(np.float64)
+        actions = (self.predict(states)[0] - self._centre) / self._half
+        worst = np.min([self._value(states, np.broadcast_to(corner, actions.shape)) for corner in corners], axis=0)
+        return np.maximum(self._value(states, actions) - worst, 0.0).astype(np.float64)
 
     def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """Return the value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)
@@ -90,11 +91,7 @@ class Teacher:
         Raises ValueError for a teacher without critics.
         """
         self._check_critics()
-        found = {}
-        for i, layers in enumerate(self._critics):
-            for j, (weight, bias) in enumerate(layers):
-                found |= {f"qf{i}.{2 * j}.weight": weight.T, f"qf{i}.{2 * j}.bias": bias}
-        return found
+        return self._critic
 
     def _check_critics(self) -> None:
         if not self._critics:
@@ -116,19 +113,16 @@ def _forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) ->
 
 def _layers(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return weight and bias of every layer of the network called `name`; an empty list if there is no such network."""
-    found = (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors)
-    indices = sorted(int(match[1]) for match in found if match)
-    layers = [
-        (_tensor(tensors, f"{name}.{i}.weight", 2).T.copy(), _tensor(tensors, f"{name}.{i}.bias", 1)) for i in indices
-    ]
-    shapes, biases = [weight.shape for weight, _ in layers], [len(bias) for _, bias in layers]
-    given, taken = [out for _, out in shapes], [width for width, _ in shapes]
-    if biases != given or given[:-1] != taken[1:]:
+    indices = sorted(int(m[1]) for m in (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors) if m)
+    weights = [_tensor(tensors, f"{name}.{i}.weight", 2).T.copy() for i in indices]
+    biases = [_tensor(tensors, f"{name}.{i}.bias", 1) for i in indices]
+    shapes, outputs = [weight.shape for weight in weights], [len(bias) for bias in biases]
+    if [given for _, given in shapes] != outputs or [taken for taken, _ in shapes[1:]] != outputs[:-1]:
         raise ValueError(
-            f"the layers of {name} are {shapes} (inputs, outputs) with {biases} biases, expected one for each output, "
+            f"the layers of {name} are {shapes} (inputs, outputs) with {outputs} biases, expected one for each output, "
             "and as many inputs as the layer before has outputs"
         )
-    return layers
+    return list(zip(weights, biases))
 
 
 def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
@@ -157,14 +151,10 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
         )
     if not path.suffix:
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
-    from safetensors import SafetensorError
     from safetensors.numpy import load
 
     content, card = listed.read_carded(path)
-    try:
-        tensors = load(content)
-    except SafetensorError as error:
-        raise atomic.DamagedFile(f"{path}: not a safetensors file: {error}") from error
+    tensors = load(content)
     critic = part_of(tensors, "critic")
     return Teacher(part_of(tensors, "actor"), task or card.get("task"), card=card, critic=critic)
 

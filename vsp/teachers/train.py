@@ -1,7 +1,7 @@
 """Train a TD3 teacher with Stable-Baselines3, resumably, and export it with its card.
 
-`python -m vsp.teachers.train --cache FOLDER` trains the shipped teachers again. Only the functions that train import
-torch and stable_baselines3.
+`python -m studies.make_teachers --cache FOLDER` trains the shipped teachers again, also those of the robots. Only the
+functions that train import torch and stable_baselines3.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import argparse
 import copy
 import io
 import os
-import pickle
 import sys
 from dataclasses import asdict, replace
 from importlib.metadata import version
@@ -19,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ..evaluation import rollout_from_seed
-from ..run import atomic, command, listed, sealed
+from ..run import listed, sealed
 from ..tasks.base import GOAL, PIT
 from ..tasks.registry import get_task
 from .agent_zip import part_of
@@ -36,21 +35,11 @@ OFTEN = {"BipedalWalker-v3": 4}  # factor on CURVE_EPISODES where a rare fall de
 SELECTION_SEED, SCORE_SEED = 101, 102  # seeds of start states: to select a training seed, and to report scores
 
 
-def train(
-    task: str,
-    *,
-    seed: int,
-    cache: str | os.PathLike,
-    lean: str | os.PathLike | None = None,
-    recipe: Recipe | None = None,
-    report=print,
-) -> Path:
+def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | None = None, report=print) -> Path:
     """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint.
 
     Training proceeds in chunks of `CHUNK` steps. Each chunk begins a new episode with new random streams from (seed,
-    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one. The folder
-    `lean` is for moving to another machine: its checkpoints have no replay buffer. If `cache` has no checkpoint,
-    training resumes from `lean`, after the actor has refilled the buffer; the checkpoint records the steps of refills.
+    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one.
     """
     import torch
 
@@ -58,51 +47,24 @@ def train(
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     recipe = RECIPES[task] if recipe is None else recipe
     path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
-    model, curve, best, refilled = _new_model(task, recipe, seed), [], None, []
-    known = [path, Path(lean) / path.name] if lean else [path]
-    if found := next(filter(Path.exists, known), None):
-        snapshot = read_checkpoint(found)
-        curve, best, refilled = _restore(model, snapshot), snapshot.get("best"), snapshot.get("refilled", [])
-        if "buffer" not in snapshot and model.num_timesteps < recipe.steps:
-            model.set_random_seed(seed)
-            _refill(model)
-            refilled.append(model.num_timesteps)
+    model, snapshot = _new_model(task, recipe, seed), {"curve": []}
+    if path.exists():
+        snapshot = read_checkpoint(path)
+        _restore(model, snapshot)
     while model.num_timesteps < recipe.steps:
         chunk_seed = np.random.SeedSequence([seed, model.num_timesteps]).generate_state(1)[0]
         model.set_random_seed(int(chunk_seed))
         model._last_obs = None  # begin a fresh episode
         model.action_noise.reset()
         model.learn(min(CHUNK, recipe.steps - model.num_timesteps), reset_num_timesteps=False, log_interval=None)
-        curve.append(_score(model, task))
-        report(f"{task} seed {seed}: {curve[-1]}")
-        snapshot = _snapshot(model, curve)
-        if task in BEST_OF_CURVE:
-            if best is None or curve[-1]["mean"] > best["point"]["mean"]:
-                best = {"point": curve[-1], "policy": copy.deepcopy(snapshot["policy"])}
-            snapshot["best"] = best
-        snapshot["refilled"] = refilled
-        found = _write_checkpoint(path, snapshot)
-        if lean:
-            del snapshot["buffer"], snapshot["buffer_at"]
-            _write_checkpoint(Path(lean) / path.name, snapshot)
-    return found
-
-
-def _write_checkpoint(path: Path, snapshot: dict) -> Path:
-    import torch
-
-    content = io.BytesIO()
-    torch.save(snapshot, content)
-    sealed.write_sealed(path, content.getvalue())
+        point = _score(model, task)
+        report(f"{task} seed {seed}: {point}")
+        snapshot |= _snapshot(model) | {"curve": [*snapshot["curve"], point]}
+        if task in BEST_OF_CURVE and ("best" not in snapshot or point["mean"] > snapshot["best"]["point"]["mean"]):
+            snapshot["best"] = {"point": point, "policy": copy.deepcopy(snapshot["policy"])}
+        torch.save(snapshot, content := io.BytesIO())
+        sealed.write_sealed(path, content.getvalue())
     return path
-
-
-def _refill(model) -> None:
-    """Refill the replay buffer with as many steps as precede training, without training. These steps do not count."""
-    steps, gradient_steps = model.num_timesteps, model.gradient_steps
-    model.gradient_steps = 0
-    model.learn(max(model.learning_starts, model.batch_size), reset_num_timesteps=False, log_interval=None)
-    model.num_timesteps, model.gradient_steps = steps, gradient_steps
 
 
 def read_checkpoint(path: str | os.PathLike) -> dict:
@@ -112,11 +74,7 @@ def read_checkpoint(path: str | os.PathLike) -> dict:
     """
     import torch
 
-    content = io.BytesIO(sealed.read_sealed(path))
-    try:
-        return torch.load(content, weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError) as error:
-        raise atomic.DamagedFile(f"{path}: the checksum is right, but the file is no checkpoint: delete it") from error
+    return torch.load(io.BytesIO(sealed.read_sealed(path)), weights_only=True)
 
 
 def _new_model(task: str, recipe: Recipe, seed: int):
@@ -135,7 +93,7 @@ def _new_model(task: str, recipe: Recipe, seed: int):
 _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def _snapshot(model, curve: list[dict]) -> dict:
+def _snapshot(model) -> dict:
     """Return the state of training between two chunks, in types that `weights_only` loading accepts."""
     import torch
 
@@ -148,20 +106,18 @@ def _snapshot(model, curve: list[dict]) -> dict:
         "buffer": {name: torch.from_numpy(getattr(buffer, name)[:n].copy()) for name in _BUFFER},
         "buffer_at": [buffer.pos, buffer.full],
         "counters": [model.num_timesteps, model._n_updates, model._episode_num],
-        "curve": curve,
     }
 
 
-def _restore(model, snapshot: dict) -> list[dict]:
-    """Restore a snapshot into a new model. Returns the learning curve so far."""
+def _restore(model, snapshot: dict) -> None:
+    """Restore a snapshot into a new model."""
     model.policy.load_state_dict(snapshot["policy"])
     model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
     model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
-    for name, rows in snapshot.get("buffer", {}).items():
+    for name, rows in snapshot["buffer"].items():
         getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
-    model.replay_buffer.pos, model.replay_buffer.full = snapshot.get("buffer_at", (0, False))
+    model.replay_buffer.pos, model.replay_buffer.full = snapshot["buffer_at"]
     model.num_timesteps, model._n_updates, model._episode_num = snapshot["counters"]
-    return snapshot["curve"]
 
 
 def _score(model, task: str) -> dict:
@@ -197,12 +153,8 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
     seed, snapshot = list(tried.items())[-1]
     if not reaches_bar(score(_teacher(snapshot, task), task, seed=SELECTION_SEED), task):
         return False
-    about = {
-        "seeds_tried": [{"seed": s, **_chosen(snap)[1]} for s, snap in tried.items()],
-        "earlier_trials": EARLIER_TRIALS.get(task, []),
-    }
-    if snapshot.get("refilled"):  # after a move to another machine
-        about["buffer_refilled_at"] = snapshot["refilled"]
+    about = {"seeds_tried": [{"seed": s, **_chosen(snap)[1]} for s, snap in tried.items()]}
+    about["earlier_trials"] = EARLIER_TRIALS.get(task, [])
     _write(task, snapshot, RECIPES[task], seed, Path(folder) / f"{task}.safetensors", ("actor.", "critic."), about)
     return True
 
@@ -234,7 +186,6 @@ def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, par
     """Write the tensors whose names begin with one of `parts`, and the card."""
     from safetensors.numpy import save
 
-    found = score(_teacher(snapshot, task), task)
     tensors = {name: tensor.numpy() for name, tensor in _chosen(snapshot)[0].items() if name.startswith(parts)}
     card = {
         "task": task,
@@ -243,16 +194,17 @@ def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, par
         "seed": seed,
         **about,
         "versions": {name: version(name) for name in (*PACKAGES, *ENGINES.get(task, ()))},
-        "score": {"episodes": SCORE_EPISODES // get_task(task).slowness, "start_seed": SCORE_SEED, **found},
+        "score": {"episodes": SCORE_EPISODES // get_task(task).slowness, "start_seed": SCORE_SEED}
+        | score(_teacher(snapshot, task), task),
         "learning_curve": snapshot["curve"],
     }
     listed.write_carded(path, save(tensors), card)
 
 
-def reaches_bar(found: dict, task: str) -> bool:
+def reaches_bar(scores: dict, task: str) -> bool:
     """Whether a score meets the requirements of the task, `BARS`."""
     mean, failures = BARS[task]
-    return found["mean"] >= mean and 1.0 - found["goal"] <= failures
+    return scores["mean"] >= mean and 1.0 - scores["goal"] <= failures
 
 
 def main() -> None:
@@ -262,14 +214,12 @@ def main() -> None:
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--cache", required=True, help="folder for checkpoints; training resumes from there")
-    parser.add_argument("--lean", help="folder for checkpoints without replay buffers, to resume on another machine")
     parser.add_argument("--out", default=SHIPPED, help="folder for the exported teachers")
     parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
     parser.add_argument("--short", action="store_true", help="run the shorter trainings that a study compares")
     arguments = parser.parse_args()
-    if arguments.short and (arguments.lean or not set(arguments.task or ()) <= set(SHORT_SEEDS)):
-        parser.error(f"argument --short: it takes no --lean, and a --task of {list(SHORT_SEEDS)}")
-    for task in arguments.task or (SHORT_SEEDS if arguments.short else RECIPES):
+    known = SHORT_SEEDS if arguments.short else RECIPES
+    for task in [task for task in known if task in (arguments.task or known)]:
         if arguments.short:
             for seed in SHORT_SEEDS[task]:
                 checkpoint = train(task, seed=seed, cache=arguments.cache, recipe=short_recipe(task))
@@ -277,13 +227,8 @@ def main() -> None:
             continue
         checkpoints = {}
         for seed in range(MOST_SEEDS):
-            checkpoints[seed] = train(task, seed=seed, cache=arguments.cache, lean=arguments.lean)
+            checkpoints[seed] = train(task, seed=seed, cache=arguments.cache)
             if export(task, checkpoints, arguments.out):
                 break
         else:
             sys.exit(f"{task}: none of the seeds 0 to {MOST_SEEDS - 1} met the requirements {BARS[task]}")
-
-
-if __name__ == "__main__":
-    with command.in_one_line():
-        main()

@@ -1,4 +1,5 @@
-"""Studies of the reproduction: the effect of each choice that the paper leaves open, and of the teacher."""
+"""Studies of the reproduction: the effect of open choices, of the teacher, and of the cells beside simpler policies."""
 
+from .committed import stale
 from .interpretations import PANELS, as_intervals, interpretation_summary, ranking
 from .teachers import teacher_summary, variance_shares

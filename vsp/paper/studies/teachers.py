@@ -14,9 +14,9 @@ from ...evaluation import rollout_from_seed
 from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
 from ..baselines import linear_map
-from ..beside import teacher_data
 from ..results import settings_id
 from ..runs import EVALUATION_SEED, Experiment, load_runs, make_all, outcome_shares, paper_experiment
+from .simpler import teacher_data
 
 VERSION = 1  # raise it when the same runs give other rows
 SEEDS = range(1000, 1010)  # of the distillations of each teacher

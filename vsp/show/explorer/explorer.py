@@ -55,8 +55,11 @@ class Explorer:
         tasks = {policy.task.name: policy.task for policy in policies.values()}
         if len(tasks) != 1:
             raise ValueError(f"the policies play {sorted(tasks) or 'nothing'}, expected one task")
-        self.policies, (self.task,) = policies, tasks.values()
-        _check_history(history, next(iter(policies.values())))
+        self.policies, (self.task,), first = policies, tasks.values(), next(iter(policies.values()))
+        if not isinstance(history, History | None):
+            raise ValueError(f"history is a {type(history).__name__}, expected the History that `vsp.distill` returns")
+        if history and not np.array_equal(history.policy_at(len(history.cells) - 1).codewords, first.codewords):
+            raise ValueError("history is of another run than the first policy, expected the one that gave it")
         if guess is not None and not (isinstance(guess, str) and guess and self.task.name in PLANES):
             raise ValueError(f"guess is {guess!r}, expected a question about one of {', '.join(PLANES)}, or None")
         self.scene = scene_of(policies, self.task, teacher, history, axes)
@@ -65,14 +68,13 @@ class Explorer:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a standalone HTML file, which opens from disk and needs no other file or host."""
-        title = f"{self.task.name}: explore the policy"
-        page = _PAGE.format(title=html.escape(title), body=self.element(), script=SCRIPT.read_text("utf-8"))
-        atomic.write_text(path, page)
+        title = html.escape(f"{self.task.name}: explore the policy")
+        atomic.write_text(path, _PAGE.format(title=title, body=self.element(), script=SCRIPT.read_text("utf-8")))
 
     def element(self, *, source: str | None = None) -> str:
         """Return HTML with the script's scene (inside, or in the file `source`) and a picture to show without it."""
-        said = f"<figcaption>{html.escape(self._alt())}</figcaption>"
-        picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{said}</figure>"
+        caption = f"<figcaption>{html.escape(self._alt())}</figcaption>"
+        picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{caption}</figure>"
         if source is not None:
             return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
         scene = to_json(self.scene).replace("<", "\\u003c")  # no tag ends here
@@ -95,7 +97,7 @@ class Explorer:
         policy, (low, high, labels) = next(iter(self.policies.values())), self.scene["plane"].values()
         fig, (ax,) = style.panels(1, width=3.2, height=3.0)
         if "stored" in self.scene:
-            states = np.concatenate([one["states"] for one in self.scene["policies"][0]["episodes"]])
+            states = np.concatenate([episode["states"] for episode in self.scene["policies"][0]["episodes"]])
             colours = [style.COLOURS[cell % len(style.COLOURS)] for cell in policy.cells(states)]
             ax.scatter(*states[:, self.scene["stored"]["axes"]].T, s=3, color=colours)
         else:
@@ -119,28 +121,10 @@ class Explorer:
             state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
 
 
-def _check_history(history: History | None, policy: VoronoiPolicy) -> None:
-    """Raise ValueError unless `history` is None or that of the run that gave `policy`."""
-    if history is None:
-        return
-    if not isinstance(history, History):
-        kind = type(history).__name__
-        raise ValueError(f"history is a {kind}, expected the History that `vsp.distill` returns with a Config")
-    last = history.policy_at(len(history.cells) - 1)
-    if last.task.name != policy.task.name:
-        raise ValueError(f"history is of a run on {last.task.name}, expected one on {policy.task.name}")
-    if last.policy_class.name != "linear" or not np.array_equal(last.codewords, policy.codewords):
-        raise ValueError("history is of another run than the first policy, expected the one that gave it")
-
-
 def explore(
-    policies: VoronoiPolicy | dict[str, VoronoiPolicy],
-    *,
-    teacher: Policy | None = None,
-    history: History | None = None,
-    axes: tuple[str, str] | None = None,
-    guess: str | None = None,
-) -> Explorer:
+    policies: VoronoiPolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None,
+    history: History | None = None, axes: tuple[str, str] | None = None, guess: str | None = None,
+) -> Explorer:  # fmt: skip
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
     `policies`: one policy with linear maps, or several by name. `teacher`: its actions are shown beside theirs.
@@ -150,5 +134,5 @@ def explore(
     ValueError for other policies, unknown inputs, a history of another method or task, and a guess for a task that the
     browser cannot simulate.
     """
-    several = policies if isinstance(policies, dict) else {"policy": policies}
-    return Explorer(several, teacher=teacher, history=history, axes=axes, guess=guess)
+    policies = policies if isinstance(policies, dict) else {"policy": policies}
+    return Explorer(policies, teacher=teacher, history=history, axes=axes, guess=guess)

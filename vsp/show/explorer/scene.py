@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import count
+from itertools import count, permutations
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def scene_of(
     Their scenes stay below `MOST` bytes, with fewer moments and steps where needed. Raises ValueError for `axes` that
     are not inputs, for a teacher whose actions have another shape, and as `collect_episodes` does.
     """
-    scene = _numbers_of_task(task) | {"policies": [_numbers(policy, name) for name, policy in policies.items()]}
+    scene = {"task": _task(task), "policies": [_numbers(policy, name) for name, policy in policies.items()]}
     if history is not None:
         first = scene["policies"][0]
         first["replay"] = _replay(history)
@@ -63,27 +63,20 @@ def to_json(scene: object) -> str:
     return json.dumps(scene, separators=(",", ":"), allow_nan=False)
 
 
-def _numbers_of_task(task: Task) -> dict:
-    return {
-        "task": {
-            "name": task.name, "inputs": list(task.inputs), "outputs": list(task.outputs), "maxSteps": task.max_steps,
-            "actionLow": task.action_low.tolist(), "actionHigh": task.action_high.tolist(),
-        },
-    }  # fmt: skip
+def _task(task: Task) -> dict:
+    names = {"name": task.name, "inputs": list(task.inputs), "outputs": list(task.outputs), "maxSteps": task.max_steps}
+    return names | {"actionLow": task.action_low.tolist(), "actionHigh": task.action_high.tolist()}
 
 
 def _played(task: Task, teacher: Policy | None) -> dict:
     """Return what the script needs to simulate a task: plane, starts, failures, and a teacher's grid."""
     (low, high, labels), starts = PLANES[task.name], starts_of(task)
-    found = {
-        "plane": {"low": low, "high": high, "labels": labels},
-        "starts": starts.tolist(),
-        "lost": [] if task.name == "Pendulum-v1" else [RUNNING, PIT],
-    }
+    lost = [] if task.name == "Pendulum-v1" else [RUNNING, PIT]
+    scene = {"plane": {"low": low, "high": high, "labels": labels}, "starts": starts.tolist(), "lost": lost}
     if teacher is not None:
         mean = float(rollout(teacher, task, starts).returns.mean())
-        found["teacher"] = _teacher(teacher, task, np.array(low), np.array(high)) | {"mean": mean}
-    return found
+        scene["teacher"] = _teacher(teacher, task, np.array(low), np.array(high)) | {"mean": mean}
+    return scene
 
 
 def _stored(
@@ -91,11 +84,12 @@ def _stored(
 ) -> dict:
     """Add every policy's episodes and the teacher's actions to `into`; return the plane and the box of the states."""
     first, starts = next(iter(policies.values())), start_states(task, N_EPISODES, EPISODE_SEED)
-    _check_axes(task, axes)  # before the episodes are played
-    played = [[one.states for one in collect_episodes(policy, task, starts)] for policy in policies.values()]
-    seen = np.concatenate([states for episodes in played for states in episodes])
-    low, high, chosen = seen.min(axis=0), seen.max(axis=0), _axes(task, seen, first, axes)
-    decimals = _decimals(seen)
+    if axes is not None and axes not in permutations(task.inputs, 2):
+        raise ValueError(f"axes are {axes!r}, expected two of the inputs {', '.join(task.inputs)}")
+    played = [[episode.states for episode in collect_episodes(policy, task, starts)] for policy in policies.values()]
+    visited = np.concatenate([states for episodes in played for states in episodes])
+    low, high, decimals = visited.min(axis=0), visited.max(axis=0), _decimals(visited)
+    chosen = _widest(visited / first.scale) if axes is None else [task.inputs.index(name) for name in axes]
     for most in (N_STEPS // n for n in count(1)):
         for episodes, about in zip(played, into):
             about["episodes"] = [_episode(states, decimals, teacher, task, max(most, 1)) for states in episodes]
@@ -114,40 +108,30 @@ def _episode(states: np.ndarray, decimals: list[int], teacher: Policy | None, ta
     """Return at most `most` evenly spaced states of an episode, and the teacher's actions there."""
     every = 1 + (len(states) - 1) // most
     kept = _rounded(states[::every], decimals)
-    found = {"states": kept.tolist(), "every": every, "steps": len(states)}
-    if teacher is None:
-        return found
-    actions = check_array("the teacher's actions", teacher.predict(kept)[0], (len(kept), len(task.outputs)))
-    return found | {"teacher": _rounded(actions, _decimals(np.stack([task.action_low, task.action_high]))).tolist()}
+    episode = {"states": kept.tolist(), "every": every, "steps": len(states)}
+    if teacher is not None:
+        actions = check_array("the teacher's actions", teacher.predict(kept)[0], (len(kept), len(task.outputs)))
+        episode["teacher"] = _rounded(actions, _decimals(np.stack([task.action_low, task.action_high]))).tolist()
+    return episode
 
 
 def _decimals(values: np.ndarray) -> list[int]:
     """Return for each column the number of decimals that gives its range `DIGITS` digits or one more."""
     size = np.maximum(np.ptp(values, axis=0), 1e-6 * np.abs(values).max(axis=0))
-    return [DIGITS - int(np.floor(np.log10(one))) if one else 0 for one in size.tolist()]
+    return [DIGITS - int(np.floor(np.log10(range_))) if range_ else 0 for range_ in size.tolist()]
 
 
 def _rounded(values: np.ndarray, decimals: list[int]) -> np.ndarray:
     return np.column_stack([column.round(n) for column, n in zip(values.T, decimals)])
 
 
-def _check_axes(task: Task, names: tuple[str, str] | None) -> None:
-    """Raise ValueError unless `names` are two inputs, or None."""
-    given = [] if names is None or isinstance(names, str) else list(names) if np.iterable(names) else []
-    if names is not None and (len(given) != 2 or given[0] == given[1] or not all(one in task.inputs for one in given)):
-        raise ValueError(f"axes are {names!r}, expected two of the inputs {', '.join(task.inputs)}")
+def _widest(states: np.ndarray) -> list[int]:
+    """Return the two inputs that vary most, in units of the look-up.
 
-
-def _axes(task: Task, seen: np.ndarray, policy: VoronoiPolicy, names: tuple[str, str] | None) -> list[int]:
-    """Return the two inputs to draw: those named, or those that vary most in units of the look-up.
-
-    Inputs with two values, such as contacts, are drawn only if there are no others; a single input is drawn twice.
+    Inputs with two values, such as contacts, count only if there are no others; a single input counts twice.
     """
-    if names is not None:
-        return [task.inputs.index(name) for name in names]
-    spread = (seen / policy.scale).std(axis=0)
-    binary = np.array([len(np.unique(column)) <= 2 for column in seen.T])
-    order = np.lexsort((-spread, binary))
+    binary = np.array([len(np.unique(column)) <= 2 for column in states.T])
+    order = np.lexsort((-states.std(axis=0), binary))
     return sorted(order[:2].tolist()) if len(order) > 1 else [0, 0]
 
 
@@ -156,24 +140,22 @@ def _thinned(moments: list[dict], most: int) -> list[dict]:
 
     The first and the last moment stay.
     """
-    changes = [i for i, one in enumerate(moments) if one["change"] or i in (0, len(moments) - 1)]
-    for places in ([*range(len(moments))], changes):
-        if len(to_json([moments[i] for i in places])) <= most:
-            return [moments[i] for i in places]
-    for every in count(2):
-        places = [*changes[:-1][::every], changes[-1]]
-        if len(to_json(found := [moments[i] for i in places])) <= most or every > len(changes):
-            return found
-    raise AssertionError
+    if len(to_json(moments)) <= most:
+        return moments
+    changes = [moment for i, moment in enumerate(moments) if moment["change"] or i in (0, len(moments) - 1)]
+    for every in range(1, len(changes) + 1):
+        kept = [*changes[:-1][::every], changes[-1]]
+        if len(to_json(kept)) <= most:
+            break
+    return kept
 
 
 def starts_of(task: Task) -> np.ndarray:
     """Return starts in a regular grid over the range of the task's starts. (n, 2)"""
     drawn = task.start(np.random.default_rng(0), 10_000)
     low, high = drawn.min(axis=0), drawn.max(axis=0)
-    sides = [1 if a == b else None for a, b in zip(low, high)]
-    n = N_STARTS if 1 in sides else round(N_STARTS**0.5)
-    axes = [np.array([a]) if one else a + (np.arange(n) + 0.5) / n * (b - a) for a, b, one in zip(low, high, sides)]
+    n = N_STARTS if (low == high).any() else round(N_STARTS**0.5)
+    axes = [np.array([a]) if a == b else a + (np.arange(n) + 0.5) / n * (b - a) for a, b in zip(low, high)]
     return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)).round(6)
 
 
@@ -211,12 +193,10 @@ def _replay(history: History) -> list[dict]:
     for event in history.events:
         changes.setdefault(event.iteration, []).append(event.kind)
     moments = {*np.linspace(0, last, N_MOMENTS).astype(int).tolist(), *changes}
-    found = []
+    replay = []
     for n in sorted(moments):
-        policy = history.policy_at(n)
-        rounded = (numbers.round(4).tolist() for numbers in (policy.codewords, policy.coefficients))
-        numbers = dict(zip(("codewords", "coefficients"), rounded))
-        kinds = changes.get(n, [])
+        policy, kinds = history.policy_at(n), changes.get(n, [])
         words = ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("split", "merge") if kind in kinds)
-        found.append({"n": n, **numbers, "change": words})
-    return found
+        numbers = {name: getattr(policy, name).round(4).tolist() for name in ("codewords", "coefficients")}
+        replay.append({"n": n, **numbers, "change": words})
+    return replay
