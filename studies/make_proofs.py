@@ -12,25 +12,30 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from vsp import VoronoiPolicy, collect_episodes, load_teacher, rollout, start_states
 from vsp.algorithms import distill
 from vsp.config import paper_preset
-from vsp.evaluation import start_states
-from vsp.paper import results
+from vsp.paper import published_policy, results
 from vsp.paper.baselines import linear_map
-from vsp.paper.printed import published_policy
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import collect_episodes, rollout
 from vsp.run import command, listed
 from vsp.run.progress import progress
 from vsp.tasks import simplegoal
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.config import tuned_preset
+from vsp_beyond import tuned_preset
 from vsp_beyond.few_cells.tuned import distill_tuned
+<<<<<<< HEAD
 from vsp_beyond.proofs import check, prove
 from vsp_beyond.proofs.mountaincar import prove_mountaincar
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
+=======
+from vsp_beyond.proofs import check, largest_disturbance, prove, steps_to_goal, teacher_steps_to_goal
+from vsp_beyond.proofs.mountaincar import prove_mountaincar
+from vsp_beyond.proofs.mountaincar_reals import prove_reals
+from vsp_beyond.proofs.pendulum import prove_pendulum
+from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
+from vsp_beyond.proofs.robust import outside_pit
+>>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .comparison.rows import simplest

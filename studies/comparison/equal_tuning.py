@@ -8,12 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from vsp.evaluation import start_states
-from vsp.rollouts import visited_states
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
+from vsp import get_task, load_teacher, start_states, visited_states
+from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
-from vsp_beyond.few_cells.config import Faithful, Tuned, faithful_preset, tuned_preset
 
 from ..results import read_results
 from ..rivals.small_network import units_for

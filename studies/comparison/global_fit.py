@@ -12,10 +12,8 @@ import numpy as np
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
+from vsp import Policy, Task, VoronoiPolicy
 from vsp.paper.baselines import refit
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy
-from vsp.tasks.base import Task
 from vsp_beyond.few_cells import search
 from vsp_beyond.few_cells.anneal import temperature_unit
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling, joined

@@ -12,11 +12,9 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from vsp.evaluation import start_states
+from vsp import Policy, Task, VoronoiPolicy, rollout, start_states, visited_states
 from vsp.paper.baselines import Tree
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, visited_states
-from vsp.tasks.base import GOAL, Task
+from vsp.tasks.base import GOAL
 
 from ..rivals import tdavq
 from ..rivals.soft_tree import SoftTree

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 
+from vsp import Policy
 from vsp.paper import printed
-from vsp.rollouts import Policy
+from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import limit
-from vsp_beyond.few_cells.config import Faithful, Tuned, faithful_preset, tuned_preset
 
 from ..robots import walking_preset
 from . import makers

@@ -18,17 +18,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vsp.evaluation import start_states
+from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.paper.results import load_made, make_missing, provenance, provenance_folder
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import rollout
 from vsp.run import listed, sealed
 from vsp.run.progress import progress
 from vsp.tasks.base import GOAL
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import Teacher, further_teachers, load_teacher
-from vsp_beyond import optimum
-from vsp_beyond.few_cells.simplification import simplify
+from vsp.teachers.teacher import Teacher, further_teachers
+from vsp_beyond import optimum, simplify
 from vsp_beyond.few_cells.units import METRIC
 from vsp_beyond.optimum.grid import GridPolicy
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vsp import Policy, Task, VoronoiPolicy, visited_states
 from vsp.paper.baselines import Tree
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, visited_states
 from vsp.subpolicies import linear_outputs
-from vsp.tasks.base import Task
-from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import Candidates, Objective, tune
 from vsp_beyond.few_cells.units import Cells, Scaling, joined, parted
 
@@ -138,8 +136,7 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
 def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
     """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
 
-    The frame has the policy's own scale, or that of `frame` if the policy has none. Raises TypeError for a kind of
-    policy that has no numbers to tune.
+    The frame has the policy's own scale, or that of `frame` if the policy has none.
     """
     if isinstance(policy, Tunable):
         return policy.frame, policy.numbers
@@ -154,10 +151,15 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
         return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):
         return tunable, _of_tree(policy, tunable)
+<<<<<<< HEAD
     if isinstance(policy, SmallNetwork):
         hidden, output = (np.vstack(layer) for layer in policy.layers)
         return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
     raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
+=======
+    hidden, output = (np.vstack(layer) for layer in policy.layers)
+    return tunable, NetworkNumbers(hidden, tunable.maps(output))
+>>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
 
 
 def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:

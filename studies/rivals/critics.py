@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from vsp import Task, VoronoiPolicy, get_task
 from vsp.geometry import nearest
 from vsp.paper.baselines import kmeans_cells
-from vsp.policy import VoronoiPolicy
 from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
 from vsp.subpolicies.stacked import Adam
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import Teacher
 
 N_STEPS, BATCH, RATE = 1000, 256, 0.03  # Adam: steps per added cell, states per step, initial step size in half ranges

@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vsp.rollouts import Policy, rollout, score, visited_states
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.config import Tuned
+from vsp import Policy, Task, get_task, rollout, visited_states
+from vsp.rollouts import score
+from vsp_beyond import Tuned
 
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.tasks.base import Task
+from vsp import Task
 
 
 class Heuristic:

@@ -6,9 +6,8 @@ import warnings
 
 import numpy as np
 
+from vsp import Task, get_task
 from vsp.rollouts import standard
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
 
 
 class SmallNetwork:

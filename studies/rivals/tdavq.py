@@ -14,9 +14,8 @@ from itertools import product
 
 import numpy as np
 
-from vsp import geometry
-from vsp.tasks.base import RUNNING, Task
-from vsp.tasks.registry import get_task
+from vsp import Task, geometry, get_task
+from vsp.tasks.base import RUNNING
 
 METRIC = "euclidean"
 N_PARALLEL = 64  # episodes that advance together

@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
+from vsp import get_task
 from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
-from vsp.tasks.registry import get_task
 
 CUTS = 255  # quantiles of a node at which a split may lie
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vsp.tasks.base import Task
+from vsp import Task
 from vsp.tasks.gym_adapter import gymnasium_task
 
 NAME = "BipedalWalker-v3"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.rollouts import Policy, rollout
-from vsp.tasks.base import Task
+from vsp import Policy, Task, rollout
 
 N_FINALISTS, LONGER = 4, 5  # the best N_FINALISTS policies play LONGER times as many episodes
 

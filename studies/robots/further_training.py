@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.rollouts import Policy
+from vsp import Policy
 from vsp.teachers.teacher import Teacher
 from vsp_beyond.few_cells.units import Scaling
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from vsp.policy import VoronoiPolicy
-from vsp.tasks.base import RUNNING, Task
-from vsp.tasks.registry import get_task
+from vsp import Task, VoronoiPolicy, get_task
+from vsp.tasks.base import RUNNING
 
 DIGITS = 4  # decimals of a position in metres, and of an input
 

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from vsp.tasks.base import Task
+from vsp import Task
 from vsp.tasks.gym_adapter import begin_live, live_task
 
 NAME = "HalfCheetah-v5"

@@ -8,10 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, visited_states
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
+from vsp import Policy, Task, VoronoiPolicy, get_task, visited_states
 from vsp_beyond.few_cells.faithful import by_visits
 from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, spread
 from vsp_beyond.few_cells.units import LabelledStates, Scaling

@@ -8,9 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.policy import VoronoiPolicy
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
+from vsp import Task, VoronoiPolicy, get_task
 from vsp_beyond.few_cells.population import rollout_population
 from vsp_beyond.few_cells.units import METRIC
 

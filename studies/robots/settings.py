@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vsp.tasks import Task, get_task
+from vsp import Task, get_task
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@ import numpy as np
 from support import MOUNTAINCAR
 
 from studies.robots import choice
-from vsp.tasks.registry import get_task
+from vsp import get_task
 
 
 def test_the_best_are_compared_again_over_more_episodes(monkeypatch):

@@ -6,8 +6,8 @@ from support import SIMPLEGOAL, CurvedTeacher, examples
 
 from studies.rivals import critics
 from studies.rivals.critics import advantage_weighted, critic_driven, trained, where_lost
+from vsp import get_task
 from vsp.paper.baselines import kmeans_cells, linear_map
-from vsp.tasks.registry import get_task
 
 TASK = get_task(SIMPLEGOAL)
 

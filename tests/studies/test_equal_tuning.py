@@ -19,11 +19,8 @@ from studies.comparison.equal_tuning import (
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS
 from studies.comparison.tuning import in_units
-from vsp.evaluation import start_states
-from vsp.rollouts import visited_states
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.config import Tuned, faithful_preset, tuned_preset
+from vsp import get_task, load_teacher, start_states, visited_states
+from vsp_beyond import Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells.units import Scaling
 
 MODULES = ("studies.rivals.dagger", "vsp_beyond.few_cells.tune", "vsp_beyond.few_cells.tuned")

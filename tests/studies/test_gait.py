@@ -5,10 +5,7 @@ import numpy as np
 from support import PENDULUM
 
 from studies.robots import record_gait
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import visited_states
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
+from vsp import Task, VoronoiPolicy, get_task, visited_states
 
 
 class Engine:

@@ -7,8 +7,7 @@ from studies.comparison.global_fit import RandomTree, descend, expected_loss, gl
 from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import Tunable, in_units
 from studies.rivals.trees import ObliqueLinearTree, Split
-from vsp.policy import VoronoiPolicy
-from vsp.tasks.registry import get_task
+from vsp import VoronoiPolicy, get_task
 from vsp_beyond.few_cells import search
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 

@@ -19,11 +19,11 @@ from studies.comparison.methods import METHODS, OF_PRESET
 from studies.rivals import tdavq
 from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking
-from vsp import algorithms
+from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
 from vsp.paper.studies import simpler
 from vsp.run import kernels
-from vsp.tasks.registry import get_task
+from vsp_beyond import Faithful, Tuned, simplify
 from vsp_beyond.few_cells import limit
 from vsp_beyond.few_cells.config import Faithful, Tuned
 from vsp_beyond.few_cells.limit import search_limit

@@ -9,9 +9,9 @@ from studies.comparison.makers import Budget, corrected
 from studies.comparison.methods import FOUND, METHODS, methods_of
 from studies.rivals import critics
 from studies.rivals.soft_tree import SoftTree
+from vsp import get_task
 from vsp.paper import printed
-from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond import Tuned
 
 SMALL = Tuned(
     n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,

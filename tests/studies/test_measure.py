@@ -19,12 +19,9 @@ from studies.rivals import tdavq
 from studies.rivals.dagger import dagger
 from studies.rivals.hand_written import Heuristic
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
-from vsp.evaluation import rollout_from_seed, start_states
+from vsp import VoronoiPolicy, get_task, load_teacher, rollout_from_seed, start_states
 from vsp.paper.baselines import Tree
-from vsp.policy import VoronoiPolicy
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tuned import distill_tuned
 
 
@@ -148,8 +145,3 @@ def test_the_worst_coordinate_is_told(few):
     half = constants([[0.2, 0.5], [0.8, 0.5]], [[0.8, 0.0], [-0.8, 0.0]])
     found = fidelity(half, teacher, get_task(SIMPLEGOAL))
     assert found["r2"] > 0.9 and found["r2_worst"] < 0.2 and found["off"] == 0.0
-
-
-def test_the_common_states_are_fresh_and_the_same_for_all(few):
-    one, again = (common_states(CurvedTeacher(), get_task(SIMPLEGOAL)) for _ in range(2))
-    assert np.array_equal(one, again)

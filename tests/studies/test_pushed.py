@@ -7,9 +7,7 @@ from support import PENDULUM, WALKER
 from studies.rivals.hand_written import ZeroPolicy
 from studies.robots.imitation import Pushed, imitate_pushed
 from studies.robots.settings import Walking, walking_preset
-from vsp.rollouts import visited_states
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
+from vsp import get_task, load_teacher, visited_states
 
 FEW = Walking(n_cells=3, n_episodes=4, n_corrections=1, n_correction_episodes=2, n_states=1500, n_restarts=1)
 

@@ -5,8 +5,7 @@ from support import PENDULUM
 
 from studies.robots.random_search import RunningMoments, search_one_map
 from studies.robots.settings import Walking
-from vsp.rollouts import rollout
-from vsp.tasks.registry import get_task
+from vsp import get_task, rollout
 
 FEW = Walking(n_cells=1, n_random_steps=60_000, n_directions=8, n_best=4, n_validation=10)
 

@@ -14,14 +14,10 @@ from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, TUNED_SI
 from studies.comparison.rows import Job, jobs_of, kept_job, make_all, make_row
 from studies.comparison.summary import read_rows
 from studies.robots import Walking
-from vsp.evaluation import start_states
+from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.paper import printed
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import rollout
 from vsp.run import atomic, sealed
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.config import Faithful, Tuned
+from vsp_beyond import Faithful, Tuned
 
 SMALL = Tuned(
     n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,

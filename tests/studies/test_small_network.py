@@ -3,7 +3,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, examples
 
 from studies.rivals.small_network import SmallNetwork, units_for
-from vsp.tasks.registry import get_task
+from vsp import get_task
 
 
 @pytest.mark.parametrize("task", TASKS)

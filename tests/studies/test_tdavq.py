@@ -4,8 +4,7 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 from studies.rivals import tdavq
 from studies.rivals.tdavq import DiscretePolicy, ParallelEpisodes, learn, merge, split, update
-from vsp.evaluation import evaluate
-from vsp.tasks.registry import get_task
+from vsp import evaluate, get_task
 
 
 def policy_of(codewords, values):

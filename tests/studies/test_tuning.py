@@ -6,15 +6,12 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeache
 
 from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import TreeNumbers, in_units, tuned
-from studies.rivals.hand_written import ZeroPolicy
 from studies.rivals.small_network import SmallNetwork
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
+from vsp import get_task, rollout
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map
-from vsp.rollouts import rollout
-from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond import Tuned
 from vsp_beyond.few_cells.population import rollout_population
-from vsp_beyond.few_cells.tune import cma_es
 from vsp_beyond.few_cells.units import Scaling
 
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
@@ -104,19 +101,3 @@ def test_tuning_raises_the_return_and_is_the_same_again(kind):
     assert rollout(one, task, fresh).returns.mean() > rollout(start, task, fresh).returns.mean() + 0.5
     untouched = tuned(start, teacher, task, replace(SMALL, n_generations=0), seed=3)
     assert np.allclose(untouched.predict(states)[0], start.predict(states)[0])
-
-
-def test_what_has_no_numbers_is_refused():
-    with pytest.raises(TypeError, match="the policy is a ZeroPolicy, which has no numbers to tune"):
-        in_units(ZeroPolicy(get_task(SIMPLEGOAL)), Scaling.of(get_task(SIMPLEGOAL), examples(SIMPLEGOAL)[0]))
-
-
-def test_a_short_search_of_many_numbers_gains_by_learning_variances_only():
-    scales, found = np.logspace(0, 2, 200), {}
-    for diagonal in (True, False):
-        search = cma_es(np.ones(200), 0.3, np.random.default_rng(0), diagonal=diagonal)
-        for _ in range(100):
-            steps = search.ask()
-            search.tell(steps, [float(np.square(scales * step).sum()) for step in steps])
-        found[diagonal] = search.result.fbest
-    assert found[True] < 0.95 * found[False]
