@@ -6,10 +6,9 @@ from support import TASKS
 
 from vsp.paper.results import read_results, write_results
 from vsp.paper.runs import paper_experiment
-from vsp.paper.studies import interpretations, make_studies
+from vsp.paper.studies import interpretations
 from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
 from vsp.paper.studies.teachers import SEEDS
-from vsp.run import listed
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -74,18 +73,3 @@ def test_ids_are_read_as_they_were_written(tmp_path):
     found = read_results("readings", folder)
     assert found["settings"].tolist() == ["0123456789", "12345e6789"] and found["teacher"][0] == "0000000001"
     assert found["version"][0] == 1 and found["version"].isna()[1]
-
-
-def test_make_study_writes_what_was_found(tmp_path, monkeypatch):
-    asked = {}
-
-    def studied(name):
-        frame = pd.DataFrame({"mean": [0.5]})
-        return lambda runs, *, jobs: (asked.update({name: (runs, jobs)}), frame)[1]
-
-    monkeypatch.setattr(make_studies, "STUDIES", {name: studied(name) for name in make_studies.STUDIES})
-    monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path), "--jobs", "3"])
-    make_studies.main()
-    assert asked == dict.fromkeys(("readings", "teachers"), (tmp_path / "build" / "study", 3))
-    names = [path.name for path in sorted((tmp_path / "data" / "results").iterdir())]
-    assert names == [listed.MANIFEST, "readings.csv", "teachers.csv"]

@@ -13,7 +13,7 @@ from scipy.stats import trim_mean
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.evaluation import rollout_from_seed
-from vsp.paper import audit, ledger, tables
+from vsp.paper import ledger, tables
 from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, VERDICTS, largest_gaps, results_of, verdict
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
@@ -95,13 +95,6 @@ def test_results_of_a_task_are_there_once_the_teachers_first(book, task):
     assert len(text) == {SIMPLEGOAL: 5 + 5, MOUNTAINCAR: 1 + 9}[task] + 1  # what the text says of outliers
 
 
-def test_counts_by_hand():
-    part = ["settings", "results", "results", "coefficients"]
-    table = ledger.verdict_counts(pd.DataFrame({"part": part, "verdict": [REPRODUCED, DIFFERS, DIFFERS, UNCHECKED]}))
-    assert table.index.tolist() == ["settings", "results", "coefficients"] and table.columns.tolist() == list(VERDICTS)
-    assert table.to_numpy().tolist() == [[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0]]
-
-
 def notebook_cells():
     found = {}
     for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
@@ -158,15 +151,6 @@ ROOT2 = np.sqrt(2)
 def test_verdicts_by_hand(row, expected):
     assert verdict(row) == expected
     assert verdict(row, in_doubt=True) == CONTRADICTED
-
-
-def test_verdicts_of_the_book_are_those_of_the_rules(book):
-    doubted = audit.in_doubt()
-    assert book["id"][book["verdict"] == CONTRADICTED].tolist() == [id for id in book["id"] if id in doubted]
-    values = printed_values().set_index("id")["value"]
-    for found in book.itertuples():
-        as_row = row(found.paper, found.here, found.low, found.high, value=values[found.id])
-        assert found.verdict == verdict(as_row, in_doubt=found.id in doubted), found.id
 
 
 # Settings

@@ -9,7 +9,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL
 
 from vsp.paper import printed as printed_module
-from vsp.paper.printed import FOLDER, printed_hyperparameters, printed_spread, printed_text_numbers, printed_value
+from vsp.paper.printed import FOLDER, printed_hyperparameters, printed_spread, printed_text_numbers
 from vsp.paper.statistics import spread
 from vsp.run import listed
 
@@ -57,11 +57,6 @@ def test_tdavq_comparison():
     frame = printed_module.printed_tdavq_comparison()
     assert frame["TD-AVQ"].tolist() == ["No", "No", "No", "Accumulated reward"]
     assert frame["Ours"].tolist() == ["Yes", "Yes", "Yes", "Prediction loss"]
-
-
-def test_a_text_has_no_value():
-    with pytest.raises(ValueError, match="'pytorch_version' is the text '2.3.1'"):
-        printed_value("pytorch_version")
 
 
 def test_missing_and_altered_files_are_named(tmp_path, monkeypatch):
@@ -125,16 +120,6 @@ def test_terms_that_the_paper_does_not_print_are_no_printed_values(printed):
     assert "sg_cell_3_dx_x" not in printed.index and printed.at["sg_cell_3_dx_y", "paper"] == "3.175"
     assert printed.at["sg_cell_3_dx_bias", "paper"] == "-1.000"
     assert printed.at["mc_cell_1_codeword_v", "paper"] == "0.000"  # printed, though zero
-
-
-def test_printed_values_keep_the_papers_digits(printed):
-    spelled = {
-        "sg_ours_min": "-11.790", "mc_ours_outliers_below_share": "73.19%", "mc_drl_outliers": "no",
-        "initial_subpolicies": "one", "sg_training_steps": "500.000", "mc_spread_ours_min": "71.050",
-        "mc_hyper_max_pol_loss": "0.00001", "pytorch_version": "2.3.1",
-    }  # fmt: skip
-    assert {id: printed.at[id, "paper"] for id in spelled} == spelled
-    assert printed.index[printed["value"].isna()].tolist() == ["machine_chip", "pytorch_version", "python_version"]
 
 
 def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():

@@ -9,7 +9,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 from vsp.config import EXTENSIONS, Config
 from vsp.paper import printed as printed_module
 from vsp.paper import tables
-from vsp.paper.printed import PREFIX, SHORT, printed_hyperparameters, printed_spread, printed_text_numbers
+from vsp.paper.printed import PREFIX, printed_hyperparameters, printed_spread, printed_text_numbers
 from vsp.paper.readings import Readings
 from vsp.paper.statistics import spread
 from vsp.paper.tables import (
@@ -87,15 +87,6 @@ def test_numbers_in_a_csv_have_at_most_eight_digits_also_beside_words(tmp_path, 
     save_table(make(), "some_table", caption="", out=tmp_path)
     numbers = re.findall(r"\d+\.\d+", written(tmp_path)[1].read_text())
     assert numbers and max(len(number.replace(".", "").lstrip("0")) for number in numbers) <= 8
-
-
-def test_hyperparameters_stand_beside_the_papers():
-    frame = hyperparameter_table(list(TASKS))
-    assert frame["hyperparameter"].tolist() == list(printed_hyperparameters(SIMPLEGOAL)) and frame.shape == (9, 5)
-    for task in TASKS:
-        assert frame[f"{SHORT[task]}, paper"].tolist() == frame[f"{SHORT[task]}, here"].tolist()
-    row = frame.set_index("hyperparameter").loc["n_epochs"]
-    assert row["SimpleGoal, here"] == 5000 and row["MountainCar, here"] == 2000
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -236,14 +227,6 @@ def test_a_notebook_shows_no_row_numbers():
     assert cells(show_table(odd).data) == ["a", "7.25", "1.50"]
 
 
-def test_rows_with_names_keep_them():
-    named = pd.DataFrame({"a": [1, 2]}, index=["x", "y"])
-    assert cells(show_table(named).data) == ["", "a", "x", "1", "y", "2"]
-    assert cells(show_table(named.rename_axis("input")).data)[:2] == ["input", "a"]
-    nested = pd.concat({"one": named, "two": named})
-    assert cells(show_table(nested).data)[3:6] == ["one", "x", "1"]
-
-
 def test_counts_have_no_decimals_where_each_row_is_another_quantity():
     frame = pd.DataFrame(
         {"quantity": ["outliers", "mean"], "here": [24.0, 1.5], "low": [20.0, 1.25], "high": [30.0, 2.25]}
@@ -307,9 +290,3 @@ def test_a_table_stands_below_its_caption(book):
     assert re.search(r"<table[^>]*>\s*<caption><b>Table 2.1.</b> C.</caption>", show_table(frame, "c").data)
     assert "<caption>Mine.</caption>" in show_table(frame, caption="Mine.").data
     assert "caption" not in show_table(frame, "unknown").data
-
-
-def test_a_figure_of_ones_own_says_what_it_shows(book):
-    assert captions.caption_of("figures", "mine", text="Seen.", alt="x") == captions.Caption("", "Seen.", "x")
-    with pytest.raises(ValueError, match="figure 'mine' has no alternative text: pass alt= or add it to notebooks"):
-        captions.caption_of("figures", "mine")

@@ -92,8 +92,8 @@ def test_the_words_tell_the_distilled_policy_from_the_teacher(lab):
     assert f"The teacher: mean return {teacher.returns.mean():.2f}, {(teacher.outcomes != 1).sum() or 'no'} f" in words
 
 
-def test_a_trial_that_fails_leaves_no_doubt(lab, monkeypatch, stage):
-    """Whether the distillation fails or the drawing, the picture is an earlier trial's."""
+@pytest.mark.parametrize("stage", ["trial", "scene"])
+def test_a_trial_that_fails_leaves_the_earlier_picture_and_says_so(lab, monkeypatch, stage):
     lab.settings["min_pol_distance"].value = 0.45
     before, (shown,) = (lab.explorer.scene, lab.text.value), re.findall(r"→\s(\d+)", lab.text.value)
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):

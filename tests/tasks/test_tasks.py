@@ -12,7 +12,7 @@ from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TAS
 import vsp
 from studies.robots import halfcheetah
 from vsp.rollouts import collect_episodes, rollout
-from vsp.tasks import mountaincar, registry, simplegoal
+from vsp.tasks import mountaincar, simplegoal
 from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import BOX, get_task, task_names
@@ -323,11 +323,6 @@ def test_without_mujoco_one_sentence_says_how_to_get_it(monkeypatch):
     assert teacher.predict(np.zeros(17))[0].shape == (6,)
     with pytest.raises(ValueError, match="HalfCheetah-v5 needs the package mujoco, which is not inst.*: run `make "):
         vsp.evaluate(teacher, CHEETAH, n_episodes=1, seed=0)
-
-
-def test_a_state_inside_an_engine_is_not_drawn():
-    with pytest.raises(ValueError, match="state of LunarLander.* is inside its environment, expected one of .*Simple"):
-        registry.render(LUNARLANDER, [1.0])
 
 
 @pytest.mark.skipif(not find_spec("mujoco"), reason="needs mujoco")

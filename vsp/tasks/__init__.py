@@ -5,4 +5,4 @@ To add one, write a module like `mountaincar.py` with its `TASK`, and enter it i
 """
 
 from .base import ENDED, GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Signals, Task
-from .registry import get_task, register, register_maker, render, task_names
+from .registry import get_task, register, register_maker, task_names

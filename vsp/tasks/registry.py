@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -12,7 +11,6 @@ from typing import NoReturn
 import gymnasium
 import numpy as np
 
-from ..checks import check_array
 from . import lunarlander, mountaincar, pendulum, simplegoal
 from .base import Task
 from .gym_adapter import Outcome, gymnasium_task
@@ -117,21 +115,3 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
 def _absent(name: str, *_) -> NoReturn:
     what = "is not registered here, so its policy can act but no episode can run: import what registers it"
     raise ValueError(f"{name} {what}")
-
-
-def render(name: str, state: np.ndarray) -> np.ndarray:
-    """Return a picture of the task in `state` (s,), as Gymnasium draws it. (height, width, 3) bytes
-
-    Raises ValueError for a task whose state is inside its environment, as that of a physics engine.
-    """
-    task = get_task(name)
-    if task.one_by_one:
-        raise ValueError(f"the state of {task.name} is inside its environment, expected one of {list(_TASKS)}")
-    state = check_array("state", state, (task.start_size or len(task.low),))
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # so that pygame needs no screen
-    env = gymnasium.make(task.name, render_mode="rgb_array")
-    env.reset(seed=0)
-    env.unwrapped.state = state
-    image = env.render()
-    env.close()
-    return image

@@ -21,16 +21,6 @@ class Agent:
         return np.asarray(self._act(obs)), None
 
 
-def _without_state(predicted: tuple[np.ndarray, object]) -> np.ndarray:
-    actions, state = predicted
-    if state is not None:
-        raise ValueError(
-            "the agent keeps a state between steps, expected actions that depend on the observation alone: train one "
-            "without memory, or put what it remembers into the observation"
-        )
-    return actions
-
-
 def agent(source: Policy | Callable[[np.ndarray], np.ndarray]) -> Agent:
     """Turn `source` into a teacher for `vsp.distill` and similar functions.
 
@@ -42,7 +32,17 @@ def agent(source: Policy | Callable[[np.ndarray], np.ndarray]) -> Agent:
         return source
     if callable(predict := getattr(source, "predict", None)):
         options = {"deterministic": True} if "deterministic" in inspect.signature(predict).parameters else {}
-        return Agent(lambda obs: _without_state(predict(obs, **options)))
+
+        def act(obs: np.ndarray) -> np.ndarray:
+            actions, state = predict(obs, **options)
+            if state is not None:
+                raise ValueError(
+                    "the agent keeps a state between steps, expected actions that depend on the observation alone: "
+                    "train one without memory, or put what it remembers into the observation"
+                )
+            return actions
+
+        return Agent(act)
     if not callable(source):
         raise ValueError(f"the agent is {source!r}, expected something with `predict`, or a function of observations")
     return Agent(source)

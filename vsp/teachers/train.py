@@ -47,7 +47,8 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     recipe = RECIPES[task] if recipe is None else recipe
     path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
-    model, snapshot = _new_model(task, recipe, seed), {"curve": []}
+    model = _new_model(task, recipe, seed)
+    snapshot: dict = {"curve": []}
     if path.exists():
         snapshot = read_checkpoint(path)
         _restore(model, snapshot)
