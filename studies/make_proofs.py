@@ -22,20 +22,11 @@ from vsp.run.progress import progress
 from vsp.tasks import simplegoal
 from vsp_beyond import tuned_preset
 from vsp_beyond.few_cells.tuned import distill_tuned
-<<<<<<< HEAD
 from vsp_beyond.proofs import check, prove
 from vsp_beyond.proofs.mountaincar import prove_mountaincar
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
-=======
-from vsp_beyond.proofs import check, largest_disturbance, prove, steps_to_goal, teacher_steps_to_goal
-from vsp_beyond.proofs.mountaincar import prove_mountaincar
-from vsp_beyond.proofs.mountaincar_reals import prove_reals
-from vsp_beyond.proofs.pendulum import prove_pendulum
-from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
-from vsp_beyond.proofs.robust import outside_pit
->>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .comparison.rows import simplest

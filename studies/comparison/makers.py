@@ -16,12 +16,9 @@ import numpy as np
 
 from vsp import Policy, Task, VoronoiPolicy, visited_states
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, rule_of_thumb
-from vsp_beyond import Faithful, Tuned, at_the_limit
+from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
-<<<<<<< HEAD
 from vsp_beyond.few_cells.limit import search_limit
-=======
->>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 

