@@ -15,7 +15,7 @@ import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class Exercise:
         """Print that the answer is right."""
         print(*_lines(f"✓ {self.number} {self.name}: {text}"), sep="\n")
 
-    def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> object:
+    def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> Any:
         """Call a student's function and return its result. It gets copies of `arguments` unless `keep`.
 
         Raises NotYet for a stub, an error, an interrupt, an argument altered in place, a call of the library's own
@@ -152,7 +152,7 @@ class Exercise:
             mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, rtol))
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
-    def answers(self, given: object, options: dict[str, Sequence[str] | type]) -> None:
+    def answers(self, given: Any, options: dict[str, Any]) -> None:
         """Raise NotYet unless the dictionary `given` has one of the `options` (or a number) for each key."""
         self.refuse_if(not isinstance(given, dict), f"{given!r}", "a dictionary of answers")
         for key, choices in options.items():
@@ -165,7 +165,7 @@ class Exercise:
             else:
                 self.refuse_if(answer not in choices, f"{answer!r} for {key!r}", f"one of {list(choices)}")
 
-    def ask(self, given: object, questions: dict[str, Question]) -> str:
+    def ask(self, given: Any, questions: dict[str, Question]) -> str:
         """Raise NotYet unless the dictionary `given` has the right answer to every question.
 
         Returns a sentence for `passed` that says how many of the first answers were right: who guesses sees it in the
@@ -188,7 +188,8 @@ class Exercise:
 def joined(episodes: Iterable[Episode]) -> tuple[np.ndarray, np.ndarray]:
     """Concatenate the states (n, d) and actions (n, m) of all episodes."""
     parts = [(episode.states, episode.actions.astype(float)) for episode in episodes]
-    return tuple(map(np.concatenate, zip(*parts)))
+    states, actions = (np.concatenate(column) for column in zip(*parts))
+    return states, actions
 
 
 def seal(number: str, key: str, answer: str) -> str:

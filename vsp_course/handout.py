@@ -37,7 +37,7 @@ def write_handout(path: Path, copies: dict[str, str]) -> None:
 def requirements() -> str:
     """Return the lines of requirements.txt: the packages that the lessons need, in the versions of environment.lock."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    wanted = [re.match(r"[\w-]+", line)[0] for line in project["dependencies"]]
+    wanted = re.findall(r"^[\w-]+", "\n".join(project["dependencies"]), re.MULTILINE)
     lock = (ROOT / "environment.lock").read_text(encoding="utf-8")
     locked = dict(re.findall(r"^([\w-]+)==(\S+)", lock, re.MULTILINE))
     return "".join(f"{name}=={locked[name]}\n" for name in wanted if name not in UNUSED)

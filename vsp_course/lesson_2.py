@@ -62,7 +62,7 @@ SEEDS = range(3)  # of the runs for each change
 
 
 @READING.checks
-def reading(answers: object, history: History, config: Config) -> None:
+def reading(answers: dict, history: History, config: Config) -> None:
     """2.1: answers `last change` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
     READING.answers(answers, {"last change": float})
     given, last = answers["last change"], max((event.iteration for event in history.events), default=0)
@@ -184,10 +184,10 @@ def _on_schedule(log: _Log, right: _Log, episodes: list[Episode], config: Config
         words, hint = (f"; {freeze} = {frozen}", 3) if n >= frozen - config.n_split else ("", 2)
         for what, period in (("split", "n_split"), ("merge", "n_merge"), ("clear", "n_reset")):
             every = f"one every {period} = {getattr(config, period)} iterations{words}"
-            missing, stray = what in due and what not in done, what in done and what not in due
+            missing, extra = what in due and what not in done, what in done and what not in due
             ALGORITHM_1.refuse_if(missing, f"no `{what}` in iteration {n}", every, hint)
             why = "a map that was trained once tells nothing yet" if n == 0 else f"it is not due then{words}"
-            ALGORITHM_1.refuse_if(stray, f"`{what}` in iteration {n}", f"none: {why}", hint)
+            ALGORITHM_1.refuse_if(extra, f"`{what}` in iteration {n}", f"none: {why}", hint)
         ALGORITHM_1.refuse_if(done != due, steps, "each once, splits first, as the paper prints it", 2)
 
 

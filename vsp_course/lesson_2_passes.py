@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsp.buffers import Buffers
 from vsp.config import paper_preset
 from vsp.paper.readings import Readings
 from vsp.partition import Partition
@@ -49,7 +50,6 @@ def _with_codewords(codewords: np.ndarray) -> Partition:
 
 def walk(places: list[float], actions: list[float]) -> Episode:
     """Return an episode along y = 0.5 whose two actions are equal: for a zero map, the loss is the action's square."""
-    places, actions = np.array(places), np.array(actions)
     return Episode(np.column_stack([places, np.full(len(places), 0.5)]), np.column_stack([actions, actions]))
 
 
@@ -111,7 +111,7 @@ def split_regions(function: Callable) -> None:
             raise SPLIT.wrong(elsewhere, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         _returned(SPLIT, added, partition.codewords[before:], "one for every new cell")
         expected = "those of the cell that was split and of its old neighbours emptied, no others"
-        _emptied(SPLIT, partition, [case.full], expected)
+        _emptied(SPLIT, partition.buffers, [case.full], expected)
     for seed in range(4):
         _on_a_random_walk(function, np.random.default_rng(seed))
     SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
@@ -127,9 +127,9 @@ def _returned(exercise: Exercise, returned: object, right: np.ndarray, what: str
         exercise.refuse_if(sorted(values.tolist()) != sorted(right.tolist()), "other codewords returned", what, 1)
 
 
-def _emptied(exercise: Exercise, partition: Partition, full: list[tuple], expected: str) -> None:
+def _emptied(exercise: Exercise, buffers: Buffers, full: list[tuple], expected: str) -> None:
     """Check the numbers of states in the buffers; each of `full` is right, an empty one stands for any."""
-    counts = tuple(partition.buffers.counts.tolist())
+    counts = tuple(buffers.counts.tolist())
     wrong = () not in full and counts not in full
     exercise.refuse_if(wrong, f"buffers of {counts} states in a row of cells that had one each", expected, 5)
 
@@ -203,7 +203,7 @@ def merge_regions(function: Callable) -> None:
             raise MERGE.wrong(left, f"{' or '.join(map(str, case.left))}, in a case of {case.what}", case.hint)
         gone = [i for i in range(len(places)) if i not in kept]
         _returned(MERGE, removed, before[gone], "one for every cell that went")
-        _emptied(MERGE, partition, case.full, "those of the survivor and of its neighbours emptied, no others")
+        _emptied(MERGE, partition.buffers, case.full, "those of the survivor and of its neighbours emptied, no others")
     for seed in range(9):
         _with_random_maps(function, np.random.default_rng(seed))
     MERGE.passed("similar neighbours have become one, and no other cell was removed.")

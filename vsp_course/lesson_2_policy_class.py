@@ -11,6 +11,7 @@ from scipy.optimize import approx_fprime
 
 from vsp import geometry
 from vsp.algorithms import teacher_episodes
+from vsp.buffers import Buffers
 from vsp.config import paper_preset
 from vsp.export import SHARED
 from vsp.partition import Partition
@@ -113,13 +114,13 @@ def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:
     (states, actions), (fresh, right) = (joined(teacher_episodes(teacher, task, 300, rng)) for _ in range(2))
     partition = Partition(task, paper_preset(task))
     partition.models = SubPolicies(own_class, len(task.outputs), initial="uniform")
-    partition.buffers = type(partition.buffers)(len(own_class.terms), len(task.outputs))
+    partition.buffers = buffers = Buffers(len(own_class.terms), len(task.outputs))
     for codeword in states[rng.choice(len(states), 8, replace=False)]:
         partition.add(codeword, rng)
     partition.observe(Episode(states, actions))
-    cells = np.flatnonzero(partition.buffers.counts)
+    cells = np.flatnonzero(buffers.counts)
     for rate in (0.05,) * 400 + (0.01,) * 400:
-        inputs, goals = partition.buffers.sample(cells, 128, rng)
+        inputs, goals = buffers.sample(cells, 128, rng)
         partition.models.train(cells, inputs, goals, learning_rate=rate)
     own = partition.models.parameters[geometry.nearest(partition.codewords, fresh)]
     return float(np.square(own_class.outputs(own_class.features(fresh), own) - right).mean())

@@ -1,6 +1,6 @@
 """A sample solution of the project: MountainCar in two cells, beside one linear map and a tree.
 
-.venv/bin/python notebooks/course/project_solution.py
+    .venv/bin/python notebooks/course/project_solution.py
 """
 
 from __future__ import annotations
@@ -71,21 +71,15 @@ def main() -> None:
     print(f"# {TASK}: who returns most?\n")
     print(f"{best['method']} returns {best['mean']:.2f} on average, from {N_STARTS} starts.\n")
     print(table.round(3).to_string(index=False))
-    print(
-        "\nmean, low, high: mean return and its 95 % interval over seeds; failing: the largest share of failed episodes of"
-    )
+    print("\nmean, low, high: mean return and its 95 % interval over seeds; failing: the largest share of failed episodes of")
     print("a seed; r2: median over seeds.")
     print(f"\nThe policy of seed 0:\n\n{policy.to_text()}")
     print(f"Of the states it visits, it differs most from the teacher in {state.tolist()}. There it is in")
     print(f"cell {policy.explain(state).cell}: {policy.explain(state).equations[0]};")
     print(f"it pushes with {policy.predict(state)[0][0]:.2f}, the teacher with {teacher.predict(state)[0][0]:.2f}.")
     print(f"Actions differ by more than 0.1 in {np.mean(difference > 0.1):.1%} of the visited states.")
-    print(
-        "\nThis cannot be concluded: whether another teacher would give the same order, for there is one. All methods"
-    )
-    print(
-        f"fit {N_EPISODES} episodes; the cells are also compared with the teacher on others, to choose among restarts."
-    )
+    print("\nThis cannot be concluded: whether another teacher would give the same order, for there is one. All methods")
+    print(f"fit {N_EPISODES} episodes; the cells are also compared with the teacher on others, to choose among restarts.")
 
 
 if __name__ == "__main__":
