@@ -36,10 +36,6 @@ def weights(**tensors):
     return Teacher({f"mu.0.{part}": tensor for part, tensor in tensors.items()}, SIMPLEGOAL)
 
 
-def partition():
-    return partition_of([[0.25, 0.5], [0.75, 0.5]])
-
-
 def episodes(**arguments):
     return list(vsp.teacher_episodes(task=vsp.get_task(SIMPLEGOAL), rng=np.random.default_rng(0), **arguments))
 
@@ -105,7 +101,7 @@ CASES = {
     "geometry.lookup_neighbours": (geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
     "geometry.visited_neighbours": (geometry.visited_neighbours, cells_of_states | {"witnesses": states}),
     "Partition.observe": (
-        lambda states, actions: partition().observe(Episode(states, actions)),
+        lambda states, actions: partition_of([[0.25, 0.5], [0.75, 0.5]]).observe(Episode(states, actions)),
         {"states": array(STATES, free=(), nonempty=True), "actions": array(ACTIONS, free=(), nonempty=True)},
     ),
     "History.policy_at": (HISTORY.policy_at, {"n": count(3, least=0, most=23)}),
