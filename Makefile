@@ -21,7 +21,7 @@ outputs = $(call executed,$(1))/$(1).ipynb $(patsubst $(1):%,%,$(filter $(1):%,$
   $(if $(filter 03_evaluation,$(1)),$(SUMMARIES))
 inputs = notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml environment.lock vsp data/paper data/teachers \
   $(if $(filter $(1),$(BEYOND)),vsp_beyond studies data/beyond) \
-  $(if $(filter 05_ledger,$(1)),$(filter-out $(SUMMARIES),$(wildcard data/results/*.csv)))
+  $(if $(filter 05_ledger,$(1)),$(addprefix data/results/,readings.csv teachers.csv simpler.csv))
 
 # What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
 # make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
@@ -95,7 +95,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions: 4 to 10 minutes
+lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions, into data/beyond/: 2 to 5 minutes
 	$(PY) -m studies.benchmarks --out="$$OUT"
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
