@@ -30,7 +30,6 @@ from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .comparison.rows import simplest
-from .proofs.mountaincar_reals import prove_reals
 from .proofs.network import teacher_steps_to_goal
 from .proofs.returns import mean_return, worst_start
 from .results import BEYOND, RESULTS, read_results, write_results
@@ -44,8 +43,8 @@ HOUR = 3600.0
 
 def main() -> None:
     """Prove the policies that are not proved yet. Write a certificate of each to data/beyond/proofs/ and the results to
-    data/beyond/proofs.csv. After a new proof, also write that of MountainCar over the reals to proofs_reals.csv, and
-    that of Pendulum over smaller boxes to proofs_grid.csv. With --teacher, write proofs_teacher.csv instead."""
+    data/beyond/proofs.csv. After a new proof, also write that of Pendulum over smaller boxes to proofs_grid.csv. With
+    --teacher, write proofs_teacher.csv instead."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it")
     parser.add_argument("--teacher", action="store_true", help="prove what an hour allows of SimpleGoal's teacher")
@@ -55,8 +54,6 @@ def main() -> None:
         write_results(of_teacher(), "proofs_teacher", out=arguments.out)
         return
     if certificates(Path(arguments.out), arguments.jobs):
-        table = pd.DataFrame([reals(arguments.jobs)])
-        write_results(table, "proofs_reals", out=arguments.out, float_format="%.17g")
         write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
 
 
@@ -132,14 +129,6 @@ def _sampled(policy: VoronoiPolicy) -> dict:
     played = rollout(policy, policy.task, start_states(policy.task, n, 1))
     shares = {f"sampled_{name}": float((played.outcomes == end).mean()) for end, name in ENDS.items()}
     return {"sampled": n, "sampled_mean": float(played.returns.mean()), **shares}
-
-
-def reals(jobs: int | str) -> dict:
-    """Prove from which share of its starts MountainCar's car reaches the flag, in real numbers."""
-    began, policy = time.perf_counter(), _kept("limit", MOUNTAINCAR)
-    parts = prove_reals(policy, jobs=jobs)
-    row = {"share": float(np.mean([part.share for part in parts])), "longest": max(part.longest for part in parts)}
-    return row | {"least": min(part.least for part in parts), "seconds": time.perf_counter() - began}
 
 
 def smaller_boxes() -> pd.DataFrame:
