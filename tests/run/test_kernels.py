@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,8 +50,11 @@ def test_this_process_and_its_workers_are_fixed():
 
 
 def test_whatever_a_caller_sets_is_overridden(caller):
-    told = subprocess.check_output([sys.executable, "-c", PROBE], env=caller, text=True)
-    assert json.loads(told) == FIXED
+    """On one core and on two."""
+    for cores in (1, 2):
+        few = partial(os.sched_setaffinity, 0, sorted(os.sched_getaffinity(0))[:cores])
+        told = subprocess.check_output([sys.executable, "-c", PROBE], env=caller, text=True, preexec_fn=few)
+        assert json.loads(told) == FIXED
 
 
 def test_an_older_processor_runs_with_its_own_kernels_and_make_says_so(monkeypatch):
