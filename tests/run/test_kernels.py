@@ -50,11 +50,10 @@ def test_this_process_and_its_workers_are_fixed():
 
 
 def test_whatever_a_caller_sets_is_overridden(caller):
-    """On one core and on two."""
-    for cores in (1, 2):
-        few = partial(os.sched_setaffinity, 0, sorted(os.sched_getaffinity(0))[:cores])
-        told = subprocess.check_output([sys.executable, "-c", PROBE], env=caller, text=True, preexec_fn=few)
-        assert json.loads(told) == FIXED
+    """On one core; the test above runs on all of them."""
+    one = partial(os.sched_setaffinity, 0, sorted(os.sched_getaffinity(0))[:1])
+    told = subprocess.check_output([sys.executable, "-c", PROBE], env=caller, text=True, preexec_fn=one)
+    assert json.loads(told) == FIXED
 
 
 def test_an_older_processor_runs_with_its_own_kernels_and_make_says_so(monkeypatch):
