@@ -170,10 +170,10 @@ def alive(pid: int) -> bool:
 
 
 def until(condition) -> None:
-    """Wait for `condition`, for at most 30 s."""
-    deadline = time.monotonic() + 30
+    """Wait for `condition`, for at most two minutes."""
+    deadline = time.monotonic() + 120
     while not condition():
-        assert time.monotonic() < deadline, "waited 30 s in vain"
+        assert time.monotonic() < deadline, "waited two minutes in vain"
         time.sleep(0.05)
 
 

@@ -31,11 +31,6 @@ def test_times_are_words(seconds, words):
     assert _words(seconds) == words
 
 
-def test_quick_work_is_silent_until_it_is_done(capsys):
-    list(progress(range(100), "quick", total=100, unit="steps"))
-    assert capsys.readouterr().err == "quick: 100 of 100 steps, 0 s left\n"
-
-
 @pytest.mark.parametrize("where", ["terminal", "notebook"])
 def test_a_bar_is_shown_where_somebody_looks(monkeypatch, where):
     shown = []

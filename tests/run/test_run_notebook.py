@@ -91,13 +91,6 @@ def test_results_are_listed_beside_those_of_others(tmp_path):
     assert listed.read_listed(results / "a.csv") + listed.read_listed(results / "b.csv") == b"ab"
 
 
-@pytest.mark.parametrize("content", [b"", b"\x80\x04N.", b'{"cells": 3}', b"!!python/name:os.system"])
-def test_a_file_that_is_no_notebook(tmp_path, content):
-    (tmp_path / "x.ipynb").write_bytes(content)
-    with pytest.raises(run_notebook.NotebookError, match="x.ipynb: "):
-        run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
-
-
 FAULTS = {
     "failing cell": (["1 / 0"], "code cell (1 / 0) failed: ZeroDivisionError"),
     "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
@@ -133,7 +126,8 @@ def test_fault_leaves_previous_figures(tmp_path, fault):
 def test_damage_is_told_in_one_line(tmp_path):
     """With the file and a remedy; only an error of the notebook's own brings a traceback, as the faults above do."""
     (tmp_path / "1.run").write_text("rubbish")
-    error = refused(write(tmp_path, f"import vsp.run.sealed\nvsp.run.sealed.read_sealed({str(tmp_path / '1.run')!r})"))
+    read = f"import vsp.run.sealed\nvsp.run.sealed.read_sealed({str(tmp_path / '1.run')!r})"
+    error = refused(write(tmp_path, read), "--out", tmp_path)
     assert "1.run: damaged, or no file of vsp (its SHA-256 is " in error and "\n" not in error
 
 
@@ -164,6 +158,10 @@ def test_wrong_parameter(tmp_path):
 
 
 def test_unfit_notebook(tmp_path):
+    for content in (b"", b"\x80\x04N.", b'{"cells": 3}', b"!!python/name:os.system"):
+        (tmp_path / "x.ipynb").write_bytes(content)
+        with pytest.raises(run_notebook.NotebookError, match="x.ipynb: not a notebook"):
+            run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
     with pytest.raises(atomic.MissingFile, match="none.ipynb: no such file"):
         run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
     with pytest.raises(run_notebook.NotebookError, match="story.ipynb: unknown parameter 'out'"):
