@@ -1,5 +1,6 @@
 """The reproduction of the paper: its printed values, the rerun and its tables, the ledger, the audit, the studies."""
 
+from . import baselines
 from .audit import audit_findings, audit_table, mean_inside
 from .ledger import N_RESAMPLES, largest_gaps, ledger_table, left_out_by_quartiles, results_of, verdict_counts
 from .printed import (
