@@ -14,18 +14,11 @@ HOLDS, CONTRADICTS, OPEN = audit.VERDICTS
 VERDICTS = {
     "Number of distilled policies": CONTRADICTS,
     "SimpleGoal: coverage and outliers of the distilled policies": CONTRADICTS,
-    "Coverage and moments of the other columns": HOLDS,
     "MountainCar: quartiles of the distilled policies, in table and text": CONTRADICTS,
     "The same rule for outliers in every column": OPEN,
     "SimpleGoal: what the teacher's outliers are": HOLDS,
-    "Shares and moments of outliers": HOLDS,
-    "Numbers printed twice": HOLDS,
-    "Returns within the limits of the tasks": HOLDS,
     "T3 and T4: coefficients rounded to four digits": CONTRADICTS,
-    "T3: pairs closer than the thresholds": OPEN,
-    "T4: pairs closer than the thresholds": OPEN,
     "Dimensions of states and actions": CONTRADICTS,
-    "MountainCar: truncation": OPEN,
     "Which iterations may change the partition": CONTRADICTS,
 }
 IN_DOUBT = {
@@ -75,7 +68,6 @@ def test_every_finding_says_what_is_printed_and_computes(found):
     for finding in found.values():
         assert finding.printed and any(digit in finding.arithmetic for digit in "0123456789"), finding
         assert "nan" not in (finding.printed + finding.arithmetic).split()
-        assert not finding.concerns or finding.verdict == CONTRADICTS
 
 
 def test_what_is_in_doubt_exists(found):
@@ -92,8 +84,6 @@ def test_what_is_in_doubt_exists(found):
             "SimpleGoal: coverage and outliers of the distilled policies",
             ["86.98 %", "86.17 %", "1175", "80000 episodes", "68933", "73933"],
         ),
-        ("Coverage and moments of the other columns", ["1 - 24/1000 = 97.6 %", "1 - 3130/40000 = 92.175 %"]),
-        ("Coverage and moments of the other columns", ["1 - 0/1000 = 100 %", "mean 16.801 (", "std 2.737 ("]),
         # (94.130 - 93.313)/4 = 0.20425; 93.313 + 1.5 * 0.20425 = 93.619375; 93.403 - 1.5 * 0.145 = 93.1855
         (
             "MountainCar: quartiles of the distilled policies, in table and text",
@@ -106,16 +96,9 @@ def test_what_is_in_doubt_exists(found):
         ),
         # (24 * 8.369 + 20)/22 = 10.0389; 0.2 * 0.2 * 1000 = 40
         ("SimpleGoal: what the teacher's outliers are", ["24 = 2 at -10 and 22 with mean 10.04", "40 of 1000"]),
-        ("Shares and moments of outliers", ["2291/3130 = 73.195 %", "839/3130 = 26.805 %", "of at most 0.204"]),
-        ("Numbers printed twice", ["26 of 26"]),
-        ("Returns within the limits of the tasks", ["= 23.142", "22.798", "16.599 of 16.65", "71.050"]),
         # 13 * 2 + 13 * 6 - 2 numbers in T3, 32 * 5 in T4
         ("T3 and T4: coefficients rounded to four digits", ["Of 262 numbers 6 have 4 decimals (all 2 to 4)"]),
-        # |0.891 - 0.826| + |0.628 - 0.460| = 0.065 + 0.168 = 0.233
-        ("T3: pairs closer than the thresholds", ["of 78 pairs", "manhattan: 1 (rows 1-2)", "euclidean: 12 ("]),
-        ("T4: pairs closer than the thresholds", ["of 496 pairs", "manhattan: 8 (", "neighbours: 4 (rows 3-8,"]),
         ("Dimensions of states and actions", ["[2, 2]", "[2, 1]"]),
-        ("MountainCar: truncation", ["1000 and 999", "71.050"]),
         ("Which iterations may change the partition", ["4000, 1000, 5000 - 20 = 4980", "1600, 400, 2000 - 50 = 1950"]),
     ],
 )
@@ -133,15 +116,9 @@ QUARTILES = {f"mc_spread_ours_{name}": text for name, text in QUARTILES.items()}
     [
         ("Number of distilled policies", {"sg_text_policies": "85", "mc_text_policies": "40"}, HOLDS),
         ("SimpleGoal: coverage and outliers of the distilled policies", {"sg_spread_ours_coverage": "86.98"}, HOLDS),
-        ("Coverage and moments of the other columns", {"sg_drl_outliers": "25"}, CONTRADICTS),
-        ("Coverage and moments of the other columns", {"sg_spread_ours_std": "8.0"}, CONTRADICTS),
         ("MountainCar: quartiles of the distilled policies, in table and text", QUARTILES, HOLDS),
         ("The same rule for outliers in every column", {"sg_drl_outliers_max": "8.0"}, HOLDS),
         ("SimpleGoal: what the teacher's outliers are", {"sg_drl_outliers_std": "4.5"}, OPEN),
-        ("Shares and moments of outliers", {"mc_ours_outliers_below_share": "73.25"}, CONTRADICTS),
-        ("Numbers printed twice", {"sg_ours_mean": "12.658"}, CONTRADICTS),
-        ("Returns within the limits of the tasks", {"sg_spread_ours_max": "23.2"}, CONTRADICTS),
-        ("MountainCar: truncation", {"mc_max_steps": "999"}, HOLDS),
     ],
 )
 def test_another_number_another_verdict(found, alter, title, numbers, verdict):
@@ -149,7 +126,6 @@ def test_another_number_another_verdict(found, alter, title, numbers, verdict):
     alter(numbers)
     finding = check()
     assert finding.title == title and finding.verdict == verdict != VERDICTS[title]
-    assert not finding.concerns or verdict == CONTRADICTS
 
 
 def test_other_tables_other_verdicts(monkeypatch):
