@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import count, permutations
+from itertools import permutations
 
 import numpy as np
 
@@ -24,8 +24,7 @@ N_STARTS = 400
 TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid, per axis; states to measure the grid's error at
 N_EPISODES, N_STEPS = 8, 250  # stored for a task that the script cannot simulate: episodes, and most steps of each
 EPISODE_SEED = 0
-DIGITS = 4  # of stored numbers, within the range of each variable
-MOST = 490_000  # most bytes of a scene with stored episodes
+N_NUMBERS = 45_000  # stored in all: some ten bytes each
 N_MOMENTS = 80  # of a replay, in addition to those with a split or merge
 
 
@@ -40,9 +39,9 @@ def scene_of(
 
     Keys: task (names and limits), plane (low, high, labels), policies. A task that the script can simulate also has
     starts (n, 2), lost (which outcomes are failures) and teacher: its actions on a grid, the largest error of
-    interpolating them, and its mean return. Other tasks have stored episodes instead, drawn over the two inputs `axes`.
-    Their scenes stay below `MOST` bytes, with fewer moments and steps where needed. Raises ValueError for `axes` that
-    are not inputs, for a teacher whose actions have another shape, and as `collect_episodes` does.
+    interpolating them, and its mean return. Other tasks have stored episodes instead, drawn over the two inputs `axes`
+    (by default the first two), with fewer steps where there are many inputs or policies. Raises ValueError for `axes`
+    that are not inputs, for a teacher whose actions have another shape, and as `collect_episodes` does.
     """
     scene = {"task": _task(task), "policies": [_numbers(policy, name) for name, policy in policies.items()]}
     if history is not None:
@@ -53,8 +52,6 @@ def scene_of(
         if axes is not None:
             raise ValueError(f"axes are {axes!r}, expected None: the states of {task.name} are drawn as a whole")
         return scene | _played(task, teacher)
-    if history is not None:
-        scene["policies"][0]["replay"] = _thinned(scene["policies"][0]["replay"], MOST // 2)
     return scene | _stored(policies, task, teacher, axes, scene["policies"])
 
 
@@ -83,18 +80,19 @@ def _stored(
     policies: dict[str, VoronoiPolicy], task: Task, teacher: Policy | None, axes: tuple[str, str] | None, into: list
 ) -> dict:
     """Add every policy's episodes and the teacher's actions to `into`; return the plane and the box of the states."""
-    first, starts = next(iter(policies.values())), start_states(task, N_EPISODES, EPISODE_SEED)
-    if axes is not None and axes not in permutations(task.inputs, 2):
-        raise ValueError(f"axes are {axes!r}, expected two of the inputs {', '.join(task.inputs)}")
-    played = [[episode.states for episode in collect_episodes(policy, task, starts)] for policy in policies.values()]
-    visited = np.concatenate([states for episodes in played for states in episodes])
-    low, high, decimals = visited.min(axis=0), visited.max(axis=0), _decimals(visited)
-    chosen = _widest(visited / first.scale) if axes is None else [task.inputs.index(name) for name in axes]
-    for most in (N_STEPS // n for n in count(1)):
-        for episodes, about in zip(played, into):
-            about["episodes"] = [_episode(states, decimals, teacher, task, max(most, 1)) for states in episodes]
-        if len(to_json(into).encode()) < MOST - 10_000 or most <= 1:  # the rest is for plane and names
-            break
+    chosen = [0, min(1, len(task.inputs) - 1)]  # a single input counts twice
+    if axes is not None:
+        if axes not in permutations(task.inputs, 2):
+            raise ValueError(f"axes are {axes!r}, expected two of the inputs {', '.join(task.inputs)}")
+        chosen = [task.inputs.index(name) for name in axes]
+    starts, numbers = start_states(task, N_EPISODES, EPISODE_SEED), len(task.inputs) + len(task.outputs)
+    most = max(1, min(N_STEPS, N_NUMBERS // (len(policies) * N_EPISODES * numbers)))
+    visited = []
+    for policy, about in zip(policies.values(), into):
+        played = [episode.states for episode in collect_episodes(policy, task, starts)]
+        about["episodes"] = [_episode(states, teacher, task, most) for states in played]
+        visited += played
+    low, high = np.concatenate(visited).min(axis=0), np.concatenate(visited).max(axis=0)
     room = 0.03 * np.maximum(high - low, 1e-3 * np.maximum(1.0, np.abs(high)))
     plane = {
         "low": (low - room)[chosen].tolist(),
@@ -104,50 +102,20 @@ def _stored(
     return {"plane": plane, "stored": {"axes": chosen, "low": low.tolist(), "high": high.tolist()}}
 
 
-def _episode(states: np.ndarray, decimals: list[int], teacher: Policy | None, task: Task, most: int) -> dict:
+def _episode(states: np.ndarray, teacher: Policy | None, task: Task, most: int) -> dict:
     """Return at most `most` evenly spaced states of an episode, and the teacher's actions there."""
     every = 1 + (len(states) - 1) // most
-    kept = _rounded(states[::every], decimals)
+    kept = _rounded(states[::every])
     episode = {"states": kept.tolist(), "every": every, "steps": len(states)}
     if teacher is not None:
         actions = check_array("the teacher's actions", teacher.predict(kept)[0], (len(kept), len(task.outputs)))
-        episode["teacher"] = _rounded(actions, _decimals(np.stack([task.action_low, task.action_high]))).tolist()
+        episode["teacher"] = _rounded(actions).tolist()
     return episode
 
 
-def _decimals(values: np.ndarray) -> list[int]:
-    """Return for each column the number of decimals that gives its range `DIGITS` digits or one more."""
-    size = np.maximum(np.ptp(values, axis=0), 1e-6 * np.abs(values).max(axis=0))
-    return [DIGITS - int(np.floor(np.log10(range_))) if range_ else 0 for range_ in size.tolist()]
-
-
-def _rounded(values: np.ndarray, decimals: list[int]) -> np.ndarray:
-    return np.column_stack([column.round(n) for column, n in zip(values.T, decimals)])
-
-
-def _widest(states: np.ndarray) -> list[int]:
-    """Return the two inputs that vary most, in units of the look-up.
-
-    Inputs with two values, such as contacts, count only if there are no others; a single input counts twice.
-    """
-    binary = np.array([len(np.unique(column)) <= 2 for column in states.T])
-    order = np.lexsort((-states.std(axis=0), binary))
-    return sorted(order[:2].tolist()) if len(order) > 1 else [0, 0]
-
-
-def _thinned(moments: list[dict], most: int) -> list[dict]:
-    """Thin a replay to `most` bytes. Moments without a split or merge go first, then evenly spaced ones of the rest.
-
-    The first and the last moment stay.
-    """
-    if len(to_json(moments)) <= most:
-        return moments
-    changes = [moment for i, moment in enumerate(moments) if moment["change"] or i in (0, len(moments) - 1)]
-    for every in range(1, len(changes) + 1):
-        kept = [*changes[:-1][::every], changes[-1]]
-        if len(to_json(kept)) <= most:
-            break
-    return kept
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Round to six significant digits."""
+    return np.array([float(f"{value:.6g}") for value in values.ravel()]).reshape(values.shape)
 
 
 def starts_of(task: Task) -> np.ndarray:
