@@ -92,19 +92,6 @@ def test_the_words_tell_the_distilled_policy_from_the_teacher(lab):
     assert f"The teacher: mean return {teacher.returns.mean():.2f}, {(teacher.outcomes != 1).sum() or 'no'} f" in words
 
 
-@pytest.mark.parametrize("stage", ["trial", "scene"])
-def test_a_trial_that_fails_leaves_the_earlier_picture_and_says_so(lab, monkeypatch, stage):
-    lab.settings["min_pol_distance"].value = 0.45
-    before, (shown,) = (lab.explorer.scene, lab.text.value), re.findall(r"→\s(\d+)", lab.text.value)
-    with monkeypatch.context() as patch, pytest.raises(RuntimeError):
-        patch.setattr(lab, stage, fails)
-        lab.settings["min_pol_distance"].value = 0.5
-    assert lab.status.value.endswith(f"RuntimeError: no &lt;room&gt; left. The picture below is trial {shown}.")
-    assert (lab.explorer.scene, lab.text.value) == before
-    lab.settings["min_pol_distance"].value = 0.45
-    assert lab.status.value.startswith("Change a setting")
-
-
 def test_the_same_settings_are_not_tried_twice(lab):
     lab.settings["min_param_distance"].value = 0.9
     known = len(lab.trials)

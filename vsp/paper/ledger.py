@@ -213,7 +213,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
 
     teacher, means = result.teacher_returns, result.returns.mean(axis=1)
     cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
-    measures = {
+    measures: dict[str, tuple] = {
         "interquartile mean of the runs": (means, partial(trim_mean, proportiontocut=0.25), teacher.mean()),
         "probability that an episode beats the teacher's": ((result.returns > teacher).mean(axis=1), np.mean, np.nan),
     }

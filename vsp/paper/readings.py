@@ -15,7 +15,7 @@ from ..partition import Partition
 from ..rollouts import Episode
 
 # Every open question: fields of `Config` and `Readings` with values other than their defaults
-ALTERNATIVES = {
+ALTERNATIVES: dict[str, list[dict[str, object]]] = {
     "R1": [{"freeze": "first_n_freeze"}, {"freeze": "last_n_split"}],
     "R2": [{"split_lookup": "kept"}],
     "R3": [{"split_metric": "euclidean"}],

@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from decimal import Decimal
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from ..checks import check_array, check_count, check_finite, check_number, check_seed
+from ..checks import check_array, check_count, check_finite, check_seed
 from ..evaluation import fences
 
 
@@ -150,7 +149,7 @@ class _SortedReturns:
 
     def __init__(self, returns: np.ndarray):
         (p, n), self.block = returns.shape, math.ceil(math.sqrt(returns.size))
-        order = returns.argsort(axis=None, kind="stable")
+        order = np.argsort(returns.ravel(), kind="stable")
         self.values, self.policy = returns.ravel()[order], order // n
         cells = self.policy * self.block + np.arange(p * n) // self.block
         in_block = np.bincount(cells, minlength=p * self.block).reshape(p, self.block)
@@ -164,8 +163,9 @@ class _SortedReturns:
         """Return the columns of `resample`, for the resamples that draw these policies (r, p)."""
         counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
         q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
-        lower, upper = fences(q1, q3)
-        n, low, high = len(self.values), self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
+        lower, upper = np.stack(fences(q1, q3))
+        n = len(self.values)
+        low, high = self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
         places = np.arange(max(1, low.max()))  # outliers of any resample
         below = self._part(places, counts[:, self.policy[places]] * (places < low[:, None]))
         places = np.arange(min(n - 1, high.min()), n)
@@ -176,9 +176,8 @@ class _SortedReturns:
         numbers = {prefix + name: x for prefix, part in parts.items() for name, x in _pooled(*part).items()}
         outliers = (below[0] + above[0])[:, 0]
         some = np.where(outliers > 0, outliers, np.nan)
-        numbers["outliers_below_share"], numbers["outliers_above_share"] = (
-            100 * part[0][:, 0] / some for part in (below, above)
-        )
+        for side, part in (("below", below), ("above", above)):
+            numbers[f"outliers_{side}_share"] = 100 * part[0][:, 0] / some
         numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
         return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / n)}
 
@@ -270,6 +269,5 @@ def greatest_std(mean: float, low: float, high: float) -> float:
 
 def rounds_to(number: float, printed: float) -> bool:
     """Return whether `number`, rounded to the decimals of `printed`, may be `printed`; NaN may not."""
-    check_number("printed", printed)
-    decimals = max(0, -Decimal(repr(float(printed))).normalize().as_tuple().exponent)
+    decimals = len(f"{printed:.12g}".partition(".")[2])
     return bool(abs(number - printed) <= 0.5 / 10**decimals + 1e-9)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -118,23 +118,22 @@ def _heading(column: str) -> str:
     return (headings()["words"] | headings()["percent"]).get(column, column)
 
 
-def as_text(frame: pd.DataFrame, *, digits: int = 3) -> pd.DataFrame:
+def as_text(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the frame as text.
 
-    Floats have `digits` decimals, or fewer if these hold the whole column. From 100 on they have fewer, so that five
+    Floats have three decimals, or fewer if these hold the whole column. From 100 on they have fewer, so that five
     digits remain. All else stays as it is, apart from thousands separators.
     """
-    check_count("digits", digits, least=0)
-    return frame.apply(lambda column: column.map(lambda value: _text(value, min(digits, _decimals(column)))))
+    return frame.apply(lambda column: column.map(lambda value: _text(value, _decimals(column))))
 
 
 def _decimals(column: pd.Series) -> int:
-    """Return the fewest decimals that hold all floats of a column, at most 9: counts are floats if one is missing."""
+    """Return the fewest decimals that hold all floats of a column, at most 3: counts are floats if one is missing."""
     values = np.array([value for value in column if isinstance(value, float) and math.isfinite(value)])
-    return next((n for n in range(9) if (values.round(n) == values).all()), 9)
+    return next((n for n in range(3) if np.array_equal(values.round(n), values)), 3)
 
 
-def _text(value: object, digits: int) -> str:
+def _text(value: Any, digits: int) -> str:
     if not isinstance(value, float):
         return f"{value:,}" if isinstance(value, int | np.integer) and abs(value) >= 10_000 else str(value)
     if np.isnan(value):
@@ -160,7 +159,7 @@ def _escape(text: str) -> str:
 def hyperparameter_table(tasks: list[str]) -> pd.DataFrame:
     """Return T2 as printed and as configured here: one row per hyperparameter, two columns per task."""
     names = printed_hyperparameters(tasks[0])
-    columns = {"hyperparameter": list(names)}
+    columns: dict[str, list] = {"hyperparameter": list(names)}
     for task in tasks:
         printed, here = printed_hyperparameters(task), paper_preset(task)
         columns[f"{SHORT[task]}, paper"] = [printed[name] for name in names]
@@ -208,8 +207,8 @@ def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str =
         where = f"Each row holds where its codeword is the nearest ({policy.metric.capitalize()} distance{units})"
     else:
         frame = frame.drop(columns="codeword")
-    limits = zip(task.outputs, task.action_low, task.action_high)
-    limits = ", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in limits)
+    boxes = zip(task.outputs, task.action_low, task.action_high)
+    limits = ", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in boxes)
     return show_table(frame, caption=f"{caption} {where}. Limits: {limits}.".strip())
 
 

@@ -115,7 +115,6 @@ def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | No
 
 def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
     """Return the outer edges (left, right, bottom, top) of an image whose pixel centres are the points of a `grid`."""
-    x, y = _grid(x, y)
     dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
     return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
 

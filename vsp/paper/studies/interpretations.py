@@ -27,7 +27,7 @@ N_RESAMPLES = 1000  # per interval
 N_CONFIRMED = 5  # variants to check, in addition to the default and the nearest one of each task
 
 # Readings to try in all combinations: they change the number of cells or how fast the maps learn
-FACTORS = {
+FACTORS: dict[str, dict[str, object]] = {
     "R2": {"split_lookup": "kept"},
     "R3": {"split_metric": "euclidean"},
     "R4": {"one_split": True},
@@ -43,7 +43,7 @@ AS_PRINTED = {
 
 def variants() -> dict[str, dict]:
     """Return the variants by name: the default, each reading alone, the algorithms as printed, all combinations."""
-    tried = {"default": {}}
+    tried: dict[str, dict] = {"default": {}}
     tried |= {f"{number} {name_of(change)}": change for number, changes in ALTERNATIVES.items() for change in changes}
     tried["algorithms as printed"] = AS_PRINTED
     for size in range(2, len(FACTORS) + 1):
@@ -167,12 +167,10 @@ def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.Dat
     """
     names = list(dict.fromkeys(name for name, _ in away))
     joint = {name: np.mean([away[name, task] for task in tasks], axis=0) for name in names}
-    rows = [
-        {"phase": phase, "variant": name, "task": "both"}
-        | _with_interval("distance", joint[name])
-        | _with_interval("gap", joint[name] - joint["default"])
-        for name in names
-    ]
+    rows = []
+    for name, values in joint.items():
+        intervals = _with_interval("distance", values) | _with_interval("gap", values - joint["default"])
+        rows.append({"phase": phase, "variant": name, "task": "both", **intervals})
     return pd.DataFrame(rows)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from ...algorithms import teacher_episodes
-from ...checks import check_seed
 from ...evaluation import rollout_from_seed
 from ...rollouts import Outcomes, Policy
 from ...run import workers
@@ -48,7 +47,6 @@ def provenance_of(experiment: Experiment) -> dict[str, str | int]:
 
 def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return all states (n, d) and actions (n, m) of the teacher that `distill` sees under `seed`."""
-    check_seed(seed)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[0])
     task, n = get_task(experiment.task), experiment.config.n_iterations
     episodes = list(teacher_episodes(experiment.teacher, task, n, rng))
@@ -79,7 +77,7 @@ def compare_simpler(result: Results, n_runs: int = N_FITTED, *, jobs: int | str 
     work = [(experiment, run) for run in result.runs[:n_runs]]
     fitted = dict(workers.results(_fitted, work, f"{task}, simpler", jobs=jobs, total=len(work), unit="fits"))
     name, rule = rule_of_thumb(task)
-    played = {"teacher (TD3)": [(np.nan, result.teacher_outcomes)]}
+    played: dict[str, list] = {"teacher (TD3)": [(np.nan, result.teacher_outcomes)]}
     unfitted = _played(experiment, {name: rule, "published policy": printed.published_policy(task)})
     for policies in (unfitted, *(fitted[i] for i in range(len(work)))):
         for kind, evaluated in policies.items():

@@ -76,18 +76,14 @@ def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
     """Return the variance of `values` between and within groups of equal size: one-way random effects.
 
     Keys: between, within (variances, by moments; between is cut at zero), share (between / sum of both), share_low and
-    share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6). Raises ValueError for unequal groups.
+    share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6).
     """
     from scipy.stats import f  # here: it takes long to import
 
     table = values.groupby(groups)
     size, means = table.size(), table.mean()
     k, n = len(size), size.iloc[0]
-    if size.nunique() != 1 or k < 2 or n < 2:
-        raise ValueError(f"sizes of the groups are {size.to_dict()}, expected two or more groups of one size, above 1")
     within = table.var().mean()
-    if not within:
-        raise ValueError("no variance within the groups, expected values that differ")
     ratio = n * means.var() / within
     low, high = (ratio / f.ppf(q, k - 1, k * (n - 1)) for q in (0.975, 0.025))
     shares = {name: max(0.0, (x - 1) / (x + n - 1)) for name, x in (("", ratio), ("_low", low), ("_high", high))}

@@ -83,7 +83,8 @@ class Explorer:
     def _ipython_display_(self) -> None:
         from .view import View  # here: anywidget takes long to import
 
-        page.show(View(scene=to_json(self.scene))._repr_mimebundle_()[0], self.element(), self._alt())
+        view, _ = View(scene=to_json(self.scene))._repr_mimebundle_() or ({}, {})
+        page.show(view, self.element(), self._alt())
 
     def _alt(self) -> str:
         name, policy = next(iter(self.policies.items()))

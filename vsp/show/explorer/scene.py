@@ -15,7 +15,8 @@ from ...rollouts import Policy, collect_episodes, rollout
 from ...tasks import PIT, RUNNING
 from ...tasks.base import Task
 
-PLANES = {  # for each task that the script can simulate: lower and upper limits of the plane, and its axis labels
+# For each task that the script can simulate: lower and upper limits of the plane, and its axis labels
+PLANES: dict[str, tuple[list, list, list[str]]] = {
     "SimpleGoal-v0": ([0.0, 0.0], [1.0, 1.0], ["x", "y"]),
     "MountainCarContinuous-v0": ([-1.2, -0.07], [0.6, 0.07], ["position", "velocity (per step)"]),
     "Pendulum-v1": ([-np.pi, -8.0], [np.pi, 8.0], ["angle (rad)", "angular velocity (rad/s)"]),
@@ -43,7 +44,7 @@ def scene_of(
     (by default the first two), with fewer steps where there are many inputs or policies. Raises ValueError for `axes`
     that are not inputs, for a teacher whose actions have another shape, and as `collect_episodes` does.
     """
-    scene = {"task": _task(task), "policies": [_numbers(policy, name) for name, policy in policies.items()]}
+    scene: dict = {"task": _task(task), "policies": [_numbers(policy, name) for name, policy in policies.items()]}
     if history is not None:
         first = scene["policies"][0]
         first["replay"] = _replay(history)
@@ -137,19 +138,15 @@ def _teacher(teacher: Policy, task: Task, low: np.ndarray, high: np.ndarray) -> 
 
     Of `N_ERRORS` random states, "error" is the largest error in any action, and "usual" that of 90 % of them.
     """
-    n, rng = TEACHER_POINTS, np.random.default_rng(0)
+    from scipy.interpolate import RegularGridInterpolator  # here: it takes long to import
+
+    n = TEACHER_POINTS
     axes = [np.linspace(a, b, n) for a, b in zip(low, high)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     actions = np.round(teacher.predict(task.see(points))[0], 3)
-    states = rng.uniform(low, high, size=(N_ERRORS, 2))
-    place = (states - low) / (high - low) * (n - 1)
-    first = np.minimum(place.astype(int), n - 2)
-    share = place - first
-    read = np.zeros((N_ERRORS, actions.shape[1]))
-    for i, j in np.ndindex(2, 2):  # the four grid points around each state
-        weight = np.where(i, share[:, 0], 1 - share[:, 0]) * np.where(j, share[:, 1], 1 - share[:, 1])
-        read += weight[:, None] * actions[(first[:, 0] + i) * n + first[:, 1] + j]
-    error = np.abs(read - teacher.predict(task.see(states))[0])
+    states = np.random.default_rng(0).uniform(low, high, size=(N_ERRORS, 2))
+    between = RegularGridInterpolator(axes, actions.reshape(n, n, -1))(states)
+    error = np.abs(between - teacher.predict(task.see(states))[0])
     usual = float(np.quantile(error.max(axis=1), 0.9))
     return {"n": n, "actions": actions.tolist(), "error": float(error.max()), "usual": usual}
 
