@@ -135,7 +135,7 @@ def _decimals(column: pd.Series) -> int:
 
 def _text(value: Any, digits: int) -> str:
     if not isinstance(value, float):
-        return f"{value:,}" if isinstance(value, int | np.integer) and abs(value) >= 10_000 else str(value)
+        return f"{value:,}" if isinstance(value, int | np.integer) and abs(int(value)) >= 10_000 else str(value)
     if np.isnan(value):
         return MISSING
     if value and abs(value) < 0.001:

@@ -41,7 +41,8 @@ class Explorer:
 
     `policies`: policies with linear maps by name, all of one task. `history`: replays the first of them. The script
     simulates SimpleGoal, MountainCarContinuous and Pendulum itself; for other tasks it shows stored episodes, over the
-    two inputs `axes`. Raises ValueError for other policies, unknown inputs, and the history of another run.
+    two inputs `axes`, by default the first two. Raises ValueError for other policies, unknown inputs, and the history
+    of another run.
     """
 
     def __init__(
