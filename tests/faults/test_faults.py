@@ -104,7 +104,7 @@ def test_kill_of_a_kernel(reference, record):
     for _ in range(tried := min(10, PER_ROW)):
         name = str(rng.choice(list(reference.notebooks)))
         out = reference.again(without=reference.notebooks)  # others are under way when this one dies
-        place = f"{out}/build/running/{name}-"  # its kernel's working folder is there
+        place = f"{out}/build/running/{name}/"  # its kernel's working folder is there
         moment = partial(rng.uniform, 0, 0.8 * reference.notebooks[name])
         said = kill_one(out, "ipykernel_launcher", moment, place=place)
         wrong |= unless_named(rf"error: {name}\.ipynb.*did not end", said, out, reference)

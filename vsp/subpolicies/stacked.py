@@ -17,20 +17,6 @@ def adam(gradient, mean, square, steps) -> tuple[np.ndarray, np.ndarray, np.ndar
     return mean, square, np.sqrt(square / (1 - BETA2**steps)) + EPSILON
 
 
-class Adam:
-    """The steps of Adam for one array, before they are multiplied by the learning rate."""
-
-    def __init__(self):
-        self._mean = self._square = 0.0
-        self._steps = 0
-
-    def step(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the step against which to move, from the next gradient."""
-        self._steps += 1
-        self._mean, self._square, spread = adam(gradient, self._mean, self._square, self._steps)
-        return self._mean / (1 - BETA1**self._steps) / spread
-
-
 class SubPolicies:
     """One sub-policy per cell, all of the same class, trained on the mean squared error of their actions (m,)."""
 
