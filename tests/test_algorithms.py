@@ -319,21 +319,7 @@ def test_every_field_acts_in_a_run(field):
     )
 
 
-# Beyond the paper: classes of sub-policy, least squares, neighbours among visited states
-
-
-def test_neighbours_among_visited_states():
-    """Three cells in a row: which of them touch is what states say, the last ones that were seen."""
-    partition = partition_of(ROW, config=tiny(neighbours="visited"), filled=False)
-    for states, pairs in (([[0.3, 0.5]], {(0, 1)}), ([[0.7, 0.5]], {(0, 1), (1, 2)}), ([[0.9, 0.5]] * 4095, {(1, 2)})):
-        partition.observe(walk(states, np.zeros(len(states))))
-        assert {(i, j) for i, j in np.argwhere(partition.neighbours()) if i < j} == pairs
-
-
-def test_visited_states_are_scaled_as_codewords_are():
-    config = tiny(neighbours="visited", scale="box")
-    partition = partition_of([[-0.5, -0.05], [-0.5, 0.05], [0.4, 0.0]], config=config, task=MOUNTAINCAR)
-    assert np.allclose(partition.recent.states() / partition.scale, partition.codewords / [1.8, 0.14])
+# Beyond the paper: classes of sub-policy, least squares
 
 
 CLASSES = [("constant", "adam"), ("constant", "closed_form"), ("linear", "closed_form"), ("quadratic", "adam"),

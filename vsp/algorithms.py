@@ -65,7 +65,9 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
     Returns the new codewords, each (d,).
     """
-    previous, losses, added = None, [], []
+    previous: int | None = None
+    losses: list[float] = []
+    added: list[np.ndarray] = []
     for state, action in zip(episode.states, episode.actions):
         i = partition.locate(state)  # l. 4
         if i != previous:  # l. 5-8

@@ -6,8 +6,6 @@ teacher's action there.
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 
 from .config import Config
@@ -133,23 +131,5 @@ class SufficientStatistics:
         self.reset(slice(None))
 
 
-FITS = {"adam": Buffers, "closed_form": SufficientStatistics}  # `Config.fit` to the data that it needs
-
-
-class RecentStates:
-    """The most recent `size` states, or all states while there are fewer."""
-
-    def __init__(self, size: int):
-        self.size, self._held = size, 0
-        self._episodes: deque[np.ndarray] = deque()
-
-    def append(self, states: np.ndarray) -> None:
-        """Add the states (T, d) of an episode, and drop episodes that are too old."""
-        self._episodes.append(states)
-        self._held += len(states)
-        while self._held - len(self._episodes[0]) >= self.size:
-            self._held -= len(self._episodes.popleft())
-
-    def states(self) -> np.ndarray:
-        """At most `size` states, the oldest first. (n, d)"""
-        return np.concatenate(self._episodes)[-self.size :]
+# `Config.fit` to the data that it needs
+FITS: dict[str, type[Buffers | SufficientStatistics]] = {"adam": Buffers, "closed_form": SufficientStatistics}

@@ -69,10 +69,9 @@ class Config:
     scale: Literal["raw", "box"] = "raw"
     """R8. Whether distances are taken between raw states or between states divided by the widths of the state box. This
     applies to the look-up, `min_pol_distance` and neighbours. T4's codewords are in raw units."""
-    neighbours: Literal["delaunay", "lookup", "visited"] = "delaunay"
-    """R9. Which cells are neighbours: those that share a Euclidean Delaunay edge (prose), or those that touch under the
-    look-up's metric. "lookup" samples the state box; "visited" (beyond the paper, for many dimensions) uses states that
-    the teacher visited recently."""
+    neighbours: Literal["delaunay", "lookup"] = "delaunay"
+    """R9. Which cells are neighbours: those that share a Euclidean Delaunay edge (prose), or those that touch inside
+    the state box under the look-up's metric."""
     split_loss: Literal["raw", "clipped"] = "raw"
     """R10. Whether the loss of splitting uses the raw output, as training does, or the output clipped to the action
     box."""
