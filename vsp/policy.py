@@ -13,7 +13,7 @@ from .checks import check_array, check_choice, check_observations
 from .export import Exportable
 from .run import sealed
 from .run.atomic import DamagedFile
-from .subpolicies.registry import policy_class
+from .subpolicies import policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
 

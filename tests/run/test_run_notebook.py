@@ -98,7 +98,7 @@ FAULTS = {
     "never ran": (["# skip", "2"], "code cell (# skip) never ran"),
     "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
     "address": (["object()"], "code cell (object()) shows 'at 0x"),
-    "path": (["print(out)"], "code cell (print(out)) shows a folder of this machine"),
+    "path": (["print(out)"], "code cell (print(out)) shows '/"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
         "code cell (try:) failed: ZeroDivisionError: division by zero",

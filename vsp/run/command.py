@@ -53,7 +53,7 @@ def in_one_line(what: str = "") -> Iterator[None]:
     except OSError as error:
         if error.errno not in _DISK:
             raise
-        sys.exit(f"{begin}{error}: free space, make it writable, or name another folder: OUT=folder")
+        sys.exit(f"{begin}{error}: free some space, make it writable, or name another folder: OUT=folder")
 
 
 def _interrupt(signum: int, frame: object) -> None:
