@@ -98,15 +98,15 @@ class SufficientStatistics:
             self.squares[cell] += np.square(goal).sum()
             self.counts[cell] += len(own)
 
-    def losses(self, cells: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    def losses(self, cells: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         """Mean squared error of linear maps (c, q + 1, m), each over all rows of its cell in `cells` (c,). (c,)"""
         products, targets = self.products[cells], self.targets[cells]
-        squares = self.squares[cells] + (parameters * (products @ parameters - 2 * targets)).sum(axis=(1, 2))
+        squares = self.squares[cells] + (coefficients * (products @ coefficients - 2 * targets)).sum(axis=(1, 2))
         return np.maximum(squares, 0.0) / (self.counts[cells] * targets.shape[2])  # rounding may go below 0
 
     def fit(self, models: SubPolicies, cells: np.ndarray, config: Config, rng: np.random.Generator) -> np.ndarray:
         """Solve least squares for the models of `cells` (c,). Returns each cell's loss before. (c,)"""
-        losses = self.losses(cells, models.parameters[cells])
+        losses = self.losses(cells, models.coefficients[cells])
         models.solve(cells, self.products[cells], self.targets[cells])
         return losses
 

@@ -113,15 +113,15 @@ class Partition:
             return geometry.lookup_neighbours(codewords, self.scaled(self.task.low), self.scaled(self.task.high))
         return geometry.delaunay_neighbours(codewords)
 
-    def comparable_parameters(self) -> np.ndarray:
-        """Return the parameters that a merge compares (R12), one row per cell. (k, p)"""
-        parameters = self.models.comparable()
+    def comparable_coefficients(self) -> np.ndarray:
+        """Return the coefficients that a merge compares (R12), one row per cell. (k, p)"""
+        coefficients = self.models.comparable()
         if self.config.merge_parameters == "weights":
-            parameters = parameters[:, :-1]
-        return parameters.reshape(len(self.codewords), -1)
+            coefficients = coefficients[:, :-1]
+        return coefficients.reshape(len(self.codewords), -1)
 
     def policy(self) -> VoronoiPolicy:
         """Return the partition as a policy that later changes do not affect."""
         scale = None if self.config.scale == "raw" else self.scale
-        parameters, name = self.models.parameters, self.config.sub_policy
-        return VoronoiPolicy(self.codewords, parameters, task=self.task, scale=scale, sub_policy=name)
+        coefficients, name = self.models.coefficients, self.config.sub_policy
+        return VoronoiPolicy(self.codewords, coefficients, task=self.task, scale=scale, sub_policy=name)

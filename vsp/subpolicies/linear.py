@@ -1,4 +1,4 @@
-"""Classes of sub-policies that are linear in their parameters, by name. The paper uses `linear`.
+"""Classes of sub-policies that are linear in their coefficients, by name. The paper uses `linear`.
 
 To add one, write a function that takes a task and returns a `PolicyClass`, and enter it in `POLICY_CLASSES`.
 """
