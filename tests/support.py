@@ -105,9 +105,9 @@ def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL, filled
     partition = Partition(get_task(task), config)
     for codeword in np.asarray(codewords, dtype=np.float64):
         partition.add(codeword, np.random.default_rng(0))
-    partition.models.parameters[:] = 0.0
+    partition.models.coefficients[:] = 0.0
     if biases is not None:
-        partition.models.parameters[:, -1, :] = np.asarray(biases, dtype=np.float64)[:, None]
+        partition.models.coefficients[:, -1, :] = np.asarray(biases, dtype=np.float64)[:, None]
     if filled:
         m = len(partition.task.action_low)
         partition.observe(Episode(partition.codewords.copy(), np.zeros((len(codewords), m))))

@@ -54,7 +54,7 @@ def test_a_split_by_hand():
     assert split(partition, walk(states, [0, 0.25, 0.5, 0.5, 0.5])) == [(0.375, 0.5), (0.6875, 0.5)]
     assert partition.codewords.tolist() == [[0, 0.5], [1, 0.5], [0.375, 0.5], [0.6875, 0.5]]
     assert partition.buffers.counts.tolist() == [0, 0, 0, 0]
-    assert partition.models.parameters.shape == (4, 3, 2)
+    assert partition.models.coefficients.shape == (4, 3, 2)
 
 
 def test_the_running_loss_is_a_mean_and_starts_anew_in_each_cell():
@@ -101,8 +101,8 @@ def test_split_loss_clipped_forgives_what_the_action_box_hides(loss, bias, split
 def test_the_new_cell_is_random_and_empty():
     partition = partition_of([[0, 0.5]], config=tiny(max_pol_loss=0.01, min_pol_distance=0.1))
     split(partition, walk([[0.5, 0.5]], [1]))
-    assert np.ptp(partition.models.parameters[1]) > 0 and partition.buffers.counts[1] == 0
-    assert not partition.models.parameters[0].any()
+    assert np.ptp(partition.models.coefficients[1]) > 0 and partition.buffers.counts[1] == 0
+    assert not partition.models.coefficients[0].any()
 
 
 def test_scale_box_divides_by_the_width_of_the_box():
@@ -128,14 +128,14 @@ def test_a_split_resets_its_cell_and_the_old_neighbours():
 
 
 def test_a_merge_by_hand():
-    """Biases 0, 1/8, 3/8 in a row A - B - C; parameters closer than 1/4 agree.
+    """Biases 0, 1/8, 3/8 in a row A - B - C; coefficients closer than 1/4 agree.
 
     A: neighbour B differs by 1/8: B goes, A and B are reset. B: gone. C: its neighbour is now A, 3/8 away: stays.
     """
     partition = partition_of(ROW, [0, 1 / 8, 3 / 8], config=tiny(min_param_distance=0.25))
     assert [tuple(c) for c in merge_regions(partition, partition.config)] == [(0.5, 0.5)]
     assert partition.codewords.tolist() == [ROW[0], ROW[2]]
-    assert partition.models.parameters[:, -1, 0].tolist() == [0, 3 / 8]
+    assert partition.models.coefficients[:, -1, 0].tolist() == [0, 3 / 8]
     assert partition.buffers.counts.tolist() == [0, 1]
 
 
@@ -166,16 +166,16 @@ def test_settings_decide_who_merges(settings, codewords, biases, left):
 
 def test_the_distance_of_parameters_is_the_largest_difference():
     partition = partition_of(ROW[:2], config=tiny(min_param_distance=0.5))
-    partition.models.parameters[1, 0, 1] = 0.6  # one weight of one action
+    partition.models.coefficients[1, 0, 1] = 0.6  # one weight of one action
     assert merge_regions(partition, partition.config) == []
-    partition.models.parameters[1] = 0.4  # all, each by less
+    partition.models.coefficients[1] = 0.4  # all, each by less
     assert len(merge_regions(partition, partition.config)) == 1
 
 
 def test_merge_resets_neighbours_that_stay():
     partition = partition_of(ROW, [1, 0, 0.9], config=tiny(min_param_distance=0.25))
-    partition.models.parameters[0, -1] = 0.1  # the first swallows the middle one; then the last is its neighbour
-    partition.models.parameters[2, -1] = 5.0
+    partition.models.coefficients[0, -1] = 0.1  # the first swallows the middle one; then the last is its neighbour
+    partition.models.coefficients[2, -1] = 5.0
     merge_regions(partition, partition.config)
     assert partition.buffers.counts.tolist() == [0, 1]
     partition = partition_of(ROW, [5, 0, 0.1], config=tiny(min_param_distance=0.25))
@@ -319,21 +319,7 @@ def test_every_field_acts_in_a_run(field):
     )
 
 
-# Beyond the paper: classes of sub-policy, least squares, neighbours among visited states
-
-
-def test_neighbours_among_visited_states():
-    """Three cells in a row: which of them touch is what states say, the last ones that were seen."""
-    partition = partition_of(ROW, config=tiny(neighbours="visited"), filled=False)
-    for states, pairs in (([[0.3, 0.5]], {(0, 1)}), ([[0.7, 0.5]], {(0, 1), (1, 2)}), ([[0.9, 0.5]] * 4095, {(1, 2)})):
-        partition.observe(walk(states, np.zeros(len(states))))
-        assert {(i, j) for i, j in np.argwhere(partition.neighbours()) if i < j} == pairs
-
-
-def test_visited_states_are_scaled_as_codewords_are():
-    config = tiny(neighbours="visited", scale="box")
-    partition = partition_of([[-0.5, -0.05], [-0.5, 0.05], [0.4, 0.0]], config=config, task=MOUNTAINCAR)
-    assert np.allclose(partition.recent.states() / partition.scale, partition.codewords / [1.8, 0.14])
+# Beyond the paper: classes of sub-policy, least squares
 
 
 CLASSES = [("constant", "adam"), ("constant", "closed_form"), ("linear", "closed_form"), ("quadratic", "adam"),

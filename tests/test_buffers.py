@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vsp.buffers import Buffers, RecentStates, SufficientStatistics
+from vsp.buffers import Buffers, SufficientStatistics
 
 
 def rows_of(buffers, cell):
@@ -159,17 +159,3 @@ def test_sums_never_grow():
     for _ in range(50):
         sums.append(np.zeros(100, int), np.ones((100, 2)), np.ones((100, 1)))
     assert sum(part.size for part in vars(sums).values()) == 9 + 3 + 1 + 1 and sums.counts.tolist() == [5000]
-
-
-# Recent
-
-
-@given(st.integers(1, 30), st.lists(st.integers(1, 12), min_size=1, max_size=30))
-def test_recent_states_are_the_last_ones(size, lengths):
-    recent, model = RecentStates(size), np.zeros((0, 1))
-    for length in lengths:
-        states = len(model) + np.arange(length, dtype=float)[:, None]
-        recent.append(states)
-        model = np.concatenate([model, states])
-        assert np.array_equal(recent.states(), model[-size:])
-        assert recent._held < size + len(recent._episodes[0])  # no episode more than it takes

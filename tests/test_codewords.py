@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from support import nearest_brute, nearest_kdtree, partition_of
 
 from vsp import Config, VoronoiPolicy
-from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
+from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours
 from vsp.tasks import Task
 
 
@@ -55,7 +55,6 @@ def graphs(codewords, states, metric):
     return {
         "delaunay": delaunay_neighbours(codewords),
         "lookup": lookup_neighbours(codewords, low, high, metric),
-        "visited": visited_neighbours(codewords, states, metric),
     }
 
 

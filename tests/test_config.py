@@ -72,7 +72,6 @@ def test_extensions_at_rest_are_no_part_of_the_settings():
     assert set(dataclasses.asdict(TINY)) - set(plain) == set(EXTENSIONS) and plain["neighbours"] == "delaunay"
     assert all(getattr(TINY, name) == value for name, value in EXTENSIONS.items())
     assert tiny(fit="closed_form").settings() == {**plain, "fit": "closed_form"}
-    assert tiny(neighbours="visited").settings() == {**plain, "neighbours": "visited"}
 
 
 def test_an_unknown_task_and_an_unknown_field():

@@ -6,7 +6,7 @@ from hypothesis.extra.numpy import arrays
 from support import nearest_brute, nearest_kdtree
 
 from vsp import nearest
-from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours, visited_neighbours
+from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours
 from vsp.show import grid
 
 each_metric = pytest.mark.parametrize("metric", METRICS)
@@ -152,26 +152,6 @@ def test_lookup_neighbours_repeat_and_follow_the_box():
     graph = lookup_neighbours(codewords, np.zeros(3), np.ones(3))
     assert np.array_equal(lookup_neighbours(codewords, np.zeros(3), np.ones(3)), graph)
     assert np.array_equal(lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0)), graph)
-
-
-# Neighbours among visited states
-
-
-def test_visited_neighbours_by_hand():
-    row = np.array([[0.1, 0.5], [0.5, 0.5], [0.9, 0.5]])
-    assert edges(visited_neighbours(row, np.array([[0.2, 0.5], [0.3, 0.9]]))) == {(0, 1)}
-    assert edges(visited_neighbours(row, np.array([[0.2, 0.5], [0.6, 0.5]]))) == {(0, 1), (1, 2)}
-    assert edges(visited_neighbours(row[:2], np.array([[0.2, 0.5]]))) == {(0, 1)}
-    assert edges(visited_neighbours(row[:1], np.array([[0.2, 0.5]]))) == set()
-
-
-@each_metric
-def test_visited_neighbours_are_the_two_nearest_of_some_state(metric):
-    rng = np.random.default_rng(8)
-    codewords, states = rng.random((15, 8)), rng.random((300, 8))
-    graph = visited_neighbours(codewords, states, metric)
-    pairs = {tuple(sorted(map(int, row.argsort()[:2]))) for row in distances(states, codewords, metric)}
-    assert is_graph(graph) and edges(graph) == pairs
 
 
 def test_grid():

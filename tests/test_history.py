@@ -15,7 +15,7 @@ def observed(n):
     """The history of n iterations without events; the coefficients of iteration i are i."""
     history, partition = History(n), partition_of([[0.5, 0.5]])
     for i in range(n):
-        partition.models.parameters = np.full((1, 3, 2), float(i))
+        partition.models.coefficients = np.full((1, 3, 2), float(i))
         history.observe(i, 0.0, partition)
     return history
 
@@ -65,6 +65,6 @@ def test_a_snapshot_is_at_most_so_many_iterations_old(n):
 def test_snapshots_do_not_change_afterwards():
     history, partition = History(), partition_of([[0.5, 0.5]])
     history.observe(0, 0.0, partition)
-    partition.models.parameters[:] = 9.0
+    partition.models.coefficients[:] = 9.0
     partition.codewords[:] = 9.0
     assert not (history.policy_at(0).coefficients == 9).any() and not (history.policy_at(0).codewords == 9).any()

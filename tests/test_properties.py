@@ -99,7 +99,6 @@ CASES = {
     "geometry.distances": (geometry.distances, cells_of_states | {"states": states}),
     "geometry.delaunay_neighbours": (geometry.delaunay_neighbours, codewords),
     "geometry.lookup_neighbours": (geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
-    "geometry.visited_neighbours": (geometry.visited_neighbours, cells_of_states | {"witnesses": states}),
     "Partition.observe": (
         lambda states, actions: partition_of([[0.25, 0.5], [0.75, 0.5]]).observe(Episode(states, actions)),
         {"states": array(STATES, free=(), nonempty=True), "actions": array(ACTIONS, free=(), nonempty=True)},

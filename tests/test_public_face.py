@@ -1,5 +1,4 @@
 import dataclasses
-import shutil
 
 import numpy as np
 import pandas as pd
@@ -7,6 +6,7 @@ import pytest
 from support import TASKS
 
 import vsp
+from vsp.run import listed
 from vsp.teachers.teacher import SHIPPED
 
 
@@ -51,6 +51,6 @@ def test_an_unknown_task_is_the_same_clear_error_everywhere(call):
 
 def test_a_path_to_a_teacher_may_be_relative(tmp_path, monkeypatch):
     for suffix in (".safetensors", ".json"):
-        shutil.copy(SHIPPED / f"SimpleGoal-v0{suffix}", tmp_path / f"mine{suffix}")
+        listed.write_listed(tmp_path / f"mine{suffix}", (SHIPPED / f"SimpleGoal-v0{suffix}").read_bytes())
     monkeypatch.chdir(tmp_path)
     assert vsp.load_teacher("mine.safetensors").digest == vsp.load_teacher("SimpleGoal-v0").digest

@@ -65,7 +65,9 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
     Returns the new codewords, each (d,).
     """
-    previous, losses, added = None, [], []
+    previous: int | None = None
+    losses: list[float] = []
+    added: list[np.ndarray] = []
     for state, action in zip(episode.states, episode.actions):
         i = partition.locate(state)  # l. 4
         if i != previous:  # l. 5-8
@@ -84,11 +86,11 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
 
 def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
-    """Algorithm 3: for each cell, remove neighbours with similar parameters. Returns the removed codewords."""
+    """Algorithm 3: for each cell, remove neighbours with similar coefficients. Returns the removed codewords."""
     before, i = partition.codewords, 0
     while i < len(partition.codewords):  # l. 1
-        parameters, near = partition.comparable_parameters(), partition.neighbours()[i]  # l. 2
-        distances = np.abs(parameters - parameters[i]).max(axis=1)  # L-infinity
+        coefficients, near = partition.comparable_coefficients(), partition.neighbours()[i]  # l. 2
+        distances = np.abs(coefficients - coefficients[i]).max(axis=1)  # L-infinity
         similar = near & (distances < config.min_param_distance)  # l. 3-4
         if similar.any():
             near[i] = True  # R6

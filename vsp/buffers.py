@@ -6,8 +6,6 @@ teacher's action there.
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 
 from .config import Config
@@ -100,15 +98,15 @@ class SufficientStatistics:
             self.squares[cell] += np.square(goal).sum()
             self.counts[cell] += len(own)
 
-    def losses(self, cells: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    def losses(self, cells: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         """Mean squared error of linear maps (c, q + 1, m), each over all rows of its cell in `cells` (c,). (c,)"""
         products, targets = self.products[cells], self.targets[cells]
-        squares = self.squares[cells] + (parameters * (products @ parameters - 2 * targets)).sum(axis=(1, 2))
+        squares = self.squares[cells] + (coefficients * (products @ coefficients - 2 * targets)).sum(axis=(1, 2))
         return np.maximum(squares, 0.0) / (self.counts[cells] * targets.shape[2])  # rounding may go below 0
 
     def fit(self, models: SubPolicies, cells: np.ndarray, config: Config, rng: np.random.Generator) -> np.ndarray:
         """Solve least squares for the models of `cells` (c,). Returns each cell's loss before. (c,)"""
-        losses = self.losses(cells, models.parameters[cells])
+        losses = self.losses(cells, models.coefficients[cells])
         models.solve(cells, self.products[cells], self.targets[cells])
         return losses
 
@@ -133,23 +131,5 @@ class SufficientStatistics:
         self.reset(slice(None))
 
 
-FITS = {"adam": Buffers, "closed_form": SufficientStatistics}  # `Config.fit` to the data that it needs
-
-
-class RecentStates:
-    """The most recent `size` states, or all states while there are fewer."""
-
-    def __init__(self, size: int):
-        self.size, self._held = size, 0
-        self._episodes: deque[np.ndarray] = deque()
-
-    def append(self, states: np.ndarray) -> None:
-        """Add the states (T, d) of an episode, and drop episodes that are too old."""
-        self._episodes.append(states)
-        self._held += len(states)
-        while self._held - len(self._episodes[0]) >= self.size:
-            self._held -= len(self._episodes.popleft())
-
-    def states(self) -> np.ndarray:
-        """At most `size` states, the oldest first. (n, d)"""
-        return np.concatenate(self._episodes)[-self.size :]
+# `Config.fit` to the data that it needs
+FITS: dict[str, type[Buffers | SufficientStatistics]] = {"adam": Buffers, "closed_form": SufficientStatistics}

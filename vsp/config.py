@@ -36,7 +36,7 @@ class Config:
     n_reset: int
     """Period, in iterations, of the reset that R5 is about."""
     min_param_distance: float
-    """Neighbours whose parameters are closer than this (L-infinity) are merged."""
+    """Neighbours whose coefficients are closer than this (L-infinity) are merged."""
     min_pol_distance: float
     """A state closer to its codeword than this never becomes a codeword; in units of the (scaled) state."""
     max_pol_loss: float
@@ -57,22 +57,21 @@ class Config:
     batch_size: int = 64
     """R7. States per minibatch and cell, drawn with replacement. The paper does not state it."""
     n_minibatches: int = 1
-    """R7. Minibatches per iteration and cell. The paper does not state it. With the default learning rate, a parameter
-    can move by about 5 in 5000 iterations and by 2 in 2000; the largest printed coefficients are 5.3 (T3) and 3.0
+    """R7. Minibatches per iteration and cell. The paper does not state it. With the default learning rate, a
+    coefficient can move by about 5 in 5000 iterations and by 2 in 2000; the largest printed ones are 5.3 (T3) and 3.0
     (T4)."""
     learning_rate: float = 1e-3
     """R7. Step size of Adam. The paper does not state it, so this is Adam's default."""
     initial: Literal["uniform", "zeros"] = "uniform"
-    """R7. Initial parameters of a sub-policy, "initialized randomly": uniform in +-1/sqrt(d), as in torch.nn.Linear."""
+    """R7. Initial coefficients, "initialized randomly": uniform in +-1/sqrt(d), as in torch.nn.Linear."""
     adam_on_reset: Literal["keep", "restart"] = "keep"
     """R7. Whether a buffer reset keeps Adam's moments. The paper resets buffers and nothing else."""
     scale: Literal["raw", "box"] = "raw"
     """R8. Whether distances are taken between raw states or between states divided by the widths of the state box. This
     applies to the look-up, `min_pol_distance` and neighbours. T4's codewords are in raw units."""
-    neighbours: Literal["delaunay", "lookup", "visited"] = "delaunay"
-    """R9. Which cells are neighbours: those that share a Euclidean Delaunay edge (prose), or those that touch under the
-    look-up's metric. "lookup" samples the state box; "visited" (beyond the paper, for many dimensions) uses states that
-    the teacher visited recently."""
+    neighbours: Literal["delaunay", "lookup"] = "delaunay"
+    """R9. Which cells are neighbours: those that share a Euclidean Delaunay edge (prose), or those that touch inside
+    the state box under the look-up's metric."""
     split_loss: Literal["raw", "clipped"] = "raw"
     """R10. Whether the loss of splitting uses the raw output, as training does, or the output clipped to the action
     box."""

@@ -1,4 +1,4 @@
-"""Export a policy as text that needs no vsp: `VoronoiPolicy.to_json`, `to_python`, `to_c`, `to_latex`, `to_text`.
+"""Export a policy as text that needs no vsp: JSON, Python, C, LaTeX and plain words.
 
 Numbers are written so that they read back as the same float64. In code, as in `VoronoiPolicy`, codewords are already
 divided by the scale of the distance, and states are divided before distances are taken.
@@ -7,7 +7,6 @@ divided by the scale of the distance, and states are divided before distances ar
 from __future__ import annotations
 
 import json
-from typing import Protocol
 
 import numpy as np
 
@@ -23,8 +22,8 @@ _SYMBOLS = {
 }  # fmt: skip
 
 
-class Exportable(Protocol):
-    """What these functions read of a `VoronoiPolicy`."""
+class Exportable:
+    """The exports of a policy as methods: `VoronoiPolicy` inherits them and sets the fields that they read."""
 
     task: Task
     policy_class: PolicyClass
@@ -33,104 +32,113 @@ class Exportable(Protocol):
     coefficients: np.ndarray  # (k, p, m)
     scale: np.ndarray  # (d,)
 
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        return len(self.codewords)
 
-    def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]: ...
+    def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
+        """Return the equations of one cell, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
 
+        `digits` is the number of decimals. None prints each number exactly and leaves out terms that are zero, which
+        suits policies of `simplify`.
+        Raises ValueError for a cell that does not exist.
+        """
+        check_count("cell", cell, least=0, most=len(self) - 1)
+        return tuple(
+            f"{output} = {self.policy_class.expression(self.coefficients[cell, :, j], digits)}"
+            for j, output in enumerate(self.task.outputs)
+        )
 
-def to_json(policy: Exportable) -> str:
-    """Return all numbers of the policy by name, as JSON."""
-    task = policy.task
-    about = {
-        "task": task.name,
-        "inputs": list(task.inputs),
-        "sub_policy": policy.policy_class.name,
-        "rows": list(policy.policy_class.rows),
-        "outputs": list(task.outputs),
-        "metric": policy.metric,
-        "action_low": task.action_low.tolist(),
-        "action_high": task.action_high.tolist(),
-        "scale": policy.scale.tolist(),
-        "codewords": policy.codewords.tolist(),
-        "coefficients": policy.coefficients.tolist(),
-    }
-    return json.dumps(about, ensure_ascii=False, indent=1) + "\n"
+    def to_json(self) -> str:
+        """Return all numbers of the policy by name, as JSON."""
+        task = self.task
+        about = {
+            "task": task.name,
+            "inputs": list(task.inputs),
+            "sub_policy": self.policy_class.name,
+            "rows": list(self.policy_class.rows),
+            "outputs": list(task.outputs),
+            "metric": self.metric,
+            "action_low": task.action_low.tolist(),
+            "action_high": task.action_high.tolist(),
+            "scale": self.scale.tolist(),
+            "codewords": self.codewords.tolist(),
+            "coefficients": self.coefficients.tolist(),
+        }
+        return json.dumps(about, ensure_ascii=False, indent=1) + "\n"
 
+    def to_python(self) -> str:
+        """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
 
-def to_python(policy: Exportable) -> str:
-    """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
+        It imports only the standard library. For a state that is not finite the functions return -1 and nan.
+        Raises ValueError for features that are not plain arithmetic.
+        """
+        task = self.task
+        distance = {
+            "manhattan": "sum(abs(a - b) for a, b in zip(point, codeword))",
+            "euclidean": "sqrt(sum((a - b) ** 2 for a, b in zip(point, codeword)))",
+            "chebyshev": "max(abs(a - b) for a, b in zip(point, codeword))",
+        }[self.metric]
+        numbers = {
+            "SCALE": self.scale,
+            "CODEWORDS": self.codewords / self.scale,
+            "COEFFICIENTS": self.coefficients.transpose(0, 2, 1),
+            "LOW": task.action_low,
+            "HIGH": task.action_high,
+        }
+        return "\n".join([
+            f'"""{_escaped(_headline(self))}"""',
+            "",
+            f"from math import {', '.join(SHARED)}, isfinite, nan  # noqa: F401",
+            "",
+            *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
+            "",
+            "",
+            "def cell(state):",
+            '    """Index of the nearest codeword; -1 for a state that is not finite."""',
+            "    if not all(map(isfinite, state)):",
+            "        return -1",
+            "    point = [s / unit for s, unit in zip(state, SCALE)]",
+            f"    distances = [{distance} for codeword in CODEWORDS]",
+            "    return distances.index(min(distances))",
+            "",
+            "",
+            "def output(row, features):",
+            "    return sum(w * f for w, f in zip(row, features))",
+            "",
+            "",
+            "def act(state):",
+            f'    """From [{_names(task.inputs)}] to [{_names(task.outputs)}]; nan for a state that is not finite."""',
+            "    i = cell(state)",
+            "    if i < 0:",
+            "        return [nan for _ in LOW]",
+            f"    features = [{self.policy_class.feature_code()}]",
+            "    raw = [output(row, features) for row in COEFFICIENTS[i]]",
+            "    return [min(max(a, low), high) for a, low, high in zip(raw, LOW, HIGH)]",
+            "",
+        ])  # fmt: skip
 
-    It imports only the standard library. For a state that is not finite the functions return -1 and nan.
-    Raises ValueError for features that are not plain arithmetic.
-    """
-    task = policy.task
-    distance = {
-        "manhattan": "sum(abs(a - b) for a, b in zip(point, codeword))",
-        "euclidean": "sqrt(sum((a - b) ** 2 for a, b in zip(point, codeword)))",
-        "chebyshev": "max(abs(a - b) for a, b in zip(point, codeword))",
-    }[policy.metric]
-    numbers = {
-        "SCALE": policy.scale,
-        "CODEWORDS": policy.codewords / policy.scale,
-        "COEFFICIENTS": policy.coefficients.transpose(0, 2, 1),
-        "LOW": task.action_low,
-        "HIGH": task.action_high,
-    }
-    return "\n".join([
-        f'"""{_escaped(_headline(policy))}"""',
-        "",
-        f"from math import {', '.join(SHARED)}, isfinite, nan  # noqa: F401",
-        "",
-        *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
-        "",
-        "",
-        "def cell(state):",
-        '    """Index of the nearest codeword; -1 for a state that is not finite."""',
-        "    if not all(map(isfinite, state)):",
-        "        return -1",
-        "    point = [s / unit for s, unit in zip(state, SCALE)]",
-        f"    distances = [{distance} for codeword in CODEWORDS]",
-        "    return distances.index(min(distances))",
-        "",
-        "",
-        "def output(row, features):",
-        "    return sum(w * f for w, f in zip(row, features))",
-        "",
-        "",
-        "def act(state):",
-        f'    """From [{_names(task.inputs)}] to [{_names(task.outputs)}]; nan for a state that is not finite."""',
-        "    i = cell(state)",
-        "    if i < 0:",
-        "        return [nan for _ in LOW]",
-        f"    features = [{policy.policy_class.feature_code()}]",
-        "    raw = [output(row, features) for row in COEFFICIENTS[i]]",
-        "    return [min(max(a, low), high) for a, low, high in zip(raw, LOW, HIGH)]",
-        "",
-    ])  # fmt: skip
+    def to_c(self) -> str:
+        """Return C99 code: `int vsp_cell(const double *state)`, `void vsp_act(const double *state, double *action)`.
 
-
-def to_c(policy: Exportable) -> str:
-    """Return C99 code with `int vsp_cell(const double *state)` and `void vsp_act(const double *state, double *action)`.
-
-    It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
-    Raises ValueError for features that are not plain arithmetic.
-    """
-    (k, p, m), d, inputs = policy.coefficients.shape, len(policy.task.low), len(policy.policy_class.code) + 1
-    add = {
-        "manhattan": "distance += fabs(gap);",
-        "euclidean": "distance += gap * gap;",
-        "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
-    }[policy.metric]
-    root = "        distance = sqrt(distance);\n" if policy.metric == "euclidean" else ""
-    return f"""/* {_escaped(_headline(policy))}
-   state: {_names(policy.task.inputs)}; action: {_names(policy.task.outputs)}. */
+        It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
+        Raises ValueError for features that are not plain arithmetic.
+        """
+        (k, p, m), d, inputs = self.coefficients.shape, len(self.task.low), len(self.policy_class.code) + 1
+        add = {
+            "manhattan": "distance += fabs(gap);",
+            "euclidean": "distance += gap * gap;",
+            "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
+        }[self.metric]
+        root = "        distance = sqrt(distance);\n" if self.metric == "euclidean" else ""
+        return f"""/* {_escaped(_headline(self))}
+   state: {_names(self.task.inputs)}; action: {_names(self.task.outputs)}. */
 #include <math.h>
 
-static const double scale[{d}] = {_braces(policy.scale)};
-static const double codewords[{k}][{d}] = {_braces(policy.codewords / policy.scale)};
-static const double coefficients[{k}][{m}][{p}] = {_braces(policy.coefficients.transpose(0, 2, 1))};
-static const double low[{m}] = {_braces(policy.task.action_low)};
-static const double high[{m}] = {_braces(policy.task.action_high)};
+static const double scale[{d}] = {_braces(self.scale)};
+static const double codewords[{k}][{d}] = {_braces(self.codewords / self.scale)};
+static const double coefficients[{k}][{m}][{p}] = {_braces(self.coefficients.transpose(0, 2, 1))};
+static const double low[{m}] = {_braces(self.task.action_low)};
+static const double high[{m}] = {_braces(self.task.action_high)};
 
 /* The index of the nearest codeword; -1 for a state that is not finite. */
 int vsp_cell(const double *state) {{
@@ -158,7 +166,7 @@ static double output(const double *row, const double *features) {{
 }}
 
 void vsp_act(const double *state, double *action) {{
-    const double features[{inputs}] = {{{policy.policy_class.feature_code()}}};
+    const double features[{inputs}] = {{{self.policy_class.feature_code()}}};
     int i = vsp_cell(state);
     for (int j = 0; j < {m}; j++) {{
         double raw = i < 0 ? NAN : output(coefficients[i][j], features);
@@ -167,43 +175,33 @@ void vsp_act(const double *state, double *action) {{
 }}
 """
 
+    def to_text(self, digits: int | None = 3) -> str:
+        """Return the whole policy in words: the distance, and the equations of every codeword."""
+        lines = [_headline(self)]
+        if len(self) > 1:
+            lines.append(f"{self.metric.capitalize()} distances{_of_scaled(self, digits)}.")
+        for i, codeword in enumerate(self.codewords):
+            place = ", ".join(f"{name} {number(c, digits)}" for name, c in zip(self.task.inputs, codeword))
+            lines += [f"nearest to {place}:"] if len(self) > 1 else []
+            lines += [f"  {equation}" for equation in self.equations(i, digits)]
+        lows, highs = ([number(limit, None) for limit in box] for box in (self.task.action_low, self.task.action_high))
+        limits = (f"{name} from {low} to {high}" for name, low, high in zip(self.task.outputs, lows, highs))
+        return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
 
-def to_text(policy: Exportable, digits: int | None = 3) -> str:
-    """Return the whole policy in words: the distance, and the equations of every codeword."""
-    lines = [_headline(policy)]
-    if len(policy) > 1:
-        lines.append(f"{policy.metric.capitalize()} distances{_of_scaled(policy, digits)}.")
-    for i, codeword in enumerate(policy.codewords):
-        place = ", ".join(f"{name} {number(c, digits)}" for name, c in zip(policy.task.inputs, codeword))
-        lines += [f"nearest to {place}:"] if len(policy) > 1 else []
-        lines += [f"  {equation}" for equation in policy.equations(i, digits)]
-    lows, highs = ([number(limit, None) for limit in box] for box in (policy.task.action_low, policy.task.action_high))
-    limits = (f"{name} from {low} to {high}" for name, low, high in zip(policy.task.outputs, lows, highs))
-    return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
-
-
-def _of_scaled(policy: Exportable, digits: int | None) -> str:
-    """Return the scale of the distance in words; an empty text for raw states."""
-    if (policy.scale == 1).all():
-        return ""
-    units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
-    return f" of states divided, {', '.join(units)}"
-
-
-def to_latex(policy: Exportable, digits: int | None = 3) -> str:
-    """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
-    outputs = [f"${symbol(output)}$" for output in policy.task.outputs]
-    rows = [
-        " & ".join([codeword_latex(policy, i, digits), *equations_latex(policy, i, digits)]) for i in range(len(policy))
-    ]
-    head = " & ".join(["codeword", *outputs])
-    body = "".join(rf"{row} \\" + "\n" for row in rows)
-    columns = "l" * (1 + len(outputs))
-    note = rf"\multicolumn{{{len(columns)}}}{{l}}{{{distances_latex(policy, digits)}}} \\" + "\n"
-    return (
-        f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n"
-        f"{body}\\midrule\n{note}\\bottomrule\n\\end{{tabular}}\n"
-    )
+    def to_latex(self, digits: int | None = 3) -> str:
+        """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
+        outputs = [f"${symbol(output)}$" for output in self.task.outputs]
+        rows = [
+            " & ".join([codeword_latex(self, i, digits), *equations_latex(self, i, digits)]) for i in range(len(self))
+        ]
+        head = " & ".join(["codeword", *outputs])
+        body = "".join(rf"{row} \\" + "\n" for row in rows)
+        columns = "l" * (1 + len(outputs))
+        note = rf"\multicolumn{{{len(columns)}}}{{l}}{{{distances_latex(self, digits)}}} \\" + "\n"
+        return (
+            f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n"
+            f"{body}\\midrule\n{note}\\bottomrule\n\\end{{tabular}}\n"
+        )
 
 
 def distances_latex(policy: Exportable, digits: int | None = 3) -> str:
@@ -226,6 +224,14 @@ def equations_latex(policy: Exportable, cell: int, digits: int | None = 3) -> li
     """Return the right-hand sides of the equations of a cell, one per action, between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return [f"${policy.policy_class.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
+
+
+def _of_scaled(policy: Exportable, digits: int | None) -> str:
+    """Return the scale of the distance in words; an empty text for raw states."""
+    if (policy.scale == 1).all():
+        return ""
+    units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
+    return f" of states divided, {', '.join(units)}"
 
 
 def symbol(name: str) -> str:

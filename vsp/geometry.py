@@ -87,34 +87,21 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
 def lookup_neighbours(codewords: np.ndarray, low: np.ndarray, high: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Which cells touch inside the box [low, high] under the look-up's metric. (k, k) bool, symmetric.
 
-    The witnesses are an unscrambled Halton sequence, so the result is deterministic. They fill the box, much of which a
-    task may never visit: see `visited_neighbours`.
+    Two cells are neighbours when some witness has their codewords as its two nearest (Martinetz & Schulten 1994), for
+    any metric and dimension. The witnesses are an unscrambled Halton sequence, so the result is deterministic. They
+    fill the box, much of which a task may never visit. A border without a witness near it is missed.
     """
     from scipy.stats import qmc
 
-    d = check_codewords(codewords).shape[1]
+    k, d = check_codewords(codewords).shape
     low, high = check_array("low", low, (d,)), check_array("high", high, (d,))
     if not (low < high).all():
         raise ValueError(f"the box is {low.tolist()} to {high.tolist()}, expected each low below its high")
-    points = qmc.scale(qmc.Halton(len(low), scramble=False).random(WITNESSES), low, high)
-    return visited_neighbours(codewords, points, metric)
-
-
-def visited_neighbours(codewords: np.ndarray, witnesses: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
-    """Which cells touch where `witnesses` (n, d) are, under the look-up's metric. (k, k) bool, symmetric.
-
-    Two cells are neighbours when some witness has their codewords as its two nearest (Martinetz & Schulten 1994), for
-    any metric and dimension. Witnesses that fill the state box would add unrelated neighbours, for two reasons. Some
-    points of the box are never states, such as those off the circle of an angle's cosine and sine. Others lie far from
-    the curves that episodes follow. Both kinds grow more frequent with the dimension, and some boxes have no limits.
-    States that a teacher visited show which cells touch where the policy acts. A border without a witness near it is
-    missed. One or two codewords need no witness.
-    """
-    codewords, witnesses = _checked(codewords, witnesses, metric)
-    k = len(codewords)
+    witnesses = qmc.scale(qmc.Halton(d, scramble=False).random(WITNESSES), low, high)
+    gaps = distances(witnesses, codewords, metric)
     if k <= 2:
         return ~np.eye(k, dtype=bool)
-    return _adjacency(k, np.argpartition(distances(witnesses, codewords, metric), 1, axis=1)[:, :2])
+    return _adjacency(k, np.argpartition(gaps, 1, axis=1)[:, :2])
 
 
 def check_codewords(codewords: np.ndarray) -> np.ndarray:
@@ -145,12 +132,12 @@ def _triangulated(points: np.ndarray) -> np.ndarray:
     If Qhull leaves points out because of rounding, the points are centred, which reduces rounding, and triangulated
     again. A point that is still left out becomes a neighbour of its nearest vertex.
     """
-    found = Delaunay(points)
-    if len(found.coplanar):
-        found = Delaunay(points - points.mean(axis=0))
-    starts, others = found.vertex_neighbor_vertices
+    mesh = Delaunay(points)
+    if len(mesh.coplanar):
+        mesh = Delaunay(points - points.mean(axis=0))
+    starts, others = mesh.vertex_neighbor_vertices
     edges = np.column_stack([np.repeat(np.arange(len(points)), np.diff(starts)), others])
-    return np.concatenate([edges, found.coplanar[:, [0, 2]]])
+    return np.concatenate([edges, mesh.coplanar[:, [0, 2]]])
 
 
 def _adjacency(k: int, edges: np.ndarray) -> np.ndarray:

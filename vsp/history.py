@@ -14,7 +14,7 @@ from .policy import VoronoiPolicy
 if TYPE_CHECKING:
     import pandas as pd
 
-SNAPSHOT_EVERY = 10  # iterations between two stored copies of the parameters
+SNAPSHOT_EVERY = 10  # iterations between two stored copies of the coefficients
 SNAPSHOTS = 500  # approximate maximum; in long runs snapshots are further apart, which bounds memory
 
 

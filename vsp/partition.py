@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import geometry
-from .buffers import FITS, RecentStates
+from .buffers import FITS
 from .config import Config
 from .policy import VoronoiPolicy
 from .rollouts import Episode
@@ -27,20 +27,18 @@ class Partition:
         self.models = SubPolicies(policy_class(config.sub_policy, task), m, initial=config.initial)
         q = len(self.models.policy_class.terms)
         self.buffers = FITS[config.fit](q, m)
-        self.recent = RecentStates(geometry.WITNESSES)
         self.scale = np.ones(d) if config.scale == "raw" else task.high - task.low  # R8
 
     def observe(self, episode: Episode) -> None:
         """Put each state and action into the buffer of its cell. Raises ValueError for an episode of another task."""
-        found = episode.states.shape[1], episode.actions.shape[1]
+        sizes = episode.states.shape[1], episode.actions.shape[1]
         wanted = len(self.task.low), len(self.task.action_low)
-        if found != wanted:
+        if sizes != wanted:
             raise ValueError(
-                f"the episode has states and actions of {found} numbers, expected {wanted}: {self.task.name}"
+                f"the episode has states and actions of {sizes} numbers, expected {wanted}: {self.task.name}"
             )
         features = self.models.policy_class.features(episode.states)
         self.buffers.append(self.cells(episode.states), features, episode.actions)
-        self.recent.append(episode.states)
 
     def train(self, rng: np.random.Generator) -> float:
         """Train every cell that has data. Returns the mean loss over cells."""
@@ -97,14 +95,14 @@ class Partition:
 
     def loss(self, i: int, state: np.ndarray, action: np.ndarray) -> float:
         """Mean squared error of cell i's action at `state` against the teacher's."""
-        own = self.models.predict(i, state)
+        output = self.models.predict(i, state)
         if self.config.split_loss == "clipped":  # R10
-            own = np.clip(own, self.task.action_low, self.task.action_high)
-        return float(np.square(own - action).mean())
+            output = np.clip(output, self.task.action_low, self.task.action_high)
+        return float(np.square(output - action).mean())
 
     def neighbours(self) -> np.ndarray:
         """Which cells are neighbours (R9). (k, k) bool"""
-        if self._graph is None or self.config.neighbours == "visited":  # the visited states change, too
+        if self._graph is None:
             self._graph = self.neighbours_of(self.codewords)
         return self._graph.copy()
 
@@ -113,19 +111,17 @@ class Partition:
         codewords = self.scaled(codewords)
         if self.config.neighbours == "lookup":
             return geometry.lookup_neighbours(codewords, self.scaled(self.task.low), self.scaled(self.task.high))
-        if self.config.neighbours == "visited":
-            return geometry.visited_neighbours(codewords, self.scaled(self.recent.states()))
         return geometry.delaunay_neighbours(codewords)
 
-    def comparable_parameters(self) -> np.ndarray:
-        """Return the parameters that a merge compares (R12), one row per cell. (k, p)"""
-        parameters = self.models.comparable()
+    def comparable_coefficients(self) -> np.ndarray:
+        """Return the coefficients that a merge compares (R12), one row per cell. (k, p)"""
+        coefficients = self.models.comparable()
         if self.config.merge_parameters == "weights":
-            parameters = parameters[:, :-1]
-        return parameters.reshape(len(self.codewords), -1)
+            coefficients = coefficients[:, :-1]
+        return coefficients.reshape(len(self.codewords), -1)
 
     def policy(self) -> VoronoiPolicy:
         """Return the partition as a policy that later changes do not affect."""
         scale = None if self.config.scale == "raw" else self.scale
-        parameters, name = self.models.parameters, self.config.sub_policy
-        return VoronoiPolicy(self.codewords, parameters, task=self.task, scale=scale, sub_policy=name)
+        coefficients, name = self.models.coefficients, self.config.sub_policy
+        return VoronoiPolicy(self.codewords, coefficients, task=self.task, scale=scale, sub_policy=name)

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import export, geometry
-from .checks import check_array, check_choice, check_count, check_observations
+from . import geometry
+from .checks import check_array, check_choice, check_observations
+from .export import Exportable
 from .run import sealed
 from .run.atomic import DamagedFile
-from .subpolicies.registry import policy_class
+from .subpolicies import policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
 
@@ -55,7 +56,7 @@ class Explanation:
         return "\n".join([*parts, f"action within the limits: {action}", others])
 
 
-class VoronoiPolicy:
+class VoronoiPolicy(Exportable):
     """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
 
     `codewords` are (k, d). `coefficients` are (k, p, m); `policy_class.rows` names the p rows: for linear sub-policies
@@ -89,9 +90,6 @@ class VoronoiPolicy:
         self._scaled = self.codewords / self.scale
         for array in (self.codewords, self.scale):  # an edit would not reach the look-up
             array.setflags(write=False)
-
-    def __len__(self) -> int:
-        return len(self.codewords)
 
     def __repr__(self) -> str:
         d, m = len(self.task.inputs), len(self.task.outputs)
@@ -174,19 +172,6 @@ class VoronoiPolicy:
             inside, outside, found = line[left[0] - 1, axis], line[left[0], axis], int(self.cells(line[left[0]]))
         return float(outside - state[axis]), found
 
-    def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
-        """Return the equations of one cell, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
-
-        `digits` is the number of decimals. None prints each number exactly and leaves out terms that are zero, which
-        suits policies of `simplify`.
-        Raises ValueError for a cell that does not exist.
-        """
-        check_count("cell", cell, least=0, most=len(self) - 1)
-        return tuple(
-            f"{output} = {self.policy_class.expression(self.coefficients[cell, :, j], digits)}"
-            for j, output in enumerate(self.task.outputs)
-        )
-
     def to_frame(self) -> pd.DataFrame:
         """Return one row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
         import pandas as pd  # here, because it takes long to import
@@ -196,26 +181,6 @@ class VoronoiPolicy:
             for i, name in enumerate(self.policy_class.rows):
                 columns[f"{output.replace('Δ', 'd')}_{name}"] = self.coefficients[:, i, j]
         return pd.DataFrame(columns).rename_axis("cell")
-
-    def to_json(self) -> str:
-        """Return all numbers of the policy by name, as JSON."""
-        return export.to_json(self)
-
-    def to_python(self) -> str:
-        """Return the source of a Python module with a function `act(state)` that needs no package."""
-        return export.to_python(self)
-
-    def to_c(self) -> str:
-        """Return C99 source without dependencies: `void vsp_act(const double *state, double *action)`."""
-        return export.to_c(self)
-
-    def to_latex(self, digits: int | None = 3) -> str:
-        """Return a LaTeX table of codewords and equations; `digits` as in `equations`."""
-        return export.to_latex(self, digits)
-
-    def to_text(self, digits: int | None = 3) -> str:
-        """Return the whole policy in plain words; `digits` as in `equations`."""
-        return export.to_text(self, digits)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""

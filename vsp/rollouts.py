@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import InitVar, dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -10,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from .checks import check_array, check_data, check_finite
-from .tasks import GOAL, RUNNING, TRUNCATED, Task, get_task
+from .tasks import RUNNING, TRUNCATED, Task, get_task
 
 Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # running episodes (a,), observations (a, d), actions (a, m)
 
@@ -92,27 +91,6 @@ def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"states have shape {states.shape}, expected at least one state")
     varies = np.ptp(states, axis=0) > 0  # the deviation of a constant may be a rounding error above 0
     return states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0)
-
-
-def warn_outside(task: Task, states: np.ndarray) -> None:
-    """Warn if observations (t, d) leave the box that the task declares: how many, and which variable leaves it most."""
-    beyond = np.maximum(task.low - states, states - task.high)
-    outside = (beyond > 1e-6 * (1.0 + np.abs(states))).any(axis=1)  # float32 rounds
-    if outside.any():
-        row, j = np.unravel_index(beyond.argmax(), beyond.shape)
-        warnings.warn(
-            f"{outside.sum():,} of {len(states):,} observations leave the box of {task.name}, such as "
-            f"{task.inputs[j]} = {states[row, j]:.6g}, declared from {task.low[j]:g} to {task.high[j]:g}",
-            stacklevel=5,  # the caller of `vsp.distill`
-        )
-
-
-def score(result: Outcomes, failure_penalty: float) -> float:
-    """Return the mean return minus `failure_penalty` times the share of failed episodes.
-
-    In a task without a goal the penalty is the same for all policies, so it changes no comparison.
-    """
-    return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))
 
 
 def _begin(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from vsp.run.atomic import ROOT, DamagedFile, sha256, write_text
 from vsp.run.command import in_one_line
-from vsp.run.locks import file_lock
+from vsp.run.locks import folder_lock
 from vsp.run.notebook import NotebookNode, nbformat
 from vsp.run.sealed import read_sealed, write_sealed
 
@@ -49,7 +49,7 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
     texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
     texts["guide.md"] = guide(lessons)
-    with file_lock(folder.parent / "locks" / "course", f"writes into {folder}"):
+    with folder_lock(folder, f"another run writes into {folder}"):
         _keep_edited(folder, texts)
         for name, text in texts.items():
             write_text(folder / name, text)

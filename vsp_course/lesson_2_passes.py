@@ -32,10 +32,10 @@ SMALL = replace(paper_preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min
 
 def on_a_line(places: list[float], maps: list) -> Partition:
     """A partition with codewords at x = `places`, y = 0.5, and one state in each buffer. Each of `maps` is a constant,
-    or six parameters."""
+    or six coefficients."""
     partition = _with_codewords(np.column_stack([places, np.full(len(places), 0.5)]))
-    for parameters, values in zip(partition.models.parameters, maps):
-        parameters[:] = np.reshape(values, (3, 2)) if np.ndim(values) else [[0, 0], [0, 0], [values, values]]
+    for coefficients, values in zip(partition.models.coefficients, maps):
+        coefficients[:] = np.reshape(values, (3, 2)) if np.ndim(values) else [[0, 0], [0, 0], [values, values]]
     return partition
 
 
@@ -141,7 +141,7 @@ def _count(n: int, what: str) -> str:
 def _on_a_random_walk(function: Callable, rng: np.random.Generator) -> None:
     """Compare with vsp's pass on a random partition and episode, under both readings of R14."""
     partition = _with_codewords(rng.uniform(size=(4, 2)))
-    partition.models.parameters[:] = rng.normal(size=partition.models.parameters.shape)
+    partition.models.coefficients[:] = rng.normal(size=partition.models.coefficients.shape)
     states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
     episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
     split, *readings = (copy.deepcopy(partition) for _ in range(3))
@@ -169,9 +169,9 @@ class MergeCase(NamedTuple):
 MERGES = (
     MergeCase([0, 0], [[0], [1]], "two equal cells: one goes, one stays", 2),
     MergeCase([0, [0, 0, 0.7, 0, 0, 0]], [[0, 1]],
-              "one parameter that differs by more than the limit (its size counts, not its sign), the others equal", 1),
+              "one coefficient that differs by more than the limit (its size counts, not its sign), others equal", 1),
     MergeCase([0, [0.5, -0.5, 0.5, 0.5, -0.5, 0.5]], [[0], [1]],
-              "six parameters that each differ by less than the limit", 1),
+              "six coefficients that each differ by less than the limit", 1),
     MergeCase([0, [SMALL.min_param_distance, 0, 0, 0, 0, 0]], [[0, 1]],
               "a difference of exactly the limit: only less than the limit counts", 1),
     MergeCase([0, 5, 10], [[0, 1, 2]], "cells that are all different", 1),
@@ -199,7 +199,7 @@ def merge_regions(function: Callable) -> None:
         removed = MERGE.call(function, partition, SMALL, keep=True)
         kept = [i for i, x in enumerate(places) if np.isclose(partition.codewords[:, 0], x).any()]
         if kept not in case.left:
-            left = f"cells {kept} left of a row of {len(places)} with biases or parameters {case.maps}"
+            left = f"cells {kept} left of a row of {len(places)} with biases or coefficients {case.maps}"
             raise MERGE.wrong(left, f"{' or '.join(map(str, case.left))}, in a case of {case.what}", case.hint)
         gone = [i for i in range(len(places)) if i not in kept]
         _returned(MERGE, removed, before[gone], "one for every cell that went")
@@ -212,7 +212,7 @@ def merge_regions(function: Callable) -> None:
 def _with_random_maps(function: Callable, rng: np.random.Generator) -> None:
     """Check that the cells left of a random partition are those of one of the readings, with their maps."""
     partition = _with_codewords(rng.uniform(size=(12, 2)))
-    partition.models.parameters[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
+    partition.models.coefficients[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
     merged = copy.deepcopy(partition)
     MERGE.call(function, merged, SMALL, keep=True)
     alive = (partition.codewords[:, None] == merged.codewords).all(axis=2).any(axis=1)
@@ -221,17 +221,17 @@ def _with_random_maps(function: Callable, rng: np.random.Generator) -> None:
         left = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
         expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
         raise MERGE.wrong(left, expected, 4)
-    same = np.array_equal(merged.models.parameters, partition.models.parameters[alive])
+    same = np.array_equal(merged.models.coefficients, partition.models.coefficients[alive])
     MERGE.refuse_if(not same, "other maps in the cells that are left", "those that they had: nothing is averaged", 1)
 
 
 def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:
     """Return which cells a merging pass keeps (k,). Neighbours are computed once or, with `anew`, among the remaining
     cells. A turn removes the cell's similar neighbours once or, with `again`, also new neighbours."""
-    parameters, k = partition.comparable_parameters(), len(partition.codewords)
+    coefficients, k = partition.comparable_coefficients(), len(partition.codewords)
     alive, graph = np.ones(k, dtype=bool), partition.neighbours()
     for i in range(k):
-        alike = np.abs(parameters - parameters[i]).max(axis=1) < SMALL.min_param_distance
+        alike = np.abs(coefficients - coefficients[i]).max(axis=1) < SMALL.min_param_distance
         for _ in range(k if again else 1):
             alive &= ~(alive[i] & graph[i] & alike)
             if anew:

@@ -47,7 +47,7 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     OWN_CLASS.refuse_if(error > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
     linear = _errors(policy_class("linear", task), teacher, task)
     OWN_CLASS.passed(
-        f"{len(own_class.rows)} parameters per action, {share}; x and y alone have {linear / constant:.0%}."
+        f"{len(own_class.rows)} coefficients per action, {share}; x and y alone have {linear / constant:.0%}."
     )
 
 
@@ -90,20 +90,20 @@ def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> N
 
 
 def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
-    """Whether the gradient of the loss by the parameters agrees with finite differences."""
+    """Whether the gradient of the loss by the coefficients agrees with finite differences."""
     rng = np.random.default_rng(1)
     inputs = np.column_stack([features, np.ones(len(features))])[None]
     theta, actions = rng.normal(size=(1, len(own_class.rows), m)), rng.normal(size=(1, len(features), m))
 
-    def loss(parameters: np.ndarray) -> float:
-        return float(np.square(own_class.batch(inputs, parameters.reshape(theta.shape))[0] - actions).sum())
+    def loss(coefficients: np.ndarray) -> float:
+        return float(np.square(own_class.batch(inputs, coefficients.reshape(theta.shape))[0] - actions).sum())
 
     outputs, pull_back = own_class.batch(inputs, theta)
     if not np.allclose(outputs[0], own_class.outputs(features, theta[0])):
         raise OWN_CLASS.wrong("other outputs in training (`batch`) than in use (`outputs`)", "the same", 3)
     gradient, slopes = pull_back(2 * (outputs - actions)).ravel(), approx_fprime(theta.ravel(), loss, 1e-6)
     worst = np.abs(gradient - slopes).argmax()
-    number = f"a gradient of {gradient[worst]:.4g} by parameter {worst // m}"
+    number = f"a gradient of {gradient[worst]:.4g} by coefficient {worst // m}"
     wrong = not np.allclose(gradient, slopes, rtol=1e-3, atol=1e-2)
     OWN_CLASS.refuse_if(wrong, number, f"the slope {slopes[worst]:.4g}", 3)
 
@@ -122,5 +122,5 @@ def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:
     for rate in (0.05,) * 400 + (0.01,) * 400:
         inputs, goals = buffers.sample(cells, 128, rng)
         partition.models.train(cells, inputs, goals, learning_rate=rate)
-    own = partition.models.parameters[geometry.nearest(partition.codewords, fresh)]
+    own = partition.models.coefficients[geometry.nearest(partition.codewords, fresh)]
     return float(np.square(own_class.outputs(own_class.features(fresh), own) - right).mean())

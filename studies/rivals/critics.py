@@ -12,8 +12,8 @@ from vsp.geometry import nearest
 from vsp.paper.baselines import kmeans_cells
 from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
-from vsp.subpolicies.stacked import Adam
 from vsp.teachers.teacher import Teacher
+from vsp_beyond.few_cells.anneal import Adam
 
 N_STEPS, BATCH, RATE = 1000, 256, 0.03  # Adam: steps per added cell, states per step, initial step size in half ranges
 WORST = 0.01  # share of a cell's states whose mean becomes a codeword: those that lose the most value

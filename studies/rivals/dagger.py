@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vsp import Policy, Task, get_task, rollout, visited_states
-from vsp.rollouts import score
 from vsp_beyond import Tuned
+from vsp_beyond.few_cells.tune import score
 
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 

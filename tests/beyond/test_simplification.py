@@ -6,10 +6,11 @@ from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, PumpingTeacher
 
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import rollout, score
+from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.simplification import gathered, prune, rounded, simplify
+from vsp_beyond.few_cells.tune import score
 
 module = importlib.import_module("vsp_beyond.few_cells.simplification")
 CONFIG = Tuned(

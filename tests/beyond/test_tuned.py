@@ -10,11 +10,11 @@ import vsp_beyond
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Outcomes, score
+from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
 from vsp_beyond.few_cells.anneal import anneal, expected_loss, random_init, squared_error
 from vsp_beyond.few_cells.config import Tuned
-from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, Objective, tune
+from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, Objective, score, tune
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 

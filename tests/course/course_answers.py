@@ -273,12 +273,12 @@ right("2.3")(changed("2.3", LOCATE, OWN_LOCATE, "return added", "return np.array
 
 # 2.4 merge_regions
 
-RESET, SIZE = "partition.reset(near)", "np.abs(parameters - parameters[i]).max(axis=1)"
+RESET, SIZE = "partition.reset(near)", "np.abs(coefficients - coefficients[i]).max(axis=1)"
 wrongs(
     "2.4",
-    ("six parameters that each differ", SIZE, "np.linalg.norm(parameters - parameters[i], axis=1)"),
-    ("one parameter that differs", "apart < config", "apart < 2 * config"),
-    ("six parameters that each differ", "apart < config", "apart < 0.8 * config"),
+    ("six coefficients that each differ", SIZE, "np.linalg.norm(coefficients - coefficients[i], axis=1)"),
+    ("one coefficient that differs", "apart < config", "apart < 2 * config"),
+    ("six coefficients that each differ", "apart < config", "apart < 0.8 * config"),
     ("its size counts, not its sign", SIZE, SIZE.replace("np.abs", "")),
     ("cells that are not neighbours", "partition.neighbours()[i]", "np.arange(len(partition.codewords)) != i"),
     ("whose turn comes first stays", "removed +=", "alike = np.arange(len(alike)) == i; removed +="),
@@ -290,7 +290,7 @@ wrongs(
     ("→ Hint 5", RESET, "partition.keep(~alike)", "partition.keep(~alike)\n            i", f"{RESET}\n            i"),
     ("not their indices", "list(partition.codewords[alike])", "np.flatnonzero(alike).tolist()"),
     ("→ Hint 2", "while i < len(partition.codewords):", "for i in range(len(partition.codewords)):"),
-    ("nothing is averaged", "return removed", "partition.models.parameters[:] += 0.1; return removed"),
+    ("nothing is averaged", "return removed", "partition.models.coefficients[:] += 0.1; return removed"),
     ("exactly the limit", "apart < config", "apart <= config"),
     ("both go at once", "if alike.any()", "alike[alike.argmax() + 1 :] = False\n        if alike.any()"),
     ("all neighbours alike, of any index", "if alike.any()", "alike[:i] = False\n        if alike.any()"),
@@ -300,8 +300,8 @@ right("2.4")(changed("2.4", "        i += 1", "        i += not alike.any()"))
 
 
 def with_a_mask(partition, config, gone_have_turns=False):
-    parameters, graph = partition.comparable_parameters(), partition.neighbours()
-    close = np.abs(parameters[:, None] - parameters).max(axis=2) < config.min_param_distance
+    coefficients, graph = partition.comparable_coefficients(), partition.neighbours()
+    close = np.abs(coefficients[:, None] - coefficients).max(axis=2) < config.min_param_distance
     alive = np.ones(len(graph), dtype=bool)
     for i in range(len(graph)):
         alike = alive & graph[i] & close[i] & (alive[i] or gone_have_turns)
@@ -426,11 +426,11 @@ def squashed(task):
     """Not linear in what it does with the weighted sum, with a gradient of its own."""
 
     class Squashed(PolicyClass):
-        def outputs(self, features, parameters):
-            return np.tanh(super().outputs(features, parameters))
+        def outputs(self, features, coefficients):
+            return np.tanh(super().outputs(features, coefficients))
 
-        def batch(self, inputs, parameters):
-            out = np.tanh(inputs @ parameters)
+        def batch(self, inputs, coefficients):
+            out = np.tanh(inputs @ coefficients)
             return out, lambda error: inputs.transpose(0, 2, 1) @ (error * (1 - out**2))
 
     return Squashed("squashed", ("x", "y"), ("state[0]", "state[1]"), np.ones(2), lambda s: s)

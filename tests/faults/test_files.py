@@ -22,7 +22,7 @@ from studies.comparison.rows import Job, make_row
 from vsp.paper import results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
-from vsp.run.listed import MANIFEST, list_folder, read_carded, read_listed, read_table
+from vsp.run.listed import MANIFEST, list_folder, read_listed, read_table
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
 from vsp.teachers import train
@@ -48,12 +48,12 @@ class Kind:
     parsers: tuple[str, ...] = PARSERS
 
 
-def copied(*names: str, manifest: bool = True) -> Callable[[Path], Path]:
+def copied(*names: str) -> Callable[[Path], Path]:
     """Puts committed files into a folder, the first of them to be damaged, and their manifest."""
 
     def make(folder: Path) -> Path:
-        more = [str(Path(names[0]).with_name(MANIFEST))] if manifest else []
-        paths = [shutil.copy(atomic.ROOT / "data" / name, folder) for name in (*names, *more)]
+        manifest = str(Path(names[0]).with_name(MANIFEST))
+        paths = [shutil.copy(atomic.ROOT / "data" / name, folder) for name in (*names, manifest)]
         return Path(paths[0])
 
     return make
@@ -90,9 +90,6 @@ KINDS = {
     "checkpoint of a training": Kind(checkpoint, train.read_checkpoint),
     "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
     "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
-    "weights without a manifest": Kind(  # whose checksum is on the card
-        copied(WEIGHTS, CARD, manifest=False), vsp.load_teacher, tuple(one for one in PARSERS if one != "json.loads")
-    ),
     "results of a study": Kind(copied("results/readings.csv"), of_study),
     "what the course has made": Kind(course, read_sealed),
 }
@@ -238,7 +235,6 @@ LOADERS = {
     "sealed": read_sealed,
     "listed": read_listed,
     "table": read_table,
-    "carded": read_carded,
     "study": lambda path: of_study(path.with_suffix(".csv")),
     "notebook": lambda path: run_notebook._read(path),
 }

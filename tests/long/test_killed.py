@@ -43,16 +43,16 @@ def test_a_killed_run_leaves_nothing_in_the_folders_of_others_and_the_next_remov
     for semaphore in memory.glob(f"sem.loky-{kernel}-*"):  # a kernel that ends when its runner does removes them
         semaphore.unlink()
     assert not list(shared.iterdir()) and not list(memory.glob(f"joblib*_{kernel}_*"))
-    (work,) = (tmp_path / "build" / "running").iterdir()
+    (work,) = (tmp_path / "build" / "running" / "story").iterdir()
     assert (work / "kernel.json").exists() and list((work / "tmp").iterdir())
     subprocess.run(command, cwd=ROOT, env=environ, check=True)
-    assert not list((tmp_path / "build" / "running").iterdir()) and not list(shared.iterdir())
+    assert not list((tmp_path / "build" / "running" / "story").iterdir()) and not list(shared.iterdir())
 
 
 def test_end_by_signal_ends_kernel(tmp_path):
     """SIGTERM to the runner: no kernel and no output is left, and its lock is free."""
     pid = tmp_path / "pid"
-    wait = "import os, time\n(Path(out).parents[3] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
+    wait = "import os, time\n(Path(out).parents[4] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
     command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, DRAW, wait), "--out", tmp_path]
     process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
     until(lambda: pid.exists() and pid.read_text())
@@ -60,7 +60,7 @@ def test_end_by_signal_ends_kernel(tmp_path):
     assert "story.ipynb: interrupted" in process.communicate(timeout=30)[1]
     assert process.returncode == 1
     until(lambda: not alive(int(pid.read_text())))
-    assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running").iterdir())
+    assert not (tmp_path / "figures").exists() and not list((tmp_path / "build" / "running" / "story").iterdir())
 
 
 def test_an_end_by_signal_ends_the_workers_too(tmp_path):

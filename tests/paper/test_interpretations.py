@@ -36,7 +36,6 @@ CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `
 # What is tried
 
 ALONE = [(number, change) for number, changes in ALTERNATIVES.items() for change in changes]
-BEYOND = [("neighbours", "visited")]  # values of readings that are none of the paper's
 PRINTED = {*printed.printed_hyperparameters(SIMPLEGOAL)} - {"one_split"}  # T2 prints it, yet it is a reading (R4)
 
 
@@ -50,7 +49,7 @@ def forgotten(config, readings):
             continue
         values = get_args(kind) if get_origin(kind) is Literal else (not default,) if kind is bool else ()
         others = [(field.name, value) for value in values if value != default]
-        missing += [other for other in others if other not in tried and other not in BEYOND]
+        missing += [other for other in others if other not in tried]
         if field.name not in {name for name, _ in tried}:
             missing.append((field.name, "any"))
     return missing
@@ -58,7 +57,6 @@ def forgotten(config, readings):
 
 def test_no_reading_is_forgotten():
     assert forgotten(Config, ALTERNATIVES) == forgotten(Readings, ALTERNATIVES) == []
-    assert not any((name, value) in BEYOND for _, change in ALONE for name, value in change.items())
 
 
 def test_readings_have_the_numbers_that_the_configuration_gives_them():

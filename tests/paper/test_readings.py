@@ -71,13 +71,13 @@ def test_by_default_they_are_the_passes_of_the_algorithms(seed):
     k = int(rng.integers(2, 12))
     config = tiny(max_pol_loss=0.4, min_pol_distance=0.1, min_param_distance=1.2, one_split=seed % 5 == 0)
     partition = partition_of(rng.random((k, 2)), config=config)
-    partition.models.parameters[:] = rng.normal(scale=0.6, size=partition.models.parameters.shape)
+    partition.models.coefficients[:] = rng.normal(scale=0.6, size=partition.models.coefficients.shape)
     states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
     episode, other = Episode(states, rng.uniform(-1, 1, (60, 2))), copy.deepcopy(partition)
     added = split_regions(partition, episode, config, np.random.default_rng(1))
     assert np.array_equal(added, Readings().split(other, episode, config, np.random.default_rng(1)))
     assert np.array_equal(merge_regions(partition, config), Readings().merge(other, config))
-    pairs = [(one.codewords, one.models.parameters, one.buffers.counts) for one in (partition, other)]
+    pairs = [(one.codewords, one.models.coefficients, one.buffers.counts) for one in (partition, other)]
     assert same_arrays(*zip(*pairs))
 
 

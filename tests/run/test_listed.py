@@ -1,20 +1,17 @@
-"""Listed files and carded weights are compared with their checksums before anything is parsed."""
+"""Listed files are compared with their checksums before anything is parsed."""
 
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 
 from vsp.run import manifest
 from vsp.run.atomic import DamagedFile, sha256
 from vsp.run.listed import (
     MANIFEST,
-    read_carded,
     read_listed,
     read_table,
-    write_carded,
     write_listed,
 )
 
@@ -102,50 +99,6 @@ def test_of_several_writers_none_loses_a_line(tmp_path):
     assert len(visible(tmp_path)) == 61
     for path in tmp_path.glob("*.csv"):
         assert read_listed(path).decode() == path.stem[2:]
-
-
-# Weights and their card
-
-
-def test_weights_come_back_with_their_card_and_neither_is_read_alone(tmp_path):
-    path = tmp_path / "x.safetensors"
-    write_carded(path, b"weights", {"task": "t"})
-    assert read_carded(path) == (b"weights", {"task": "t", "sha256": sha256(path)})
-    for part in (path.with_suffix(".json"), path):
-        part.unlink()
-        with pytest.raises(FileNotFoundError, match=f"{part.name}: no such file"):
-            read_carded(path)
-
-
-def test_a_card_with_nan_is_refused_before_anything_is_written(tmp_path):
-    with pytest.raises(ValueError):
-        write_carded(tmp_path / "x.safetensors", b"weights", {"score": np.nan})
-    assert visible(tmp_path) == []
-
-
-def test_weights_are_compared_with_their_card_and_the_card_with_the_manifest(tmp_path):
-    path, card = tmp_path / "x.safetensors", tmp_path / "x.json"
-    write_carded(path, b"weights", {"task": "t", "score": 16.6})
-    text = card.read_bytes()
-    card.write_bytes(text.replace(b"16.6", b"16.7"))
-    with pytest.raises(DamagedFile, match="x.json: SHA-256"):
-        read_carded(path)
-    card.write_bytes(text)
-    for folder in ("listed", "somebody's own, without a manifest"):
-        path.write_bytes(b"weighus")
-        with pytest.raises(DamagedFile, match="SHA-256 is [0-9a-f]{64}, its card says [0-9a-f]{64}"):
-            read_carded(path)
-        path.write_bytes(b"weights")
-        assert read_carded(path)[1]["score"] == 16.6, folder
-        (tmp_path / MANIFEST).unlink(missing_ok=True)
-
-
-@pytest.mark.parametrize("card", ["", "[]", '{"task": "t"}', "[" * 100_000], ids=range(4))
-def test_a_card_that_is_none(tmp_path, card):
-    (tmp_path / "x.safetensors").write_bytes(b"weights")
-    (tmp_path / "x.json").write_text(card)
-    with pytest.raises(DamagedFile, match="not a card"):
-        read_carded(tmp_path / "x.safetensors")
 
 
 # The committed manifests

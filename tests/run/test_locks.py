@@ -6,12 +6,12 @@ import pytest
 
 from vsp.run.atomic import ROOT
 from vsp.run.command import CommandError
-from vsp.run.locks import file_lock
+from vsp.run.locks import folder_lock
 
 HOLD = """
 import sys
-from vsp.run.locks import file_lock
-with file_lock(sys.argv[1], "x"):
+from vsp.run.locks import folder_lock
+with folder_lock(sys.argv[1], "busy"):
     print(1, flush=True)
     input()
 """
@@ -24,12 +24,12 @@ def test_the_second_is_refused_until_the_first_ends_or_is_killed(tmp_path):
     first.stdout.readline()
     with (
         pytest.raises(CommandError, match="another run writes here: wait for it to end"),
-        file_lock(lock, "writes here"),
+        folder_lock(lock, "another run writes here"),
     ):
         pytest.fail("came in")
     first.kill()
     assert first.wait() == -signal.SIGKILL
     for _ in range(2):
-        with file_lock(lock, "writes here"):
+        with folder_lock(lock, "another run writes here"):
             pass
     first.communicate()

@@ -60,7 +60,7 @@ def test_success_twice(tmp_path):
     assert run_notebook.run_notebook(notebook, out) == []
     assert tree(out) == first
     assert run_notebook.run_notebook(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
-    assert not list((out / "build" / "running").iterdir())
+    assert not list((out / "build" / "running" / "story").iterdir())
 
 
 def test_of_a_widget_its_still_picture_is_left(tmp_path):
@@ -98,18 +98,17 @@ FAULTS = {
     "never ran": (["# skip", "2"], "code cell (# skip) never ran"),
     "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
     "address": (["object()"], "code cell (object()) shows 'at 0x"),
-    "path": (["print(out)"], "code cell (print(out)) shows a folder of this machine"),
+    "path": (["print(out)"], "code cell (print(out)) shows '/"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
         "code cell (try:) failed: ZeroDivisionError: division by zero",
     ),
-    "stray file": (['(Path(out) / "x").write_text("y")'], "wrote x, expected files in figures/"),
     "missing": (["2"], "did not make figures/c.pdf"),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_fault_leaves_previous_figures(tmp_path, fault):
+def test_fault_leaves_previous_figures(tmp_path, monkeypatch, fault):
     cells, message = FAULTS[fault]
     (tmp_path / "figures" / "executed").mkdir(parents=True)
     for name in ("a.txt", "executed/story.ipynb"):
@@ -117,7 +116,8 @@ def test_fault_leaves_previous_figures(tmp_path, fault):
     notebook = write(tmp_path, DRAW, *cells)
     before = tree(tmp_path)
     expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
-    error = refused(notebook, "--out", tmp_path, "--timeout", "1" if fault == "too slow" else "60", "--expect", *expect)
+    monkeypatch.setattr(run_notebook, "TIMEOUT", 1 if fault == "too slow" else 60)
+    error = refused(notebook, "--out", tmp_path, "--expect", *expect)
     assert error.startswith("error: story.ipynb") and message in error
     assert fault != "failing cell" or "Traceback" in error
     assert tree(tmp_path) == before
@@ -146,7 +146,7 @@ def test_limit_on_the_size_of_files(tmp_path, cell):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert error.startswith("error: story.ipynb") and "File too large" in error and "\n" not in error
-    assert "ulimit -f" in error and tree(tmp_path) == before
+    assert tree(tmp_path) == before
 
 
 def test_wrong_parameter(tmp_path):

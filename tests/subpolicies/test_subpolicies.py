@@ -36,12 +36,12 @@ def test_one_step_by_hand():
     models = models_of(1, d=1, m=1, initial="zeros")
     loss = models.train(np.array([0]), np.array([[[2.0, 1.0]]]), np.array([[[1.0]]]), learning_rate=0.125)
     assert loss.tolist() == [1.0]
-    assert models.parameters[0, :, 0] == pytest.approx([0.125, 0.125], abs=1e-9)
+    assert models.coefficients[0, :, 0] == pytest.approx([0.125, 0.125], abs=1e-9)
 
 
 def test_predict_by_hand():
     models = models_of(1)
-    models.parameters[0] = [[1, 2], [3, 4], [5, 6]]
+    models.coefficients[0] = [[1, 2], [3, 4], [5, 6]]
     assert models.predict(0, np.array([10.0, 100.0])).tolist() == [315, 426]
 
 
@@ -50,7 +50,7 @@ def test_training_equals_torch_cell_by_cell(m):
     torch = pytest.importorskip("torch")
     models, rng = models_of(3, m=m), np.random.default_rng(1)
     twins = [torch.nn.Linear(2, m, dtype=torch.float64) for _ in range(3)]
-    for twin, start in zip(twins, models.parameters):
+    for twin, start in zip(twins, models.coefficients):
         twin.weight.data, twin.bias.data = torch.tensor(start[:-1].T), torch.tensor(start[-1])
     optimisers = [torch.optim.Adam(twin.parameters(), lr=0.01) for twin in twins]
     for step in range(100):
@@ -63,21 +63,21 @@ def test_training_equals_torch_cell_by_cell(m):
             torch_loss.backward()
             optimisers[c].step()
             assert torch_loss.item() == pytest.approx(loss, rel=1e-12)
-    for twin, parameters in zip(twins, models.parameters):
+    for twin, coefficients in zip(twins, models.coefficients):
         expected = np.vstack([twin.weight.detach().numpy().T, twin.bias.detach().numpy()])
-        assert np.allclose(parameters, expected, rtol=1e-10, atol=1e-12)
+        assert np.allclose(coefficients, expected, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("d", [1, 9])
 def test_first_parameters_are_those_of_torch_linear(d):
     torch = pytest.importorskip("torch")
-    parameters, bound = models_of(400, d=d).parameters, 1 / np.sqrt(d)
+    coefficients, bound = models_of(400, d=d).coefficients, 1 / np.sqrt(d)
     torch.manual_seed(0)
     layers = [torch.nn.Linear(d, 2) for _ in range(400)]
     largest = max(float(p.detach().abs().max()) for layer in layers for p in layer.parameters())
-    for value in (largest, np.abs(parameters).max()):
+    for value in (largest, np.abs(coefficients).max()):
         assert 0.98 * bound < value <= bound + 1e-7
-    assert abs(parameters.mean()) < 0.1 * bound and parameters.var() == pytest.approx(bound**2 / 3, rel=0.1)
+    assert abs(coefficients.mean()) < 0.1 * bound and coefficients.var() == pytest.approx(bound**2 / 3, rel=0.1)
 
 
 def test_zeros_draws_as_many_random_numbers_as_uniform():
@@ -85,7 +85,7 @@ def test_zeros_draws_as_many_random_numbers_as_uniform():
     for rng, initial in zip(rngs, ("zeros", "uniform")):
         SubPolicies(linear(2), 2, initial=initial).add(rng)
     assert rngs[0].random() == rngs[1].random()
-    assert not models_of(3, initial="zeros").parameters.any()
+    assert not models_of(3, initial="zeros").coefficients.any()
 
 
 def test_dropping_cells_takes_their_moments_along():
@@ -97,7 +97,7 @@ def test_dropping_cells_takes_their_moments_along():
     models.keep(np.array([False, False, True]))
     models.train(np.array([0]), inputs[2:], actions[2:], learning_rate=0.1)
     uncut.train(np.array([2]), inputs[2:], actions[2:], learning_rate=0.1)
-    assert np.allclose(models.parameters[0], uncut.parameters[2], rtol=1e-13)
+    assert np.allclose(models.coefficients[0], uncut.coefficients[2], rtol=1e-13)
 
 
 def test_restart_makes_adam_as_new_and_leaves_the_map():
@@ -105,13 +105,13 @@ def test_restart_makes_adam_as_new_and_leaves_the_map():
     models, fresh = models_of(2), models_of(2)
     for _ in range(3):
         models.train(np.arange(2), inputs, actions, learning_rate=0.1)
-    fresh.parameters = models.parameters.copy()
+    fresh.coefficients = models.coefficients.copy()
     models.restart_adam(np.array([True, False]))
-    assert np.array_equal(models.parameters, fresh.parameters)
+    assert np.array_equal(models.coefficients, fresh.coefficients)
     for each in (models, fresh):
         each.train(np.arange(2), inputs, actions, learning_rate=0.1)
-    assert np.array_equal(models.parameters[0], fresh.parameters[0])
-    assert not np.array_equal(models.parameters[1], fresh.parameters[1])
+    assert np.array_equal(models.coefficients[0], fresh.coefficients[0])
+    assert not np.array_equal(models.coefficients[1], fresh.coefficients[1])
 
 
 # Classes
@@ -162,12 +162,12 @@ def test_an_input_without_limits_keeps_its_unit():
 def test_one_state_a_batch_and_the_training_see_the_same_outputs(name, task):
     task = get_task(task)
     form, states, rng = policy_class(name, task), some_states(task).reshape(5, 10, -1), np.random.default_rng(1)
-    parameters = rng.normal(size=(5, len(form.rows), 2)) / form.units
+    coefficients = rng.normal(size=(5, len(form.rows), 2)) / form.units
     features = form.features(states)
-    outputs, _ = form.batch(np.concatenate([features, np.ones((5, 10, 1))], axis=2), parameters)
+    outputs, _ = form.batch(np.concatenate([features, np.ones((5, 10, 1))], axis=2), coefficients)
     for cell in range(5):
-        batch = form.outputs(features[cell], np.tile(parameters[cell], (10, 1, 1)))
-        singles = [form.outputs(row, parameters[cell]) for row in features[cell]]
+        batch = form.outputs(features[cell], np.tile(coefficients[cell], (10, 1, 1)))
+        singles = [form.outputs(row, coefficients[cell]) for row in features[cell]]
         assert np.allclose(batch, outputs[cell], rtol=1e-12, atol=1e-12) and np.allclose(singles, batch, atol=1e-12)
 
 
@@ -181,7 +181,9 @@ def test_a_quadratic_map_trains_as_a_linear_one_of_scaled_features():
         for models, sizes in ((quadratic, 1.0), (scaled, form.sizes)):
             inputs = np.column_stack([features / sizes, np.ones(16)])
             models.train(np.array([0]), inputs[None], actions, learning_rate=0.01)
-    assert np.allclose(quadratic.comparable(), scaled.parameters, atol=1e-6) and np.abs(scaled.parameters).max() > 0.05
+    assert (
+        np.allclose(quadratic.comparable(), scaled.coefficients, atol=1e-6) and np.abs(scaled.coefficients).max() > 0.05
+    )
 
 
 @each_class
@@ -212,7 +214,7 @@ def test_solving_one_state_by_hand():
     """Map 0, one state x = 2 with action 5: the least change that answers 5 is (2, 1)."""
     models = models_of(1, d=1, m=1, initial="zeros")
     solve(models, [0], np.array([[[2.0, 1.0]]]), np.array([[[5.0]]]))
-    assert models.parameters[0, :, 0] == pytest.approx([2, 1], abs=1e-5)
+    assert models.coefficients[0, :, 0] == pytest.approx([2, 1], abs=1e-5)
 
 
 @pytest.mark.parametrize("name", POLICY_CLASSES)
@@ -222,19 +224,19 @@ def test_solving_is_least_squares(name):
     features = models.policy_class.features(some_states(task, 80).reshape(2, 40, 2))
     inputs = np.concatenate([features, np.ones((2, 40, 1))], axis=2)
     actions = np.random.default_rng(0).normal(size=(2, 40, 2))
-    untouched, units = models.parameters[1].copy(), models.policy_class.units
+    untouched, units = models.coefficients[1].copy(), models.policy_class.units
     for _ in range(3):
         solve(models, [0, 2], inputs, actions)
     for cell, x, a in zip((0, 2), inputs, actions):
         expected = np.linalg.lstsq(x, a, rcond=None)[0]
-        assert np.allclose(models.parameters[cell] * units, expected * units, atol=1e-8)
-    assert np.array_equal(models.parameters[1], untouched)
+        assert np.allclose(models.coefficients[cell] * units, expected * units, atol=1e-8)
+    assert np.array_equal(models.coefficients[1], untouched)
 
 
 def test_what_the_states_leave_open_stays_as_it_was():
     models = models_of(1, d=2, m=1)
-    before = models.parameters[0, :, 0].copy()
+    before = models.coefficients[0, :, 0].copy()
     x = np.linspace(-1, 1, 9)
     inputs = np.stack([x, np.zeros(9), np.ones(9)], axis=1)[None]  # y never varies
     solve(models, [0], inputs, (3 * x - 1)[None, :, None])
-    assert models.parameters[0, :, 0] == pytest.approx([3, before[1], -1], abs=1e-5)
+    assert models.coefficients[0, :, 0] == pytest.approx([3, before[1], -1], abs=1e-5)

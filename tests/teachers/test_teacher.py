@@ -4,7 +4,6 @@ import io
 import json
 import os
 import pickle
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -72,7 +71,7 @@ def test_the_digest_tells_teachers_apart_and_repeats():
 @pytest.fixture
 def copied(tmp_path):
     for suffix in (".safetensors", ".json"):
-        shutil.copy(SHIPPED / f"{SIMPLEGOAL}{suffix}", tmp_path / f"own{suffix}")
+        listed.write_listed(tmp_path / f"own{suffix}", (SHIPPED / f"{SIMPLEGOAL}{suffix}").read_bytes())
     return tmp_path / "own.safetensors"
 
 
@@ -88,7 +87,7 @@ def test_damaged_weights_are_refused(copied, position):
     altered[position] ^= 16
     for damaged in (content[:position], altered):
         copied.write_bytes(damaged)
-        with pytest.raises(DamagedFile, match="own.safetensors: SHA-256 is .*its card says"):
+        with pytest.raises(DamagedFile, match="own.safetensors: SHA-256 is"):
             load_teacher(copied)
 
 
@@ -103,7 +102,7 @@ def test_missing_weights_or_card_are_named(copied, tmp_path):
 
 
 def test_a_card_without_a_known_task_is_one_clear_error(copied):
-    listed.write_carded(copied, copied.read_bytes(), {"task": "SimpelGoal-v0"})
+    listed.write_listed(copied.with_suffix(".json"), '{"task": "SimpelGoal-v0"}')
     with pytest.raises(ValueError, match="task"):
         load_teacher(copied)
 

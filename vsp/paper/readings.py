@@ -94,7 +94,7 @@ class Readings:
 
     def merge(self, partition: Partition, config: Config) -> list[np.ndarray]:
         """Algorithm 3 with these readings. Returns the removed codewords."""
-        k, parameters = len(partition.codewords), partition.comparable_parameters()
+        k, coefficients = len(partition.codewords), partition.comparable_coefficients()
         alive = np.ones(k, dtype=bool)
         for i in range(k):
             if not alive[i] and not self.merge_visits_removed:
@@ -103,7 +103,7 @@ class Readings:
             members[i] = True
             near = np.zeros(k, dtype=bool)
             near[members] = partition.neighbours_of(partition.codewords[members])[members[:i].sum()]
-            distances = np.abs(parameters - parameters[i]).max(axis=1)
+            distances = np.abs(coefficients - coefficients[i]).max(axis=1)
             similar = near & alive & (distances < config.min_param_distance)
             if not alive[i]:
                 similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import hashlib
 import os
 import secrets
@@ -12,11 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]  # the checkout, or where vsp is installed
-TEMPORARY = ".?*-????????.*"  # names of the temporary files of `atomic_path`
-
-_DISK = [errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM]
-_DISK += [errno.EEXIST, errno.EISDIR, errno.ENOTDIR]
-_REMEDY = "free some space, make it writable, raise `ulimit -f` or move away what is there, or name another: OUT=folder"
 
 
 class DamagedFile(ValueError):
@@ -59,11 +53,6 @@ def write_text(path: str | os.PathLike, text: str) -> None:
     """Write `text` to `path` atomically, as UTF-8 with Unix line endings on every system."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-
-
-def disk_remedy(number: int | None) -> str | None:
-    """Return a remedy for a system error of this number: no space, no access, name in use. None for other errors."""
-    return _REMEDY if number in _DISK else None
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:

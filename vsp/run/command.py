@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import re
 import signal
 import sys
 from collections.abc import Iterator
 
-from .atomic import DamagedFile, MissingFile, disk_remedy
+from .atomic import DamagedFile, MissingFile
 
 JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # help text of --jobs
+
+
+# Errors of a disk: no space, no access, name in use
+_DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
+_DISK |= {errno.EEXIST, errno.EISDIR, errno.ENOTDIR}
 
 
 class CommandError(RuntimeError):
@@ -45,9 +51,9 @@ def in_one_line(what: str = "") -> Iterator[None]:
     except (CommandError, DamagedFile, MissingFile) as error:
         sys.exit(f"error: {error}")
     except OSError as error:
-        if not (remedy := disk_remedy(error.errno)):
+        if error.errno not in _DISK:
             raise
-        sys.exit(f"{begin}{error.filename2 or error.filename or 'a file'}: {error.strerror}: {remedy}")
+        sys.exit(f"{begin}{error}: free some space, make it writable, or name another folder: OUT=folder")
 
 
 def _interrupt(signum: int, frame: object) -> None:

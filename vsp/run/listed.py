@@ -5,18 +5,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import io
-import json
 import os
 import re
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .atomic import DamagedFile, atomic_path, read_bytes, remedy, sha256, write_text
+from .locks import folder_lock
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +36,7 @@ def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
 def list_file(path: str | os.PathLike) -> None:
     """Add the file at `path`, as it is, to the manifest of its folder."""
     path = Path(path)
-    with _locked(path.parent):
+    with folder_lock(path.parent):
         _write_manifest(path.parent, {**_listed(path.parent), path.name: sha256(path)})
 
 
@@ -70,32 +68,6 @@ def read_table(path: str | os.PathLike, **options) -> pd.DataFrame:
     return pd.read_csv(io.BytesIO(read_listed(path)), **options)
 
 
-def write_carded(path: str | os.PathLike, content: bytes, card: dict) -> None:
-    """Write `content`, then beside it its card as `.json`, with the SHA-256 added. Both files are listed."""
-    text = json.dumps({**card, "sha256": hashlib.sha256(content).hexdigest()}, indent=2, allow_nan=False) + "\n"
-    write_listed(path, content)
-    write_listed(Path(path).with_suffix(".json"), text)
-
-
-def read_carded(path: str | os.PathLike) -> tuple[bytes, dict]:
-    """Return a file that `write_carded` wrote, and its card, which has its checksum. Raises as `read_listed` does.
-
-    The card is listed, except in a folder without a manifest, as somebody who copied the two files has it.
-    """
-    path, card_path = Path(path), Path(path).with_suffix(".json")
-    content = read_bytes(path)
-    text = (read_listed if (path.parent / MANIFEST).exists() else read_bytes)(card_path)
-    digest = hashlib.sha256(content).hexdigest()
-    try:
-        card = json.loads(text)
-        expected = card["sha256"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise DamagedFile(f"{card_path}: not a card with a sha256: {error!r:.300}") from error
-    if digest != expected:
-        raise DamagedFile(f"{path}: SHA-256 is {digest}, its card says {expected}: get both files again")
-    return content, card
-
-
 def _listed(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest."""
     manifest = folder / MANIFEST
@@ -109,16 +81,3 @@ def _listed(folder: Path) -> dict[str, str]:
 
 def _write_manifest(folder: Path, listed: dict[str, str]) -> None:
     write_text(folder / MANIFEST, "".join(f"{digest}  {name}\n" for name, digest in sorted(listed.items())))
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Lock `folder` against others that write its manifest."""
-    import fcntl
-
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)

@@ -14,7 +14,6 @@ import argparse
 import ast
 import contextlib
 import copy
-import errno
 import filecmp
 import json
 import os
@@ -26,13 +25,14 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .atomic import ROOT, disk_remedy, read_bytes, write_text
+from .atomic import ROOT, read_bytes, write_text
 from .command import CommandError, in_one_line
 from .listed import MANIFEST, list_file
-from .locks import file_lock
+from .locks import folder_lock
 from .notebook import NotebookNode, nbformat
 
 KERNEL = "python3"
+TIMEOUT = 1800  # seconds per cell
 EXECUTED = "figures/executed"
 KERNEL_FOLDERS = {  # folders a kernel writes to, by variable; the next run removes what a killed one left
     "TMPDIR": "tmp",
@@ -51,9 +51,9 @@ KERNEL_SETTINGS = {
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no debugger message on standard error
 }
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
-_SYSTEM_ERROR = re.compile(r"\[Errno (\d+)\] ")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-_MENDABLE = ("DamagedFile", "MissingFile", "WorkerDied", "UnlikeWorker", "NoScheduler")  # a user can fix these
+# A user can fix these: a damaged file, a full or read-only disk, a cluster
+_MENDABLE = ("DamagedFile", "MissingFile", "OSError", "PermissionError", "WorkerDied", "UnlikeWorker", "NoScheduler")
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
 
 
@@ -68,14 +68,13 @@ def run_notebook(
     parameters: dict[str, object] | None = None,
     expect: Sequence[str] = (),
     executed: str = EXECUTED,
-    timeout: int = 1800,
 ) -> list[str]:
     """Run `notebook` with `parameters` and move the files that it made to `out`. Returns those that changed there.
 
     `expect` names files, relative to `out`, that the notebook must make. An executed copy, without anything that varies
-    between runs, goes to the folder `executed` in `out`. `timeout` is in seconds per cell. Raises CommandError if
-    another process runs the same notebook into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for
-    a full or read-only disk; the earlier files of `out` then stay.
+    between runs, goes to the folder `executed` in `out`. Raises CommandError if another process runs the same notebook
+    into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk; the earlier
+    files of `out` then stay.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
@@ -83,21 +82,22 @@ def run_notebook(
     if "runs" in declared:
         values.setdefault("runs", str(out / "data" / "runs"))
     _check_parameters(notebook, declared, values)
-    running = out / "build" / "running"
-    with file_lock(out / "build" / "locks" / notebook.stem, f"of {notebook.stem} writes into {out}"):
-        for left in running.glob(f"{notebook.stem}-*"):
+    running = out / "build" / "running" / notebook.stem
+    with folder_lock(running, f"another run of {notebook.stem} writes into {out}"):
+        for left in running.iterdir():
             shutil.rmtree(left, ignore_errors=True)  # left by a killed run
-        running.mkdir(exist_ok=True)
         # A new name each time: an orphaned kernel may still write to an old folder
-        work = Path(tempfile.mkdtemp(dir=running, prefix=f"{notebook.stem}-"))
+        work = Path(tempfile.mkdtemp(dir=running))
         staging = work / "out"
         try:
             staging.mkdir()
-            cells = _execute(notebook, {**values, "out": str(staging)}, work, timeout)
+            cells = _execute(notebook, {**values, "out": str(staging)}, work)
             for cell in cells:
                 _check_cell(notebook, cell, (str(out), str(ROOT), sys.prefix))
             _write_copy(source, cells, staging / executed / notebook.name)
-            _check_files(notebook, staging, expect)
+            missing = [name for name in expect if not (staging / name).is_file() or not (staging / name).stat().st_size]
+            if missing:
+                raise NotebookError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
             return _publish(staging, out)
         finally:
             shutil.rmtree(work, ignore_errors=True)
@@ -107,13 +107,10 @@ def _read(notebook: Path) -> tuple[NotebookNode, dict[str, object]]:
     """Return the notebook and the defaults of its parameters."""
     content = read_bytes(notebook)
     try:
-        cells = json.loads(content)["cells"]
         source = nbformat.reads(content.decode(), as_version=4)
         tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
     except (nbformat.ValidationError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise NotebookError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
-    if any("id" not in cell for cell in cells):
-        raise NotebookError(f"{notebook.name}: has cells without an id, expected format 4.5: save it in JupyterLab")
     if len(tagged) != 1:
         raise NotebookError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
     try:
@@ -134,24 +131,20 @@ def _check_parameters(notebook: Path, declared: dict[str, object], values: dict[
             )
 
 
-def _execute(notebook: Path, values: dict[str, object], work: Path, timeout: int) -> list[NotebookNode]:
+def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[NotebookNode]:
     """Run a copy of the notebook by papermill with the parameters `values`. Returns its code cells."""
     import papermill
+    from nbclient.exceptions import CellTimeoutError, DeadKernelError
 
-    options = {
-        "kernel_name": KERNEL,
-        "cwd": notebook.parent,
-        "execution_timeout": timeout,
-    }  # the folder as in JupyterLab
+    # The folder as in JupyterLab
+    options = {"kernel_name": KERNEL, "cwd": notebook.parent, "execution_timeout": TIMEOUT}
     quiet = {"progress_bar": False, "extra_arguments": ["--log-level=CRITICAL"]}  # no log messages on standard error
     try:
         with _environment(work):
             ran = papermill.execute_notebook(notebook, work / notebook.name, values, **options, **quiet)
     except papermill.PapermillExecutionError as error:
         raise _failure(_name(notebook, error.source), error.ename, error.evalue, "\n".join(error.traceback)) from error
-    except Exception as error:
-        if disk_remedy(getattr(error, "errno", None)):
-            raise
+    except (CellTimeoutError, DeadKernelError) as error:
         saved = nbformat.read(work / notebook.name, as_version=4)
         begun = [cell.source for cell in saved.cells if cell.metadata.get("papermill", {}).get("start_time")]
         where = _name(notebook, *begun[-1:])
@@ -186,11 +179,8 @@ def _environment(work: Path) -> Iterator[None]:
 
 def _failure(where: str, kind: str, message: str, traceback: str) -> NotebookError:
     """Return the error in one line if a user can fix it, such as a damaged file, else with the traceback."""
-    number = _SYSTEM_ERROR.match(message)
-    remedy = disk_remedy(int(number[1])) if number else None
-    if kind in _MENDABLE or remedy:
-        return NotebookError(": ".join(filter(None, (f"{where} failed: {kind}: {message}", remedy))))
-    return NotebookError(f"{where} failed: {kind}: {message}\n{_COLOUR.sub('', traceback)}")
+    details = "" if kind in _MENDABLE else "\n" + _COLOUR.sub("", traceback)
+    return NotebookError(f"{where} failed: {kind}: {message}{details}")
 
 
 def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> None:
@@ -202,13 +192,8 @@ def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> N
         if output["output_type"] == "error":  # papermill takes `sys.exit(0)` for a success
             raise _failure(where, output["ename"], output["evalue"], "\n".join(output["traceback"]))
         shown = output.get("text") or json.dumps(output.get("data", {}))
-        if varying := _VARIES.search(shown):
-            raise NotebookError(
-                f"{where} shows {varying[0]!r}, which differs between runs: fix the warning, or end with `;`"
-            )
-        for folder in folders:
-            if folder in shown:
-                raise NotebookError(f"{where} shows a folder of this machine: {folder}")
+        if varying := _VARIES.findall(shown) + [folder for folder in folders if folder in shown]:
+            raise NotebookError(f"{where} shows {varying[0]!r}, which differs between runs: end with `;`, or fix it")
 
 
 def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> None:
@@ -244,27 +229,14 @@ def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode
     return result
 
 
-def _check_files(notebook: Path, staging: Path, expect: Sequence[str]) -> None:
-    missing = [name for name in expect if not (staging / name).is_file() or not (staging / name).stat().st_size]
-    if missing:
-        raise NotebookError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
-    for path in staging.rglob("*"):
-        place = path.relative_to(staging).as_posix()
-        if path.is_file() and not place.startswith(("figures/", "data/results/")):
-            raise NotebookError(f"{notebook.name}: wrote {place}, expected files in figures/ and data/results/ only")
-
-
 def _publish(staging: Path, out: Path) -> list[str]:
     """Move each staged file to its place in `out`; a file with the same bytes stays untouched. Results are listed."""
     staged = (path.relative_to(staging).as_posix() for path in staging.rglob("*") if path.is_file())
     names = sorted(name for name in staged if Path(name).name != MANIFEST)
     same = {name for name in names if (out / name).is_file() and filecmp.cmp(staging / name, out / name, shallow=False)}
     changed = [name for name in names if name not in same]
-    for folder in {(out / name).parent for name in changed}:  # check all folders before moving any file: all or nothing
-        folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
     for name in changed:
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(staging / name, out / name)
     for name in names:
         if name.startswith("data/results/"):
@@ -288,7 +260,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("-p", dest="parameters", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"))
     parser.add_argument("--expect", nargs="+", default=[], metavar="FILE", help="files in OUT that it must make")
     parser.add_argument("--executed", default=EXECUTED, help="folder in OUT for the executed copy (%(default)s)")
-    parser.add_argument("--timeout", type=int, default=1800, help="seconds per cell (%(default)s)")
     options = vars(parser.parse_args(arguments))
     began, notebook = time.monotonic(), options.pop("notebook")
     name = Path(notebook).name

@@ -1,6 +1,6 @@
-"""`PolicyClass`: how a sub-policy computes actions from a state and its parameters.
+"""`PolicyClass`: how a sub-policy computes actions from a state and its coefficients.
 
-Parameters (p, m) have a column per action; the last row is the bias.
+Coefficients (p, m) have a column per action; the last row is the bias.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d
 
 @dataclass(frozen=True)
 class PolicyClass:
-    """A class of sub-policy that is linear in its parameters: output = features @ weights + bias.
+    """A class of sub-policy that is linear in its coefficients: output = features @ weights + bias.
 
     Features are in the units of the task, and so are the equations. Training divides features by `sizes`, so that one
     step size suits all of them.
@@ -48,45 +48,45 @@ class PolicyClass:
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the p rows of the parameters."""
+        """Names of the p rows of the coefficients."""
         return (*self.terms, "bias")
 
     @property
     def units(self) -> np.ndarray:
-        """Factors that convert parameters to their values in training. (p, 1)"""
+        """Factors that convert coefficients to their values in training. (p, 1)"""
         return np.append(self.sizes, 1.0)[:, None]
 
     @property
     def bounds(self) -> np.ndarray:
-        """Initial parameters are uniform in +- `bounds` / `units`: 1 / sqrt(inputs), as in torch.nn.Linear. (p, 1)"""
+        """Initial coefficients are uniform in +- `bounds` / `units`: 1 / sqrt(inputs), as in torch.nn.Linear. (p, 1)"""
         return np.full((len(self.rows), 1), 1.0 / np.sqrt(max(1, len(self.terms))))
 
-    def outputs(self, features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-        """Actions (..., m) at features (..., q) with parameters (..., p, m), not limited to the action box."""
-        return linear_outputs(features, parameters)
+    def outputs(self, features: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+        """Actions (..., m) at features (..., q) with coefficients (..., p, m), not limited to the action box."""
+        return linear_outputs(features, coefficients)
 
-    def batch(self, inputs: np.ndarray, parameters: np.ndarray) -> tuple[np.ndarray, Pullback]:
-        """Return outputs (c, B, m) of c cells with parameters (c, p, m) at `inputs` (c, B, q + 1): features and a 1.
+    def batch(self, inputs: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, Pullback]:
+        """Return outputs (c, B, m) of c cells with coefficients (c, p, m) at `inputs` (c, B, q + 1): features and a 1.
 
         Also returns a function that maps the gradient of the loss with respect to these outputs to the gradient with
-        respect to the parameters.
+        respect to the coefficients.
         """
-        return inputs @ parameters, lambda error: inputs.transpose(0, 2, 1) @ error
+        return inputs @ coefficients, lambda error: inputs.transpose(0, 2, 1) @ error
 
-    def contributions(self, state: np.ndarray, parameters: np.ndarray) -> pd.DataFrame:
+    def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> pd.DataFrame:
         """Return the terms of the output at `state` (d,): m rows, one per action; a column per feature and the bias."""
         import pandas as pd  # here, because it takes long to import
 
-        return pd.DataFrame(parameters.T * np.append(self.features(state), 1.0), columns=list(self.rows))
+        return pd.DataFrame(coefficients.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """Return one action's output as text, for parameters (p,); `symbol` formats a variable's name."""
+        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name."""
         return expression(column, tuple(symbol(term) for term in self.terms), digits)
 
 
-def linear_outputs(features: np.ndarray, parameters: np.ndarray) -> np.ndarray:
-    """Features (..., q) times weights plus bias, for parameters (..., q + 1, m). (..., m)"""
-    return np.einsum("...q,...qm->...m", features, parameters[..., :-1, :]) + parameters[..., -1, :]
+def linear_outputs(features: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """Features (..., q) times weights plus bias, for coefficients (..., q + 1, m). (..., m)"""
+    return np.einsum("...q,...qm->...m", features, coefficients[..., :-1, :]) + coefficients[..., -1, :]
 
 
 def state_code(task: Task) -> tuple[str, ...]:

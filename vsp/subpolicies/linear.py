@@ -1,9 +1,13 @@
-"""Classes of sub-policies that are linear in their parameters. The paper uses `linear`."""
+"""Classes of sub-policies that are linear in their coefficients, by name. The paper uses `linear`.
+
+To add one, write a function that takes a task and returns a `PolicyClass`, and enter it in `POLICY_CLASSES`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..checks import check_choice
 from ..tasks.base import Task
 from .base import PolicyClass, reach, state_code
 
@@ -45,3 +49,13 @@ def pid(task: Task) -> PolicyClass:
             "MountainCarContinuous-v0 or Pendulum-v1: give the task signals or take another sub_policy"
         )
     return PolicyClass("pid", signals.names, signals.code, np.array(signals.sizes), signals.compute)
+
+
+POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic, "pid": pid}
+
+
+def policy_class(sub_policy: str, task: Task) -> PolicyClass:
+    """Return the class of sub-policies called `sub_policy`, for `task`. Raises ValueError for an unknown name, and for
+    "pid" if the task has no signals."""
+    check_choice("sub_policy", sub_policy, POLICY_CLASSES)
+    return POLICY_CLASSES[sub_policy](task)

@@ -58,10 +58,10 @@ def _step_live(
     for i, (episode, action) in enumerate(zip(states, actions)):
         action = action.astype(episode.env.action_space.dtype)
         episode.observation, rewards[i], ended, cut, info = episode.env.step(action)
-        if ended and outcome is None:
-            outcomes[i] = ENDED
-        elif ended:
+        if ended and outcome:
             outcomes[i] = GOAL if outcome(episode.observation, rewards[i], info) else PIT
+        elif ended:
+            outcomes[i] = ENDED
         elif cut:
             outcomes[i] = TRUNCATED
     return states, rewards, outcomes

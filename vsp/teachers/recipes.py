@@ -1,4 +1,4 @@
-"""How each teacher is trained, which trainings were rejected, and which score is required."""
+"""How each teacher is trained, and which score is required."""
 
 from __future__ import annotations
 
@@ -47,21 +47,6 @@ RECIPES = {
 
 # Tasks whose teacher is the best snapshot of the learning curve; for other tasks it is the last one
 BEST_OF_CURVE = ("LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5")
-
-# Trainings with another recipe, rejected for their score (over SCORE_EPISODES, or `episodes`)
-_ZOO = {"gamma": 0.98, "buffer_size": 200_000, "learning_rate": 1e-3, "seed": 0, "episodes": 50}
-EARLIER_TRIALS = {
-    "SimpleGoal-v0": [{"noise_std": 0.0, "seed": 0, "steps": 140_000, "mean": 16.0875, "std": 2.9943, "pit": 0.001}],
-    "LunarLanderContinuous-v3": [  # RL Zoo's recipe; its best snapshot; continued from there with smaller steps
-        {**_ZOO, "steps": 300_000, "mean": 209.8963, "std": 91.8232},
-        {**_ZOO, "steps": 290_000, "mean": 239.2406, "std": 48.4486},
-        {**_ZOO, "steps": 350_000, "then_learning_rate": 1e-4, "mean": 210.4371, "std": 99.7109},
-    ],
-    "BipedalWalker-v3": [  # stopped early: the same recipe on another machine, and with smaller batches
-        {"seed": 0, "episodes": 25, "steps": 100_000, "mean": -40.3250, "std": 4.5847},
-        {"seed": 0, "episodes": 25, "batch_size": 100, "steps": 20_000, "mean": -106.1235, "std": 1.8941},
-    ],
-}
 
 # Further trainings, to study the influence of the teacher; shorter if the shipped one took long. SimpleGoal's seed 1 is
 # left out: its actor saturated within 10,000 steps at (-1, -1) for every state and stayed there.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 import os
 import re
 from pathlib import Path
@@ -134,10 +135,10 @@ def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
 def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
     """Load a teacher: the one shipped for a task, or one from a file.
 
-    `source` is a task's name, a `.safetensors` file with its JSON card beside it, or a `.zip` of a TD3 or DDPG agent
-    with ReLU layers that Stable-Baselines3 saved; for a zip, `task` names the task. Only tensors are read: no code from
-    the file runs. Raises ValueError for an unknown task or a teacher that does not fit, FileNotFoundError, and
-    `run.atomic.DamagedFile`.
+    `source` is a task's name, a `.safetensors` file with its JSON card and their manifest beside it, or a `.zip` of a
+    TD3 or DDPG agent with ReLU layers that Stable-Baselines3 saved; for a zip, `task` names the task. Only tensors are
+    read: no code from the file runs. Raises ValueError for an unknown task or a teacher that does not fit,
+    FileNotFoundError, and `run.atomic.DamagedFile`.
     """
     path = Path(source)
     if path.suffix == ".zip":
@@ -153,8 +154,8 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
     from safetensors.numpy import load
 
-    content, card = listed.read_carded(path)
-    tensors = load(content)
+    tensors = load(listed.read_listed(path))
+    card = json.loads(listed.read_listed(path.with_suffix(".json")))
     critic = part_of(tensors, "critic")
     return Teacher(part_of(tensors, "actor"), task or card.get("task"), card=card, critic=critic)
 

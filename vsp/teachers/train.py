@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import copy
 import io
+import json
 import os
 import sys
 from dataclasses import asdict, replace
@@ -22,8 +23,8 @@ from ..run import listed, sealed
 from ..tasks.base import GOAL, PIT
 from ..tasks.registry import get_task
 from .agent_zip import part_of
-from .recipes import BARS, BEST_OF_CURVE, EARLIER_TRIALS, RECIPES, SHORT_SEEDS, SHORT_STEPS, Recipe
-from .teacher import SHIPPED, Teacher
+from .recipes import BARS, BEST_OF_CURVE, RECIPES, SHORT_SEEDS, SHORT_STEPS, Recipe
+from .teacher import SHIPPED, Teacher, load_teacher
 
 PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # a card names their versions
 ENGINES = {"HalfCheetah-v5": ("mujoco",)}
@@ -148,14 +149,15 @@ def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed
 def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = SHIPPED) -> bool:
     """Write the teacher of the last seed in `checkpoints` as safetensors with its card, if it meets the requirements.
 
-    Returns whether it does. The card lists all seeds in `checkpoints`. Actor and critics are written in float32.
+    Returns whether it does. The card lists all seeds in `checkpoints`, and the rejected trials with other recipes that
+    the shipped card lists. Actor and critics are written in float32.
     """
     tried = {seed: read_checkpoint(path) for seed, path in checkpoints.items()}
     seed, snapshot = list(tried.items())[-1]
     if not reaches_bar(score(_teacher(snapshot, task), task, seed=SELECTION_SEED), task):
         return False
     about = {"seeds_tried": [{"seed": s, **_chosen(snap)[1]} for s, snap in tried.items()]}
-    about["earlier_trials"] = EARLIER_TRIALS.get(task, [])
+    about["earlier_trials"] = load_teacher(task).card["earlier_trials"]
     _write(task, snapshot, RECIPES[task], seed, Path(folder) / f"{task}.safetensors", ("actor.", "critic."), about)
     return True
 
@@ -199,7 +201,8 @@ def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, par
         | score(_teacher(snapshot, task), task),
         "learning_curve": snapshot["curve"],
     }
-    listed.write_carded(path, save(tensors), card)
+    listed.write_listed(path, save(tensors))
+    listed.write_listed(path.with_suffix(".json"), json.dumps(card, indent=2, allow_nan=False) + "\n")
 
 
 def reaches_bar(scores: dict, task: str) -> bool:

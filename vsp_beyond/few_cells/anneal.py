@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vsp.subpolicies.stacked import Adam
+from vsp.subpolicies.stacked import BETA1, adam
 
 from .config import Tuned
 from .units import Cells, LabelledStates
@@ -94,3 +94,17 @@ def expected_loss(
     by_closeness = shares * (losses - loss) * (2 / (n * temperature))
     by_codewords = by_closeness @ states - by_closeness.sum(axis=1)[:, None] * cells.codewords
     return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_coefficients.ravel()])
+
+
+class Adam:
+    """The steps of Adam for one array, before they are multiplied by the learning rate."""
+
+    def __init__(self):
+        self._mean = self._square = 0.0
+        self._steps = 0
+
+    def step(self, gradient: np.ndarray) -> np.ndarray:
+        """Return the step against which to move, from the next gradient."""
+        self._steps += 1
+        self._mean, self._square, spread = adam(gradient, self._mean, self._square, self._steps)
+        return self._mean / (1 - BETA1**self._steps) / spread

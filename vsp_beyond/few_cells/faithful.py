@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, score, visited_states, warn_outside
+from vsp.rollouts import Policy, rollout, visited_states
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
@@ -23,8 +23,8 @@ from .anneal import squared_error
 from .config import Faithful, check_kind
 from .population import rollout_population
 from .search import least_error, moves, spread, uncorrelated
-from .tune import cma_es, is_snapshot
-from .units import Cells, LabelledStates, Scaling
+from .tune import cma_es, is_snapshot, score
+from .units import Cells, LabelledStates, Scaling, warn_outside
 
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # states on which the error of a candidate is measured

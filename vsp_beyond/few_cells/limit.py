@@ -13,7 +13,7 @@ import numpy as np
 
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, score
+from vsp.rollouts import Policy, rollout
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task, task_names
 from vsp.teachers.teacher import load_teacher
@@ -21,6 +21,7 @@ from vsp.teachers.teacher import load_teacher
 from ..optimum.references import TASKS, best_policy
 from .config import Tuned, faithful_preset, tuned_preset
 from .faithful import distill_faithfully
+from .tune import score
 from .tuned import distill_tuned
 
 VERSION = 2  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this

@@ -10,12 +10,13 @@ import pandas as pd
 from vsp.checks import check_array, check_count, check_number, check_seed
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, score, visited_states
+from vsp.rollouts import Policy, rollout, visited_states
 from vsp.run.progress import progress
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
 from .config import Tuned, check_kind
+from .tune import score
 from .tuned import distill_tuned
 
 N_VISITED = 100  # episodes that show where the states lie

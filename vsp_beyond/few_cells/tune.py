@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsp.rollouts import Outcomes, rollout, score
+from vsp.rollouts import Outcomes, rollout
 from vsp.tasks.base import GOAL
 
 from .anneal import squared_error
@@ -87,3 +87,11 @@ def is_snapshot(i: int, n: int, n_snapshots: int) -> bool:
 def candidates_per_generation(n: int) -> int:
     """Return the default number of candidates in a generation of CMA-ES for n numbers (Hansen 2016, table 1)."""
     return 4 + int(3 * np.log(n))
+
+
+def score(result: Outcomes, failure_penalty: float) -> float:
+    """Return the mean return minus `failure_penalty` times the share of failed episodes.
+
+    In a task without a goal the penalty is the same for all policies, so it changes no comparison.
+    """
+    return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))

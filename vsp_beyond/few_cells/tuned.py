@@ -14,14 +14,14 @@ from threadpoolctl import threadpool_limits
 
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, visited_states, warn_outside
+from vsp.rollouts import Policy, visited_states
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
 from .config import Tuned, check_kind
 from .tune import Candidates, Objective, tune
-from .units import METRIC, Scaling
+from .units import METRIC, Scaling, warn_outside
 
 
 @threadpool_limits.wrap(limits=1)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -162,3 +163,16 @@ class LabelledStates:
             return lambda: rng.integers(n, size=size)
         edges = np.cumsum(self.criticality / self.criticality.sum())
         return lambda: np.minimum(edges.searchsorted(rng.random(size), side="right"), n - 1)
+
+
+def warn_outside(task: Task, states: np.ndarray) -> None:
+    """Warn if observations (t, d) leave the box that the task declares: how many, and which variable leaves it most."""
+    beyond = np.maximum(task.low - states, states - task.high)
+    outside = (beyond > 1e-6 * (1.0 + np.abs(states))).any(axis=1)  # float32 rounds
+    if outside.any():
+        row, j = np.unravel_index(beyond.argmax(), beyond.shape)
+        warnings.warn(
+            f"{outside.sum():,} of {len(states):,} observations leave the box of {task.name}, such as "
+            f"{task.inputs[j]} = {states[row, j]:.6g}, declared from {task.low[j]:g} to {task.high[j]:g}",
+            stacklevel=5,  # the caller of `vsp.distill`
+        )
