@@ -30,6 +30,7 @@ IMITATIONS = {
     "small network": "small network, DAgger",
     "one linear map": "one linear map",
 }
+COSTED = (OURS, "oblique tree, linear", "small network", "one linear map")  # of these, costs are told
 SOURCES = ("methods", "tuned", "apart", "faithful", "demanded")  # tables that hold all methods of the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
@@ -60,7 +61,7 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first.
 
-    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
+    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean,
     low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
     method of size 1 is one linear map. Sizes without rivals are left out.
     """
@@ -71,7 +72,7 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
             tuned, cells = f"{untuned}, tuned", 0 if name == "one linear map" else size
             if (size == 1) != (cells == 0) or (tuned, cells) not in table.index:
                 continue
-            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies", "parameters"]]}
+            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies"]]}
             for prefix, method in (("", tuned), ("untuned ", untuned)):
                 scores = table.loc[method, cells].to_dict() | {"r2": r2[method, cells]}
                 row |= {prefix + column: scores[column] for column in COLUMNS}
@@ -98,19 +99,16 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 
 def possible(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the medians over seeds for the plot of return against fidelity, one row per method and size."""
-    return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "cells", "parameters"]].median().reset_index()
+    return frame.groupby(["method", "size"], sort=False)[["mean", "r2"]].median().reset_index()
 
 
 def tail(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the worst returns beside the mean, one row per method and size of `all_rows` that has them.
 
-    Columns: method, size, policies; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and
-    failing, each as a mean over the seeds; worst_least (the lowest `worst` of any seed).
+    Columns: method, size; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and failing, each
+    as a mean over the seeds.
     """
-    by_kind = frame[frame["worst"].notna()].groupby(["method", "size"])
-    table = by_kind[["mean", "worst", "failing"]].mean()
-    table.insert(0, "policies", by_kind.size())
-    table["worst_least"] = by_kind["worst"].min()
+    table = frame[frame["worst"].notna()].groupby(["method", "size"])[["mean", "worst", "failing"]].mean()
     names = {f"{untuned}, tuned": f"{name}, tuned" for name, untuned in IMITATIONS.items()}
     table = table.rename(index=names | {"faithful": f"{OURS}, faithful"})
     return table.sort_values("mean", ascending=False, kind="stable").reset_index()
@@ -130,22 +128,19 @@ def fit_and_geometry(task: str) -> pd.DataFrame:
 def budgets(task: str) -> pd.DataFrame:
     """Count the episodes of every kind that a policy of the preset's size needs, and its seconds on one core.
 
-    One row per method. Columns: method, size; numbers of episodes: teacher (played by the teacher), correction (played
-    by the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the
-    seeds); steps (of the teacher's training, only in its row, the first). Faithful policies are tuned only if they
-    return too little, so their tuning episodes are an upper bound.
+    One row per method of `COSTED`, the faithful one first. Columns: method, size; numbers of episodes: teacher (played
+    by the teacher), correction (played by the policy, labelled by the teacher), tuning and validation (played by
+    candidates); seconds (median over the seeds). Faithful policies are tuned only if they return too little, so their
+    tuning episodes are an upper bound.
     """
-    config, close = tuned_preset(task), faithful_preset(task)
-    seconds = _seconds(task)
-    rows = [{"method": "teacher", "steps": load_teacher(task).card["recipe"]["steps"]}]
-    cost = {**_of_faithful(close, task), "seconds": seconds.get(("faithful", close.n_cells))}
-    rows.append({"method": f"{OURS}, faithful", "size": close.n_cells, **cost})
-    for name, untuned in IMITATIONS.items():
-        size = 0 if name == "one linear map" else config.n_cells
-        for suffix in ("", ", tuned"):
-            if (method := untuned + suffix, size) in seconds:
-                cost = {**episodes(name, config, task, tuned=bool(suffix)), "seconds": seconds[method, size]}
-                rows.append({"method": name + suffix, "size": size or 1, **cost})
+    config, close, seconds = tuned_preset(task), faithful_preset(task), _seconds(task)
+    cost = {**_of_faithful(close, task), "seconds": seconds["faithful", close.n_cells]}
+    rows = [{"method": f"{OURS}, faithful", "size": close.n_cells, **cost}]
+    for name in COSTED:
+        method, size = f"{IMITATIONS[name]}, tuned", 0 if name == "one linear map" else config.n_cells
+        if (method, size) in seconds:
+            cost = {**episodes(name, config, task), "seconds": seconds[method, size]}
+            rows.append({"method": f"{name}, tuned", "size": size or 1, **cost})
     return pd.DataFrame(rows)
 
 
@@ -156,8 +151,8 @@ def _seconds(task: str) -> pd.Series:
     return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
 
 
-def episodes(name: str, config: Tuned, task: str, *, tuned: bool) -> dict[str, int]:
-    """Count the episodes of a method of `IMITATIONS` with the settings `config`, with or without tuning.
+def episodes(name: str, config: Tuned, task: str) -> dict[str, int]:
+    """Count the episodes of a method of `COSTED` with the settings `config`, tuning included.
 
     Keys: teacher, correction, tuning, validation.
     """
@@ -165,14 +160,14 @@ def episodes(name: str, config: Tuned, task: str, *, tuned: bool) -> dict[str, i
         rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
     else:
         method = METHODS[IMITATIONS[name]]
-        rounds, restarts = method.settings.get("rounds", 0), config.n_restarts if "n_restarts" in method.reads else 1
-        candidates = rounds + restarts + tuned
+        rounds = method.settings.get("rounds", 0)
+        candidates = rounds + (config.n_restarts if "n_restarts" in method.reads else 1) + 1
     n = config.n_corrections * config.n_correction_episodes
     return {
         "teacher": config.n_episodes + (0 if rounds else n),
         "correction": n if rounds else 0,
-        "tuning": _tuning(config, _tuned_numbers(name, config.n_cells, task)) if tuned else 0,
-        "validation": (candidates + min(tune.SNAPSHOTS, config.n_generations) * tuned) * config.n_validation,
+        "tuning": _tuning(config, _tuned_numbers(name, config.n_cells, task)),
+        "validation": (candidates + min(tune.SNAPSHOTS, config.n_generations)) * config.n_validation,
     }
 
 
@@ -191,16 +186,12 @@ def _tuning(config: Tuned | Faithful, numbers: int) -> int:
 
 
 def _tuned_numbers(name: str, k: int, task: str) -> int:
-    """Return how many numbers are tuned in a method of `IMITATIONS` with k cells or leaves."""
+    """Return how many numbers are tuned in a method of `COSTED` with k cells or leaves."""
     about = get_task(task)
     d, m = len(about.low), len(about.action_low)
     maps, units = k * (d + 1) * m, units_for(numbers_of(k, about), about)
     return {
         OURS: k * d + maps,
-        "k-means cells": k * d + maps,
-        "axis tree, constants": k - 1 + k * m,
-        "axis tree, linear": k - 1 + maps,
-        "oblique tree, constants": (k - 1) * (d + 1) + k * m,
         "oblique tree, linear": (k - 1) * (d + 1) + maps,
         "small network": (d + 1) * units + (units + 1) * m,
         "one linear map": (d + 1) * m,

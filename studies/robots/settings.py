@@ -26,7 +26,7 @@ class Walking:
     n_states: int = 30_000
     # Descents from different random initial cells in the first round; the closest imitation is kept.
     n_restarts: int = 8
-    # Episodes over which policies are compared; the best are compared again over more (`choice`).
+    # Episodes over which policies are compared; the best are compared again over more (`most_rewarding`).
     n_validation: int = 20
     # Steps for which TD3 continues, with the cells as its actor.
     n_steps: int = 320_000
@@ -63,7 +63,7 @@ _WALKING = {
 }
 
 
-    # Return the settings for a robot, eight cells; other tasks get those of HalfCheetah. Raises ValueError as
-    # `get_task` does.
 def walking_preset(task: str | Task) -> Walking:
+    """Return the settings for a robot, eight cells; other tasks get those of HalfCheetah. Raises ValueError as
+    `get_task` does."""
     return _WALKING.get(get_task(task).name, Walking(n_cells=8))

@@ -75,7 +75,7 @@ def save_gait(
 
 
 def _frames(gait: pd.DataFrame, step_seconds: float, quick: bool) -> list[Image.Image]:
-    """Draw each step. The first image has all colours, in its legend and bands, so all share its palette."""
+    """Draw each step."""
     fig, (body, below) = style.panels(2, rows=2, width=6.0, height=2.8, dpi=120, height_ratios=(2, 1))
     plt.close(fig)  # only pyplot drops it, so that no notebook displays it by itself
     lines, colors = body_lines(gait), cell_colors(gait)
@@ -101,6 +101,6 @@ def _frames(gait: pd.DataFrame, step_seconds: float, quick: bool) -> list[Image.
         now.set_xdata(2 * [step_seconds * (step + 0.5)])
         canvas.draw()
         fig.set_layout_engine("none")  # the layout of the first step stays
-        image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-        images.append(image.quantize(palette=images[0] if images else image.quantize(128), dither=Image.Dither.NONE))
-    return images
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    palette = images[0].quantize(256, Image.Quantize.MAXCOVERAGE)  # the first image has all colours, in its legend
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 from studies.rivals import tdavq
 from studies.rivals.tdavq import DiscretePolicy, ParallelEpisodes, learn, merge, split, update
@@ -57,12 +57,6 @@ def test_a_merge_by_hand():
     assert len(one) == 1
 
 
-def test_like_values_with_another_best_action_stay():
-    policy = policy_of([[0, 0], [1, 0]], [[1, 0.9], [0.9, 1]])
-    merge(policy, 0.5)
-    assert len(policy) == 2
-
-
 def test_a_new_episode_begins_where_one_ends():
     episodes = ParallelEpisodes(get_task(SIMPLEGOAL), np.random.default_rng(0))
     episodes.states[:3] = [[0.15, 0.15], [0.35, 0.35], [0.8, 0.8]]
@@ -93,20 +87,3 @@ def test_it_learns_to_walk_around_the_pit(learned):
 def test_codewords_keep_their_distance(learned):
     gaps = np.linalg.norm(learned.codewords[:, None] - learned.codewords, axis=2)[np.triu_indices(len(learned), 1)]
     assert gaps.min() >= 0.06 and 20 < len(learned) == len(learned.values) and learned.values.shape[1] == 9
-
-
-def test_a_larger_distance_gives_fewer_cells_and_a_discount_lower_values(learned):
-    coarse = learn(SIMPLEGOAL, seed=0, n_steps=4000, min_distance=0.15, likeness=1.0, discount=0.95)
-    assert 3 < len(coarse) < 0.5 * len(learned)
-    near = learn(SIMPLEGOAL, seed=0, n_steps=500, discount=0.5)
-    assert near.values.max() < 12 < learn(SIMPLEGOAL, seed=0, n_steps=500).values.max()
-
-
-def test_tasks_with_other_observations_than_states():
-    policy = learn(PENDULUM, seed=0, n_steps=200)
-    assert policy.codewords.shape[1] == 3 and np.allclose(np.hypot(*policy.codewords.T[:2]), 1)
-
-
-def test_faults():
-    with pytest.raises(ValueError, match="LunarLanderContinuous-v3 has a physics engine"):
-        learn(LUNARLANDER, seed=0)
