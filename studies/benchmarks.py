@@ -29,10 +29,7 @@ N_CODEWORDS = 100
 DELAUNAY_UP_TO = 8  # dimensions; with 11 Qhull takes minutes, and gigabytes of memory
 N_STATES = 1000  # looked up at once, as in an evaluation of 1000 episodes
 FIT = {"dimensions": 17, "cells": 8, "states": 32_768}  # those of HalfCheetah; one of these varies at a time
-VARIED = {
-    "dimensions": (2, 4, 8, 17, 32, 64), "cells": (1, 2, 4, 8, 16, 32, 64), "states": (1024, 4096, 16_384, 65_536),
-}  # fmt: skip
-N_ACTIONS = 6
+VARIED = {"dimensions": (2, 64), "cells": (1, 64), "states": (1024, 65_536)}
 
 
 def nearest_by_product(codewords: np.ndarray, states: np.ndarray) -> np.ndarray:
@@ -73,7 +70,7 @@ def evaluations() -> Iterator[tuple[dict, Callable[[], object]]]:
             size = FIT | {varied: value}
             (d, k, n), rng = size.values(), np.random.default_rng(0)
             inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
-            cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
+            cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, 6)) / np.sqrt(d + 1))
             labelled = LabelledStates(inputs, np.clip(inputs @ cells.coefficients[0], -1.0, 1.0))
             about = {"temperature": TEMPERATURES[stage] * d, "clip_slope": CLIP_SLOPES[stage]}
             yield {"varied": varied, **size}, partial(whole_loss, cells, labelled, **about)

@@ -13,11 +13,9 @@ from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 
 from ..results import read_results
-from ..rivals.small_network import units_for
-from .makers import numbers_of
 from .measure import ERROR_SEED, N_ERROR
-from .methods import LONG, METHODS, TABLES
-from .summary import INTERVAL, OURS, ahead, method_summary, read_rows
+from .methods import LONG, TABLES
+from .summary import INTERVAL, OURS, TUNED, ahead, method_summary, read_rows
 
 # By the name in tables: the untuned method; the same method tuned is "..., tuned"
 IMITATIONS = {
@@ -30,7 +28,7 @@ IMITATIONS = {
     "small network": "small network, DAgger",
     "one linear map": "one linear map",
 }
-COSTED = (OURS, "oblique tree, linear", "small network", "one linear map")  # of these, costs are told
+ONE_MAP = "one linear map, tuned"
 SOURCES = ("methods", "tuned", "apart", "faithful", "demanded")  # tables that hold all methods of the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
@@ -126,73 +124,40 @@ def fit_and_geometry(task: str) -> pd.DataFrame:
 
 
 def budgets(task: str) -> pd.DataFrame:
-    """Count the episodes of every kind that a policy of the preset's size needs, and its seconds on one core.
+    """Count the episodes of every kind that our policies and one tuned linear map need, and their seconds on one core.
 
-    One row per method of `COSTED`, the faithful one first. Columns: method, size; numbers of episodes: teacher (played
-    by the teacher), correction (played by the policy, labelled by the teacher), tuning and validation (played by
-    candidates); seconds (median over the seeds). Faithful policies are tuned only if they return too little, so their
-    tuning episodes are an upper bound.
+    Columns: method, size (the preset's); numbers of episodes: teacher (played by the teacher), correction (played by
+    the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the seeds).
+    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound.
     """
-    config, close, seconds = tuned_preset(task), faithful_preset(task), _seconds(task)
-    cost = {**_of_faithful(close, task), "seconds": seconds["faithful", close.n_cells]}
-    rows = [{"method": f"{OURS}, faithful", "size": close.n_cells, **cost}]
-    for name in COSTED:
-        method, size = f"{IMITATIONS[name]}, tuned", 0 if name == "one linear map" else config.n_cells
-        if (method, size) in seconds:
-            cost = {**episodes(name, config, task), "seconds": seconds[method, size]}
-            rows.append({"method": f"{name}, tuned", "size": size or 1, **cost})
-    return pd.DataFrame(rows)
-
-
-def _seconds(task: str) -> pd.Series:
-    """Return the median seconds by method and size, from all committed tables of times."""
     long = "_long" * (task in LONG)
-    frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
-    return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
+    times = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
+    seconds = times[times["task"] == task].groupby(["method", "size"])["seconds"].median()
+    close, config = faithful_preset(task), tuned_preset(task)
+    sizes = {"faithful": close.n_cells, TUNED: config.n_cells, ONE_MAP: 0}
+    return pd.DataFrame([
+        {"method": f"{OURS}, faithful" if method == "faithful" else method, "size": size or 1}
+        | episodes(method, close if method == "faithful" else config, task) | {"seconds": seconds[method, size]}
+        for method, size in sizes.items()
+    ])  # fmt: skip
 
 
-def episodes(name: str, config: Tuned, task: str) -> dict[str, int]:
-    """Count the episodes of a method of `COSTED` with the settings `config`, tuning included.
-
-    Keys: teacher, correction, tuning, validation.
-    """
-    if name == OURS:  # the first candidate of `distill_tuned` is one linear map
-        rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
+def episodes(method: str, config: Tuned | Faithful, task: str) -> dict[str, int]:
+    """Count the episodes of "faithful", `TUNED` or `ONE_MAP` with the settings `config`, by kind."""
+    k, d, m = config.n_cells, len(get_task(task).low), len(get_task(task).action_low)
+    numbers = (d + 1) * m if method == ONE_MAP else k * d + k * (d + 1) * m
+    # CMA-ES chooses the number of candidates by that of the numbers it tunes
+    tuning = config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
+    if isinstance(config, Faithful):
+        by_teacher = config.n_episodes + config.n_validation + faithful.POOL * config.n_tuning_episodes
+        labelled, candidates = 0, 1 + faithful.SNAPSHOTS
     else:
-        method = METHODS[IMITATIONS[name]]
-        rounds = method.settings.get("rounds", 0)
-        candidates = rounds + (config.n_restarts if "n_restarts" in method.reads else 1) + 1
-    n = config.n_corrections * config.n_correction_episodes
-    return {
-        "teacher": config.n_episodes + (0 if rounds else n),
-        "correction": n if rounds else 0,
-        "tuning": _tuning(config, _tuned_numbers(name, config.n_cells, task)),
-        "validation": (candidates + min(tune.SNAPSHOTS, config.n_generations)) * config.n_validation,
-    }
-
-
-def _of_faithful(config: Faithful, task: str) -> dict[str, int]:
-    return {
-        "teacher": config.n_episodes + config.n_validation + faithful.POOL * config.n_tuning_episodes,
-        "correction": 0,
-        "tuning": _tuning(config, _tuned_numbers(OURS, config.n_cells, task)),
-        "validation": (1 + faithful.SNAPSHOTS) * config.n_validation,
-    }
-
-
-def _tuning(config: Tuned | Faithful, numbers: int) -> int:
-    """Count the episodes of all generations. CMA-ES chooses the number of candidates by that of the tuned `numbers`."""
-    return config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
-
-
-def _tuned_numbers(name: str, k: int, task: str) -> int:
-    """Return how many numbers are tuned in a method of `COSTED` with k cells or leaves."""
-    about = get_task(task)
-    d, m = len(about.low), len(about.action_low)
-    maps, units = k * (d + 1) * m, units_for(numbers_of(k, about), about)
-    return {
-        OURS: k * d + maps,
-        "oblique tree, linear": (k - 1) * (d + 1) + maps,
-        "small network": (d + 1) * units + (units + 1) * m,
-        "one linear map": (d + 1) * m,
-    }[name]
+        labels = config.n_corrections * config.n_correction_episodes
+        snapshots = min(tune.SNAPSHOTS, config.n_generations)
+        if method == ONE_MAP:
+            by_teacher, labelled, candidates = config.n_episodes + labels, 0, 2 + snapshots
+        else:  # the first candidate of `distill_tuned` is one linear map
+            by_teacher, labelled = config.n_episodes, labels
+            candidates = 1 + config.n_restarts + config.n_corrections + snapshots
+    validation = candidates * config.n_validation
+    return {"teacher": by_teacher, "correction": labelled, "tuning": tuning, "validation": validation}

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from vsp import Policy, Task, VoronoiPolicy, agent, visited_states
-from vsp.paper.baselines import Tree, kmeans_cells, linear_map, rule_of_thumb
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map
 from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit
@@ -81,7 +81,7 @@ FITS: dict[str, Callable[..., Policy]] = {
         x, y, leaves=size, task=task, seed=seed, constant=True
     ),
     "small network": lambda x, y, size, task, seed: SmallNetwork(
-        x, y, units=units_for(numbers_of(size, task), task), task=task, seed=seed
+        x, y, units=units_for(size, task), task=task, seed=seed
     ),
     "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
     "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
@@ -116,12 +116,6 @@ def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., 
     return tuned(start, budget.teacher, budget.task, budget.config, seed)
 
 
-def numbers_of(cells: int, task: Task) -> int:
-    """Return how many numbers a policy of `cells` Voronoi cells with linear maps has."""
-    d, m = len(task.low), len(task.action_low)
-    return cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
-
-
 def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts: int) -> Policy:
     seeds = range(n_restarts * seed, n_restarts * (seed + 1))
     fits = [partial(fit, size=size, task=budget.task, seed=restart) for restart in seeds]
@@ -134,11 +128,6 @@ def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts
 def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """Return the teacher itself."""
     return budget.teacher
-
-
-def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
-    """Return the rule of thumb that a person would write down for the task."""
-    return rule_of_thumb(budget.task.name)[1]
 
 
 def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:

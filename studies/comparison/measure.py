@@ -29,11 +29,6 @@ def settings(*, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
     return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
 
 
-def common() -> dict:
-    """Return the additional settings that determine the numbers of `fidelity`, as JSON-able values."""
-    return {"states": N_COMMON}
-
-
 def measure(
     policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
 ) -> dict[str, float]:

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 from vsp import Policy
-from vsp.paper import printed
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import limit
 
@@ -104,7 +103,6 @@ METHODS = {
     "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
     "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
     "one linear map": _uncorrected("one map", FOUND),
-    "rule of thumb": Method(makers.by_thumb, sizes=FOUND, chance=False, tasks=printed.TASKS),
     "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=TASKS[:1]),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
@@ -186,7 +184,6 @@ class Table:
     methods: tuple[str, ...] = ()  # empty: the methods whose table it is
     sizes: tuple[int, ...] = ()  # only these sizes; empty: all sizes of a method
     agents: tuple[int, ...] = (0,)  # teachers: 0 is the shipped one, the others are those of `further_teachers`
-    at_preset: bool = False  # only the preset's size
     tail: bool = False  # measure the worst returns too
     keeps: str = ""  # the method whose policy of the preset's size and of the first seed is kept
 
@@ -199,7 +196,10 @@ _SMALL = {
     "apart": Table(range(5)),
     "demanded": Table(range(2)),
     "teachers": Table(
-        range(5), methods=("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP), agents=(1, 2), at_preset=True
+        range(5),
+        methods=("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP),
+        agents=(1, 2),
+        sizes=FOUND + OF_PRESET,
     ),
     "limit": Table(fewer=range(3), keeps="at the limit"),
 }
@@ -231,6 +231,6 @@ def methods_of(task: str, table: str) -> dict[str, Method]:
 
 def sizes_of(task: str, method: Method, table: Table) -> tuple[int, ...]:
     """Return the sizes at which `table` has a method."""
-    if method.sizes == OF_PRESET or table.at_preset and method.sizes != FOUND:
+    if OF_PRESET[0] in method.sizes + table.sizes and method.sizes != FOUND:
         return (PRESETS[method.preset](task).n_cells,)
     return tuple(size for size in method.sizes if size in (table.sizes or method.sizes))

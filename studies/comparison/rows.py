@@ -40,7 +40,6 @@ GAIT, GAIT_VERSION = {"start": 0.0, "n_steps": 200}, 2  # raise the version when
 OPTIMUM_VERSION = 1  # raise it when the best policies give different returns
 # Tasks, and how much finer the grid is; the difference between two returns of a task shows the grid's error
 WAYS = ((optimum.TASKS[0], 1.0), *((task, finer) for task in optimum.TASKS[1:] for finer in (1.0, 2.0)))
-CLOSED = "closed form"
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class Job:
         about: dict = {"task": self.task, "method": FORMER_NAMES.get(self.method, self.method), "size": self.size}
         about["settings"] = {name: getattr(config, name) for name in how.reads} | how.settings
         about["measure"] = measure.settings(tail=self.tail, whole=self.whole, seed=self.start_seed)
-        about["measure"] |= measure.common() if how.preset in ALIKE else {}
+        about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
@@ -237,8 +236,8 @@ def _keep(policy: VoronoiPolicy, path: Path, made_with: dict) -> None:
 def best_returns() -> pd.DataFrame:
     """Return the returns of the best policies, one row per task and way to find them. A task's last row is its best.
 
-    Columns: task, found (how: `CLOSED`, or the points of the grid), mean, worst, failing (share of the episodes that
-    miss the goal; NaN for a task without a goal), longest (steps), and the provenance. Takes about five minutes.
+    Columns: task, found (how: "closed form", or the points of the grid), mean, worst, failing (share of the episodes
+    that miss the goal; NaN for a task without a goal), longest (steps), and the provenance. Takes about five minutes.
     """
     return pd.DataFrame([_best(*way) for way in progress(WAYS, "optimum", total=len(WAYS), unit="policies")])
 
@@ -251,7 +250,7 @@ def _best(name: str, finer: float) -> dict:
     if isinstance(policy, GridPolicy):
         returns, how = result.returns, "{} × {} points".format(*policy.grid.shape)
     else:
-        returns, how = optimum.best_returns(starts), CLOSED
+        returns, how = optimum.best_returns(starts), "closed form"
     failing = np.nan if name == "Pendulum-v1" else np.mean(result.outcomes != GOAL)  # nothing can fail there
     row = {"task": name, "found": how, "mean": returns.mean(), "worst": returns.min(), "failing": failing}
     return row | {"longest": result.lengths.max()} | best_provenance(name, finer)

@@ -30,17 +30,12 @@ AS_GOOD = {
 LEAST_R2 = {"SimpleGoal-v0": 0.95, "MountainCarContinuous-v0": 0.97, "Pendulum-v1": 0.95,
             "LunarLanderContinuous-v3": 0.9}  # fmt: skip
 SAME_CELLS = 0.9  # least median adjusted Rand index over pairs of seeds for cells to count as the same
-PARTS = {  # the tuned method, whole and with one part removed or changed
-    TUNED: "all parts",
-    "our cells, no annealing": "no annealing",
-    "our cells, one restart": "one restart",
-    "our cells, no correction": "no correction",
-    "our cells, no slope beyond the limits": "no slope beyond the limits",
-    OURS: "no tuning",
-    "our cells, no failure penalty": "no failure penalty",
-    "our cells, no teacher": "no teacher",
-    "our cells, weighted by criticality": "weighted by criticality",
-}
+# The tuned method, whole and with one part removed or changed
+PARTS = {TUNED: "all parts"} | {
+    OURS if part == "no tuning" else f"{OURS}, {part}": part
+    for part in ("no annealing", "one restart", "no correction", "no slope beyond the limits", "no tuning",
+                 "no failure penalty", "no teacher", "weighted by criticality")
+}  # fmt: skip
 
 
 def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "methods") -> pd.DataFrame:

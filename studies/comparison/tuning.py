@@ -28,12 +28,6 @@ class TreeNumbers:
     oblique: bool  # whether directions are tuned
     constant: bool  # whether leaves have only biases
 
-    @classmethod
-    def one_leaf(cls, maps: np.ndarray) -> TreeNumbers:
-        """Return a tree with one leaf, whose map is `maps` (1, d + 1, m)."""
-        d = maps.shape[1] - 1
-        return cls(np.zeros((1, 0)), np.zeros((0, d)), np.zeros(0), maps, oblique=False, constant=False)
-
     def __len__(self) -> int:
         return len(self.maps)
 
@@ -147,7 +141,8 @@ def in_units(policy: Fitted, frame: Scaling) -> tuple[Scaling, Numbers | Cells]:
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
     tunable = TunableFrame(frame.task, units.centre, units.scale)
     if isinstance(policy, VoronoiPolicy):
-        return tunable, TreeNumbers.one_leaf(tunable.cells(policy).coefficients)
+        maps, none, d = tunable.cells(policy).coefficients, np.zeros(0), len(frame.centre)
+        return tunable, TreeNumbers(none[None], np.zeros((0, d)), none, maps, oblique=False, constant=False)
     if isinstance(policy, Tree):
         return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):

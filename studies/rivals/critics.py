@@ -66,7 +66,8 @@ def trained(
     """Return `maps` (k, d + 1, m) after Adam on the squared error of the clipped action.
 
     `points` (n, d) lie in `cells` (n,) and are standardised, `actions` (n, m) in the units of the task. `rng` draws the
-    batches; the step size falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box would stop learning.
+    batches; the step size falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box
+    would stop learning.
     """
     half, adam = 0.5 * (task.action_high - task.action_low), Adam()
     inputs = np.column_stack([points, np.ones(len(points))])

@@ -57,6 +57,12 @@ def test_a_merge_by_hand():
     assert len(one) == 1
 
 
+def test_like_values_with_another_best_action_stay():
+    policy = policy_of([[0, 0], [1, 0]], [[1, 0.9], [0.9, 1]])
+    merge(policy, 0.5)
+    assert len(policy) == 2
+
+
 def test_a_new_episode_begins_where_one_ends():
     episodes = ParallelEpisodes(get_task(SIMPLEGOAL), np.random.default_rng(0))
     episodes.states[:3] = [[0.15, 0.15], [0.35, 0.35], [0.8, 0.8]]
@@ -87,3 +93,8 @@ def test_it_learns_to_walk_around_the_pit(learned):
 def test_codewords_keep_their_distance(learned):
     gaps = np.linalg.norm(learned.codewords[:, None] - learned.codewords, axis=2)[np.triu_indices(len(learned), 1)]
     assert gaps.min() >= 0.06 and 20 < len(learned) == len(learned.values) and learned.values.shape[1] == 9
+
+
+def test_tasks_with_other_observations_than_states():
+    policy = learn(PENDULUM, seed=0, n_steps=200)
+    assert policy.codewords.shape[1] == 3 and np.allclose(np.hypot(*policy.codewords.T[:2]), 1)
