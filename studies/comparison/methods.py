@@ -189,18 +189,14 @@ class Table:
 
 
 OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the closest rivals
+WITH_OTHERS = ("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP)  # the methods that distil other teachers
 _SMALL = {
     "methods": Table(),
     "tuned": Table(range(7)),
     "faithful": Table(fewer=range(6), keeps="faithful"),
     "apart": Table(range(5)),
     "demanded": Table(range(2)),
-    "teachers": Table(
-        range(5),
-        methods=("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP),
-        agents=(1, 2),
-        sizes=FOUND + OF_PRESET,
-    ),
+    "teachers": Table(range(5), methods=WITH_OTHERS, agents=(1, 2), sizes=FOUND + OF_PRESET),
     "limit": Table(fewer=range(3), keeps="at the limit"),
 }
 TABLES = {

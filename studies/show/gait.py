@@ -67,8 +67,7 @@ def save_gait(
     about, path = caption_of("figures", name), file_of("figures", name, out)
     frames, moving, still = _frames(gait, step_seconds, quick), path.with_suffix(".gif"), path.with_suffix(".png")
     with atomic.atomic_path(moving) as temporary:
-        duration = round(1000 * step_seconds)  # milliseconds per frame
-        frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=duration, loop=0)
+        frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=round(1000 * step_seconds), loop=0)
     with atomic.atomic_path(still) as temporary:
         frames[-1].save(temporary, optimize=True)
     return MovingPicture(still.read_bytes(), moving.read_bytes(), about)
@@ -103,4 +102,5 @@ def _frames(gait: pd.DataFrame, step_seconds: float, quick: bool) -> list[Image.
         fig.set_layout_engine("none")  # the layout of the first step stays
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
     palette = images[0].quantize(256, Image.Quantize.MAXCOVERAGE)  # the first image has all colours, in its legend
+    palette.putpalette([255 if value > 247 else value for value in palette.getpalette()])  # the background stays white
     return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
