@@ -51,7 +51,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
 .PHONY: help list quick paper-figures beyond-figures all lab runs study lookup proofs proofs-teacher course site test \
-  test-long lint test-site manifest lock clean bench beyond short-teachers beyond-long faults teachers begin \
+  test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
 # $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp was made with this QUICK, no file of INPUTS is newer,
@@ -97,6 +97,8 @@ study: begin venv ##- studies of the readings, the teachers and simpler policies
 	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions, into data/beyond/: 2 to 5 minutes
 	$(PY) -m studies.benchmarks --out="$$OUT"
+stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
+	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 proofs-teacher: begin venv ##- proofs for a network: an HOUR at most

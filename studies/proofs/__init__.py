@@ -1,1 +1,1 @@
-"""Proofs that only make committed tables: MountainCar over the real numbers, SimpleGoal's teacher, exact returns."""
+"""Proofs that only make committed tables: of SimpleGoal's teacher, and the exact returns of its pieces."""

@@ -41,7 +41,7 @@ def start(browser, address):
 
 
 def test_the_pages_that_are_promised_are_there():
-    notebooks = {f"notebooks/{path.stem}.html" for path in Path("figures/executed").glob("*.ipynb")}
+    notebooks = {f"notebooks/{path.stem}.html" for path in Path("figures").glob("**/executed/*.ipynb")}
     assert len(notebooks) >= 6 and notebooks | {"index.html", "course.html", "api.html", "search.html"} <= set(NAMES)
 
 

@@ -368,7 +368,7 @@ def audit_findings() -> list[Finding]:
 
 def in_doubt() -> set[str]:
     """Return the ids of the printed values that a contradiction puts in doubt."""
-    return {id for found in audit_findings() for id in found.concerns}
+    return {id for check in audit_findings() for id in check.concerns}
 
 
 def audit_table(findings: list[Finding]) -> pd.DataFrame:

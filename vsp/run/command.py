@@ -30,23 +30,24 @@ def jobs(text: str) -> int | str:
 
 
 @contextlib.contextmanager
-def in_one_line(what: str = "the command") -> Iterator[None]:
+def in_one_line(what: str = "") -> Iterator[None]:
     """End a command and its workers with a one-line message, without traceback, for errors that its user can fix.
 
     These are a damaged or missing file, a full or read-only disk, an interrupt or SIGTERM, and every `CommandError`.
-    `what` names the work.
+    `what` names the work, and precedes messages that do not name it.
     """
+    begin = f"error: {what}: " if what else "error: "
     signal.signal(signal.SIGTERM, _interrupt)  # all code that started kernels or workers then ends them
     try:
         yield
     except KeyboardInterrupt:
-        sys.exit(f"error: {what}: interrupted. Finished files stay on disk: run the same command to resume.")
+        sys.exit(f"{begin}interrupted. Finished files stay on disk: run the same command to resume.")
     except (CommandError, DamagedFile, MissingFile) as error:
         sys.exit(f"error: {error}")
     except OSError as error:
         if not (remedy := disk_remedy(error.errno)):
             raise
-        sys.exit(f"error: {what}: {error.filename2 or error.filename or 'a file'}: {error.strerror}: {remedy}")
+        sys.exit(f"{begin}{error.filename2 or error.filename or 'a file'}: {error.strerror}: {remedy}")
 
 
 def _interrupt(signum: int, frame: object) -> None:

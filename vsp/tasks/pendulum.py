@@ -18,9 +18,10 @@ def see(states: np.ndarray) -> np.ndarray:
     return np.column_stack([np.cos(angle), np.sin(angle), velocity])
 
 
-def signals(seen: np.ndarray) -> np.ndarray:
+def signals(observations: np.ndarray) -> np.ndarray:
     """Return the angle to upright (rad) and its change (rad/s). (..., 2)"""
-    return np.stack([-np.arctan2(seen[..., 1], seen[..., 0]), -seen[..., 2]], axis=-1)
+    cosine, sine, velocity = np.moveaxis(observations, -1, 0)
+    return np.stack([-np.arctan2(sine, cosine), -velocity], axis=-1)
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Our own methods: few cells that act like their teacher, or return much.
 
-`distill_tuned` optimises a few cells and their coefficients for the return, `search_limit` does so from the best
-policy. `distill_faithfully` optimises them for actions like the teacher's too. `simplify` reduces cells and numbers.
+`faithful.py` fits a few cells to the teacher's actions and return, `tuned.py` to the return alone, `limit.py` does so
+from the best policy. `simplification.py` reduces cells and numbers. The others hold what these share.
 """
 
 from .config import Faithful, Tuned, faithful_preset, tuned_preset

@@ -36,15 +36,17 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) 
     make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
     rows = []
     for (task, name), experiment in work.items():
-        own = rollout_from_seed(experiment.teacher, task, seed=EVALUATION_SEED).returns
+        teacher = rollout_from_seed(experiment.teacher, task, seed=EVALUATION_SEED).returns
         made_with = provenance_of(experiment)
-        about = {"task": task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"]}
-        about |= {"version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"]}
-        about |= {"linear_error": linear_error(experiment)}
+        about = {
+            "task": task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"],
+            "version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"],
+            "linear_error": linear_error(experiment),
+        }  # fmt: skip
         for run in load_runs(experiment, SEEDS, runs=runs):
             returns = run.outcomes.returns
-            scores = {"mean": returns.mean(), "std": returns.std(ddof=1), "teacher_mean": own.mean()}
-            scores["teacher_std"] = own.std(ddof=1)
+            scores = {"mean": returns.mean(), "std": returns.std(ddof=1)}
+            scores |= {"teacher_mean": teacher.mean(), "teacher_std": teacher.std(ddof=1)}
             shares = outcome_shares(run.outcomes.outcomes)
             rows.append({**about, "seed": run.seed, "cells": len(run.policy), **scores, **shares})
     return pd.DataFrame(rows)
