@@ -16,7 +16,6 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 import vsp
-from vsp.show.animation import write_gif
 
 TASK = "SimpleGoal-v0"
 PICTURE = Path(__file__).with_name("explorer.gif")
@@ -37,9 +36,10 @@ def main() -> None:
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         page.goto(path.as_uri())
         page.locator("canvas").wait_for()
-        images = [np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")) for shot in shots(page, policy)]
+        images = [Image.open(io.BytesIO(shot)).convert("RGB").quantize() for shot in shots(page, policy)]
         browser.close()
-    write_gif(PICTURE, images, step=STEP, hold=HOLD)
+    durations = [STEP] * (len(images) - 1) + [HOLD]
+    images[0].save(PICTURE, save_all=True, append_images=images[1:], duration=durations, loop=0)
 
 
 def shots(page: Page, policy: vsp.VoronoiPolicy) -> Iterator[bytes]:

@@ -24,15 +24,12 @@ from vsp_beyond.few_cells.units import Cells, LabelledStates
 
 from .results import write_results
 
-DIMENSIONS = (2, 3, 4, 6, 8, 11, 17)  # 8, 11 and 17 are those of LunarLander, Hopper and HalfCheetah
-CODEWORDS, OF_GRAPHS = (10, 30, 100, 300, 1000), 100
+DIMENSIONS = (2, 8, 17)  # 8 and 17 are those of LunarLander and HalfCheetah
+N_CODEWORDS = 100
 DELAUNAY_UP_TO = 8  # dimensions; with 11 Qhull takes minutes, and gigabytes of memory
 N_STATES = 1000  # looked up at once, as in an evaluation of 1000 episodes
 FIT = {"dimensions": 17, "cells": 8, "states": 32_768}  # those of HalfCheetah; one of these varies at a time
-VARIED = {
-    "dimensions": (2, 4, 8, 17, 32, 64), "cells": (1, 2, 4, 8, 16, 32, 64), "states": (1024, 4096, 16_384, 65_536),
-}  # fmt: skip
-N_ACTIONS = 6
+VARIED = {"dimensions": (2, 64), "cells": (1, 64), "states": (1024, 65_536)}
 
 
 def nearest_by_product(codewords: np.ndarray, states: np.ndarray) -> np.ndarray:
@@ -46,25 +43,23 @@ def nearest_by_product(codewords: np.ndarray, states: np.ndarray) -> np.ndarray:
 
 
 def look_ups() -> Iterator[tuple[dict, Callable[[], object]]]:
-    """Yield what is measured, and how: what ("look-up" or "graph"), d, method, k (codewords).
+    """Yield what is measured, and how: d, method, k (codewords).
 
-    A look-up is that of `N_STATES` states, including building the kd-tree.
+    A look-up (kd-tree, matrix product) is that of `N_STATES` states, including building the kd-tree. The others find
+    the neighbour graph of the codewords.
     """
     for d in DIMENSIONS:
-        states, low, high = np.random.default_rng(d).random((N_STATES, d)), np.zeros(d), np.ones(d)
-        for k in CODEWORDS:
-            codewords = np.random.default_rng([d, k]).random((k, d))
-            brute = partial(geometry.nearest, codewords, states, "euclidean", kdtree=False)
-            tree = partial(geometry.nearest, codewords, states, "euclidean", kdtree=True)
-            product = partial(nearest_by_product, codewords, states)
-            for method, look_up in (("cdist", brute), ("matrix product", product), ("kd-tree", tree)):
-                yield {"what": "look-up", "d": d, "method": method, "k": k}, look_up
-            if k == OF_GRAPHS and d <= DELAUNAY_UP_TO:
-                about = {"what": "graph", "d": d, "method": "Delaunay", "k": k}
-                yield about, partial(geometry.delaunay_neighbours, codewords)
-            if k == OF_GRAPHS:
-                about = {"what": "graph", "d": d, "method": "witnesses", "k": k}
-                yield about, partial(geometry.lookup_neighbours, codewords, low, high, "euclidean")
+        states = np.random.default_rng(d).random((N_STATES, d))
+        codewords = np.random.default_rng([d, N_CODEWORDS]).random((N_CODEWORDS, d))
+        ways: dict[str, Callable[[], object]] = {
+            "matrix product": partial(nearest_by_product, codewords, states),
+            "kd-tree": partial(geometry.nearest, codewords, states, "euclidean", kdtree=True),
+            "witnesses": partial(geometry.lookup_neighbours, codewords, np.zeros(d), np.ones(d), "euclidean"),
+        }
+        if d <= DELAUNAY_UP_TO:
+            ways["Delaunay"] = partial(geometry.delaunay_neighbours, codewords)
+        for method, work in ways.items():
+            yield {"d": d, "method": method, "k": N_CODEWORDS}, work
 
 
 def evaluations() -> Iterator[tuple[dict, Callable[[], object]]]:
@@ -75,7 +70,7 @@ def evaluations() -> Iterator[tuple[dict, Callable[[], object]]]:
             size = FIT | {varied: value}
             (d, k, n), rng = size.values(), np.random.default_rng(0)
             inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
-            cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, N_ACTIONS)) / np.sqrt(d + 1))
+            cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, 6)) / np.sqrt(d + 1))
             labelled = LabelledStates(inputs, np.clip(inputs @ cells.coefficients[0], -1.0, 1.0))
             about = {"temperature": TEMPERATURES[stage] * d, "clip_slope": CLIP_SLOPES[stage]}
             yield {"varied": varied, **size}, partial(whole_loss, cells, labelled, **about)

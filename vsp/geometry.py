@@ -15,7 +15,7 @@ from .checks import check_array, check_choice
 
 METRICS = {"manhattan": ("cityblock", 1), "euclidean": ("euclidean", 2), "chebyshev": ("chebyshev", np.inf)}
 LOOKUP = "manhattan"  # the distance that finds a state's cell
-KDTREE_FROM = 512  # codewords from which the kd-tree is faster in low dimensions; see `make lookup`
+KDTREE_FROM = 512  # codewords from which the kd-tree is faster in low dimensions; see tests/bench
 WITNESSES = 4096  # number of points that test which cells touch
 
 

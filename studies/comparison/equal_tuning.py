@@ -13,11 +13,9 @@ from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 
 from ..results import read_results
-from ..rivals.small_network import units_for
-from .makers import numbers_of
 from .measure import ERROR_SEED, N_ERROR
-from .methods import LONG, METHODS, TABLES
-from .summary import INTERVAL, OURS, ahead, method_summary, read_rows
+from .methods import LONG, TABLES
+from .summary import INTERVAL, OURS, TUNED, ahead, method_summary, read_rows
 
 # By the name in tables: the untuned method; the same method tuned is "..., tuned"
 IMITATIONS = {
@@ -30,6 +28,7 @@ IMITATIONS = {
     "small network": "small network, DAgger",
     "one linear map": "one linear map",
 }
+ONE_MAP = "one linear map, tuned"
 SOURCES = ("methods", "tuned", "apart", "faithful", "demanded")  # tables that hold all methods of the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
 COLUMNS = ("mean", "low", "high", "r2")
@@ -60,7 +59,7 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first.
 
-    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies, parameters; mean,
+    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean,
     low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
     method of size 1 is one linear map. Sizes without rivals are left out.
     """
@@ -71,7 +70,7 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
             tuned, cells = f"{untuned}, tuned", 0 if name == "one linear map" else size
             if (size == 1) != (cells == 0) or (tuned, cells) not in table.index:
                 continue
-            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies", "parameters"]]}
+            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies"]]}
             for prefix, method in (("", tuned), ("untuned ", untuned)):
                 scores = table.loc[method, cells].to_dict() | {"r2": r2[method, cells]}
                 row |= {prefix + column: scores[column] for column in COLUMNS}
@@ -98,19 +97,16 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 
 def possible(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the medians over seeds for the plot of return against fidelity, one row per method and size."""
-    return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "cells", "parameters"]].median().reset_index()
+    return frame.groupby(["method", "size"], sort=False)[["mean", "r2"]].median().reset_index()
 
 
 def tail(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the worst returns beside the mean, one row per method and size of `all_rows` that has them.
 
-    Columns: method, size, policies; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and
-    failing, each as a mean over the seeds; worst_least (the lowest `worst` of any seed).
+    Columns: method, size; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and failing, each
+    as a mean over the seeds.
     """
-    by_kind = frame[frame["worst"].notna()].groupby(["method", "size"])
-    table = by_kind[["mean", "worst", "failing"]].mean()
-    table.insert(0, "policies", by_kind.size())
-    table["worst_least"] = by_kind["worst"].min()
+    table = frame[frame["worst"].notna()].groupby(["method", "size"])[["mean", "worst", "failing"]].mean()
     names = {f"{untuned}, tuned": f"{name}, tuned" for name, untuned in IMITATIONS.items()}
     table = table.rename(index=names | {"faithful": f"{OURS}, faithful"})
     return table.sort_values("mean", ascending=False, kind="stable").reset_index()
@@ -128,80 +124,40 @@ def fit_and_geometry(task: str) -> pd.DataFrame:
 
 
 def budgets(task: str) -> pd.DataFrame:
-    """Count the episodes of every kind that a policy of the preset's size needs, and its seconds on one core.
+    """Count the episodes of every kind that our policies and one tuned linear map need, and their seconds on one core.
 
-    One row per method. Columns: method, size; numbers of episodes: teacher (played by the teacher), correction (played
-    by the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the
-    seeds); steps (of the teacher's training, only in its row, the first). Faithful policies are tuned only if they
-    return too little, so their tuning episodes are an upper bound.
+    Columns: method, size (the preset's); numbers of episodes: teacher (played by the teacher), correction (played by
+    the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the seeds).
+    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound.
     """
-    config, close = tuned_preset(task), faithful_preset(task)
-    seconds = _seconds(task)
-    rows = [{"method": "teacher", "steps": load_teacher(task).card["recipe"]["steps"]}]
-    cost = {**_of_faithful(close, task), "seconds": seconds.get(("faithful", close.n_cells))}
-    rows.append({"method": f"{OURS}, faithful", "size": close.n_cells, **cost})
-    for name, untuned in IMITATIONS.items():
-        size = 0 if name == "one linear map" else config.n_cells
-        for suffix in ("", ", tuned"):
-            if (method := untuned + suffix, size) in seconds:
-                cost = {**episodes(name, config, task, tuned=bool(suffix)), "seconds": seconds[method, size]}
-                rows.append({"method": name + suffix, "size": size or 1, **cost})
-    return pd.DataFrame(rows)
-
-
-def _seconds(task: str) -> pd.Series:
-    """Return the median seconds by method and size, from all committed tables of times."""
     long = "_long" * (task in LONG)
-    frame = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
-    return frame[frame["task"] == task].groupby(["method", "size"])["seconds"].median()
+    times = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
+    seconds = times[times["task"] == task].groupby(["method", "size"])["seconds"].median()
+    close, config = faithful_preset(task), tuned_preset(task)
+    sizes = {"faithful": close.n_cells, TUNED: config.n_cells, ONE_MAP: 0}
+    return pd.DataFrame([
+        {"method": f"{OURS}, faithful" if method == "faithful" else method, "size": size or 1}
+        | episodes(method, close if method == "faithful" else config, task) | {"seconds": seconds[method, size]}
+        for method, size in sizes.items()
+    ])  # fmt: skip
 
 
-def episodes(name: str, config: Tuned, task: str, *, tuned: bool) -> dict[str, int]:
-    """Count the episodes of a method of `IMITATIONS` with the settings `config`, with or without tuning.
-
-    Keys: teacher, correction, tuning, validation.
-    """
-    if name == OURS:  # the first candidate of `distill_tuned` is one linear map
-        rounds, candidates = config.n_corrections, 1 + config.n_restarts + config.n_corrections
+def episodes(method: str, config: Tuned | Faithful, task: str) -> dict[str, int]:
+    """Count the episodes of "faithful", `TUNED` or `ONE_MAP` with the settings `config`, by kind."""
+    k, d, m = config.n_cells, len(get_task(task).low), len(get_task(task).action_low)
+    numbers = (d + 1) * m if method == ONE_MAP else k * d + k * (d + 1) * m
+    # CMA-ES chooses the number of candidates by that of the numbers it tunes
+    tuning = config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
+    if isinstance(config, Faithful):
+        by_teacher = config.n_episodes + config.n_validation + faithful.POOL * config.n_tuning_episodes
+        labelled, candidates = 0, 1 + faithful.SNAPSHOTS
     else:
-        method = METHODS[IMITATIONS[name]]
-        rounds, restarts = method.settings.get("rounds", 0), config.n_restarts if "n_restarts" in method.reads else 1
-        candidates = rounds + restarts + tuned
-    n = config.n_corrections * config.n_correction_episodes
-    return {
-        "teacher": config.n_episodes + (0 if rounds else n),
-        "correction": n if rounds else 0,
-        "tuning": _tuning(config, _tuned_numbers(name, config.n_cells, task)) if tuned else 0,
-        "validation": (candidates + min(tune.SNAPSHOTS, config.n_generations) * tuned) * config.n_validation,
-    }
-
-
-def _of_faithful(config: Faithful, task: str) -> dict[str, int]:
-    return {
-        "teacher": config.n_episodes + config.n_validation + faithful.POOL * config.n_tuning_episodes,
-        "correction": 0,
-        "tuning": _tuning(config, _tuned_numbers(OURS, config.n_cells, task)),
-        "validation": (1 + faithful.SNAPSHOTS) * config.n_validation,
-    }
-
-
-def _tuning(config: Tuned | Faithful, numbers: int) -> int:
-    """Count the episodes of all generations. CMA-ES chooses the number of candidates by that of the tuned `numbers`."""
-    return config.n_generations * tune.candidates_per_generation(numbers) * config.n_tuning_episodes
-
-
-def _tuned_numbers(name: str, k: int, task: str) -> int:
-    """Return how many numbers are tuned in a method of `IMITATIONS` with k cells or leaves."""
-    about = get_task(task)
-    d, m = len(about.low), len(about.action_low)
-    maps, units = k * (d + 1) * m, units_for(numbers_of(k, about), about)
-    return {
-        OURS: k * d + maps,
-        "k-means cells": k * d + maps,
-        "axis tree, constants": k - 1 + k * m,
-        "axis tree, linear": k - 1 + maps,
-        "oblique tree, constants": (k - 1) * (d + 1) + k * m,
-        "oblique tree, linear": (k - 1) * (d + 1) + maps,
-        "small network": (d + 1) * units + (units + 1) * m,
-        "one linear map": (d + 1) * m,
-    }[name]
+        labels = config.n_corrections * config.n_correction_episodes
+        snapshots = min(tune.SNAPSHOTS, config.n_generations)
+        if method == ONE_MAP:
+            by_teacher, labelled, candidates = config.n_episodes + labels, 0, 2 + snapshots
+        else:  # the first candidate of `distill_tuned` is one linear map
+            by_teacher, labelled = config.n_episodes, labels
+            candidates = 1 + config.n_restarts + config.n_corrections + snapshots
+    validation = candidates * config.n_validation
+    return {"teacher": by_teacher, "correction": labelled, "tuning": tuning, "validation": validation}

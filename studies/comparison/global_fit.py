@@ -54,7 +54,7 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
     def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
         seeds = rng.integers(2**31, size=n).tolist()
         trees = [kind(states, actions, leaves=size, task=task, seed=s, cuts=FEW_CUTS) for s in seeds]
-        return [Tunable(*in_units(tree, frame), tree) for tree in trees]
+        return [Tunable(*in_units(tree, frame)) for tree in trees]
 
     def error(tree: Tunable) -> float:
         return action_error(tree, frame, states, actions)
@@ -106,7 +106,7 @@ def descend(
     numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
     for stage in stages:
         numbers = _cooler(labelled, numbers, unit, stage, n_iterations)
-    return Tunable(tree.frame, numbers, tree)
+    return Tunable(tree.frame, numbers)
 
 
 def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:

@@ -11,8 +11,6 @@ import os
 import numpy as np
 import pandas as pd
 
-from vsp.paper.statistics import share_interval
-
 from ..results import read_results
 from .methods import PRESETS
 from .summary import INTERVAL, TUNED, method_summary, read_rows, teacher_of
@@ -65,15 +63,13 @@ def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Data
 
     Columns: size, policies; mean, low and high (its 95 % interval), least (lowest mean return of a seed), regret (of
     the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the policies that are
-    at the limit), near_low and near_high (its 95 % interval).
+    at the limit).
     """
     rows = read_rows(task, folder, table="limit")
     by_size, is_near = rows.groupby("size"), rows["mean"] >= near(task, folder)
     table = method_summary(rows).set_index("size").sort_index()[["policies", *INTERVAL]]
     table = table.assign(least=by_size["mean"].min(), regret=best_mean(task, folder) - table["mean"])
     table = table.assign(failing=by_size["failing"].max(), near=is_near.groupby(rows["size"]).mean())
-    bounds = [share_interval(int(part.sum()), len(part)) for _, part in is_near.groupby(rows["size"])]
-    table[["near_low", "near_high"]] = bounds
     return table.reset_index()
 
 
@@ -94,11 +90,11 @@ def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     """Summarise the policies of a robot, one row per method and size, the teacher first.
 
     Columns: method, size, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return
-    of a seed), failing, share (mean divided by the teacher's mean return), r2 (the median) and parameters.
+    of a seed), failing, share (mean divided by the teacher's mean return), and r2 (the median).
     """
     rows, kind = read_rows(task, folder, table="robots"), ["method", "size"]
     teacher = rows.loc[rows["method"] == WALKER, "mean"].iloc[0]
     extremes = rows.groupby(kind).agg(least=("mean", "min"), most=("mean", "max"), r2=("r2", "median"))
     table = method_summary(rows).join(extremes, on=kind).assign(share=lambda means: means["mean"] / teacher)
-    columns = [*kind, "policies", *INTERVAL, "least", "most", "failing", "share", "r2", "parameters"]
+    columns = [*kind, "policies", *INTERVAL, "least", "most", "failing", "share", "r2"]
     return table.loc[(table["method"] != WALKER).sort_values(kind="stable").index, columns]

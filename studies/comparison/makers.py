@@ -14,25 +14,23 @@ from functools import partial
 
 import numpy as np
 
-from vsp import Policy, Task, VoronoiPolicy, visited_states
-from vsp.paper.baselines import Tree, kmeans_cells, linear_map, rule_of_thumb
+from vsp import Policy, Task, VoronoiPolicy, agent, visited_states
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map
 from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import LabelledStates, Scaling
+from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
 from ..rivals import tdavq
 from ..rivals.critics import advantage_weighted, critic_driven
 from ..rivals.dagger import dagger
-from ..rivals.hand_written import Heuristic, PumpAndBalance, ZeroPolicy
 from ..rivals.small_network import SmallNetwork, units_for
-from ..rivals.soft_tree import SoftTree
 from ..rivals.trees import LinearTree, ObliqueLinearTree
 from ..robots import Walking, imitate_pushed, search_one_map
 from ..robots.imitation import COOL
 from .global_fit import descend, global_cells, global_tree, greedy_cells
-from .tuning import in_units, tuned
+from .tuning import Numbers, in_units, tuned
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,8 @@ def our_cells(budget: Budget, size: int, seed: int, **changes) -> Policy:
 
 def no_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """Call `distill_tuned` with a teacher that does nothing, to see what tuning finds without one."""
-    return our_cells(replace(budget, teacher=ZeroPolicy(budget.task)), size, seed)
+    m = len(budget.task.action_low)
+    return our_cells(replace(budget, teacher=agent(lambda obs: np.zeros((len(obs), m)))), size, seed)
 
 
 def faithful(budget: Budget, size: int, seed: int, **changes) -> Policy:
@@ -82,9 +81,8 @@ FITS: dict[str, Callable[..., Policy]] = {
         x, y, leaves=size, task=task, seed=seed, constant=True
     ),
     "small network": lambda x, y, size, task, seed: SmallNetwork(
-        x, y, units=units_for(numbers_of(size, task), task), task=task, seed=seed
+        x, y, units=units_for(size, task), task=task, seed=seed
     ),
-    "soft tree": lambda x, y, size, task, seed: SoftTree(x, y, leaves=size, seed=seed),
     "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
     "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
     "global cells": global_cells,
@@ -108,7 +106,7 @@ def uncorrected(budget: Budget, size: int, seed: int, *, fit: str) -> Policy:
     """Call a fit of `FITS` or `CRITICS` on the teacher's own episodes."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    make = FITS.get(fit) or partial(_by_critics, CRITICS.get(fit), budget.teacher)
+    make = partial(CRITICS[fit], teacher=budget.teacher) if fit in CRITICS else FITS[fit]
     return _fitted(make, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
 
 
@@ -118,20 +116,10 @@ def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., 
     return tuned(start, budget.teacher, budget.task, budget.config, seed)
 
 
-def numbers_of(cells: int, task: Task) -> int:
-    """Return how many numbers a policy of `cells` Voronoi cells with linear maps has."""
-    d, m = len(task.low), len(task.action_low)
-    return cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
-
-
 def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts: int) -> Policy:
     seeds = range(n_restarts * seed, n_restarts * (seed + 1))
     fits = [partial(fit, size=size, task=budget.task, seed=restart) for restart in seeds]
     return dagger(fits, budget.teacher, budget.task, rounds=config, seed=seed)
-
-
-def _by_critics(fit, teacher: Policy, states, actions, *, size: int, task: Task, seed: int) -> Policy:
-    return fit(states, actions, cells=size, teacher=teacher, task=task, seed=seed)
 
 
 # Methods that find their own size
@@ -140,16 +128,6 @@ def _by_critics(fit, teacher: Policy, states, actions, *, size: int, task: Task,
 def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """Return the teacher itself."""
     return budget.teacher
-
-
-def by_thumb(budget: Budget, size: int, seed: int) -> Policy:
-    """Return the rule of thumb that a person would write down for the task."""
-    return rule_of_thumb(budget.task.name)[1]
-
-
-def by_hand(budget: Budget, size: int, seed: int) -> Policy:
-    """Return a hand-written controller."""
-    return {"Pendulum-v1": PumpAndBalance, "LunarLanderContinuous-v3": Heuristic}[budget.task.name]()
 
 
 def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
@@ -188,6 +166,7 @@ def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable
     start, task = imitation(budget, size, seed), budget.task
     states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
     frame = Scaling.of(task, states)
+    numbers: Numbers | Cells
     if isinstance(start, VoronoiPolicy):  # including a single cell
         frame = replace(frame, scale=start.scale)
         numbers = frame.cells(start)

@@ -13,12 +13,7 @@ import numpy as np
 import pandas as pd
 
 from vsp import Policy, Task, VoronoiPolicy, rollout, start_states, visited_states
-from vsp.paper.baselines import Tree
 from vsp.tasks.base import GOAL
-
-from ..rivals import tdavq
-from ..rivals.soft_tree import SoftTree
-from ..rivals.trees import LinearTree, ObliqueLinearTree
 
 VERSION = 1  # raise it when the same policy gives different numbers
 REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and for action errors
@@ -34,18 +29,13 @@ def settings(*, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
     return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
 
 
-def common() -> dict:
-    """Return the additional settings that determine the numbers of `fidelity`, as JSON-able values."""
-    return {"states": N_COMMON}
-
-
 def measure(
     policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
 ) -> dict[str, float]:
-    """Measure a policy: returns, action errors, size and cost.
+    """Measure a policy: returns, action errors and size.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none), parameters; with
+    teacher's states and in the policy's own), cells (or leaves; 0: none); with
     `tail`, worst (mean return of the worst episodes). Slow tasks are played from fewer starts; with
     `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
     returns.
@@ -59,7 +49,6 @@ def measure(
         "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
         "error_own": action_error(policy, teacher, task, starts, by=policy),
         "cells": len(policy) if hasattr(policy, "__len__") else 0,
-        "parameters": parameters_of(policy),
     }
     return row | ({"worst": worst(result.returns)} if tail else {})
 
@@ -127,24 +116,3 @@ def sameness(policies: dict[int, VoronoiPolicy], teacher: Policy, task: Task) ->
 
 def _rmse(actions: np.ndarray, others: np.ndarray) -> float:
     return float(np.sqrt(np.square(actions - others).mean()))
-
-
-def parameters_of(policy: Policy) -> int:
-    """Return how many numbers determine a policy's actions. An axis split has two, an oblique one d + 1."""
-    if isinstance(policy, VoronoiPolicy):
-        policy.check_linear()
-        k, d = policy.codewords.shape
-        units = d * bool((policy.scale != 1).any())  # states are divided by these numbers
-        return policy.coefficients.size + (k > 1) * (policy.codewords.size + units)
-    if isinstance(policy, tdavq.DiscretePolicy):  # its values do not count: they do not affect the actions
-        return policy.codewords.size + len(policy) * policy.actions.shape[1]
-    if isinstance(policy, Tree):
-        return len(policy) * policy.model.n_outputs_ + 2 * (len(policy) - 1)
-    if isinstance(policy, LinearTree):
-        rows, m = policy.maps.shape[1:]
-        return len(policy) * rows * m + (len(policy) - 1) * (rows if isinstance(policy, ObliqueLinearTree) else 2)
-    if isinstance(policy, SoftTree):
-        return policy.nodes.size + policy.values.size
-    if hasattr(policy, "PARAMETERS"):  # counted by hand
-        return policy.PARAMETERS
-    return sum(weights.size + biases.size for weights, biases in policy.layers)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from typing import Any
 
 from vsp import Policy
-from vsp.paper import printed
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import limit
 
@@ -20,9 +20,8 @@ from . import makers
 TASKS = ("SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1")
 LANDER, WALKER, CHEETAH = "LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5"
 LONG = (LANDER, WALKER, CHEETAH)  # rows take minutes to hours
-SIMPLEGOAL, MOUNTAINCAR, PENDULUM = ((task,) for task in TASKS)
 
-PRESETS = {
+PRESETS: dict[str, Callable[..., Any]] = {
     "tuned": tuned_preset, "faithful": faithful_preset, "limit": limit.limit_preset, "walking": walking_preset,
 }  # fmt: skip
 ALIKE = ("faithful", "walking")  # presets whose rows also measure `fidelity`
@@ -60,13 +59,13 @@ class Method:
     settings: dict = field(default_factory=dict)
     version: int = 1  # raise it when the same arguments give a different policy; tests/golden/methods.json checks this
     chance: bool = True  # whether the policy depends on the seed
-    tasks: tuple[str, ...] | None = None  # None: all tasks
+    tasks: tuple[str, ...] = ()  # empty: all tasks
     preset: str = "tuned"  # key of `PRESETS`
 
 
-def _corrected(fit: str, *, by_chance: bool = True, rounds: int = 5, **about) -> Method:
+def _corrected(fit: str, *, by_chance: bool = True, **about) -> Method:
     make = partial(makers.corrected, fit=fit, by_chance=by_chance)
-    return Method(make, EPISODES + ("n_restarts",) * by_chance, settings={"rounds": rounds}, **about)
+    return Method(make, EPISODES + ("n_restarts",) * by_chance, settings={"rounds": 5}, **about)
 
 
 def _uncorrected(fit: str, sizes: tuple[int, ...] = SIZES, **about) -> Method:
@@ -102,12 +101,9 @@ METHODS = {
     "CART, DAgger": _corrected("tree", by_chance=False),
     "CART, linear leaves, DAgger": _corrected("linear tree", by_chance=False),
     "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
-    "soft tree, DAgger": _corrected("soft tree", rounds=2, sizes=(2, 4, 8, 32)),  # powers of two
     "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
     "one linear map": _uncorrected("one map", FOUND),
-    "rule of thumb": Method(makers.by_thumb, sizes=FOUND, chance=False, tasks=printed.TASKS),
-    "heuristic": Method(makers.by_hand, sizes=FOUND, chance=False, tasks=(*PENDULUM, LANDER)),
-    "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=SIMPLEGOAL),
+    "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=TASKS[:1]),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
     "our cells, no correction": _without(n_corrections=0),
@@ -134,11 +130,11 @@ METHODS = {
         makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"
     ),
     "at the limit, from the teacher": Method(
-        partial(makers.limited, by_teacher=True), ALL, (3,), "starts", version=limit.VERSION, tasks=MOUNTAINCAR,
+        partial(makers.limited, by_teacher=True), ALL, (3,), "starts", version=limit.VERSION, tasks=TASKS[1:2],
         preset="limit",
     ),
     "our cells, 800 generations": Method(
-        makers.our_cells, ALL, (3,), "starts", {"n_generations": 800}, tasks=MOUNTAINCAR
+        makers.our_cells, ALL, (3,), "starts", {"n_generations": 800}, tasks=TASKS[1:2]
     ),
     # Robots: imitate the teacher, then continue training as its actor; and one linear map by returns alone
     "cells": (_cells := _robot(makers.robot_cells, OF_IMITATION, (1, 2, 4, 8, 16))),
@@ -185,24 +181,22 @@ class Table:
 
     seeds: range = range(20)
     fewer: range | None = None  # seeds of sizes other than the preset's; None: the same
-    methods: tuple[str, ...] | None = None  # None: the methods whose table it is
-    sizes: tuple[int, ...] | None = None  # only these sizes; None: all sizes of a method
+    methods: tuple[str, ...] = ()  # empty: the methods whose table it is
+    sizes: tuple[int, ...] = ()  # only these sizes; empty: all sizes of a method
     agents: tuple[int, ...] = (0,)  # teachers: 0 is the shipped one, the others are those of `further_teachers`
-    at_preset: bool = False  # only the preset's size
     tail: bool = False  # measure the worst returns too
-    keeps: str | None = None  # the method whose policy of the preset's size and of the first seed is kept
+    keeps: str = ""  # the method whose policy of the preset's size and of the first seed is kept
 
 
 OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the closest rivals
+WITH_OTHERS = ("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP)  # the methods that distil other teachers
 _SMALL = {
     "methods": Table(),
     "tuned": Table(range(7)),
     "faithful": Table(fewer=range(6), keeps="faithful"),
     "apart": Table(range(5)),
     "demanded": Table(range(2)),
-    "teachers": Table(
-        range(5), methods=("faithful", "teacher", "our cells, tuned", OBLIQUE, ONE_MAP), agents=(1, 2), at_preset=True
-    ),
+    "teachers": Table(range(5), methods=WITH_OTHERS, agents=(1, 2), sizes=FOUND + OF_PRESET),
     "limit": Table(fewer=range(3), keeps="at the limit"),
 }
 TABLES = {
@@ -228,11 +222,11 @@ TABLES = {
 def methods_of(task: str, table: str) -> dict[str, Method]:
     """Return the methods that have rows of `task` in `table`, by name."""
     names = TABLES[task][table].methods or [name for name, method in METHODS.items() if method.table == table]
-    return {name: METHODS[name] for name in names if METHODS[name].tasks is None or task in METHODS[name].tasks}
+    return {name: METHODS[name] for name in names if task in (METHODS[name].tasks or TABLES)}
 
 
 def sizes_of(task: str, method: Method, table: Table) -> tuple[int, ...]:
     """Return the sizes at which `table` has a method."""
-    if method.sizes == OF_PRESET or table.at_preset and method.sizes != FOUND:
+    if OF_PRESET[0] in method.sizes + table.sizes and method.sizes != FOUND:
         return (PRESETS[method.preset](task).n_cells,)
-    return tuple(size for size in method.sizes if table.sizes is None or size in table.sizes)
+    return tuple(size for size in method.sizes if size in (table.sizes or method.sizes))

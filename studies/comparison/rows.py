@@ -40,7 +40,6 @@ GAIT, GAIT_VERSION = {"start": 0.0, "n_steps": 200}, 2  # raise the version when
 OPTIMUM_VERSION = 1  # raise it when the best policies give different returns
 # Tasks, and how much finer the grid is; the difference between two returns of a task shows the grid's error
 WAYS = ((optimum.TASKS[0], 1.0), *((task, finer) for task in optimum.TASKS[1:] for finer in (1.0, 2.0)))
-CLOSED, WITHOUT_GOAL = "closed form", ("Pendulum-v1",)
 
 
 @dataclass(frozen=True)
@@ -75,10 +74,10 @@ class Job:
     def provenance(self) -> dict[str, str | int]:
         """What identifies the row besides its seed: settings (an id), teacher, version."""
         how, config = self.how, PRESETS[self.how.preset](self.task)
-        about = {"task": self.task, "method": FORMER_NAMES.get(self.method, self.method), "size": self.size}
+        about: dict = {"task": self.task, "method": FORMER_NAMES.get(self.method, self.method), "size": self.size}
         about["settings"] = {name: getattr(config, name) for name in how.reads} | how.settings
         about["measure"] = measure.settings(tail=self.tail, whole=self.whole, seed=self.start_seed)
-        about["measure"] |= measure.common() if how.preset in ALIKE else {}
+        about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
     def path(self, folder: str | os.PathLike) -> Path:
@@ -115,8 +114,8 @@ def jobs_of(task: str, table: str = "methods") -> list[Job]:
 
 def _seeds(task: str, table: str, method: Method, size: int) -> range:
     about = TABLES[task][table]
-    all_seeds = about.fewer is None or size in (*FOUND, PRESETS[method.preset](task).n_cells)
-    seeds = about.seeds if all_seeds else about.fewer
+    main = size in (*FOUND, PRESETS[method.preset](task).n_cells)
+    seeds = about.seeds if main or about.fewer is None else about.fewer
     return seeds if method.chance else seeds[:1]
 
 
@@ -174,6 +173,7 @@ def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[P
 
     The function takes the folder of the rows and OUT; the file goes to OUT/data/beyond.
     """
+    kept = f"{table}_{task}.policy"
     if table == "faithful":
         pairs = (
             {**kind.provenance, "seed": a.seed, "other": b.seed}
@@ -183,20 +183,14 @@ def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[P
         yield f"same_{task}.csv", list(pairs), partial(_write_sameness, task)
     if TABLES[task][table].keeps:
         job = kept_job(task, table)
-        made_with, name = job.provenance, f"{table}_{task}.policy"
-        yield name, [made_with], lambda folder, out: _keep(job.policy(folder), out / BEYOND / name, made_with)
+        made_with = job.provenance
+        yield kept, [made_with], lambda folder, out: _keep(job.policy(folder), out / BEYOND / kept, made_with)
         if task == CHEETAH:
             walks = provenance({"policy": made_with, "table": "gait", **GAIT}, made_with["teacher"], GAIT_VERSION)
-            yield (
-                f"gait_{task}.csv",
-                [walks],
-                lambda folder, out: write_results(
-                    record_gait(job.policy(folder), task, **GAIT).assign(**walks), f"gait_{task}", out=out
-                ),
-            )
+            yield f"gait_{task}.csv", [walks], lambda folder, out: _write_gait(job.policy(folder), walks, out)
     if (table, task) == ("methods", LANDER):
-        few, about = f"{table}_{task}.policy", simplest_provenance(task)
-        yield few, [about], lambda folder, out: _keep(simplest(task), out / BEYOND / few, about)
+        about = simplest_provenance(task)
+        yield kept, [about], lambda folder, out: _keep(simplest(task), out / BEYOND / kept, about)
 
 
 def _write_sameness(task: str, folder: Path, out: Path) -> None:
@@ -208,6 +202,11 @@ def _write_sameness(task: str, folder: Path, out: Path) -> None:
         table.insert(0, "size", kind.size)
         tables.append(table)
     write_results(pd.concat(tables, ignore_index=True), f"same_{task}", out=out)
+
+
+def _write_gait(policy: VoronoiPolicy, made_with: dict, out: Path) -> None:
+    name = policy.task.name
+    write_results(record_gait(policy, name, **GAIT).assign(**made_with), f"gait_{name}", out=out)
 
 
 def simplest(task: str) -> VoronoiPolicy:
@@ -237,8 +236,8 @@ def _keep(policy: VoronoiPolicy, path: Path, made_with: dict) -> None:
 def best_returns() -> pd.DataFrame:
     """Return the returns of the best policies, one row per task and way to find them. A task's last row is its best.
 
-    Columns: task, found (how: `CLOSED`, or the points of the grid), mean, worst, failing (share of the episodes that
-    miss the goal; NaN for a task without a goal), longest (steps), and the provenance. Takes about five minutes.
+    Columns: task, found (how: "closed form", or the points of the grid), mean, worst, failing (share of the episodes
+    that miss the goal; NaN for a task without a goal), longest (steps), and the provenance. Takes about five minutes.
     """
     return pd.DataFrame([_best(*way) for way in progress(WAYS, "optimum", total=len(WAYS), unit="policies")])
 
@@ -247,10 +246,12 @@ def _best(name: str, finer: float) -> dict:
     """Return the row of a task, from a grid with `finer` times the points in each variable."""
     task = get_task(name)
     policy, starts = optimum.best_policy(task, finer=finer), start_states(task, measure.N_REPORTED, measure.REPORT_SEED)
-    result, on_grid = rollout(policy, task, starts), isinstance(policy, GridPolicy)
-    returns = result.returns if on_grid else optimum.best_returns(starts)
-    failing = np.nan if name in WITHOUT_GOAL else np.mean(result.outcomes != GOAL)
-    how = "{} × {} points".format(*policy.grid.shape) if on_grid else CLOSED
+    result = rollout(policy, task, starts)
+    if isinstance(policy, GridPolicy):
+        returns, how = result.returns, "{} × {} points".format(*policy.grid.shape)
+    else:
+        returns, how = optimum.best_returns(starts), "closed form"
+    failing = np.nan if name == "Pendulum-v1" else np.mean(result.outcomes != GOAL)  # nothing can fail there
     row = {"task": name, "found": how, "mean": returns.mean(), "worst": returns.min(), "failing": failing}
     return row | {"longest": result.lengths.max()} | best_provenance(name, finer)
 

@@ -14,7 +14,7 @@ from ..results import read_results
 from .methods import METHODS, PRESETS, UNTUNED
 
 OURS, TUNED = "our cells", "our cells, tuned"
-MEANS = ("failing", "error_teacher", "error_own", "cells", "parameters")
+MEANS = ("failing", "error_teacher", "error_own", "cells")
 INTERVAL = ("mean", "low", "high")
 # When a policy matches its teacher. SimpleGoal: the mean return is at most 0.03 lower, and the failures at most 0.1
 # percentage points more. MountainCar: no failure, and a higher mean return. Pendulum, where nothing can fail: the mean
@@ -30,17 +30,12 @@ AS_GOOD = {
 LEAST_R2 = {"SimpleGoal-v0": 0.95, "MountainCarContinuous-v0": 0.97, "Pendulum-v1": 0.95,
             "LunarLanderContinuous-v3": 0.9}  # fmt: skip
 SAME_CELLS = 0.9  # least median adjusted Rand index over pairs of seeds for cells to count as the same
-PARTS = {  # the tuned method, whole and with one part removed or changed
-    TUNED: "all parts",
-    "our cells, no annealing": "no annealing",
-    "our cells, one restart": "one restart",
-    "our cells, no correction": "no correction",
-    "our cells, no slope beyond the limits": "no slope beyond the limits",
-    OURS: "no tuning",
-    "our cells, no failure penalty": "no failure penalty",
-    "our cells, no teacher": "no teacher",
-    "our cells, weighted by criticality": "weighted by criticality",
-}
+# The tuned method, whole and with one part removed or changed
+PARTS = {TUNED: "all parts"} | {
+    OURS if part == "no tuning" else f"{OURS}, {part}": part
+    for part in ("no annealing", "one restart", "no correction", "no slope beyond the limits", "no tuning",
+                 "no failure penalty", "no teacher", "weighted by criticality")
+}  # fmt: skip
 
 
 def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "methods") -> pd.DataFrame:
@@ -61,7 +56,7 @@ def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
     """Summarise rows of `read_rows`: one row per method and size, within a size the best mean return first.
 
     Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median; and
-    failing, error_teacher, error_own, cells, parameters (means over the seeds).
+    failing, error_teacher, error_own, cells (means over the seeds).
     """
     table = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):
@@ -135,22 +130,19 @@ def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame
     failing (medians); like, good and both (share of the policies whose R² is at least `LEAST_R2`, share that match
     their teacher by `AS_GOOD`, and share that do both); low and high (95 % interval of both).
 
-    Over all pairs of seeds: index and index_least (median and lowest adjusted Rand index of their cells) and ratio
-    (median of the difference between their actions, divided by their difference from the teacher's). one_cell is the
-    number of policies with one cell; the index leaves them out.
+    Over all pairs of seeds: the medians of index (adjusted Rand index of their cells; policies with one cell are left
+    out) and of ratio (difference between their actions, divided by their difference from the teacher's).
     """
     rows, pairs = read_rows(task, folder, table="faithful"), read_results(f"same_{task}", folder)
     rows = rows.assign(like=rows["r2"] >= LEAST_R2[task], good=AS_GOOD[task](rows, teacher_of(read_rows(task, folder))))
-    rows = rows.assign(both=rows["like"] & rows["good"], one_cell=rows["cells"] == 1)
+    rows = rows.assign(both=rows["like"] & rows["good"])
     by_size, by_pair = rows.groupby("size"), pairs.groupby("size")
     table = by_size[["cells", "r2", "r2_worst", "off", "mean", "failing"]].median()
     table.insert(0, "policies", by_size.size())
     table.insert(3, "r2_least", by_size["r2"].min())
     table[["like", "good", "both"]] = by_size[["like", "good", "both"]].mean()
     table[["low", "high"]] = [share_interval(int(both.sum()), len(both)) for _, both in by_size["both"]]
-    table["index"], table["index_least"] = by_pair["index"].median(), by_pair["index"].min()
-    table["ratio"], table["one_cell"] = by_pair["ratio"].median(), by_size["one_cell"].sum()
-    return table.reset_index()
+    return table.join(by_pair[["index", "ratio"]].median()).reset_index()
 
 
 def largest_alike(table: pd.DataFrame) -> int | None:
@@ -169,7 +161,7 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     Columns: teacher (0: the shipped one; "all"), own (the teacher's mean return), method, size, policies, gap (mean
     return minus the teacher's, the mean over seeds), low and high (95 % interval of the gap by `mean_interval`, over
     all teachers by `over_groups`), r2 (median; NaN where it was not measured), good (share of the policies that match
-    their teacher), good_low and good_high (interval of this share for one teacher, by `share_interval`).
+    their teacher).
     """
     others = read_rows(task, folder, table="teachers")
     asked = others[["method", "size"]].drop_duplicates()
@@ -183,12 +175,9 @@ def other_teachers(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     for (method, size), of_method in rows.groupby(["method", "size"], sort=False):
         by_teacher = [part for _, part in of_method.groupby("agent")]
         for part in by_teacher:
-            good_low, good_high = share_interval(int(part["good"].sum()), len(part))
-            shares = {"good": part["good"].mean(), "good_low": good_low, "good_high": good_high}
             about = {"teacher": part["agent"].iloc[0], "own": part["own"].iloc[0], "method": method, "size": size}
-            table.append({**about, **_of_gaps([part]), **shares})
-        shares = {"good": np.mean([part["good"].mean() for part in by_teacher])}
-        table.append({"teacher": "all", "method": method, "size": size, **_of_gaps(by_teacher), **shares})
+            table.append({**about, **_of_gaps([part])})
+        table.append({"teacher": "all", "method": method, "size": size, **_of_gaps(by_teacher)})
     return pd.DataFrame(table)
 
 
@@ -196,8 +185,8 @@ def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
     """Summarise the rows of some teachers, each group with equal weight."""
     gaps = [rows["gap"].to_numpy() for rows in groups]
     low, high = over_groups(gaps) if len(gaps) > 1 else mean_interval(gaps[0])
-    r2, mean = pd.concat(groups)["r2"], np.mean([rows["gap"].mean() for rows in groups])
-    return {"policies": len(r2), "gap": mean, "low": low, "high": high, "r2": r2.dropna().median()}
+    r2, (mean, good) = pd.concat(groups)["r2"], np.mean([rows[["gap", "good"]].mean() for rows in groups], axis=0)
+    return {"policies": len(r2), "gap": mean, "low": low, "high": high, "r2": r2.dropna().median(), "good": good}
 
 
 def over_groups(groups: list[np.ndarray]) -> tuple[float, float]:

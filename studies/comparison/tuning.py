@@ -15,7 +15,6 @@ from vsp_beyond.few_cells.units import Cells, Scaling, joined, parted
 
 from ..rivals.small_network import SmallNetwork
 from ..rivals.trees import LinearTree, ObliqueLinearTree
-from .measure import parameters_of
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,8 @@ class TreeNumbers:
     oblique: bool  # whether directions are tuned
     constant: bool  # whether leaves have only biases
 
-    @classmethod
-    def one_leaf(cls, maps: np.ndarray) -> TreeNumbers:
-        """Return a tree with one leaf, whose map is `maps` (1, d + 1, m)."""
-        d = maps.shape[1] - 1
-        return cls(np.zeros((1, 0)), np.zeros((0, d)), np.zeros(0), maps, oblique=False, constant=False)
+    def __len__(self) -> int:
+        return len(self.maps)
 
     @property
     def vector(self) -> np.ndarray:
@@ -68,6 +64,9 @@ class NetworkNumbers:
     hidden: np.ndarray  # (d + 1, units): weights, then biases
     output: np.ndarray  # (units + 1, m)
 
+    def __len__(self) -> int:  # it has no cells
+        return 0
+
     @property
     def vector(self) -> np.ndarray:
         """All tuned numbers, as one vector."""
@@ -82,37 +81,33 @@ class NetworkNumbers:
         return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
 
 
-Numbers = TreeNumbers | NetworkNumbers | Cells  # what is tuned, in the units of a `Scaling`: its structure is fixed
+Numbers = TreeNumbers | NetworkNumbers  # what is tuned, in the units of a `Scaling`: the structure is fixed
 
 
+@dataclass(frozen=True)
 class Tunable:
-    """The policy with `numbers` in the units of `frame`. Its size and structure are those of `start`."""
+    """The policy with `numbers` in the units of `frame`."""
 
-    def __init__(self, frame: Scaling, numbers: Numbers, start: Policy):
-        self.frame, self.numbers, self._start = frame, numbers, start
+    frame: Scaling
+    numbers: Numbers
 
     def __len__(self) -> int:
-        return len(self._start) if hasattr(self._start, "__len__") else 0
-
-    @property
-    def PARAMETERS(self) -> int:  # named as in policies whose numbers are counted by hand
-        """The `parameters_of` `start`, since tuning does not change the structure."""
-        return parameters_of(self._start)
+        return len(self.numbers)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
         return self.frame.actions(self.numbers.outputs(self.frame.inputs(obs))), None
 
 
-@dataclass(frozen=True)
+Fitted = VoronoiPolicy | Tree | LinearTree | SmallNetwork | Tunable  # what can be tuned
+
+
 class TunableFrame(Scaling):
     """A `Scaling` for the numbers of a policy that is not made of Voronoi cells."""
 
-    start: Policy
-
-    def policy(self, cells: Numbers) -> Tunable:
+    def policy(self, cells: Numbers) -> Tunable:  # type: ignore[override]  # not of cells
         """Return the numbers `cells` as a policy in the units of the task."""
-        return Tunable(self, cells, self.start)
+        return Tunable(self, cells)
 
 
 def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) -> Policy:
@@ -133,7 +128,7 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
     return frame.policy(candidates.best)
 
 
-def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
+def in_units(policy: Fitted, frame: Scaling) -> tuple[Scaling, Numbers | Cells]:
     """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
 
     The frame has the policy's own scale, or that of `frame` if the policy has none.
@@ -144,9 +139,10 @@ def in_units(policy: Policy, frame: Scaling) -> tuple[Scaling, Numbers]:
         scaled = replace(frame, scale=policy.scale)  # the scale is part of its borders
         return scaled, scaled.cells(policy)
     units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
-    tunable = TunableFrame(frame.task, units.centre, units.scale, policy)
+    tunable = TunableFrame(frame.task, units.centre, units.scale)
     if isinstance(policy, VoronoiPolicy):
-        return tunable, TreeNumbers.one_leaf(tunable.cells(policy).coefficients)
+        maps, none, d = tunable.cells(policy).coefficients, np.zeros(0), len(frame.centre)
+        return tunable, TreeNumbers(none[None], np.zeros((0, d)), none, maps, oblique=False, constant=False)
     if isinstance(policy, Tree):
         return tunable, _of_cart(policy.model.tree_, tunable)
     if isinstance(policy, LinearTree):

@@ -1,5 +1,4 @@
-"""Compute the returns of SimpleGoal's episodes from the pieces: bounds on the mean over the square, and the worst
-start.
+"""Compute the returns of SimpleGoal's episodes from the pieces: bounds on the mean over the square.
 
 The rewards for progress of all steps but the last telescope. So an episode that reaches the goal returns
 10 |s| - 10 |s'| + 10, where s is the start and s' the state before the last step. If the episode ends in the pit, the
@@ -36,24 +35,6 @@ def mean_return(pieces: Sequence[Piece], *, width: float = 1e-6) -> tuple[float,
         if done.all():
             return float(sure - 10.0 * high - ROUNDING), float(sure - 10.0 * low + ROUNDING)
         starts, ends, areas = _quarters(starts[~done]), _quarters(ends[~done]), np.repeat(areas[~done] / 4, 4)
-
-
-def worst_start(pieces: Sequence[Piece]) -> tuple[np.ndarray, float]:
-    """Return a start (2,) with the lowest return, to 1e-6, and this return. The start lies inside its piece."""
-    starts, ends, last = _triangles(pieces)
-    found, least = starts[0].mean(axis=0), np.inf
-    while len(starts):
-        inside = starts.mean(axis=1)
-        returns = 10.0 * (_distance(inside) - _distance(ends.mean(axis=1))) + last
-        if returns.min() < least:
-            found, least = inside[returns.argmin()], returns.min()
-        # |s| is at least its tangent at the centroid, |s'| at most the plane through its corners: the bound is linear
-        centre = starts.mean(axis=1, keepdims=True)
-        tangent = (starts * centre).sum(axis=2) / np.maximum(_distance(centre), 1e-12)
-        bound = (10.0 * (tangent - _distance(ends)) + last[:, None]).min(axis=1)
-        open_ = bound < least - 1e-6
-        starts, ends, last = _quarters(starts[open_]), _quarters(ends[open_]), np.repeat(last[open_], 4)
-    return found, float(least)
 
 
 def _triangles(pieces: Sequence[Piece]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

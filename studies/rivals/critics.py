@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp import Task, VoronoiPolicy, get_task
+from vsp import Task, VoronoiPolicy
 from vsp.geometry import nearest
 from vsp.paper.baselines import kmeans_cells
 from vsp.rollouts import standard
@@ -20,7 +20,7 @@ WORST = 0.01  # share of a cell's states whose mean becomes a codeword: those th
 
 
 def critic_driven(
-    states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
+    states: np.ndarray, actions: np.ndarray, *, size: int, teacher: Teacher, task: Task, seed: int
 ) -> VoronoiPolicy:
     """Add cells where the critics value the distilled action too low, after arXiv 2605.14897.
 
@@ -29,9 +29,9 @@ def critic_driven(
     first codeword is the mean of the states. Distances are Euclidean, between standardised states. `trained` trains the
     maps. The loss of a state is the value of the teacher's action minus that of the distilled action, at least 0. The
     cell with the largest total loss gets a second codeword, at the mean of the 1 % of its states that lose most, with a
-    copy of its map. Codewords never move. The result has fewer than `cells` cells if no state loses value any more.
+    copy of its map. Codewords never move. The result has fewer than `size` cells if no state loses value any more.
     """
-    task, rng = get_task(task), np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     centre, scale = standard(states)
     points, best = (states - centre) / scale, teacher.value(states, actions)
     codewords, maps = np.zeros((1, len(centre))), np.zeros((1, len(centre) + 1, actions.shape[1]))
@@ -40,7 +40,7 @@ def critic_driven(
         maps = trained(maps, cells_of, points, actions, task, rng)
         distilled = np.clip(linear_outputs(points, maps[cells_of]), task.action_low, task.action_high)
         lost = np.maximum(0.0, best - teacher.value(states, distilled))
-        if len(maps) >= cells or not lost.any():
+        if len(maps) >= size or not lost.any():
             break
         cell, codeword = where_lost(points, cells_of, lost)
         codewords, maps = np.vstack([codewords, codeword]), np.concatenate([maps, maps[cell][None]])
@@ -61,32 +61,28 @@ def where_lost(points: np.ndarray, cells_of: np.ndarray, lost: np.ndarray) -> tu
 
 
 def trained(
-    maps: np.ndarray,
-    cells_of: np.ndarray,
-    points: np.ndarray,
-    actions: np.ndarray,
-    task: Task,
-    rng: np.random.Generator,
+    maps: np.ndarray, cells: np.ndarray, points: np.ndarray, actions: np.ndarray, task: Task, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return `maps` (k, d + 1, m) of the cells `cells_of` (n,) after Adam on the squared error of the clipped action.
+    """Return `maps` (k, d + 1, m) after Adam on the squared error of the clipped action.
 
-    `points` (n, d) are standardised, `actions` (n, m) in the units of the task. `rng` draws the batches; the step size
-    falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box would stop learning.
+    `points` (n, d) lie in `cells` (n,) and are standardised, `actions` (n, m) in the units of the task. `rng` draws the
+    batches; the step size falls to 0. The gradient ignores the clipping, because otherwise maps beyond the action box
+    would stop learning.
     """
     half, adam = 0.5 * (task.action_high - task.action_low), Adam()
     inputs = np.column_stack([points, np.ones(len(points))])
     for i in range(N_STEPS):
         rows = rng.integers(len(points), size=BATCH)
-        raw = linear_outputs(points[rows], maps[cells_of[rows]])
+        raw = linear_outputs(points[rows], maps[cells[rows]])
         error = (np.clip(raw, task.action_low, task.action_high) - actions[rows]) / half
-        here = cells_of[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
+        here = cells[rows] == np.arange(len(maps))[:, None]  # (k, BATCH)
         gradient = 2 / BATCH * np.einsum("kn,np,nm->kpm", here, inputs[rows], error, optimize=True)
         maps = maps - RATE * (1 - i / N_STEPS) * half * adam.step(gradient)
     return maps
 
 
 def advantage_weighted(
-    states: np.ndarray, actions: np.ndarray, *, cells: int, teacher: Teacher, task: str, seed: int
+    states: np.ndarray, actions: np.ndarray, *, size: int, teacher: Teacher, task: Task, seed: int
 ) -> VoronoiPolicy:
     """Fit maps in `kmeans_cells` that err least where a wrong action costs most, after the idea of arXiv 2507.07848.
 
@@ -94,7 +90,7 @@ def advantage_weighted(
     squares, weighted by the teacher's criticality relative to its largest value in the cell. A cell where no action
     costs anything keeps its unweighted map. With one cell, this is one weighted linear map.
     """
-    policy = kmeans_cells(states, actions, cells=cells, task=task, seed=seed)
+    policy = kmeans_cells(states, actions, cells=size, task=task, seed=seed)
     cells_of, weights, coefficients = policy.cells(states), teacher.criticality(states), policy.coefficients.copy()
     inputs = np.column_stack([states, np.ones(len(states))])
     for i in np.unique(cells_of):

@@ -22,7 +22,8 @@ def dagger(fits: Sequence[Fit], teacher: Policy, task: str | Task, *, rounds: Tu
     task = get_task(task)
     rng, validation_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
     validation = task.start(validation_rng, rounds.n_validation)
-    policy, states, best = teacher, np.zeros((0, len(task.low))), (-np.inf, None)
+    policy, states = teacher, np.zeros((0, len(task.low)))
+    tried: list[tuple[float, Policy]] = []
     for i in range(1 + rounds.n_corrections):
         n = rounds.n_correction_episodes if i else rounds.n_episodes
         states = np.concatenate([states, visited_states(policy, task, task.start(rng, n))])
@@ -30,5 +31,6 @@ def dagger(fits: Sequence[Fit], teacher: Policy, task: str | Task, *, rounds: Tu
         candidates = [(fit, fit(states, actions)) for fit in fits]
         scores = [score(rollout(policy, task, validation), rounds.failure_penalty) for _, policy in candidates]
         fit, policy = candidates[int(np.argmax(scores))]
-        fits, best = [fit], max(best, (max(scores), policy), key=lambda pair: pair[0])
-    return best[1]
+        fits = [fit]
+        tried.append((max(scores), policy))
+    return max(tried, key=lambda pair: pair[0])[1]

@@ -35,7 +35,9 @@ class SmallNetwork:
         return np.clip(raw, self.task.action_low, self.task.action_high), None
 
 
-def units_for(numbers: int, task: Task) -> int:
-    """Return the largest number of units whose network has at most `numbers` parameters; at least one."""
+def units_for(cells: int, task: Task) -> int:
+    """Return the largest number of units whose network has at most as many numbers as `cells` Voronoi cells with linear
+    maps; at least one."""
     d, m = len(task.low), len(task.action_low)
+    numbers = cells * (d + 1) * m + (cells > 1) * (cells + 1) * d
     return max(1, (numbers - m) // (d + 1 + m))

@@ -24,6 +24,8 @@ EXPLORATION = 1.0, 0.1  # share of random actions at the beginning, and from the
 THRESHOLD = 2.0  # TD error, in units of the reward, that splits a cell
 N_SPLIT, N_MERGE = 20, 500  # steps between two passes
 LAST_SPLIT, LAST_MERGE = 0.5, 0.8  # shares of the steps after which there is no pass
+MIN_DISTANCE, LIKENESS = 0.06, 0.3  # in units of the state, and of the reward
+DISCOUNT = 0.97  # nearer to 1, policies circle between cells
 
 
 class DiscretePolicy:
@@ -44,15 +46,11 @@ class DiscretePolicy:
         return self.actions[self.values.argmax(axis=1)[self.cells(obs)]], None
 
 
-def learn(
-    task: str | Task, *, seed: int, n_steps: int = 20_000, min_distance: float = 0.06, likeness: float = 0.3,
-    discount: float = 0.97,
-) -> DiscretePolicy:  # fmt: skip
+def learn(task: str | Task, *, seed: int, n_steps: int = 20_000) -> DiscretePolicy:
     """Learn a policy from `n_steps` steps of `N_PARALLEL` episodes. The same arguments give the same policy.
 
-    No two codewords are closer to each other than `min_distance` (in units of the state). Neighbours with the same best
-    action are merged where no value differs by more than `likeness` (in units of the reward). A `discount` near 1 gives
-    policies that circle between cells. Raises ValueError for a task that cannot be stepped in parallel.
+    No two codewords are closer to each other than `MIN_DISTANCE`. Neighbours with the same best action are merged where
+    no value differs by more than `LIKENESS`. The task must be one whose states are arrays.
     """
     task, rng = get_task(task), np.random.default_rng(seed)
     episodes, actions = ParallelEpisodes(task, rng), _actions(task)
@@ -63,15 +61,15 @@ def learn(
         epsilon = EXPLORATION[0] + (EXPLORATION[1] - EXPLORATION[0]) * min(1.0, 2 * done)
         chosen = _epsilon_greedy(policy.values[cells], epsilon, rng)
         rewards, running, arrived = episodes.step(actions[chosen])
-        targets = rewards + discount * running * policy.values[policy.cells(arrived)].max(axis=1)
+        targets = rewards + DISCOUNT * running * policy.values[policy.cells(arrived)].max(axis=1)
         errors = targets - policy.values[cells, chosen]
         rate = LEARNING_RATES[0] * (LEARNING_RATES[1] / LEARNING_RATES[0]) ** done
         update(policy.values, cells, chosen, errors, rate)
         if i % N_SPLIT == 0 and done < LAST_SPLIT:
             far = np.abs(errors) > THRESHOLD
-            split(policy, observations[far], chosen[far], targets[far], min_distance)
+            split(policy, observations[far], chosen[far], targets[far], MIN_DISTANCE)
         if i % N_MERGE == N_MERGE - 1 and done < LAST_MERGE:
-            merge(policy, likeness)
+            merge(policy, LIKENESS)
     return policy
 
 
@@ -80,10 +78,7 @@ class ParallelEpisodes:
 
     def __init__(self, task: Task, rng: np.random.Generator):
         self.task, self._rng = task, rng
-        starts = task.start(rng, N_PARALLEL)
-        self.states, self._age = task.begin(starts), np.zeros(N_PARALLEL, dtype=np.int64)
-        if self.states is not starts:
-            raise ValueError(f"{task.name} has a physics engine of its own, expected a task whose states are arrays")
+        self.states, self._age = task.begin(task.start(rng, N_PARALLEL)), np.zeros(N_PARALLEL, dtype=np.int64)
 
     @property
     def observations(self) -> np.ndarray:

@@ -35,7 +35,6 @@ class Node:
     """A node of a `LinearTree`, a leaf if it has no children."""
 
     rows: np.ndarray  # the training data that reach it
-    depth: int
     split: Split | None = None  # the best split found
     children: tuple[int, ...] = ()  # left and right
 
@@ -51,7 +50,7 @@ class LinearTree:
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, constant: bool = False):
         self.task, self.constant = get_task(task), constant
         self.centre, self.scale = standard(states)
-        inputs, self.nodes = self.inputs(states), [Node(np.arange(len(states)), 0)]
+        inputs, self.nodes = self.inputs(states), [Node(np.arange(len(states)))]
         least = 1e-9 * np.square(actions).sum()  # smaller gains are rounding errors
         for _ in range(leaves - 1):
             for node in (ends := self.ends):
@@ -61,7 +60,7 @@ class LinearTree:
                 break
             right, n = best.split.right(inputs[best.rows]), len(self.nodes)
             best.children = (n, n + 1)
-            self.nodes += [Node(best.rows[side], best.depth + 1) for side in (~right, right)]
+            self.nodes += [Node(best.rows[side]) for side in (~right, right)]
         rows = np.column_stack([np.zeros_like(inputs) if constant else inputs, np.ones(len(inputs))])
         maps = [np.linalg.lstsq(rows[node.rows], actions[node.rows], rcond=None)[0] for node in self.nodes]
         self.maps = np.array(maps)  # (nodes, d + 1, m)

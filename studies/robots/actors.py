@@ -33,7 +33,8 @@ class SoftActor(torch.nn.Module):
         """Return the actions of the nearest piece; during training, of all pieces, in shares that fall with the
         distance."""
         states = (observations - self.centre) / self.scale
-        *places, maps = parted(self.vector, self._numbers.parts)
+        parts: list[torch.Tensor] = parted(self.vector, self._numbers.parts)
+        *places, maps = parts
         closeness = self._closeness(states, places, self._numbers)  # (n, k)
         k, rows, m = maps.shape
         inputs = torch.cat([states, torch.ones(len(states), 1)], dim=1)

@@ -13,12 +13,6 @@ NAME = "BipedalWalker-v3"
 INPUTS = (
     "θ", "ω", "vx", "vy", "h1", "vh1", "k1", "vk1", "c1", "h2", "vh2", "k2", "vk2", "c2", *(f"l{i}" for i in range(10)),
 )  # fmt: skip
-LABELS = (
-    "hull angle (rad)", "hull ω", "hull vx", "hull vy",
-    "hip 1 angle", "hip 1 ω", "knee 1 angle", "knee 1 ω", "leg 1 down",
-    "hip 2 angle", "hip 2 ω", "knee 2 angle", "knee 2 ω", "leg 2 down",
-    *(f"lidar {i}" for i in range(10)),
-)  # fmt: skip
 
 
 def walked(observation: np.ndarray, reward: float, info: dict) -> bool:
@@ -29,4 +23,4 @@ def walked(observation: np.ndarray, reward: float, info: dict) -> bool:
 def make() -> Task:
     """Return the task. Opens an environment."""
     torques = ("τh1", "τk1", "τh2", "τk2")
-    return replace(gymnasium_task(NAME, walked), inputs=INPUTS, outputs=torques, input_labels=LABELS, slowness=20)
+    return replace(gymnasium_task(NAME, walked), inputs=INPUTS, outputs=torques, input_labels=INPUTS, slowness=20)

@@ -12,7 +12,7 @@ from vsp import Policy
 from vsp.teachers.teacher import Teacher
 from vsp_beyond.few_cells.units import Scaling
 
-from .choice import most_rewarding
+from .imitation import most_rewarding
 from .settings import Walking
 
 N_CHOICES = 20  # actors kept as candidates, evenly spread over the training
@@ -29,23 +29,17 @@ def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *,
     """
     import torch
 
+    start, noise = np.random.SeedSequence(seed).spawn(2)
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     try:
-        return _best_on_the_way(frame, numbers, teacher, config, seed)
+        model, tried = _model(frame, numbers, teacher, config, int(noise.generate_state(1)[0])), [frame.policy(numbers)]
+        for _ in range(N_CHOICES):
+            model.learn(max(1, config.n_steps // N_CHOICES), reset_num_timesteps=False, log_interval=None)
+            tried.append(frame.policy(model.actor.mu.numbers))
     finally:
         torch.set_flush_denormal(False)  # other code in this process may need them
-
-
-def _best_on_the_way(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int) -> Policy:
-    task = frame.task
-    start, noise = np.random.SeedSequence(seed).spawn(2)
-    model = _model(frame, numbers, teacher, config, int(noise.generate_state(1)[0]))
-    tried = [frame.policy(numbers)]
-    for _ in range(N_CHOICES):
-        model.learn(max(1, config.n_steps // N_CHOICES), reset_num_timesteps=False, log_interval=None)
-        tried.append(frame.policy(model.actor.mu.numbers))
-    return most_rewarding(tried, task, config.n_validation, np.random.default_rng(start))
+    return most_rewarding(tried, frame.task, config.n_validation, np.random.default_rng(start))
 
 
 def _model(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int):

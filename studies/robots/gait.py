@@ -24,7 +24,7 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
     states, rows = task.begin(np.array([[float(start)]])), []
     for step in range(min(n_steps, task.max_steps)):
         observed, env = task.observe(states), states[0].env.unwrapped
-        row = {"step": step, "cell": int(policy.cells(observed)[0]), **_feet(env)}
+        row: dict[str, float] = {"step": step, "cell": int(policy.cells(observed)[0]), **_feet(env)}
         for name, ends in _lines(env).items():
             row |= {f"{name} {end}": round(float(value), DIGITS) for end, value in zip(("x0", "z0", "x1", "z1"), ends)}
         inputs = zip(task.inputs, observed[0], strict=True)

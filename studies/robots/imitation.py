@@ -8,15 +8,15 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp import Policy, Task, VoronoiPolicy, get_task, visited_states
+from vsp import Policy, Task, VoronoiPolicy, get_task, rollout, visited_states
 from vsp_beyond.few_cells.faithful import by_visits
 from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, spread
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
-from .choice import most_rewarding
 from .settings import Walking
 
 COOL = range(N_STAGES // 2, N_STAGES)  # stages of a fit from the cells of the last round
+N_FINALISTS, LONGER = 4, 5  # the best N_FINALISTS policies play LONGER times as many episodes
 
 # Makes a policy from labelled states; after the first round, it begins from the policy of the round before
 Fit = Callable[[Scaling, LabelledStates, Policy | None, np.random.Generator], Policy]
@@ -61,11 +61,19 @@ def cells_fit(config: Walking) -> Fit:
     """Return the default fit: the cells with the least error, and in later rounds a descent from the cells of the round
     before."""
 
-    def fit(frame: Scaling, seen: LabelledStates, before: VoronoiPolicy | None, rng: np.random.Generator) -> Policy:
-        if before is None:
-            cells = least_error(seen, config.n_cells, config.n_restarts, rng)
-        else:
+    def fit(frame: Scaling, seen: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
+        if isinstance(before, VoronoiPolicy):
             cells = descend(seen, frame.cells(before), COOL)
+        else:
+            cells = least_error(seen, config.n_cells, config.n_restarts, rng)
         return frame.policy(by_visits(cells, seen))
 
     return fit
+
+
+def most_rewarding(policies: list[Policy], task: Task, n_episodes: int, rng: np.random.Generator) -> Policy:
+    """Return the policy with the highest mean return. All play `n_episodes` episodes; the best then play more, and
+    these decide."""
+    few, many = (task.start(rng, n) for n in (n_episodes, LONGER * n_episodes))
+    finalists = sorted(policies, key=lambda policy: -rollout(policy, task, few).returns.mean())[:N_FINALISTS]
+    return max(finalists, key=lambda policy: rollout(policy, task, many).returns.mean())

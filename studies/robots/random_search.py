@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp import Task, VoronoiPolicy, get_task
+from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp_beyond.few_cells.population import rollout_population
 from vsp_beyond.few_cells.units import METRIC
 
-from .choice import most_rewarding
+from .imitation import most_rewarding
 from .settings import Walking
 
 EVERY = 8  # every 8th observation is used for the mean and deviation
@@ -41,7 +41,7 @@ class RunningMoments:
 
 
 @threadpool_limits.wrap(limits=1)
-def search_one_map(task: str | Task, config: Walking, *, seed: int) -> VoronoiPolicy:
+def search_one_map(task: str | Task, config: Walking, *, seed: int) -> Policy:
     """Find the best map within `config.n_random_steps` steps of the robot, as one cell. Same arguments, same policy.
 
     Each round plays maps on both sides of the current one, in random directions. The map then moves along the `n_best`

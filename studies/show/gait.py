@@ -4,30 +4,41 @@ from __future__ import annotations
 
 import os
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from PIL import Image
 
+from vsp.run import atomic
 from vsp.show import style
-from vsp.show.animation import DPI, WIDTH, Animation, Stage, save_frames
+from vsp.show.captions import Caption, caption_of, file_of
 
 THICK = 3.0  # line width of the body, in points
 ENDS = ("x0", "z0", "x1", "z1")
 
 
-def body_lines(gait: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Return the lines of the body, each as its ends in every step (n, 2, 2): end, then x and z in metres."""
+class MovingPicture(style.Picture):
+    """A GIF as shown in a notebook: its last frame, and the GIF in a closed fold, so that nothing moves unasked."""
+
+    def __init__(self, png: bytes, gif: bytes, about: Caption):
+        super().__init__(png, about)
+        self.gif = gif
+
+    def _repr_html_(self) -> str:
+        still = style.embedded(self.png, f"The last frame of the moving picture: {self.about.alt}")
+        moving = style.embedded(self.gif, self.about.alt)
+        folded = f"<details><summary>play the moving picture</summary>{moving}</details>"
+        return f"<figure>{still}{folded}{self.about.to_html('figcaption')}</figure>"
+
+
+def body_lines(gait: pd.DataFrame) -> np.ndarray:
+    """Return the lines of the body in every step (n, lines, 2, 2): both ends of each, as x and z in metres."""
     names = [name.removesuffix(" x0") for name in gait.columns if name.endswith(" x0")]
-    return {name: gait[[f"{name} {end}" for end in ENDS]].to_numpy().reshape(-1, 2, 2) for name in names}
-
-
-def draw_pose(ax: Axes, lines: dict[str, np.ndarray], step: int, *, color: str) -> None:
-    """Draw the body in one step, centred at x = 0."""
-    parts = np.stack([ends[step] for ends in lines.values()])
-    parts[:, :, 0] -= parts[:, :, 0].mean()
-    ax.add_collection(LineCollection(list(parts), colors=[color], linewidths=THICK, capstyle="round"))
+    return gait[[f"{name} {end}" for name in names for end in ENDS]].to_numpy().reshape(len(gait), -1, 2, 2)
 
 
 def cell_colors(gait: pd.DataFrame) -> dict[int, str]:
@@ -46,36 +57,50 @@ def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
 
 
 def save_gait(
-    gait: pd.DataFrame, name: str, *, step_seconds: float, out: str | os.PathLike, quick: bool = False,
-    alt: str | None = None,
-) -> Animation:  # fmt: skip
-    """Write OUT/figures/NAME.gif, and its last frame as NAME.png; return the animation to show.
+    gait: pd.DataFrame, name: str, *, step_seconds: float, out: str | os.PathLike, quick: bool = False
+) -> MovingPicture:  # fmt: skip
+    """Write OUT/figures/NAME.gif, and its last frame as NAME.png; return the picture to show.
 
     The GIF shows the body step by step, in the colours of its cells, above `footfall`. The ground has a mark every
-    metre. `alt` describes the animation for readers who cannot see it; `quick` adds a watermark. The same gait gives
-    the same bytes.
+    metre. `quick` adds a watermark. The same gait gives the same bytes.
     """
-    fig, (body, below) = style.panels(2, rows=2, width=WIDTH, height=2.8, dpi=DPI, height_ratios=(2, 1))
+    about, path = caption_of("figures", name), file_of("figures", name, out)
+    frames, moving, still = _frames(gait, step_seconds, quick), path.with_suffix(".gif"), path.with_suffix(".png")
+    with atomic.atomic_path(moving) as temporary:
+        frames[0].save(temporary, save_all=True, append_images=frames[1:], duration=round(1000 * step_seconds), loop=0)
+    with atomic.atomic_path(still) as temporary:
+        frames[-1].save(temporary, optimize=True)
+    return MovingPicture(still.read_bytes(), moving.read_bytes(), about)
+
+
+def _frames(gait: pd.DataFrame, step_seconds: float, quick: bool) -> list[Image.Image]:
+    """Draw each step."""
+    fig, (body, below) = style.panels(2, rows=2, width=6.0, height=2.8, dpi=120, height_ratios=(2, 1))
+    plt.close(fig)  # only pyplot drops it, so that no notebook displays it by itself
     lines, colors = body_lines(gait), cell_colors(gait)
-    heights = np.concatenate([ends[:, :, 1].ravel() for ends in lines.values()])
-    body.set(xlim=(-2.5, 2.5), ylim=(min(heights.min(), 0) - 0.15, heights.max() + 0.1), aspect="equal")
-    body.set(xticks=[], yticks=[])
+    x, z = lines[..., 0], lines[..., 1]
+    body.set(xlim=(-2.5, 2.5), ylim=(min(z.min(), 0) - 0.15, z.max() + 0.1), aspect="equal", xticks=[], yticks=[])
     body.spines[["left", "bottom"]].set_visible(False)
     body.axhline(0.0, color="0.6", zorder=0)
     marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell + 1}") for cell, color in colors.items()]
-    beside = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "handlelength": 1.0, "columnspacing": 1.0}
-    body.legend(handles=marks, ncol=len(marks), frameon=False, **beside)
+    body.legend(handles=marks, ncol=len(marks), frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     footfall(below, gait, step_seconds=step_seconds)
-    stage = Stage(fig)
     if quick:
-        stage.watermark()
+        style.watermark(fig)
 
-    def paint(step: int) -> None:
-        draw_pose(body, lines, step, color=colors[int(gait.cell[step])])
-        middle = np.mean([ends[step, :, 0] for ends in lines.values()])
-        metres = np.arange(np.ceil(middle - 2.5), middle + 2.5) - middle
-        body.plot(metres, np.zeros(len(metres)), "|", color="0.6", zorder=0)
-        below.axvline(step_seconds * (step + 0.5), color="black", lw=1.5)
-
-    images = [stage.shoot(lambda step=step: paint(step)) for step in range(len(gait))]
-    return save_frames(images, name, out=out, alt=alt, step=round(1000 * step_seconds), hold=round(1000 * step_seconds))
+    pose = body.add_collection(LineCollection([], linewidths=THICK, capstyle="round"), autolim=False)
+    (metres,) = body.plot([], [], "|", color="0.6", zorder=0)
+    now = below.axvline(0.0, color="black", lw=1.5)
+    canvas, images = FigureCanvasAgg(fig), []
+    for step, cell in enumerate(gait.cell):
+        middle = x[step].mean()
+        pose.set(segments=lines[step] - [middle, 0.0], color=colors[int(cell)])
+        places = np.arange(np.ceil(middle - 2.5), middle + 2.5) - middle
+        metres.set_data(places, np.zeros(len(places)))
+        now.set_xdata(2 * [step_seconds * (step + 0.5)])
+        canvas.draw()
+        fig.set_layout_engine("none")  # the layout of the first step stays
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    palette = images[0].quantize(256, Image.Quantize.MAXCOVERAGE)  # the first image has all colours, in its legend
+    palette.putpalette([255 if value > 247 else value for value in palette.getpalette()])  # the background stays white
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]

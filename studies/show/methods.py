@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from vsp.show.style import COLOURS, DISTILLED, OTHER, TEACHER
 
 # Methods before tuning, and our cells after it. Ours has its own colour; the two weakest methods are grey
-IMITATIONS = {
+IMITATIONS: dict[str, dict] = {
     "our cells, tuned": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, tuned on the return"},
     "our cells": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
     "oblique tree, linear leaves, DAgger": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
@@ -19,7 +19,7 @@ IMITATIONS = {
 }
 
 # Our policies, from the best policy and from the teacher, and their rivals
-LIMITS = {
+LIMITS: dict[str, dict] = {
     "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6, "label": "our cells, from the best policy"},
     "our cells, tuned": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, from the teacher"},
     "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
@@ -29,7 +29,7 @@ LIMITS = {
 
 
 # Policies of robots
-ROBOTS = {
+ROBOTS: dict[str, dict] = {
     "cells, trained further": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, trained further"},
     "cells": {"color": DISTILLED, "ls": "--", "label": "our cells, imitation alone"},
     "one map, random search": {"color": "black", "marker": "s", "label": "one linear map, random search"},
@@ -40,7 +40,7 @@ ROBOTS = {
 
 # Marker and label of other methods, by the beginning of their names
 RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree"), "k-means": ("D", "k-means"),
-               "small network": ("P", "small network"), "soft tree": ("v", "soft tree"),
+               "small network": ("P", "small network"),
                "critic-driven": ("<", "critic-driven"), "advantage-weighted": (">", "advantage-weighted")}  # fmt: skip
 OUR_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # colours of our lines in `fidelity_map`, by number of cells
 MARK = {"ls": "", "ms": 4.5, "mec": "white", "mew": 0.4, "elinewidth": 0.7, "zorder": 6}  # of a method without a size

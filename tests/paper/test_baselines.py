@@ -7,7 +7,6 @@ from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
 
 from studies.rivals.dagger import dagger
-from studies.rivals.hand_written import Heuristic, PumpAndBalance, ZeroPolicy
 from vsp.evaluation import evaluate
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.policy import VoronoiPolicy
@@ -109,23 +108,6 @@ def test_the_rule_of_thumb_of_simplegoal_by_hand():
     assert name == "always (−1, −1)" and (actions == -1).all() and len(policy) == 1
 
 
-def test_the_pendulum_is_pumped_and_balanced_by_hand():
-    """Hanging still it has 10 J too little and is pushed along; near upright it is pushed back; never beyond 2."""
-    obs = np.array([[-1.0, 0.0, 0.1], [-1.0, 0.0, -0.1], [1.0, 0.05, 0.2], [0.0, 1.0, 5.5]])
-    actions = PumpAndBalance().predict(obs)[0].ravel()
-    assert actions[:2].tolist() == [2.0, -2.0]
-    assert actions[2:] == pytest.approx([-10 * 0.05 - 2 * 0.2, -2 * (5.5**2 / 6 - 5)])
-
-
-def test_the_pendulum_is_kept_upright():
-    frame = evaluate(PumpAndBalance(), PENDULUM, 500, seed=30)
-    assert -160 < frame["return"].mean() < -140
-
-
-def test_the_zero_policy_does_nothing():
-    assert ZeroPolicy(get_task(SIMPLEGOAL)).predict(np.ones((3, 2)))[0].tolist() == [[0.0, 0.0]] * 3
-
-
 def test_the_rule_of_thumb_of_mountaincar_by_hand():
     name, policy = rule_of_thumb(MOUNTAINCAR)
     actions, _ = policy.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
@@ -142,17 +124,6 @@ def test_rules_of_thumb_do_what_is_said_of_them():
     assert frame["return"].mean() > 97 and (frame["outcome"] == "goal").all()
     frame = evaluate(rule_of_thumb(SIMPLEGOAL)[1], SIMPLEGOAL, 200, seed=30)
     assert set(frame["outcome"]) == {"goal", "pit"} and 0.05 < (frame["outcome"] == "pit").mean() < 0.3
-
-
-def test_the_heuristic_is_that_of_gymnasium():
-    lunar_lander = pytest.importorskip("gymnasium.envs.box2d.lunar_lander")
-    observations = np.random.default_rng(0).normal(0, 0.5, size=(500, 8)).astype(np.float32)
-    observations[:, 6:] = observations[:, 6:] > 0.4
-    env = types.SimpleNamespace(unwrapped=types.SimpleNamespace(continuous=True))
-    expected = np.array([lunar_lander.heuristic(env, one) for one in observations])
-    actions, state = Heuristic().predict(observations)
-    assert np.allclose(actions, expected, atol=1e-6) and state is None and actions.dtype == np.float64
-    assert 0 < observations[:, 6:].any(axis=1).mean() < 1 and len(np.unique(actions)) > 100
 
 
 # The same cells with other maps

@@ -9,8 +9,8 @@ from studies.comparison.makers import Budget, robot_tree, trained_further
 from studies.comparison.tuning import in_units
 from studies.rivals.trees import ObliqueLinearTree
 from studies.robots.actors import CLIP_SLOPE, SoftActor
-from studies.robots.choice import LONGER
 from studies.robots.further_training import train_further
+from studies.robots.imitation import LONGER
 from studies.robots.settings import Walking
 from vsp import get_task, load_teacher, rollout, visited_states
 from vsp_beyond.few_cells.search import local_init

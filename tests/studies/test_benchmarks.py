@@ -4,14 +4,12 @@ import pytest
 
 from studies import benchmarks
 from studies.results import read_results
-from vsp import geometry
 from vsp_beyond.few_cells.units import Cells
 
 
 @pytest.fixture
 def few(monkeypatch):
     monkeypatch.setattr(benchmarks, "DIMENSIONS", (2, 9))
-    monkeypatch.setattr(benchmarks, "CODEWORDS", (100,))
     monkeypatch.setattr(benchmarks, "VARIED", {"cells": (1, 2)})
     monkeypatch.setattr(benchmarks, "FIT", {"dimensions": 3, "cells": 2, "states": 50})
 
@@ -19,10 +17,9 @@ def few(monkeypatch):
 def test_all_ways_to_look_up_agree_and_delaunay_ends_where_it_takes_long(few):
     found = {tuple(about.values()): work() for about, work in benchmarks.look_ups()}
     for d in (2, 9):
-        brute, product, tree = (found["look-up", d, name, 100] for name in ("cdist", "matrix product", "kd-tree"))
-        assert len(brute) == benchmarks.N_STATES and np.array_equal(brute, product) and np.array_equal(brute, tree)
-    graph, exact = (found["graph", 2, name, 100] for name in ("witnesses", "Delaunay"))
-    assert not (graph & ~exact).any() and ("graph", 9, "Delaunay", 100) not in found
+        product, tree = found[d, "matrix product", 100], found[d, "kd-tree", 100]
+        assert len(product) == benchmarks.N_STATES and np.array_equal(product, tree)
+    assert not (found[2, "witnesses", 100] & ~found[2, "Delaunay", 100]).any() and (9, "Delaunay", 100) not in found
 
 
 def test_an_evaluation_is_that_of_the_loss(few):
@@ -40,11 +37,3 @@ def test_the_command_writes_both_tables(few, tmp_path, monkeypatch):
     for name in ("lookup", "fits"):
         made = pd.read_csv(tmp_path / f"data/beyond/{name}.csv")
         assert list(made) == list(read_results(name)) and set(made["seconds"]) == {0.125}
-
-
-def test_the_kd_tree_pays_from_about_as_many_codewords_as_the_look_up_assumes():
-    times = read_results("lookup").query("d == 2").pivot(index="k", columns="method", values="seconds")
-    faster = times["kd-tree"] < times["cdist"]
-    assert (
-        not faster[times.index <= geometry.KDTREE_FROM / 4].any() and faster[times.index > geometry.KDTREE_FROM].all()
-    )

@@ -1,7 +1,7 @@
 import numpy as np
 from support import MOUNTAINCAR
 
-from studies.robots import choice
+from studies.robots import imitation as choice
 from vsp import get_task
 
 

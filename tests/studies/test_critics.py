@@ -27,8 +27,8 @@ def labelled(n=400, seed=0):
     return states, Critic().predict(states)[0]
 
 
-fit = functools.partial(critic_driven, teacher=Critic(), task=SIMPLEGOAL)
-weigh = functools.partial(advantage_weighted, teacher=Critic(), task=SIMPLEGOAL)
+fit = functools.partial(critic_driven, teacher=Critic(), task=TASK)
+weigh = functools.partial(advantage_weighted, teacher=Critic(), task=TASK)
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_the_next_codeword_by_hand(monkeypatch):
 
 def test_cells_are_added_where_the_critics_value_the_action_too_little(short):
     states, actions = labelled()
-    policy = fit(states, actions, cells=4, seed=0)
+    policy = fit(states, actions, size=4, seed=0)
     assert len(policy) == 4 and policy.metric == "euclidean"
     assert policy.codewords[0] == pytest.approx(states.mean(axis=0)) and (policy.codewords[1:, 0] > 0.5).all()
 
@@ -59,7 +59,7 @@ def test_no_cell_is_added_where_no_value_is_lost(short):
         def value(self, obs, actions):
             return np.zeros(len(obs))
 
-    assert len(critic_driven(*labelled(), cells=4, teacher=Content(), task=SIMPLEGOAL, seed=0)) == 1
+    assert len(critic_driven(*labelled(), size=4, teacher=Content(), task=TASK, seed=0)) == 1
 
 
 def test_gradient_descent_ends_at_least_squares():
@@ -84,7 +84,7 @@ def test_the_codewords_and_maps_are_in_the_units_of_the_task():
     """One linear map, of states far from the origin with unlike deviations."""
     states, actions = labelled()
     states = [0.01, 0.1] * states + [0.3, 0.8]
-    policies = fit(states, actions, cells=1, seed=0), linear_map(states, actions, SIMPLEGOAL)
+    policies = fit(states, actions, size=1, seed=0), linear_map(states, actions, SIMPLEGOAL)
     error, other = (np.square(one.predict(states)[0] - actions).mean() for one in policies)
     assert error < 1.02 * other and policies[0].codewords[0] == pytest.approx(states.mean(axis=0))
 
@@ -98,7 +98,7 @@ def test_weights_that_are_all_the_same_change_nothing():
             return np.full(len(obs), 7.0)
 
     states, actions = examples(SIMPLEGOAL)
-    found = advantage_weighted(states, actions, cells=3, teacher=Even(), task=SIMPLEGOAL, seed=1)
+    found = advantage_weighted(states, actions, size=3, teacher=Even(), task=SIMPLEGOAL, seed=1)
     expected = kmeans_cells(states, actions, cells=3, task=SIMPLEGOAL, seed=1)
     assert np.allclose(found.coefficients, expected.coefficients) and np.array_equal(
         found.codewords, expected.codewords
@@ -112,7 +112,7 @@ def test_a_weight_is_as_good_as_so_many_copies():
 
     states, actions = examples(SIMPLEGOAL)
     copies = np.repeat(np.arange(300), np.where(states[:, 0] > 0.5, 3, 1))
-    found = advantage_weighted(states, actions, cells=1, teacher=Twice(), task=SIMPLEGOAL, seed=0)
+    found = advantage_weighted(states, actions, size=1, teacher=Twice(), task=SIMPLEGOAL, seed=0)
     assert np.allclose(found.coefficients, linear_map(states[copies], actions[copies], SIMPLEGOAL).coefficients)
 
 
@@ -122,7 +122,7 @@ def test_where_no_action_costs_anything_the_map_is_unweighted():
             return np.zeros(len(obs))
 
     states, actions = examples(SIMPLEGOAL)
-    found = advantage_weighted(states, actions, cells=1, teacher=Careless(), task=SIMPLEGOAL, seed=0)
+    found = advantage_weighted(states, actions, size=1, teacher=Careless(), task=SIMPLEGOAL, seed=0)
     assert np.allclose(found.coefficients, linear_map(states, actions, SIMPLEGOAL).coefficients)
 
 
@@ -131,5 +131,5 @@ def test_where_no_action_costs_anything_the_map_is_unweighted():
 
 @pytest.mark.parametrize("make", [fit, weigh])
 def test_a_seed_is_a_policy(make, short):
-    one, again, other = (make(*labelled(), cells=3, seed=seed) for seed in (1, 1, 2))
+    one, again, other = (make(*labelled(), size=3, seed=seed) for seed in (1, 1, 2))
     assert one.to_json() == again.to_json() != other.to_json()

@@ -114,15 +114,6 @@ FEET = {"back": [1, 0, 0, 1, 0, 1], "front": [0, 0, 0, 1, 1, 0]}
 GAIT = pd.DataFrame({"step": range(6), "cell": [2, 2, 2, 0, 0, 5], **FEET, **LEG})
 
 
-def test_lines_have_their_ends_in_every_step():
-    assert np.array_equal(gait_module.body_lines(GAIT)["leg"][3], [[3, 0], [3.5, 1]])
-
-
-def test_each_cell_has_a_colour_of_its_own():
-    colors = gait_module.cell_colors(GAIT)
-    assert len(set(colors.values())) == 3 and colors[5] == gait_module.cell_colors(GAIT[GAIT.cell == 5])[5]
-
-
 def test_bands_are_the_cells_and_bars_the_feet_on_the_ground():
     fig, (ax,) = style.panels(1)
     show.footfall(ax, GAIT, step_seconds=0.5)
@@ -135,9 +126,14 @@ def test_bands_are_the_cells_and_bars_the_feet_on_the_ground():
 
 
 def test_the_moving_picture_has_a_frame_per_step_in_the_colour_of_its_cell(tmp_path):
-    made = [show.save_gait(GAIT, "gait", step_seconds=0.05, out=tmp_path / name, alt="a leg") for name in "ab"]
-    assert made[0].gif == made[1].gif and made[0].about.alt == "a leg"
-    with Image.open(tmp_path / "a/figures/gait.gif") as gif:
+    name = "beyond/gait_halfcheetah"
+    made = [
+        show.save_gait(GAIT, name, step_seconds=0.05, out=tmp_path / folder, quick=folder == "c") for folder in "abc"
+    ]
+    assert made[0].gif == made[1].gif != made[2].gif and made[0].png == made[1].png != made[2].png
+    before, folded = made[0]._repr_html_().split("<details><summary>play the moving picture</summary>")
+    assert "image/png" in before and "image/gif" not in before and "image/gif" in folded
+    with Image.open(tmp_path / f"a/figures/{name}.gif") as gif:
         frames = [np.asarray((gif.seek(i), gif.convert("RGB"))[1], dtype=int) for i in range(gif.n_frames)]
         assert gif.info["duration"] == 50
     assert len(frames) == len(GAIT)

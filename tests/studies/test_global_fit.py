@@ -4,7 +4,6 @@ from support import SIMPLEGOAL, examples
 
 from studies.comparison import global_fit
 from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells
-from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import Tunable, in_units
 from studies.rivals.trees import ObliqueLinearTree, Split
 from vsp import VoronoiPolicy, get_task
@@ -70,7 +69,7 @@ def test_in_the_cold_the_soft_tree_is_the_hard_one(leaves):
     assert np.allclose(soft.sum(axis=0), 1) and np.allclose(soft.max(axis=0), 1)
     loss, _ = expected_loss(numbers, seen, temperature=1e-7, clip_slope=0.0)
     states, _ = examples(SIMPLEGOAL)
-    outputs = frame.outputs(Tunable(frame, numbers, tree).predict(states)[0])
+    outputs = frame.outputs(Tunable(frame, numbers).predict(states)[0])
     assert loss == pytest.approx(np.square(outputs - seen.actions).mean())
     assert global_fit.shares(numbers, seen.inputs[:, :-1], 0.5).sum(axis=0) == pytest.approx(1.0)
 
@@ -86,10 +85,10 @@ def test_a_random_tree_has_states_in_every_leaf():
 def test_a_descent_finds_a_planted_border():
     states, actions = kinked()
     start = ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=0)
-    begun = Tunable(*in_units(start, Scaling.of(TASK, states)), start)
+    begun = Tunable(*in_units(start, Scaling.of(TASK, states)))
     ended = descend(begun, states, actions, range(10, search.N_STAGES))
     assert error(ended, states, actions) < 0.2 * error(begun, states, actions)
-    assert len(ended) == 2 and parameters_of(ended) == parameters_of(start)
+    assert len(ended) == 2
 
 
 # Each fit

@@ -17,7 +17,6 @@ from studies.comparison import measure, rows
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, OF_PRESET
 from studies.rivals import tdavq
-from studies.rivals.soft_tree import SoftTree
 from studies.robots import Walking
 from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
@@ -73,7 +72,6 @@ class CriticalTeacher(CurvedTeacher):
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SHORTER = {"TD-AVQ": {"n_steps": 1000}}  # settings of methods that would take long
 AT_LENGTH = {  # numbers that decide on a policy and are made small here
-    "soft tree, DAgger": SoftTree.N_STEPS,
     "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,
     "at the limit": [limit.N_STARTS, limit.N_SLOW, limit.SCREENING, limit.N_AGAIN, limit.AGAIN, *limit.PRICE.values()],
 }
@@ -81,7 +79,6 @@ AT_LENGTH = {  # numbers that decide on a policy and are made small here
 
 @pytest.fixture(autouse=True)
 def shorter(monkeypatch):
-    monkeypatch.setattr(SoftTree, "N_STEPS", 50)
     monkeypatch.setattr(limit, "N_STARTS", 2)
     monkeypatch.setattr(limit, "faithful_preset", lambda task, n_cells: PRESETS["faithful"])
 

@@ -12,13 +12,9 @@ from studies.comparison.measure import (
     common_states,
     fidelity,
     measure,
-    parameters_of,
     sameness,
 )  # fmt: skip
-from studies.rivals import tdavq
 from studies.rivals.dagger import dagger
-from studies.rivals.hand_written import Heuristic
-from studies.rivals.trees import LinearTree, ObliqueLinearTree
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout_from_seed, start_states
 from vsp.paper.baselines import Tree
 from vsp_beyond import Tuned
@@ -35,7 +31,7 @@ def test_what_is_reported_by_hand(monkeypatch):
     starts = start_states(task, 10, ERROR_SEED)
     assert row["error_own"] == action_error(policy, teacher, task, starts, by=policy)
     assert row["error_teacher"] == action_error(policy, teacher, task, starts, by=teacher) != row["error_own"]
-    assert (row["cells"], row["parameters"]) == (1, 6)
+    assert row["cells"] == 1
     own = measure(teacher, teacher, task)
     assert (own["error_teacher"], own["error_own"], own["cells"]) == (0, 0, 0)
 
@@ -71,20 +67,6 @@ def test_the_action_error_by_hand():
 def test_the_tail_is_the_mean_of_the_worst_hundredth():
     returns = np.arange(1000.0)[::-1]
     assert measure_module.worst(returns) == np.mean(range(10)) and measure_module.worst(returns[:3]) == 997.0
-
-
-def test_parameters_by_hand():
-    assert parameters_of(VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 2)), task=SIMPLEGOAL)) == 6
-    three = VoronoiPolicy(np.arange(6.0).reshape(3, 2), np.zeros((3, 3, 2)), task=SIMPLEGOAL)
-    assert parameters_of(three) == 18 + 6
-    states = np.linspace(0, 1, 100)[:, None] * np.ones(2)
-    about = {"leaves": 2, "task": SIMPLEGOAL}
-    assert parameters_of(Tree(states, (states > 0.5).astype(float), leaves=2)) == 2 * 2 + 2
-    assert parameters_of(LinearTree(states, (states > 0.5).astype(float), **about)) == 12 + 2
-    assert parameters_of(ObliqueLinearTree(states, (states > 0.5).astype(float), **about, seed=0)) == 12 + 3
-    assert parameters_of(tdavq.DiscretePolicy(np.zeros((3, 2)), np.zeros((3, 9)), np.zeros((9, 2)))) == 3 * (2 + 2)
-    assert parameters_of(Heuristic()) == 12
-    assert parameters_of(load_teacher(SIMPLEGOAL)) == 2 * 400 + 400 + 400 * 300 + 300 + 300 * 2 + 2
 
 
 # Likeness

@@ -4,10 +4,9 @@ import numpy as np
 from scipy.spatial import KDTree
 from support import PENDULUM, WALKER
 
-from studies.rivals.hand_written import ZeroPolicy
 from studies.robots.imitation import Pushed, imitate_pushed
 from studies.robots.settings import Walking, walking_preset
-from vsp import get_task, load_teacher, visited_states
+from vsp import agent, get_task, load_teacher, visited_states
 
 FEW = Walking(n_cells=3, n_episodes=4, n_corrections=1, n_correction_episodes=2, n_states=1500, n_restarts=1)
 
@@ -37,7 +36,7 @@ def test_corrections_and_pushes_bring_states_that_the_teacher_never_sees():
 
     def idle(frame, seen, before, rng):
         rounds.append(frame.states(seen.inputs))
-        return ZeroPolicy(task)
+        return agent(lambda obs: np.zeros((len(obs), 1)))
 
     imitate_pushed(teacher, PENDULUM, replace(FEW, n_states=10**6, n_corrections=2), seed=0, fit=idle)
     assert [len(states) for states in rounds] == [3 * 4 * 200, (3 * 4 + 2) * 200, (3 * 4 + 4) * 200]

@@ -1,5 +1,4 @@
 import dataclasses
-import shutil
 from collections import Counter
 
 import numpy as np
@@ -8,15 +7,14 @@ import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER
 
 from studies import make_rows
-from studies.comparison import measure, methods, rows
+from studies.comparison import measure, rows
 from studies.comparison.makers import Budget
-from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, TUNED_SIZES, UNTUNED, Table
+from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Table
 from studies.comparison.rows import Job, jobs_of, kept_job, make_all, make_row
 from studies.comparison.summary import read_rows
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
-from vsp.paper import printed
-from vsp.run import atomic, sealed
+from vsp.run import sealed
 from vsp_beyond import Faithful, Tuned
 
 SMALL = Tuned(
@@ -48,42 +46,6 @@ def command(patch, *arguments):
 
 
 # What is compared
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_every_method_is_there_at_every_size_with_twenty_seeds(task):
-    jobs = jobs_of(task)
-    assert len(set(jobs)) == len(jobs) == len({tuple(job.about().values()) for job in jobs})
-    for name, method in methods.methods_of(task, "methods").items():
-        sizes = (PRESETS["tuned"](task).n_cells,) if method.sizes == methods.OF_PRESET else method.sizes
-        seeds = range(20 if method.chance else 1)
-        made = {(job.size, job.seed) for job in jobs if job.method == name}
-        assert made == {(size, seed) for size in sizes for seed in seeds}
-
-
-def test_methods_that_know_one_task_are_not_asked_about_others():
-    known = {task: set(methods.methods_of(task, "methods")) for task in TASKS}
-    assert all(("rule of thumb" in known[task]) == (task in printed.TASKS) for task in TASKS)
-    assert [task for task in TASKS if "TD-AVQ" in known[task]] == [SIMPLEGOAL]
-    assert [task for task in TASKS if "heuristic" in known[task]] == [PENDULUM]
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_every_rival_is_tuned_at_every_size_and_untuned_too(task):
-    jobs = jobs_of(task, "tuned")
-    for name in UNTUNED:
-        sizes = (0,) if name == "one linear map" else TUNED_SIZES
-        made = {(job.size, job.seed) for job in jobs if job.method == f"{name}, tuned"}
-        assert made == {(size, seed) for size in sizes for seed in range(7)}
-        assert METHODS[name].table == "methods" or any(job.method == name for job in jobs)
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_other_teachers_are_distilled_at_the_size_of_the_preset(task):
-    jobs = jobs_of(task, "teachers")
-    assert {job.agent for job in jobs} == {1, 2} and len({tuple(job.about().values()) for job in jobs}) == len(jobs)
-    sizes = {(job.method, job.size) for job in jobs}
-    assert {("faithful", PRESETS["faithful"](task).n_cells), ("one linear map, tuned", 0)} <= sizes and len(sizes) == 5
 
 
 def test_a_table_differs_by_task_where_rows_take_long():
@@ -168,19 +130,6 @@ def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
     jobs[2].path(tmp_path).unlink()
     make_all(tmp_path, jobs)
     assert made == [jobs[2]] and rows.rows(tmp_path, jobs)[0].equals(frame)
-
-
-@pytest.mark.parametrize(
-    ("of", "why"),
-    [(CART, "size 1, expected 3"), (dataclasses.replace(CART_3, seed=0), "seed 0, expected 1"),
-     (Job(SIMPLEGOAL, "teacher", 0, 0), "method 'teacher', expected 'CART'")],
-)  # fmt: skip
-def test_a_file_of_another_row_is_refused(small, tmp_path, of, why):
-    make_all(tmp_path, jobs_of(SIMPLEGOAL))
-    path = CART_3.path(tmp_path)
-    shutil.copy(of.path(tmp_path), path)
-    with pytest.raises(atomic.DamagedFile, match=f"{path.name}: made with {why}: delete it"):
-        rows.rows(tmp_path, jobs_of(SIMPLEGOAL))
 
 
 # Whole commands

@@ -27,6 +27,7 @@ def test_actions_stay_in_the_box_and_the_seed_decides(monkeypatch):
 
 
 def test_as_many_units_as_numbers_allow():
-    """A unit has two weights, a bias, and a weight to each action; each action has a bias."""
-    assert [units_for(n, get_task(SIMPLEGOAL)) for n in (1, 7, 11, 12, 32)] == [1, 1, 1, 2, 6]
-    assert units_for(21, get_task(MOUNTAINCAR)) == 5
+    """A unit has two weights, a bias, and a weight to each action; each action has a bias. A cell has six numbers on
+    SimpleGoal, three on MountainCar, and two of its codeword; two more scale the states."""
+    assert [units_for(k, get_task(SIMPLEGOAL)) for k in (1, 2, 4)] == [1, 3, 6]  # of 6, 18 and 34 numbers
+    assert units_for(3, get_task(MOUNTAINCAR)) == 4  # of 17

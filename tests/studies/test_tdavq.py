@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 from studies.rivals import tdavq
 from studies.rivals.tdavq import DiscretePolicy, ParallelEpisodes, learn, merge, split, update
@@ -95,18 +95,6 @@ def test_codewords_keep_their_distance(learned):
     assert gaps.min() >= 0.06 and 20 < len(learned) == len(learned.values) and learned.values.shape[1] == 9
 
 
-def test_a_larger_distance_gives_fewer_cells_and_a_discount_lower_values(learned):
-    coarse = learn(SIMPLEGOAL, seed=0, n_steps=4000, min_distance=0.15, likeness=1.0, discount=0.95)
-    assert 3 < len(coarse) < 0.5 * len(learned)
-    near = learn(SIMPLEGOAL, seed=0, n_steps=500, discount=0.5)
-    assert near.values.max() < 12 < learn(SIMPLEGOAL, seed=0, n_steps=500).values.max()
-
-
 def test_tasks_with_other_observations_than_states():
     policy = learn(PENDULUM, seed=0, n_steps=200)
     assert policy.codewords.shape[1] == 3 and np.allclose(np.hypot(*policy.codewords.T[:2]), 1)
-
-
-def test_faults():
-    with pytest.raises(ValueError, match="LunarLanderContinuous-v3 has a physics engine"):
-        learn(LUNARLANDER, seed=0)

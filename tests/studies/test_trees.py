@@ -5,8 +5,7 @@ import pytest
 from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, SIMPLEGOAL, examples
 
-from studies.rivals import soft_tree, trees
-from studies.rivals.soft_tree import SoftTree
+from studies.rivals import trees
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
 from vsp.paper.baselines import Tree, linear_map
 
@@ -32,14 +31,6 @@ def test_constant_leaves_hold_the_mean_action_of_their_states(make):
     for node in tree.ends:
         own = np.clip(actions[node.rows].mean(axis=0), -1, 1)
         assert np.allclose(tree.predict(states[node.rows])[0], own)
-
-
-def test_constant_leaves_along_the_axes_are_nearly_those_of_cart():
-    """They differ in where a cut may lie: at a quantile, or between any two states."""
-    states, actions = examples(SIMPLEGOAL)
-    own = LinearTree(states, actions, leaves=5, task=SIMPLEGOAL, constant=True)
-    own, cart = (np.square(one.predict(states)[0] - actions).mean() for one in (own, Tree(states, actions, leaves=5)))
-    assert own == pytest.approx(cart, rel=0.05)
 
 
 def test_the_linear_leaves_are_fitted_to_their_states():
@@ -115,56 +106,3 @@ def test_a_linear_split_saves_what_it_says():
     tree.task = whole.task = dataclasses.replace(tree.task, action_low=-np.full(2, 9.0), action_high=np.full(2, 9.0))
     errors = [np.square(one.predict(states)[0] - actions).sum() for one in (whole, tree)]
     assert tree.nodes[0].split.gain == pytest.approx(errors[0] - errors[1], rel=1e-5) and len(whole) == 1
-
-
-# Soft trees
-
-
-def test_the_turns_of_a_tree_by_hand():
-    assert soft_tree._turns(2).tolist() == [
-        [0, 0, 0], [-1, 0, 0], [1, 0, 0], [-1, -1, 0], [-1, 1, 0], [1, 0, -1], [1, 0, 1]
-    ]  # fmt: skip
-    assert soft_tree._turns(0).shape == (1, 0)
-
-
-def oblique_pieces():
-    states = np.random.default_rng(0).uniform(-1, 1, size=(2000, 2))
-    u, v = states @ [1, 1] > 0, states @ [1, -1] > 0
-    return states, np.column_stack([np.where(u, 0.8, -0.6), np.where(v, 0.5, -0.9)])
-
-
-@pytest.fixture
-def shorter(monkeypatch):
-    monkeypatch.setattr(SoftTree, "N_STEPS", 400)
-
-
-def test_a_soft_tree_finds_four_oblique_pieces(shorter):
-    states, actions = oblique_pieces()
-    tree = SoftTree(states, actions, leaves=4, seed=0)
-    wrong = np.abs(tree.predict(states)[0] - actions).max(axis=1) > 0.1
-    straight = np.abs(Tree(states, actions, leaves=4).predict(states)[0] - actions).max(axis=1) > 0.1
-    assert wrong.mean() < 0.05 < straight.mean() and len(tree) == 4
-    right = 1 / (1 + np.exp(-tree._inputs(states) @ tree.nodes.T))
-    assert np.mean(np.maximum(right, 1 - right)[:, 0] > 0.95) > 0.9  # nearly sure of its leaf
-
-
-def test_a_soft_tree_acts_as_its_most_probable_leaf(shorter):
-    states, actions = examples(SIMPLEGOAL)
-    tree = SoftTree(states, actions, leaves=5, seed=1)  # rounded down to four
-    right = 1 / (1 + np.exp(-tree._inputs(states) @ tree.nodes.T))
-    probabilities = np.column_stack([
-        (1 - right[:, 0]) * (1 - right[:, 1]), (1 - right[:, 0]) * right[:, 1],
-        right[:, 0] * (1 - right[:, 2]), right[:, 0] * right[:, 2],
-    ])  # fmt: skip
-    leaf = probabilities.argmax(axis=1)
-    assert np.array_equal(tree.predict(states)[0], tree.values[leaf]) and len(tree) == 4 and len(set(leaf)) > 1
-    for i in set(leaf):
-        assert np.allclose(tree.values[i], actions[leaf == i].mean(axis=0))
-
-
-def test_a_soft_tree_of_one_leaf_is_the_mean_action_and_seeds_count(monkeypatch):
-    monkeypatch.setattr(SoftTree, "N_STEPS", 20)
-    states, actions = examples(SIMPLEGOAL)
-    assert SoftTree(states, actions, leaves=1, seed=0).values[0] == pytest.approx(actions.mean(axis=0))
-    one, same, other = (SoftTree(states, actions, leaves=2, seed=seed) for seed in (3, 3, 4))
-    assert np.array_equal(one.nodes, same.nodes) and not np.array_equal(one.nodes, other.nodes)

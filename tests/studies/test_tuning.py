@@ -4,14 +4,12 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
 
-from studies.comparison.measure import parameters_of
 from studies.comparison.tuning import TreeNumbers, in_units, tuned
 from studies.rivals.small_network import SmallNetwork
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
 from vsp import get_task, rollout
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map
 from vsp_beyond import Tuned
-from vsp_beyond.few_cells.population import rollout_population
 from vsp_beyond.few_cells.units import Scaling
 
 TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
@@ -49,7 +47,7 @@ def test_the_numbers_act_as_the_policy_they_are_of(kind, task):
     expected = np.clip(policy.predict(other)[0], frame.task.action_low, frame.task.action_high)
     same = frame.policy(numbers.like(numbers.vector))
     assert np.allclose(same.predict(other)[0], expected, atol=1e-6)  # CART's borders are those of float32
-    assert parameters_of(same) == parameters_of(policy)
+    assert len(same) == (0 if kind == "network" else len(policy))
 
 
 @pytest.mark.parametrize(
@@ -80,14 +78,6 @@ def test_a_tree_by_hand():
     assert np.allclose(tree.outputs(inputs), [[0.1], [0.6], [0.9]])
     moved = tree.like(np.append([0.5, 0.35], maps))  # the last state now turns left at the second cut
     assert np.allclose(moved.outputs(inputs), [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
-
-
-def test_a_population_of_trees_plays_as_each_alone():
-    _, frame, numbers = fitted("oblique tree", SIMPLEGOAL)
-    policies = [frame.policy(numbers.like(numbers.vector + shift)) for shift in (0.0, 0.2, -0.2)]
-    starts = frame.task.start(np.random.default_rng(0), 40)
-    for policy, together in zip(policies, rollout_population(policies, frame.task, starts), strict=True):
-        assert np.allclose(together.returns, rollout(policy, frame.task, starts).returns)
 
 
 @pytest.mark.parametrize("kind", ["linear tree", "one map"])

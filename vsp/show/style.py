@@ -85,10 +85,10 @@ class Picture:
         return self.about.alt
 
 
-def watermark(fig: Figure, **options) -> None:
+def watermark(fig: Figure) -> None:
     """Mark a figure as that of a quick run."""
     look = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
-    fig.text(0.5, 0.5, "quick run", **look, **options)
+    fig.text(0.5, 0.5, "quick run", **look)
 
 
 def save_figure(
