@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -43,7 +44,7 @@ class NoScheduler(CommandError):
 
 def results(
     work: Callable, arguments: Sequence[tuple], label: str, *, jobs: int | str, total: int, unit: str
-) -> Iterator[tuple[int, object]]:
+) -> Iterator[tuple[int, Any]]:
     """Yield (i, work(*arguments[i])) for every i, as jobs end, and show how many are done.
 
     `total` includes jobs that were done before. `jobs` is the number of worker processes (-1: one per core) or the
