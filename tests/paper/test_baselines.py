@@ -7,7 +7,7 @@ from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
 
 from studies.rivals.dagger import dagger
-from studies.rivals.hand_written import Heuristic, PumpAndBalance, ZeroPolicy
+from studies.rivals.hand_written import Heuristic, PumpAndBalance
 from vsp.evaluation import evaluate
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.policy import VoronoiPolicy
@@ -122,19 +122,10 @@ def test_the_pendulum_is_kept_upright():
     assert -160 < frame["return"].mean() < -140
 
 
-def test_the_zero_policy_does_nothing():
-    assert ZeroPolicy(get_task(SIMPLEGOAL)).predict(np.ones((3, 2)))[0].tolist() == [[0.0, 0.0]] * 3
-
-
 def test_the_rule_of_thumb_of_mountaincar_by_hand():
     name, policy = rule_of_thumb(MOUNTAINCAR)
     actions, _ = policy.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
     assert name == "12 · velocity" and np.allclose(actions, [[0], [0.6], [-0.84], [0.84]])
-
-
-def test_a_task_without_a_rule_of_thumb_is_named():
-    with pytest.raises(ValueError, match="task is 'Pendulum-v1', expected one of .*SimpleGoal-v0"):
-        rule_of_thumb(PENDULUM)
 
 
 def test_rules_of_thumb_do_what_is_said_of_them():

@@ -1,7 +1,6 @@
 import contextlib
 import dataclasses
 import io
-import json
 import os
 import pickle
 import shutil
@@ -79,17 +78,6 @@ def copied(tmp_path):
 def test_a_path_loads_as_the_name_does(copied):
     shipped, own = load_teacher(SIMPLEGOAL), load_teacher(copied)
     assert own.digest == shipped.digest == load_teacher(str(copied), SIMPLEGOAL).digest and own.task is shipped.task
-
-
-@pytest.mark.parametrize("position", [0, 1000, -1])
-def test_damaged_weights_are_refused(copied, position):
-    content = copied.read_bytes()
-    altered = bytearray(content)
-    altered[position] ^= 16
-    for damaged in (content[:position], altered):
-        copied.write_bytes(damaged)
-        with pytest.raises(DamagedFile, match="own.safetensors: SHA-256 is .*its card says"):
-            load_teacher(copied)
 
 
 def test_missing_weights_or_card_are_named(copied, tmp_path):
@@ -204,18 +192,6 @@ def test_a_payload_in_a_zip_is_not_run(agents, tmp_path, kind):
     assert not mark.exists()
     pickle.loads(pickle.dumps(Payload(mark))).close()
     assert mark.exists()  # the payload is live
-
-
-def test_a_payload_in_the_data_of_a_zip_is_not_run(agents, tmp_path):
-    import base64
-
-    mark = tmp_path / "ran"
-    serialised = base64.b64encode(pickle.dumps(Payload(mark))).decode()
-    with zipfile.ZipFile(agents[1] / "small.zip") as archive:
-        data = json.loads(archive.read("data"))
-    data["policy_class"] = {":type:": "x", ":serialized:": serialised}
-    load_teacher(rewritten(agents[1] / "small.zip", tmp_path / "x.zip", data=json.dumps(data)), SIMPLEGOAL)
-    assert not mark.exists()
 
 
 @pytest.mark.parametrize(
