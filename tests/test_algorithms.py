@@ -374,7 +374,7 @@ def test_the_seed_alone_decides_and_no_global_random_state(teacher):
     assert runs[0] == runs[1] != runs[2]
 
 
-@pytest.mark.parametrize("ahead", [1, 7, 119, 5000])
+@pytest.mark.parametrize("ahead", [1, 7, 5000])
 @pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR])
 def test_how_many_episodes_are_rolled_out_together_has_no_say(ahead, task, monkeypatch):
     player = CurvedTeacher() if task == SIMPLEGOAL else PumpingTeacher()

@@ -155,10 +155,6 @@ def made(small, tmp_path_factory):
     return runs, study(runs, tried=TRIED)
 
 
-def as_bytes(frame):
-    return frame.to_csv(index=False).encode()
-
-
 def test_the_study_has_a_row_per_phase_variant_and_task(made):
     frame = made[1]
     chosen, confirmed = (frame[frame["phase"] == phase] for phase in ("choosing", "confirming"))
