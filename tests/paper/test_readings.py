@@ -91,9 +91,8 @@ def test_every_reading_acts_in_a_run_and_no_other_word_is_taken(name):
     other = dataclasses.replace(base, **{name: alternative})
 
     def run(readings, seed):
-        return distill(CurvedTeacher(), task, config, seed=seed, split=readings.split, merge=readings.merge)[
-            0
-        ].to_json()
+        policy, _ = distill(CurvedTeacher(), task, config, seed=seed, split=readings.split, merge=readings.merge)
+        return policy.to_json()
 
     assert any(run(base, seed) != run(other, seed) for seed in range(5))
     with pytest.raises(ValueError, match=f"{name} is 'typo', expected"):
