@@ -115,13 +115,6 @@ def test_sampling_repeats_with_its_generator():
     assert draws[0] == draws[1] != draws[2]
 
 
-@pytest.mark.parametrize("cells", [np.array([True, False, True]), np.array([0, 2])])
-def test_a_reset_by_mask_or_index_empties_these_cells_alone(cells):
-    buffers = filled(0, 1, 1, 2)
-    buffers.reset(cells)
-    assert buffers.counts.tolist() == [0, 2, 0]
-
-
 def test_clear_bounds_the_memory():
     buffers = filled(0)
     for _ in range(200):

@@ -3,7 +3,6 @@
 import ast
 import html
 import json
-import pydoc
 import re
 import subprocess
 import sys
@@ -89,16 +88,6 @@ def test_figures_and_tables_that_the_text_names_exist(notebook):
     assert set(re.findall(r"\b(?:Figure|Table) \d\.\d+", text)) <= {
         caption.label for caption in captions._book().values()
     }
-
-
-def test_names_in_the_text_exist(notebook):
-    text = "".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
-    assert [
-        name for name in re.findall(r"`((?:vsp|vsp_beyond|studies)(?:\.\w+)+)", text) if pydoc.locate(name) is None
-    ] == []
-    assert [
-        path for path in re.findall(r"`((?:vsp|vsp_beyond|studies)/[\w/.]+)`", text) if not (ROOT / path).exists()
-    ] == []
 
 
 @pytest.mark.parametrize(

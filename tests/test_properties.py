@@ -197,42 +197,4 @@ def test_numbers_of_another_type_are_the_same_numbers(case):
             np.testing.assert_equal(plain(function(**good | changed)), plain(function(**good)))
 
 
-@pytest.mark.parametrize("kind", [int, np.uint8, np.float16])
-def test_whole_numbers_are_observations_too(kind):
-    corners = np.array([[0, 0], [0, 1], [1, 1]])
-    for act in (TWO.predict, NET.predict, TWO.linear, TWO.cells):
-        np.testing.assert_equal(act(corners.astype(kind)), act(corners.astype(np.float64)))
-
-
 # Arithmetic of what summaries say: what is not finite stays so
-
-GROUPS = [(2.0, 0.0, 1.0), (2.0, 1.0, 3.0)]
-PARTS = [statistics.Part(2.0, 1.0, 0.5, 0.0, 2.0)]
-MOMENTS = {
-    "fences": (1.0, 2.0),
-    "quartiles_from_fences": (1.0, 2.0),
-    "remaining_mean": (5.0, 1.0, PARTS),
-    "remaining_std": (5.0, 1.0, 1.0, PARTS),
-    "quarters": (8.0, (0.0, 1.0, 2.0, 3.0, 4.0), 1.0, 1.0),
-    "mean_range": (GROUPS,),
-    "least_std": (1.0, GROUPS),
-    "greatest_std": (1.0, 0.0, 2.0),
-}
-
-
-def with_nan(value):
-    """A number, the first two of a tuple, or each of a list of tuples: with a NaN in its place, one after the other."""
-    if isinstance(value, float):
-        return [np.nan]
-    if isinstance(value, list):
-        return [[*value[:i], bad, *value[i + 1 :]] for i, group in enumerate(value) for bad in with_nan(group)]
-    spoilt = (np.nan, *value[1:]), (value[0], np.nan, *value[2:])
-    return [statistics.Part(*group) for group in spoilt] if isinstance(value, statistics.Part) else list(spoilt)
-
-
-@pytest.mark.parametrize("case", MOMENTS)
-def test_arithmetic_of_a_nan_is_a_nan(case):
-    arguments = MOMENTS[case]
-    for place, value in enumerate(arguments):
-        for bad in with_nan(value):
-            assert np.isnan(getattr(statistics, case)(*arguments[:place], bad, *arguments[place + 1 :])).any(), bad

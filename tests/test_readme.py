@@ -11,12 +11,13 @@ import pandas as pd
 import pytest
 
 import vsp
-from studies.comparison import all_rows, largest_alike, method_summary, read_results
+from studies.comparison import all_rows, method_summary, read_results
 from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
 
 PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = PAGES[0].read_text("utf-8")
 RESULTS = (ROOT / "docs" / "results.md").read_text("utf-8")
 
@@ -56,7 +57,7 @@ def test_targets_exist():
             assert set(words.split()) <= targets, f"{page.name}: make {words}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("page", [*PAGES, *NOTEBOOKS], ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_names_exist(page):
     text = page.read_text("utf-8")
     names = re.findall(r"`((?:vsp|vsp_beyond|studies)(?:\.\w+)+)", text)
@@ -105,22 +106,6 @@ def test_counts_are_those_of_the_ledger():
     assert f"{share} reproduce, {wide} of them with a wide interval" in said
     assert f"The paper prints {len(checked) - len(once)} of these results again" in said
     assert f"{(once['verdict'] == 'reproduced').sum()} of {len(once)} reproduce." in said
-
-
-def test_the_spread_is_that_of_the_tables():
-    rows = [row for row in rows_of(section("## Did it reproduce?").partition("### ")[0], 5) if ", " in row[0]]
-    assert len(rows) == 8
-    for name, *cells in rows:
-        task, metric = name.split(",")
-        table = read_table(f"{task.lower()}_spread", index_col="metric").rename(index={"Median/Q2": "Median"})
-        assert cells == [f"{value:.3f}" for value in table.loc[metric.split()[0].capitalize()]]
-
-
-def test_what_cells_buy_is_that_of_the_table():
-    rows = rows_of(section("### What do the cells buy?"), 5)
-    for (_, kinds), columns in zip(read_table("what_cells_buy").groupby("task", sort=False), ((1, 2), (3, 4))):
-        shown = {tuple(row[i] for i in columns) for row in rows}
-        assert shown == {(f"{row.mean:.2f}", f"{100 * row.failing:.1f}") for row in kinds.itertuples()}
 
 
 def test_faithful_policies_are_those_of_the_table():

@@ -103,12 +103,6 @@ def test_contributions_have_any_number_of_inputs(ax):
     assert [bar.get_width() for bar in ax.patches] == [1, 0, 1, 3, 5, 2] and labels(ax)[0] == "τ"
 
 
-def test_contributions_of_other_classes_are_refused(ax):
-    policy = VoronoiPolicy([[0.0, 0.0]], np.zeros((1, 3, 1)), task="MountainCarContinuous-v0", sub_policy="pid")
-    with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
-        explanation.contributions(ax, policy, np.array([-0.5, 0.01]))
-
-
 def test_nothing_of_an_explanation_overlaps():
     """Labels, values and the legend: no two texts in one place."""
     fig, axes = panels(2, height=2.5)

@@ -156,12 +156,3 @@ def test_an_agent_with_a_memory_is_refused():
 
     with pytest.raises(ValueError, match="the agent keeps a state between steps, .* train one without memory"):
         vsp_beyond.faithful(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
-
-
-def test_a_task_that_never_ends_is_refused():
-    gymnasium.register("Endless-v0", entry_point="own_tasks:Tank")
-    try:
-        with pytest.raises(ValueError, match="Endless-v0 has no step limit, expected one: pass max_episode_steps"):
-            vsp_beyond.faithful(vsp.agent(own_tasks.tank_pilot), "Endless-v0", seed=0)
-    finally:
-        del gymnasium.registry["Endless-v0"]

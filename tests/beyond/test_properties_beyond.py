@@ -1,12 +1,11 @@
 """What a user calls beyond the paper refuses what it cannot work with, as `test_properties` asks of `vsp`."""
 
-import dataclasses
 import functools
 
 import numpy as np
 import pytest
 from spoilt import Argument, actor, array, but_for_none, count, name, number, refuses, settings
-from support import MOUNTAINCAR, SIMPLEGOAL, Constant, CurvedTeacher, tiny
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, tiny
 
 import vsp
 import vsp_beyond
@@ -95,16 +94,3 @@ def test_what_explains_linear_policies_alone_refuses_others():
     ):
         with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
             use()
-
-
-def test_rewards_that_are_no_numbers_are_one_clear_error():
-    plain = vsp.get_task(SIMPLEGOAL)
-
-    def step(states, actions):
-        moved, rewards, outcomes = plain.step(states, actions)
-        return moved, np.full_like(rewards, np.nan), outcomes
-
-    with pytest.raises(ValueError, match="rewards of Broken .*nan.*expected finite"):
-        vsp_beyond.faithful(
-            Constant(-1.0, -1.0), dataclasses.replace(plain, name="Broken", step=step), FAITHFUL, seed=0
-        )

@@ -8,7 +8,6 @@ import contextlib
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -218,16 +217,6 @@ def test_read_only_figures(reference, record):
     check(record, "read-only figures/, mounted", wrong, "clear error, outputs untouched")
 
 
-@pytest.mark.parametrize("limit", [10, 60])  # kB
-def test_limit_on_the_size_of_files(reference, record, limit):
-    out = reference.again()
-    before = outdated(out)
-    small = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (1000 * limit, 1000 * limit))
-    wrong = refused(figures(out, preexec_fn=small), "File too large", "ulimit -f")
-    wrong = wrong or difference(before, tree(out)) or wrong_after(out, reference, f"{out}-again.log")
-    check(record, f"files of at most {limit} kB", wrong, "clear error, outputs untouched")
-
-
 # Odd places
 
 
@@ -256,12 +245,3 @@ def test_read_only_checkout(tmp_path, reference, record):
 
 
 # Set-up with the real pip; tests/run/test_makefile.py has what needs no packages
-
-
-def test_edited_lock(elsewhere, record):
-    lock = (ROOT / "environment.lock").read_text()
-    six = re.search(r"^six==.*\n( .*\n)*", lock, re.M)[0]
-    (elsewhere / "environment.lock").write_text(lock.replace(six, re.sub("sha256:....", "sha256:beef", six)))
-    make = Make("venv", log=elsewhere.parent / "edited.log", cwd=elsewhere)
-    words = ("THESE PACKAGES DO NOT MATCH", "error: .venv is not whole", "was environment.lock edited?")
-    check(record, "lock edited: a wrong checksum", refused(make, *words), "clear error with a remedy")

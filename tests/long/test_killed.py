@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from support import alive, until
 from support import write_story as write
 
@@ -76,32 +75,3 @@ def test_an_end_by_signal_ends_the_workers_too(tmp_path):
     assert "error: interrupted." in process.communicate(timeout=30)[1] and process.returncode == 1
     until(lambda: not any(alive(int(pid)) for pid in children))
     assert len(children) >= 2
-
-
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="joblib uses it on Linux alone")
-def test_a_kill_of_all_leaves_no_folder_of_joblibs(tmp_path):
-    """Neither in /dev/shm nor in TMPDIR, although jobs get arrays that joblib would put there."""
-    ready = tmp_path / "ready"
-    code = f"""
-import pathlib, time
-import numpy as np
-from vsp.run.workers import results
-def wait(array, n):
-    pathlib.Path({str(ready)!r}).touch()
-    time.sleep(60)
-list(results(wait, [(np.zeros(10**6), n) for n in range(4)], "work", jobs=2, total=4, unit="jobs"))
-"""
-    (tmp_path / "tmp").mkdir()
-    process = subprocess.Popen(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        start_new_session=True,
-        env=os.environ | {"TMPDIR": str(tmp_path / "tmp")},
-    )
-    until(ready.exists)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    left = [*Path("/dev/shm").glob(f"joblib*_{process.pid}_*"), *(tmp_path / "tmp").iterdir()]
-    for semaphore in Path("/dev/shm").glob(f"sem.loky-{process.pid}-*"):
-        semaphore.unlink()
-    assert left == []

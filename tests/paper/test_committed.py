@@ -7,7 +7,7 @@ from support import TASKS
 from vsp.paper.results import read_results, write_results
 from vsp.paper.runs import paper_experiment
 from vsp.paper.studies import interpretations
-from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
+from vsp.paper.studies.interpretations import CHOOSING, distance, landmarks
 from vsp.paper.studies.teachers import SEEDS
 
 
@@ -25,16 +25,6 @@ def readings():
 @pytest.fixture(scope="module")
 def teachers():
     return read_results("teachers")
-
-
-def test_the_first_of_the_ranking_were_confirmed(readings):
-    chosen, confirmed = (readings[readings["phase"] == phase] for phase in ("choosing", "confirming"))
-    first = [name for name in ranking(chosen) if name != "default"][:N_CONFIRMED]
-    nearest = [ranking(chosen, task)[0] for task in TASKS]
-    expected = {(name, task) for name in ["default", *first, *nearest] for task in (*TASKS, "both")}
-    assert set(zip(confirmed["variant"], confirmed["task"])) == expected and len(confirmed) == len(expected)
-    assert (confirmed[confirmed["task"] != "both"]["runs"] == len(CONFIRMING)).all()
-    assert len(CONFIRMING) >= 10
 
 
 def test_distances_follow_from_the_other_columns(readings, teachers):

@@ -123,9 +123,5 @@ def test_terms_that_the_paper_does_not_print_are_no_printed_values(printed):
 
 
 def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():
-    assert printed_module.printed_spread_values(SIMPLEGOAL, "drl") == {
-        "min": -10.0, "max": 22.667, "mean": 16.599, "std": 3.117, "q1": 14.542, "median": 16.956, "q3": 18.687,
-        "iqr": 4.145, "coverage": 97.6,
-    }  # fmt: skip
     assert printed_module.printed_spread_values(MOUNTAINCAR, "ours")["median"] == 93.476
     assert printed_module.printed_spread_values(SIMPLEGOAL, "ours").keys() <= spread(np.arange(5.0)).keys()

@@ -151,16 +151,6 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
         load_runs(SMALL, [0], runs=tmp_path)
 
 
-def test_a_damaged_run_is_named(made, tmp_path):
-    shutil.copytree(made[0], tmp_path / "runs")
-    path = SMALL.folder(tmp_path / "runs") / "0001.run"
-    content = path.read_bytes()
-    for damaged in (content[:-1], b"", content[:300] + bytes([content[300] ^ 4]) + content[301:]):
-        path.write_bytes(damaged)
-        with pytest.raises(atomic.DamagedFile, match="0001.run: damaged"):
-            make_runs(SMALL, [0, 1], runs=tmp_path / "runs")
-
-
 # What is made of runs
 
 

@@ -10,8 +10,8 @@ from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
 from vsp.paper import printed, results, studies
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from vsp.paper.results import PROVENANCE, read_results
-from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs, paper_experiment
+from vsp.paper.results import read_results
+from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
 from vsp.paper.statistics import crossed_interval
 from vsp.paper.studies import interpretations, make_studies, simpler, teachers
 from vsp.paper.studies.simpler import LEAVES, compare_simpler, fit, teacher_data
@@ -88,18 +88,6 @@ def test_every_kind_of_policy_has_its_row_by_hand(compared):
 
 
 # The committed table, and the command that makes it
-
-
-def test_the_committed_table_has_the_kinds_of_both_tasks():
-    frame = read_results("simpler")
-    for task in TASKS:
-        rows = frame[frame["task"] == task].set_index("policy")
-        made = dict.fromkeys(FITTED, simpler.N_FITTED) | {rule_of_thumb(task)[0]: 1, "published policy": 1}
-        made |= {"teacher (TD3)": 1, "distilled, best run": 1}
-        made["distilled, all runs"] = {SIMPLEGOAL: 85, MOUNTAINCAR: 40}[task]
-        assert rows["policies"].to_dict() == made and rows.loc["teacher (TD3)", ["gap", "low", "high"]].eq(0).all()
-        provenance = simpler.provenance_of(paper_experiment(task))
-        assert rows[[*PROVENANCE]].drop_duplicates().to_dict("records") == [provenance]
 
 
 def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tmp_path, monkeypatch):

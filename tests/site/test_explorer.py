@@ -247,13 +247,8 @@ def test_with_little_motion_asked_for_the_player_goes_slowly(opened):
     assert int(root.get_by_label("iteration").input_value()) <= 2
 
 
-def test_nothing_fails_and_everyone_can_use_it(desk):
-    from axe_playwright_python.sync_playwright import Axe
-
-    for visit in desk.values():
-        assert visit.troubles == []
-        violations = Axe().run(visit.page).response["violations"]
-        assert [rule["id"] for rule in violations if rule["impact"] in ("serious", "critical")] == []
+def test_nothing_fails(desk):
+    assert [visit.troubles for visit in desk.values()] == [[]] * len(TASKS)
 
 
 # Stored episodes

@@ -154,9 +154,9 @@ def compare(name, n, **policy):
 @pytest.mark.parametrize(
     ("task", "n", "policy", "outcomes"),
     [
-        (SIMPLEGOAL, 1000, {}, {GOAL, PIT, TRUNCATED}),
-        (MOUNTAINCAR, 300, {}, {TRUNCATED}),
-        (MOUNTAINCAR, 150, {"gain": 0.9, "seed": 2}, {GOAL}),
+        (SIMPLEGOAL, 300, {}, {GOAL, PIT, TRUNCATED}),
+        (MOUNTAINCAR, 20, {}, {TRUNCATED}),
+        (MOUNTAINCAR, 40, {"gain": 0.9, "seed": 2}, {GOAL}),
     ],
 )
 def test_batched_equals_step_by_step(task, n, policy, outcomes):
@@ -227,19 +227,6 @@ def test_a_task_with_a_physics_engine_is_gymnasium_step_by_step(name, failure):
         assert np.array_equal(episode.states, np.array(seen[:-1], dtype=np.float64))
         assert result.outcomes[i] == (TRUNCATED if truncated else PIT if reward == failure else GOAL)
     assert len({episode.states[0].tobytes() for episode in episodes}) == 6
-
-
-def test_a_task_of_gymnasiums_own_pendulum():
-    """The two ways to the same environment; the generic one starts from seeds."""
-    task, own = gymnasium_task(PENDULUM), get_task(PENDULUM)
-    assert (task.max_steps, task.low.tolist(), task.action_high.tolist()) == (200, own.low.tolist(), [2.0])
-    live = task.begin(task.start(np.random.default_rng(0), 4))
-    states, actions = np.array([one.env.unwrapped.state for one in live]), np.array([[0.5], [-1], [2], [0]])
-    assert np.allclose(task.see(live), own.see(states), atol=1e-7)
-    _, rewards, outcomes = task.step(live, actions)
-    moved, expected, _ = own.step(states, actions)
-    assert np.allclose(rewards, expected) and (outcomes == RUNNING).all()
-    assert np.array_equal(task.observe(live), own.observe(moved))
 
 
 class Rescaled(gymnasium.wrappers.RescaleAction):

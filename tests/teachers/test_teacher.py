@@ -1,7 +1,6 @@
 import contextlib
 import dataclasses
 import io
-import json
 import os
 import pickle
 import subprocess
@@ -203,18 +202,6 @@ def test_a_payload_in_a_zip_is_not_run(agents, tmp_path, kind):
     assert not mark.exists()
     pickle.loads(pickle.dumps(Payload(mark))).close()
     assert mark.exists()  # the payload is live
-
-
-def test_a_payload_in_the_data_of_a_zip_is_not_run(agents, tmp_path):
-    import base64
-
-    mark = tmp_path / "ran"
-    serialised = base64.b64encode(pickle.dumps(Payload(mark))).decode()
-    with zipfile.ZipFile(agents[1] / "small.zip") as archive:
-        data = json.loads(archive.read("data"))
-    data["policy_class"] = {":type:": "x", ":serialized:": serialised}
-    load_teacher(rewritten(agents[1] / "small.zip", tmp_path / "x.zip", data=json.dumps(data)), SIMPLEGOAL)
-    assert not mark.exists()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER
 
-import vsp
 from vsp.evaluation import rollout_from_seed
 from vsp.run import atomic, listed
 from vsp.tasks.base import GOAL
@@ -164,14 +163,6 @@ def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatc
 )  # fmt: skip
 def test_reaches_bar(task, mean, goal, reached):
     assert train.reaches_bar({"mean": mean, "goal": goal, "pit": 1 - goal}, task) == reached
-
-
-def test_the_recipes_are_those_of_the_paper():
-    goal, car = RECIPES[SIMPLEGOAL], RECIPES[MOUNTAINCAR]
-    assert (goal.steps, goal.batch_size, goal.train_freq) == (500_000, 256, (1, "step"))
-    assert (car.steps, car.noise, car.noise_std, car.batch_size) == (300_000, "ornstein-uhlenbeck", 0.5, 100)
-    assert (car.train_freq, car.gradient_steps, car.learning_rate) == ((1, "episode"), -1, 1e-3)
-    assert vsp.load_teacher is load_teacher
 
 
 # The shorter trainings of a study

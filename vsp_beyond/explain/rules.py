@@ -32,7 +32,7 @@ class Rule:
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Return which of the states (n, d) lie in the box. (n,) bool"""
         states = check_array("states", states, (-1, len(self.low)))
-        return ((states > self.low) & (states <= self.high)).all(axis=1)
+        return np.all((states > self.low) & (states <= self.high), axis=1)
 
     def text(self, names: tuple[str, ...]) -> str:
         """Write the box in words, with the names of the d inputs; "always" if it has no border."""

@@ -27,7 +27,8 @@ def expected_seconds(task: Task, config: Faithful | Tuned) -> tuple[float, float
     candidates = config.n_generations * candidates_per_generation(k * (d + (d + 1) * m))
     taught, tuning = config.n_episodes + config.n_validation, candidates * config.n_tuning_episodes
     # A `Faithful` is not tuned if the closest cells return enough
-    certain, fits, (quick, slow) = taught, config.n_restarts * (k + 2), DESCENT
+    fits: float = config.n_restarts * (k + 2)
+    certain, (quick, slow) = taught, DESCENT
     if isinstance(config, Tuned):
         certain, fits, (quick, slow) = taught + tuning, fits * config.n_steps / 1000, ANNEALING
     return certain * task.max_steps / most + fits * quick, (taught + tuning) * task.max_steps / least + fits * slow

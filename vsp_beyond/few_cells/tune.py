@@ -35,8 +35,10 @@ class Objective:
 class Candidates:
     """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
 
+    best: Cells  # once there is a candidate
+
     def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
-        self.rows, self.best, self.best_restart = [], None, 0
+        self.rows, self.best_restart = [], 0
         self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
 
     def add(self, stage: str, restart: int, cells: Cells) -> None:

@@ -6,6 +6,8 @@ program in `check/` verifies. `steps_to_goal` proves over a grid what holds for 
 rounding, and under disturbances. `at_rest` finds starts of MountainCar from which the car never moves.
 """
 
+from collections.abc import Callable
+
 from vsp.policy import VoronoiPolicy
 
 from .dead_points import at_rest
@@ -15,7 +17,7 @@ from .proof import Proof, load_certificate
 from .robust import largest_disturbance, proved, steps_to_goal
 from .simplegoal_proof import prove_simplegoal
 
-PROVERS = {
+PROVERS: dict[str, Callable[[VoronoiPolicy], Proof]] = {
     "SimpleGoal-v0": prove_simplegoal,
     "MountainCarContinuous-v0": prove_mountaincar,
     "Pendulum-v1": prove_pendulum,

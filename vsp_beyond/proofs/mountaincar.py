@@ -129,10 +129,10 @@ def run_block(policy: VoronoiPolicy, first: int, n: int) -> Block:
     np.minimum.at(least, owner, ends["least"])
     np.maximum.at(most, owner, ends["most"])
     widths = high - low
-    means = (float(widths @ bound / widths.sum()) for bound in (least, most))
-    sums = (int(ends[name].sum()) for name in ("doubts", "left"))
+    mean_low, mean_high = (float(widths @ bound / widths.sum()) for bound in (least, most))
+    doubts, left = (int(ends[name].sum()) for name in ("doubts", "left"))
     longest, width = int(ends["longest"].max()), float(widths.sum() / (RIGHT - LEFT))
-    return Block(first, n, len(states), *sums, longest, float(least.min()), *means, width)
+    return Block(first, n, len(states), doubts, left, longest, float(least.min()), mean_low, mean_high, width)
 
 
 def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.ndarray):

@@ -119,9 +119,10 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
 def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the first box between two angles and two speeds, and the exclusive end of these boxes, as in `Way`. Angles
     may be any number of turns away, but less than a turn apart."""
-    first, last = around(*((end / FASTEST + 1) * n / 2 + side * ROUNDING for end, side in zip(speeds, (-1, 1))), n)
-    begin, end = ((end / np.pi + 1) * n / 2 + side * ROUNDING * n for end, side in zip(angles, (-1, 1)))
-    begin, end = np.ceil(begin).astype(np.int32) - 1, np.floor(end).astype(np.int32) + 1
+    low, high = ((end / FASTEST + 1) * n / 2 + side * ROUNDING for end, side in zip(speeds, (-1, 1)))
+    first, last = around(low, high, n)
+    low, high = ((end / np.pi + 1) * n / 2 + side * ROUNDING * n for end, side in zip(angles, (-1, 1)))
+    begin, end = np.ceil(low).astype(np.int32) - 1, np.floor(high).astype(np.int32) + 1
     turns = begin // n * n
     return np.stack([begin - turns, first]), np.stack([end - turns, last])
 
@@ -133,4 +134,5 @@ def _touched(policy: VoronoiPolicy, cell: int, angles: np.ndarray, speeds: np.nd
         waves = np.clip(np.stack([np.cos(angles), np.sin(angles)]) + sign * half[0], -1.0, 1.0)
         observed = np.vstack([np.repeat(waves, n, axis=1), np.tile(speeds + sign * half[1], n)])
         ends.append(observed + sign * SEEN * FASTEST)
-    return np.flatnonzero(touches(policy, cell, *ends, REACH))
+    low, high = ends
+    return np.flatnonzero(touches(policy, cell, low, high, REACH))

@@ -82,16 +82,15 @@ def line_of(numbers: Sequence[Fraction]) -> Line:
 
 def reduced(line: Line) -> Line:
     """Return the same line, in the smallest integers."""
-    shared = gcd(*line) or 1
-    return tuple(number // shared for number in line)
+    shared, (a, b, c) = gcd(*line) or 1, line
+    return a // shared, b // shared, c // shared
 
 
 def meet(first: Line, second: Line) -> Corner:
     """Return the intersection of two lines that are not parallel."""
     (a, b, c), (d, e, f) = first, second
-    w = a * e - b * d
-    corner = (b * f - c * e, c * d - a * f, w)
-    return corner if w > 0 else tuple(-number for number in corner)
+    x, y, w = b * f - c * e, c * d - a * f, a * e - b * d
+    return (x, y, w) if w > 0 else (-x, -y, -w)
 
 
 def total(numbers: list[Fraction]) -> Fraction:

@@ -115,7 +115,7 @@ def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, hi
 
     Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone function.
     """
-    total = 0.0
+    total = np.zeros(low.shape[1])
     for axis, scale in enumerate(policy.scale):
         gaps = []
         for end in (low[axis], high[axis]):

@@ -135,8 +135,8 @@ class Loop:
     def move(self, cell: int, limits: tuple[int, int], walls: tuple[int, int]) -> np.ndarray:
         """Return the matrix of a step, as in `State`."""
         forms = [max(side, 0) * ONE if side else form for side, form in zip(walls, self._next(cell, limits))]
-        forms = np.array([*forms, ONE])
-        return np.vectorize(int, otypes=[object])(lcm(*(number.denominator for number in forms.flat)) * forms)
+        matrix = np.array([*forms, ONE])
+        return np.vectorize(int, otypes=[object])(lcm(*(number.denominator for number in matrix.flat)) * matrix)
 
     def _next(self, cell: int, limits: tuple[int, int]) -> list[Form]:
         actions = [side * ONE if side else form for side, form in zip(limits, self.actions[cell])]
@@ -183,7 +183,7 @@ class Distance:
 
     def _compared(self, piece: Piece, i: int, j: int) -> Iterator[tuple[Piece, int]]:
         """Yield the parts of `piece`, each with the nearer of two codewords; `i` is the lower index."""
-        sides = ()
+        sides: tuple[int, ...] = ()
         if self.metric == "manhattan":  # a distance is affine where no coordinate passes the codeword's
             for axis, value in ((axis, self.codewords[which][axis]) for axis in (0, 1) for which in (i, j)):
                 low, high = _split(piece, line_of((X, Y)[axis] - value * ONE))
@@ -228,11 +228,12 @@ def _ended(piece: Piece) -> Iterator[Piece]:
 def _within(piece: Piece, lines: Sequence[Line]) -> Iterator[tuple[Piece, bool]]:
     """Yield the parts of `piece` that are not on the positive side of a line, and the part on that of all lines."""
     for line in lines:
-        outside, piece = _split(piece, line)
+        outside, inside = _split(piece, line)
         if outside:
             yield outside, False
-        if not piece:
+        if not inside:
             return
+        piece = inside
     yield piece, True
 
 
@@ -256,7 +257,8 @@ def _split(piece: Piece, line: Line) -> tuple[Piece | None, Piece | None]:
     pulled = piece.state.pull(line)
     if pulled == (0, 0, 0):
         return piece, None
-    return tuple(part and replace(piece, starts=part) for part in piece.starts.cut(pulled))
+    low, high = (replace(piece, starts=part) if part else None for part in piece.starts.cut(pulled))
+    return low, high
 
 
 def _exact(numbers: np.ndarray) -> np.ndarray:

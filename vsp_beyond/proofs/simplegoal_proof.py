@@ -76,9 +76,10 @@ def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
 
 def _in_pit(starts: Polygon) -> Polygon | None:
     """Return the part of `starts` inside the pit."""
+    inside: Polygon | None = starts
     for line in IN_PIT:
-        starts = starts and starts.cut(line)[1]
-    return starts
+        inside = inside and inside.cut(line)[1]
+    return inside
 
 
 def _itinerary(piece: Piece) -> str:

@@ -160,7 +160,7 @@ class Policy:
 
     def nearer(self, polygon: list, number: int, other: int) -> list:
         """Return the convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
-        parts = [(polygon, ())]
+        parts: list[tuple[list, tuple[int, ...]]] = [(polygon, ())]
         if self.metric == "manhattan":  # between the coordinates of the codewords, distances are linear
             for axis in (0, 1):
                 for i in (number, other):
@@ -190,7 +190,8 @@ class Policy:
             else:
                 slopes.append((at[2 * axis] - at[2 * axis + 1]) / scale)
                 constant += (at[2 * axis + 1] * d - at[2 * axis] * c) / scale
-        return Form(*slopes, constant)
+        p, q = slopes
+        return Form(p, q, constant)
 
 
 def between(form, low: int) -> tuple[Form, Form]:
