@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import vsp
-from studies.comparison import all_rows, method_summary, read_results
+from studies.comparison import all_rows, largest_alike, method_summary, read_results
 from vsp.paper import quartiles_from_fences
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
