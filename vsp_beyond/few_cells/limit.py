@@ -54,7 +54,6 @@ def limit_preset(task: str | Task) -> Tuned:
 def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy | None = None) -> VoronoiPolicy:
     """Do what `vsp_beyond.at_the_limit` does, without a word about the time."""
     check_seed(seed)
-    check_seed(seed)
     task = get_task(task)
     teacher = _best_teacher(task) if teacher is None else teacher
     n_starts = N_SLOW if task.one_by_one else N_STARTS
@@ -64,8 +63,8 @@ def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy 
     validation = task.start(np.random.default_rng(last), config.n_validation)
     best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
     best = _tuned(best, teacher, task, config, last)
-    for seed in seeds[n_starts:] if task.one_by_one else ():
-        best = _tuned(best, teacher, task, again, seed)
+    for further in seeds[n_starts:] if task.one_by_one else ():
+        best = _tuned(best, teacher, task, again, further)
     return best
 
 
