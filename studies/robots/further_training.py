@@ -69,7 +69,8 @@ def _model(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int
                     group["lr"] = rate
 
     critics = {name: torch.tensor(value) for name, value in teacher.critic_weights().items()}
-    hidden = [len(value) for name, value in critics.items() if name.startswith("qf0") and name.endswith("bias")][:-1]
+    biases = sorted(name for name in critics if name.startswith("qf0") and name.endswith("bias"))  # layer by layer
+    hidden = [len(critics[name]) for name in biases[:-1]]
     m = len(frame.task.action_low)
     model = Patient(
         "MlpPolicy", gymnasium.make(frame.task.name), learning_rate=config.critic_rate, gamma=config.gamma,
