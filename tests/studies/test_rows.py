@@ -202,7 +202,7 @@ def test_the_best_returns_are_those_of_the_best_policies(monkeypatch):
     monkeypatch.setattr(measure, "N_REPORTED", 40)
     monkeypatch.setattr(rows, "WAYS", ((SIMPLEGOAL, 1.0), (PENDULUM, 0.2), (PENDULUM, 0.4)))
     frame = rows.best_returns()
-    assert frame["found"].tolist() == [rows.CLOSED, "72 × 73 points", "144 × 145 points"]
+    assert frame["found"].tolist() == ["closed form", "72 × 73 points", "144 × 145 points"]
     starts = start_states(get_task(SIMPLEGOAL), 40, measure.REPORT_SEED)
     assert frame["mean"][0] == pytest.approx(np.maximum(10, 10 * np.hypot(*starts.T) + 9).mean(), abs=1e-12)
     assert frame["failing"][0] == 0 and frame["failing"][1:].isna().all()
