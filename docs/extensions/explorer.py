@@ -37,7 +37,7 @@ def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
 
 def _ours(task: str, teacher: Teacher):
     """Yield our policies with their names. Tuning takes seconds, but hours for a task whose tuned policy is kept."""
-    for name, table in (("faithful", "faithful"), ("tuned", "beyond"), ("at the limit", "limit")):
+    for name, table in (("faithful", "faithful"), ("tuned", "methods"), ("at the limit", "limit")):
         if (path := comparison.RESULTS / f"{table}_{task}.policy").exists():
             yield name, vsp.VoronoiPolicy.load(path)
         elif name == "tuned":

@@ -10,12 +10,13 @@ from vsp.run.atomic import ROOT
 FIVE = sorted(path.stem for path in (ROOT / "notebooks").glob("0[1-5]_*.ipynb"))
 RUN = """
 import json, sys
-cells = [cell for cell in json.load(open(sys.argv[1]))["cells"] if cell["cell_type"] == "code"]
-for cell in cells:
-    if "skip-execution" not in cell["metadata"].get("tags", []):
-        exec("".join(cell["source"]))
-    if "parameters" in cell["metadata"].get("tags", []):
-        out, runs, quick = sys.argv[2], sys.argv[2] + "/runs", True
+names = {"__name__": "__main__"}
+for cell in [cell for cell in json.load(open(sys.argv[1]))["cells"] if cell["cell_type"] == "code"]:
+    tags = cell["metadata"].get("tags", [])
+    if "skip-execution" not in tags:
+        exec("".join(cell["source"]), names)
+    if "parameters" in tags:
+        names |= {"out": sys.argv[2], "runs": sys.argv[2] + "/runs", "quick": True}
 print("modules:", *{name.partition(".")[0] for name in sys.modules})
 """
 
