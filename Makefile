@@ -94,7 +94,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 	  (cd "$$OUT" && mkdir -p data/runs && find data/runs -name '*.run' > build/stamps/runs-made))
 
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
-	$(PY) -m vsp.paper.studies.make_studies --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	$(PY) -m vsp.paper.make_runs --study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions, into data/beyond/: 2 to 5 minutes
 	$(PY) -m studies.benchmarks --out="$$OUT"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's

@@ -13,7 +13,6 @@ from vsp.policy import VoronoiPolicy
 from vsp.run import sealed
 from vsp.run.atomic import DamagedFile
 from vsp.subpolicies import POLICY_CLASSES, policy_class
-from vsp.subpolicies.base import expression
 from vsp.tasks import get_task
 
 
@@ -93,9 +92,8 @@ def test_a_policy_of_numbers_beyond_all_bounds_is_one_clear_error(change, messag
 
 
 def test_what_knows_linear_policies_alone_refuses_others():
-    """The PID class of MountainCar has as many parameters as the linear one: nothing else would notice."""
-    with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
-        refit(random_policy(task=MOUNTAINCAR, form="pid"), np.zeros((3, 2)), np.zeros((3, 1)))
+    with pytest.raises(ValueError, match="sub_policy 'constant', expected 'linear'"):
+        refit(random_policy(task=MOUNTAINCAR, form="constant"), np.zeros((3, 2)), np.zeros((3, 1)))
 
 
 # explain
@@ -143,7 +141,7 @@ def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, scaled):
 )
 def test_expressions_lose_zeros_but_no_digit_where_they_are_exact(coefficients, two_digits, exact):
     for digits, text in ((2, two_digits), (None, exact)):
-        assert expression(np.array(coefficients), ("x", "y"), digits) == text
+        assert policy_class("linear", get_task(SIMPLEGOAL)).expression(np.array(coefficients), digits) == text
 
 
 # How far the borders are
@@ -204,15 +202,6 @@ def test_every_class_acts_and_explains_itself(form, task):
         assert np.allclose(told.contributions.sum(axis=1), told.raw, atol=1e-9)
         assert told.contributions.index.tolist() == list(policy.task.outputs)
         assert told.equations == policy.equations(told.cell) and len(told.equations) == len(policy.task.outputs)
-
-
-def test_a_pid_controller_by_hand():
-    policy = VoronoiPolicy([[-0.5, 0.0]], [[[0.5], [-20.0], [0.1]]], task=MOUNTAINCAR, sub_policy="pid")
-    told = policy.explain([-0.55, 0.03])  # a whole unit to go, getting nearer by 0.03 a step
-    assert told.contributions.loc["F"].to_dict() == pytest.approx({"e": 0.5, "ė": 0.6, "bias": 0.1})
-    assert told.action == pytest.approx([1.0]) and told.raw == pytest.approx([1.2])
-    assert told.equations == ("F = 0.500 e - 20.000 ė + 0.100",)
-    assert policy.to_frame().columns.tolist() == ["codeword_x", "codeword_v", "F_e", "F_ė", "F_bias"]
 
 
 def test_to_frame_has_a_row_per_cell_and_every_number():

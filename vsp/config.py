@@ -82,7 +82,7 @@ class Config:
     merges. True: n = n_epochs is included ("n = 0 to n_epochs"), and n = 0 splits and merges."""
 
     # Beyond the paper
-    sub_policy: Literal["linear", "constant", "quadratic", "pid"] = "linear"
+    sub_policy: Literal["linear", "constant", "quadratic"] = "linear"
     """Class of the sub-policies, an entry of `subpolicies.POLICY_CLASSES`; the paper's is linear."""
     fit: Literal["adam", "closed_form"] = "adam"
     """How each iteration fits a cell: by `n_minibatches` steps of Adam, or by least squares over all states since the

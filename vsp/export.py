@@ -16,10 +16,7 @@ from .tasks.base import Task
 
 # What LaTeX would take as a command
 _SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
-_SYMBOLS = {
-    "Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "ė": r"\dot e",
-    "cos ": r"\cos ", "sin ": r"\sin ",
-}  # fmt: skip
+_SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "cos ": r"\cos ", "sin ": r"\sin "}
 
 
 class Exportable:

@@ -14,6 +14,7 @@ from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
 from vsp.teachers.teacher import Teacher
 from vsp_beyond.few_cells.anneal import Adam
+from vsp_beyond.few_cells.criticality import critics_of
 
 N_STEPS, BATCH, RATE = 1000, 256, 0.03  # Adam: steps per added cell, states per step, initial step size in half ranges
 WORST = 0.01  # share of a cell's states whose mean becomes a codeword: those that lose the most value
@@ -33,13 +34,13 @@ def critic_driven(
     """
     rng = np.random.default_rng(seed)
     centre, scale = standard(states)
-    points, best = (states - centre) / scale, teacher.value(states, actions)
+    points, best = (states - centre) / scale, critics_of(teacher).value(states, actions)
     codewords, maps = np.zeros((1, len(centre))), np.zeros((1, len(centre) + 1, actions.shape[1]))
     while True:
         cells_of = nearest(codewords, points, "euclidean")
         maps = trained(maps, cells_of, points, actions, task, rng)
         distilled = np.clip(linear_outputs(points, maps[cells_of]), task.action_low, task.action_high)
-        lost = np.maximum(0.0, best - teacher.value(states, distilled))
+        lost = np.maximum(0.0, best - critics_of(teacher).value(states, distilled))
         if len(maps) >= size or not lost.any():
             break
         cell, codeword = where_lost(points, cells_of, lost)
@@ -91,7 +92,8 @@ def advantage_weighted(
     costs anything keeps its unweighted map. With one cell, this is one weighted linear map.
     """
     policy = kmeans_cells(states, actions, cells=size, task=task, seed=seed)
-    cells_of, weights, coefficients = policy.cells(states), teacher.criticality(states), policy.coefficients.copy()
+    cells_of, coefficients = policy.cells(states), policy.coefficients.copy()
+    weights = critics_of(teacher).criticality(states)
     inputs = np.column_stack([states, np.ones(len(states))])
     for i in np.unique(cells_of):
         here = cells_of == i

@@ -30,7 +30,7 @@ of_rules = {
     "states": array(STATES, nonempty=True), "unseen": array(STATES, nonempty=True),
     "agreement": number(0.75, least=0, most=1), "leaves": count(4, least=2),
 }  # fmt: skip
-PID = vsp.VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 3, 1)), task=MOUNTAINCAR, sub_policy="pid")
+FLAT = vsp.VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 1, 1)), task=MOUNTAINCAR, sub_policy="constant")
 
 CASES = {
     "Tuned": (vsp_beyond.Tuned, settings(TUNED, from_zero=("n_corrections", "n_generations"))),
@@ -80,17 +80,16 @@ def test_the_limit_refuses_before_it_searches():
                     vsp_beyond.at_the_limit(**good | {argument: bad})
 
 
-@pytest.mark.parametrize("policy", [PID, None, CurvedTeacher()])
+@pytest.mark.parametrize("policy", [FLAT, None, CurvedTeacher()])
 def test_only_linear_policies_are_proved(policy):
     with pytest.raises(ValueError, match="expected"):
         vsp_beyond.prove(policy)
 
 
 def test_what_explains_linear_policies_alone_refuses_others():
-    """The PID class of MountainCar has as many parameters as the linear one: nothing else would notice."""
     for use in (
-        lambda: RulePolicy(PID, []),
-        lambda: compare_maps(PID, PID, np.zeros((1, 2)), scale=np.ones(2), rng=np.random.default_rng(0)),
+        lambda: RulePolicy(FLAT, []),
+        lambda: compare_maps(FLAT, FLAT, np.zeros((1, 2)), scale=np.ones(2), rng=np.random.default_rng(0)),
     ):
-        with pytest.raises(ValueError, match="sub_policy 'pid', expected 'linear'"):
+        with pytest.raises(ValueError, match="sub_policy 'constant', expected 'linear'"):
             use()

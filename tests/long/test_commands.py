@@ -39,7 +39,7 @@ def test_one_runs_by_plain_papermill_from_the_root(tmp_path):
 def test_commands_run_without_a_warning():
     """Of a module that its package has imported already, `python -m` warns."""
     commands = ["studies.comparison.stale", "studies.make_rows --help"]
-    commands += ["vsp.paper.studies.make_studies --help", "vsp.paper.make_runs --help"]
+    commands += ["vsp.paper.make_runs --help"]
     how = {"cwd": ROOT, "stdout": PIPE, "stderr": PIPE, "text": True}
     running = [subprocess.Popen([sys.executable, "-m", *command.split()], **how) for command in commands]
     said = [(*process.communicate(), process.returncode) for process in running]

@@ -8,12 +8,13 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeache
 
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
+from vsp.paper import make_runs as command
 from vsp.paper import printed, results, studies
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
 from vsp.paper.statistics import crossed_interval
-from vsp.paper.studies import interpretations, make_studies, simpler, teachers
+from vsp.paper.studies import interpretations, simpler, teachers
 from vsp.paper.studies.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp.partition import Partition
 from vsp.run.listed import write_listed
@@ -94,8 +95,8 @@ def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tm
     asked, frame = [], pd.DataFrame({"a": [0.1 + 0.2]})
     for study in (interpretations, teachers, simpler):
         monkeypatch.setattr(study, "study", lambda runs, *, jobs: asked.append((runs, jobs)) or frame)
-    monkeypatch.setattr("sys.argv", ["make_studies", "--out", str(tmp_path), "--jobs", "3"])
-    make_studies.main()
+    monkeypatch.setattr("sys.argv", ["make_runs", "--study", "--out", str(tmp_path), "--jobs", "3"])
+    command.main()
     assert asked == [(tmp_path / "build/study", 3)] * 2 + [(tmp_path / "data/runs", 3)]
     folder = tmp_path / "data" / "results"
     written = [read_results(name, folder)["a"].item() for name in ("readings", "teachers", "simpler")]

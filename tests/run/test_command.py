@@ -10,7 +10,6 @@ import pytest
 
 from studies import make_rows
 from vsp.paper import make_runs, runs
-from vsp.paper.studies import make_studies
 from vsp.run.atomic import ROOT, DamagedFile, MissingFile, atomic_path, write_text
 from vsp.run.command import CommandError, in_one_line, jobs
 from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied
@@ -68,7 +67,7 @@ def test_other_jobs_are_refused(text):
         jobs(text)
 
 
-@pytest.mark.parametrize("command", [make_runs, make_studies, make_rows], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("command", [make_runs, make_rows], ids=lambda module: module.__name__)
 def test_commands_refuse_such_jobs_before_they_begin(monkeypatch, capsys, command):
     monkeypatch.setattr("sys.argv", ["command", "--jobs", "0"])
     with pytest.raises(SystemExit) as end:

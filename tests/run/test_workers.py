@@ -6,12 +6,11 @@ import sys
 
 import numpy as np
 import pytest
-from support import CurvedTeacher
 from threadpoolctl import threadpool_info
 
 from vsp.run import workers
 from vsp.run.listed import MANIFEST
-from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied, _call, _shared, results
+from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied, _call, results
 
 
 def power(base, exponent):
@@ -88,8 +87,3 @@ def test_a_cluster_without_its_package_is_one_clear_error(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(NoScheduler, match="Dask cluster, which needs the package `distributed`"):
         ask(power, [(1, 1)], "tcp://127.0.0.1:9")
-
-
-def test_what_jobs_share_is_sent_once_and_numbers_are_not():
-    teacher, other = CurvedTeacher(), CurvedTeacher()
-    assert _shared([(teacher, 0), (other, 0), (teacher, 0)]) == [teacher]

@@ -166,7 +166,6 @@ def test_three_cells_can_lose_fewer_starts_than_the_papers_thirteen():
         (vsp.VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 6, 2)), task=SIMPLEGOAL, sub_policy="quadratic"), {}, "'linear'"),
         ({"one": TWO, "other": LANDER}, {}, "expected one task"),
         ({}, {}, "expected one task"),
-        (TWO, {"history": "a run"}, "history is a str, expected the History"),
         (LANDER, {"teacher": Constant(0.0)}, "the teacher's actions have shape"),
         (TWO, {"axes": ("x", "y")}, "axes are .'x', 'y'., expected None: the states of SimpleGoal-v0 are drawn"),
     ],

@@ -10,7 +10,7 @@ from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTea
 import vsp
 from vsp import distill
 from vsp.show import Laboratory, page
-from vsp.show.laboratory import SHOWN, Remembered
+from vsp.show.laboratory import SHOWN
 
 VIEW = "application/vnd.jupyter.widget-view+json"
 CONFIG = tiny(min_pol_distance=0.3)
@@ -134,26 +134,6 @@ def test_without_a_kernel_there_is_the_first_trial(lab, monkeypatch):
     assert [one["name"] for one in scene["policies"]] == ["trial 1"] and "<img alt=" in still["text/html"]
     fresh = displayed(Laboratory(CurvedTeacher(), SIMPLEGOAL, CONFIG, seed=3), monkeypatch)
     assert fresh[1] == still  # whatever was tried before
-
-
-def test_a_remembered_teacher_is_asked_once_and_answers_as_itself():
-    class Counting(CurvedTeacher):
-        asked = 0
-
-        def predict(self, obs):
-            self.asked += 1
-            return super().predict(obs)
-
-    teacher = Counting()
-    memory, states = Remembered(teacher), np.random.default_rng(0).uniform(size=(5, 2))
-    first = memory.predict(states)[0]
-    first[:] = 0  # whoever changes an answer does not change the memory
-    assert np.array_equal(memory.predict(states)[0], CurvedTeacher().predict(states)[0]) and teacher.asked == 1
-    memory.predict(states.astype(np.float32))
-    memory.predict(states[:4])
-    assert teacher.asked == 3
-    policies = [distill(one, SIMPLEGOAL, tiny(), seed=0)[0] for one in (memory, teacher)]
-    assert np.array_equal(*(policy.coefficients for policy in policies))
 
 
 def test_a_laboratory_needs_a_task_of_the_paper_maps_to_draw_and_a_teacher_that_fits():

@@ -63,7 +63,8 @@ class CriticalTeacher(CurvedTeacher):
     def criticality(self, obs):
         return obs[:, 0]
 
-    def critic_weights(self):
+    @property
+    def critic(self):
         rng = np.random.default_rng(0)
         shapes = {"0.weight": (6, 4), "0.bias": (6,), "2.weight": (1, 6), "2.bias": (1,)}
         return {f"qf{i}.{name}": rng.normal(size=n).astype("f4") for i in range(2) for name, n in shapes.items()}

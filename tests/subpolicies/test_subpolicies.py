@@ -116,7 +116,7 @@ def test_restart_makes_adam_as_new_and_leaves_the_map():
 
 # Classes
 
-CASES = [(name, MOUNTAINCAR) for name in POLICY_CLASSES] + [("pid", PENDULUM), ("quadratic", LUNARLANDER)]
+CASES = [(name, MOUNTAINCAR) for name in POLICY_CLASSES] + [("quadratic", PENDULUM), ("quadratic", LUNARLANDER)]
 each_class = pytest.mark.parametrize(("name", "task"), CASES)
 
 
@@ -130,8 +130,6 @@ def some_states(task, n=50, seed=0):
         ("constant", MOUNTAINCAR, [0.25, 0.5], [], ["bias"]),
         ("linear", MOUNTAINCAR, [0.25, 0.5], [0.25, 0.5], ["x", "v", "bias"]),
         ("quadratic", MOUNTAINCAR, [-0.5, 3], [-0.5, 3, 0.25, -1.5, 9], ["x", "v", "x²", "x·v", "v²", "bias"]),
-        ("pid", MOUNTAINCAR, [0.25, 0.5], [0.45 - 0.25, -0.5], ["e", "ė", "bias"]),
-        ("pid", PENDULUM, [0, 1, 3], [-np.pi / 2, -3], ["e", "ė", "bias"]),
     ],
 )
 def test_features_by_hand(name, task, state, features, rows):

@@ -326,23 +326,3 @@ def test_mujocos_warnings_are_pythons_but_for_the_one_of_every_environment(recwa
     assert not recwarn
     with pytest.warns(RuntimeWarning, match="Nan, Inf or huge value"):
         halfcheetah._warn("Nan, Inf or huge value in QACC at DOF 0.")
-
-
-# Signals of a controller
-
-
-def test_signals_by_hand():
-    car, pendulum = get_task(MOUNTAINCAR).signals, get_task(PENDULUM).signals
-    assert car.compute(np.array([0.45, 0.02])).tolist() == [0, -0.02]  # at the flag, moving on
-    assert car.compute(np.array([[-0.55, -0.01]])) == pytest.approx(np.array([[1.0, 0.01]]))
-    tilted = [np.cos(0.25), np.sin(0.25), -3.0]
-    assert pendulum.compute(np.array(tilted)) == pytest.approx([-0.25, 3.0])
-    assert get_task(SIMPLEGOAL).signals is None
-
-
-@pytest.mark.parametrize("name", [MOUNTAINCAR, PENDULUM])
-def test_the_code_of_a_signal_computes_it(name):
-    task, rng = get_task(name), np.random.default_rng(1)
-    for state in rng.uniform(task.low, task.high, size=(20, len(task.low))):
-        found = [eval(code, {"state": state, "atan2": np.arctan2}) for code in task.signals.code]
-        assert found == task.signals.compute(state).tolist()

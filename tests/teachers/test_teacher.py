@@ -296,39 +296,3 @@ def test_an_altered_description_of_the_tensors_is_refused_or_harmless(agents, tm
         bad = rewritten(small, tmp_path / "x.zip", compression=zipfile.ZIP_STORED, policy_pth=new)
         with contextlib.suppress(ValueError):
             assert np.isfinite(load_teacher(bad, SIMPLEGOAL).predict(np.ones((1, 2)))[0]).all()
-
-
-# Criticality
-
-
-def linear_agent(**critics):
-    """An actor that says (0, 0) on SimpleGoal, and critics that are linear in state and action."""
-    actor = {"mu.0.weight": np.zeros((2, 2)), "mu.0.bias": np.zeros(2)}
-    parts = {f"{name}.0.weight": np.array([row]) for name, row in critics.items()}
-    return Teacher(actor, SIMPLEGOAL, critic=parts | {f"{name}.0.bias": np.zeros(1) for name in critics})
-
-
-def test_criticality_is_the_value_of_the_own_action_over_that_of_the_worst():
-    states = np.array([[0.2, 0.4], [0.5, 0.5], [0.0, 0.0]])
-    assert linear_agent(qf0=[1, 1, 2, -1]).criticality(states) == pytest.approx(3)  # 0 against -2 - 1
-    lower = linear_agent(qf0=[0, 0, 2, -1], qf1=[1, 0, 0, 0])  # min(0, x) against -3
-    assert lower.criticality(states) == pytest.approx(3)
-    flat = linear_agent(qf0=[1, 1, 0, 0])
-    assert np.array_equal(flat.criticality(states), np.zeros(3)) and flat.criticality(states).dtype == np.float64
-
-
-def test_the_value_of_an_action_is_that_of_the_lower_critic():
-    states, actions = np.array([[0.2, 0.4], [0.5, 0.5]]), np.array([[0.5, -1.0], [0.0, 0.25]])
-    both = linear_agent(qf0=[0, 0, 2, -1], qf1=[1, 0, 0, 0])  # 2 a - b and x
-    assert (
-        both.value(states, actions) == pytest.approx([0.2, -0.25]) and both.value(states, actions).dtype == np.float64
-    )
-    with pytest.raises(ValueError, match="no critics, expected qf0.0.weight"):
-        linear_agent().value(states, actions)
-
-
-def test_values_are_of_actions_in_the_units_of_the_task():
-    task = dataclasses.replace(get_task(MOUNTAINCAR), action_low=np.array([2.0]), action_high=np.array([6.0]))
-    actor = {"mu.0.weight": np.zeros((1, 2)), "mu.0.bias": np.zeros(1)}
-    critic = {"qf0.0.weight": np.array([[0.0, 0.0, 1.0]]), "qf0.0.bias": np.zeros(1)}
-    assert Teacher(actor, task, critic=critic).value(np.zeros((3, 2)), [[2.0], [4.0], [5.0]]).tolist() == [-1, 0, 0.5]

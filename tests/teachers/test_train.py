@@ -11,6 +11,7 @@ from vsp.tasks.base import GOAL
 from vsp.teachers import train
 from vsp.teachers.teacher import SHIPPED, load_teacher
 from vsp.teachers.train import BARS, BEST_OF_CURVE, RECIPES, Recipe, export, main, read_checkpoint, short_recipe
+from vsp_beyond.few_cells.criticality import Critics
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +48,7 @@ def test_a_shipped_teacher_is_what_its_card_says(task):
     n = {LUNARLANDER: 12, WALKER: 3, CHEETAH: 3}.get(task, 400)  # a physics engine takes longer
     found = rollout_from_seed(teacher, task, n, seed=20_242)  # starts that no one chose a seed on
     assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / n**0.5
-    assert (teacher.criticality(np.zeros((3, len(teacher.task.low)))) >= 0).all()  # it has its critics with it
+    assert (Critics(teacher).criticality(np.zeros((3, len(teacher.task.low)))) >= 0).all()  # it has its critics with it
 
 
 SHORT = Recipe(steps=90, batch_size=8, learning_starts=20, buffer_size=200)

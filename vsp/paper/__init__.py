@@ -7,7 +7,6 @@ from .printed import (
     SHORT,
     SUBJECTS,
     TASKS,
-    printed_spread,
     printed_spread_values,
     printed_tdavq_comparison,
     printed_value,

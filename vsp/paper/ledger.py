@@ -35,10 +35,16 @@ VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
 N_RESAMPLES = 10_000
 # Parts of the paper by patterns of ids; the first match counts
 PARTS = {
-    "coefficients": "_cell_",
-    "results": "_(?:spread|drl|ours)_(?!episodes)|^.._(?:caption_)?cells$",
-    "settings": "",
+    "_cell_": "coefficients",
+    "_(?:spread|drl|ours)_(?!episodes)|^.._(?:caption_)?cells$": "results",
+    "": "settings",
 }
+# The notebook and the cell that compute the rerun's number, in the same way
+CELLS = {
+    "^.._(?:caption_)?cells$": "03, best", "^.._(?:caption|text|policies)": "03, runs", "_training_": "01, scores",
+    "_hyper_": "04, hyperparameters", "^sg_spread_": "04, simplegoal-spread", "^mc_spread_": "04, mountaincar-spread",
+    "^.._(?:drl|ours)_": "04, text-numbers", "_cell_": "05, replay", "": "05, ledger",
+}  # fmt: skip
 COLUMNS = "id part task where quantity subject paper value here low high verdict wide cell".split()
 
 
@@ -54,9 +60,13 @@ def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES)
     doubted = audit.in_doubt()
     frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
     frame["wide"] = _wide(frame)
-    frame["cell"] = frame["id"].map(cell)
-    frame["part"] = np.select([frame["id"].str.contains(pattern) for pattern in PARTS.values()], list(PARTS), "")
+    frame["part"] = _first_match(frame["id"], PARTS)
+    frame["cell"] = _first_match(frame["id"], CELLS)
     return frame[COLUMNS]
+
+
+def _first_match(ids: pd.Series, values: dict[str, str]) -> np.ndarray:
+    return np.select([ids.str.contains(pattern) for pattern in values], list(values.values()), "")
 
 
 def _wide(frame: pd.DataFrame) -> pd.Series:
@@ -70,7 +80,7 @@ def _wide(frame: pd.DataFrame) -> pd.Series:
 def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
     """Count the values of each part of the paper by verdict."""
     table = pd.crosstab(book["part"], book["verdict"])
-    return table.reindex(index=[*reversed(PARTS)], columns=list(VERDICTS), fill_value=0).rename_axis(columns=None)
+    return table.reindex(index=[*PARTS.values()][::-1], columns=VERDICTS, fill_value=0).rename_axis(columns=None)
 
 
 def verdict(row, *, in_doubt: bool = False) -> str:
@@ -180,22 +190,6 @@ def _environments() -> dict[str, float]:
 
 def _reward(task: base.Task, state: list[float], action: list[float]) -> float:
     return float(task.step(np.array([state]), np.array([action]))[1][0])
-
-
-_CELLS = {
-    "hyper": "04, hyperparameters", "cells": "03, best", "caption": "03, runs", "text": "03, runs",
-    "policies": "03, runs", "training": "01, scores",
-}  # fmt: skip
-
-
-def cell(id: str) -> str:
-    """Return the notebook and the cell that compute the rerun's number for the printed value `id`."""
-    prefix, kind = id.split("_")[:2]
-    task = {"sg": "simplegoal", "mc": "mountaincar"}.get(prefix)
-    if id.endswith("caption_cells"):
-        return _CELLS["cells"]
-    places = _CELLS | {"spread": f"04, {task}-spread", "drl": "04, text-numbers", "ours": "04, text-numbers"}
-    return places.get(kind, f"05, {'replay' if kind == 'cell' else 'ledger'}")
 
 
 # What the paper leaves out

@@ -1,4 +1,4 @@
-"""`make runs`: make the distillations that the paper reports."""
+"""`make runs`: make the distillations that the paper reports. `make study`: write the studies to data/results/."""
 
 from __future__ import annotations
 
@@ -6,20 +6,37 @@ import argparse
 from pathlib import Path
 
 from ..run import command
+from .results import write_results
 from .runs import N_RUNS, paper_results
 
 
 def main() -> None:
-    """Make the runs that the paper reports; skip those that exist."""
+    """Make the runs that the paper reports; skip those that exist.
+
+    With --study, do so for the studies and write readings.csv, teachers.csv and simpler.csv.
+    """
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="write runs to OUT/data/runs")
+    parser.add_argument("--out", type=Path, default=".", help="write to OUT/data and OUT/build/study")
     parser.add_argument("--quick", action="store_true", help="make a few short runs, as a test")
+    parser.add_argument("--study", action="store_true", help="make the studies instead")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     arguments = parser.parse_args()
+    runs, jobs = arguments.out / "data" / "runs", arguments.jobs
+    if arguments.study:
+        study(arguments.out, runs, jobs)
+        return
     for task in N_RUNS:
-        runs = Path(arguments.out) / "data" / "runs"
-        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=arguments.jobs)
+        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
         print(f"{task}: {len(results.runs)} runs are complete", flush=True)
+
+
+def study(out: Path, runs: Path, jobs: int | str) -> None:
+    """Write the tables of the studies; the paper's runs are in the folder `runs`."""
+    from .studies import interpretations, simpler, teachers
+
+    write_results(interpretations.study(out / "build" / "study", jobs=jobs), "readings", out=out)
+    write_results(teachers.study(out / "build" / "study", jobs=jobs), "teachers", out=out)
+    write_results(simpler.study(runs, jobs=jobs), "simpler", out=out, float_format=None)
 
 
 if __name__ == "__main__":

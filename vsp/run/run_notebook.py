@@ -44,8 +44,6 @@ KERNEL_FOLDERS = {  # folders a kernel writes to, by variable; the next run remo
 KERNEL_SETTINGS = {
     "OMP_NUM_THREADS": "1",  # the same sums in the same order, also without make
     "OPENBLAS_NUM_THREADS": "1",
-    "MKL_NUM_THREADS": "1",
-    "VECLIB_MAXIMUM_THREADS": "1",
     "JUPYTER_PREFER_ENV_PATH": "1",  # no kernel of another Python, whatever is installed
     "SDL_VIDEODRIVER": "dummy",  # no search for a screen, and no message about it on standard error
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no debugger message on standard error

@@ -10,7 +10,6 @@ import hashlib
 import platform
 import re
 import tempfile
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -76,7 +75,7 @@ def _as_they_end(work: Callable, arguments: Sequence[tuple], jobs: int | str) ->
     with contextlib.ExitStack() as stack:
         if isinstance(jobs, str):
             client = stack.enter_context(_client(jobs))
-            stack.enter_context(parallel_config("dask", client=client, scatter=_shared(arguments), n_jobs=-1))
+            stack.enter_context(parallel_config("dask", client=client, n_jobs=-1))
         else:
             # No memory maps, so no folders in /dev/shm remain after a kill: the arguments of a job take about 1 MB
             options = {"max_nbytes": None, "temp_folder": tempfile.gettempdir(), "idle_worker_timeout": IDLE}
@@ -120,10 +119,3 @@ def _client(address: str):
             f"no Dask scheduler with workers answers at {address!r}, expected one as in tcp://host:8786: {error}"
         ) from error
     return client
-
-
-def _shared(arguments: Sequence[tuple]) -> list:
-    """Return the arguments that several jobs share, such as a teacher. Every worker gets them once."""
-    objects = {id(part): part for given in arguments for part in given if not isinstance(part, int | str)}
-    counts = Counter(id(part) for given in arguments for part in given)
-    return [part for key, part in objects.items() if counts[key] > 1]

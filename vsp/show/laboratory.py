@@ -38,7 +38,7 @@ class Laboratory:
     ready, busy = "Change a setting to distil again; this takes about a second.", "distilling …"
 
     def __init__(self, teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int = 0):
-        self.teacher, self.task, self.seed = Remembered(teacher), get_task(task), seed
+        self.teacher, self.task, self.seed = teacher, get_task(task), seed
         if self.task.name not in PAPER_TASKS:  # a run of others takes long
             raise ValueError(f"task is {self.task.name}, expected one of {list(PAPER_TASKS)}")
         self.config = paper_preset(self.task) if config is None else config
@@ -152,24 +152,6 @@ def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
     weights = np.zeros((len(policy), len(policy.task.low) + 1 - policy.coefficients.shape[1], len(policy.task.outputs)))
     maps = np.concatenate([weights, policy.coefficients], axis=1)
     return VoronoiPolicy(policy.codewords, maps, task=policy.task, metric=policy.metric, scale=policy.scale)
-
-
-class Remembered:
-    """A teacher whose answers to whole batches of states are cached.
-
-    With one seed, every distillation starts its episodes in the same states, so all trials share these answers.
-    """
-
-    def __init__(self, teacher: Policy):
-        self._teacher, self._answers = teacher, {}
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Return the teacher's actions; ask it only about batches that are new."""
-        obs = np.asarray(obs)
-        key = obs.shape, obs.dtype.str, obs.tobytes()
-        if key not in self._answers:
-            self._answers[key] = self._teacher.predict(obs)[0]
-        return self._answers[key].copy(), None
 
 
 def _judge(policy: Policy, task: Task) -> dict[str, float]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..checks import check_array, check_count
+from ..checks import check_count
 from ..tasks.base import Task
 
 if TYPE_CHECKING:
@@ -80,8 +80,16 @@ class PolicyClass:
         return pd.DataFrame(coefficients.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name."""
-        return expression(column, tuple(symbol(term) for term in self.terms), digits)
+        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name.
+
+        `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that
+        are zero.
+        """
+        names = [*map(symbol, self.terms), ""]
+        terms = [(c, name) for c, name in zip(column, names, strict=True) if c or digits is not None]
+        parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
+        text = " ".join(parts)
+        return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
 
 
 def linear_outputs(features: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -98,19 +106,6 @@ def reach(task: Task) -> np.ndarray:
     """Largest absolute value of each input in the state box; 1 where it has no limit. (d,)"""
     reach = np.maximum(np.abs(task.low), np.abs(task.high))
     return np.where(np.isfinite(reach) & (reach > 0), reach, 1.0)
-
-
-def expression(coefficients: np.ndarray, names: tuple[str, ...], digits: int | None = 3) -> str:
-    """Return a linear expression in the variables `names` (q,) as text; `coefficients` (q + 1,) end with the bias.
-
-    `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that are
-    zero.
-    """
-    coefficients = check_array("coefficients", coefficients, (len(names) + 1,))
-    terms = [(c, name) for c, name in zip(coefficients, [*names, ""]) if c or digits is not None]
-    parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
-    text = " ".join(parts)
-    return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
 
 
 def number(value: float, digits: int | None) -> str:

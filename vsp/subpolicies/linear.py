@@ -35,27 +35,10 @@ def quadratic(task: Task) -> PolicyClass:
     return PolicyClass("quadratic", (*task.inputs, *terms), (*state_code(task), *code), features(reach(task)), features)
 
 
-def pid(task: Task) -> PolicyClass:
-    """A PID controller: linear in an error and its derivative, the task's `signals`.
-
-    A function of the state has no memory, so it has no integral. The bias of each cell replaces the integral: where the
-    error settles, the integral settles too, at the action that keeps the state there. Raises ValueError for a task
-    without signals.
-    """
-    signals = task.signals
-    if signals is None:
-        raise ValueError(
-            f"{task.name} defines no error, which sub_policy 'pid' needs, expected a task with `signals`, such as "
-            "MountainCarContinuous-v0 or Pendulum-v1: give the task signals or take another sub_policy"
-        )
-    return PolicyClass("pid", signals.names, signals.code, np.array(signals.sizes), signals.compute)
-
-
-POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic, "pid": pid}
+POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic}
 
 
 def policy_class(sub_policy: str, task: Task) -> PolicyClass:
-    """Return the class of sub-policies called `sub_policy`, for `task`. Raises ValueError for an unknown name, and for
-    "pid" if the task has no signals."""
+    """Return the class of sub-policies called `sub_policy`, for `task`. Raises ValueError for an unknown name."""
     check_choice("sub_policy", sub_policy, POLICY_CLASSES)
     return POLICY_CLASSES[sub_policy](task)

@@ -4,5 +4,5 @@ To add one, write a module like `mountaincar.py` with its `TASK`, and enter it i
 `gym_adapter` makes a `Task` from any Gymnasium environment.
 """
 
-from .base import ENDED, GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Signals, Task
+from .base import ENDED, GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
 from .registry import get_task, register, register_maker, task_names

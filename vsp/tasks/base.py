@@ -23,16 +23,6 @@ def _unchanged(states: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Signals:
-    """The q inputs of a PID controller of a task, computed from observations."""
-
-    names: tuple[str, ...]  # symbols, "e" the error and "ė" its derivative
-    compute: Callable[[np.ndarray], np.ndarray]  # observations (..., d) to signals (..., q)
-    code: tuple[str, ...]  # code of the signals, valid in C and Python, from an array `state`
-    sizes: tuple[float, ...]  # their largest absolute values in the box of the observations
-
-
-@dataclass(frozen=True)
 class Task:
     """A continuous-control task whose observations and actions are boxes.
 
@@ -57,7 +47,6 @@ class Task:
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
     start_size: int | None = None  # s; None: s is d
     slowness: int = 1  # evaluations divide their number of episodes by this, because an engine steps slowly
-    signals: Signals | None = None  # None: the task has no natural error
 
     @property
     def one_by_one(self) -> bool:

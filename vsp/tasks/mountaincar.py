@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import GOAL, RUNNING, Signals, Task
+from .base import GOAL, RUNNING, Task
 
 FLAG = 0.45  # position of the goal
 
@@ -12,11 +12,6 @@ FLAG = 0.45  # position of the goal
 def start(rng: np.random.Generator, n: int) -> np.ndarray:
     """Draw starts: position uniform in [-0.6, -0.4] (no unit), at rest. (n, 2)"""
     return np.column_stack([rng.uniform(-0.6, -0.4, size=n), np.zeros(n)])
-
-
-def signals(states: np.ndarray) -> np.ndarray:
-    """Return the distance to the flag and its change per step. (..., 2)"""
-    return np.stack([FLAG - states[..., 0], -states[..., 1]], axis=-1)
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -48,5 +43,4 @@ TASK = Task(
     max_steps=999,
     start=start,
     step=step,
-    signals=Signals(("e", "ė"), signals, (f"{FLAG} - state[0]", "-state[1]"), (FLAG + 1.2, 0.07)),
 )

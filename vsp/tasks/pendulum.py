@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .base import RUNNING, Signals, Task
+from .base import RUNNING, Task
 
 
 def start(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -16,12 +16,6 @@ def see(states: np.ndarray) -> np.ndarray:
     """Return the cosine and sine of the angle, and the angular velocity. (n, 3)"""
     angle, velocity = states.T
     return np.column_stack([np.cos(angle), np.sin(angle), velocity])
-
-
-def signals(observations: np.ndarray) -> np.ndarray:
-    """Return the angle to upright (rad) and its change (rad/s). (..., 2)"""
-    cosine, sine, velocity = np.moveaxis(observations, -1, 0)
-    return np.stack([-np.arctan2(sine, cosine), -velocity], axis=-1)
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -48,5 +42,4 @@ TASK = Task(
     step=step,
     see=see,
     start_size=2,
-    signals=Signals(("e", "ė"), signals, ("-atan2(state[1], state[0])", "-state[2]"), (np.pi, 8.0)),
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 import os
 import re
@@ -25,8 +24,8 @@ class Teacher:
     """A deterministic TD3 actor as arrays: ReLU layers and a tanh, scaled to the action box.
 
     `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays. `critic` does the
-    same for the critics ("qf0.0.weight", ...); only `criticality` and `value` need it. Raises ValueError if the actor
-    does not fit the task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
+    same for the critics ("qf0.0.weight", ...), which are only kept. Raises ValueError if the actor does not fit the
+    task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
 
     def __init__(
@@ -37,14 +36,12 @@ class Teacher:
         card: dict | None = None,
         critic: dict[str, np.ndarray] | None = None,
     ):
-        self.task, self.card = get_task(task), card or {}
-        self.layers = _layers(weights, "mu")
+        self.task, self.card, self.critic = get_task(task), card or {}, critic or {}
+        self.layers = layers_of(weights, "mu")
         if not self.layers:
             raise ValueError(
                 f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
             )
-        self._critic = critic or {}
-        self._critics = [layers for i in range(2) if (layers := _layers(self._critic, f"qf{i}"))]
         inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
         d, m = len(self.task.low), len(self.task.action_low)
         if (inputs, outputs) != (d, m):
@@ -52,8 +49,8 @@ class Teacher:
                 f"the teacher has {inputs} inputs and {outputs} outputs, {self.task.name} has {d} and {m}: "
                 "load it for the task it was trained on"
             )
-        self._centre = (0.5 * (self.task.action_high + self.task.action_low)).astype(np.float32)
-        self._half = (0.5 * (self.task.action_high - self.task.action_low)).astype(np.float32)
+        self.centre = (0.5 * (self.task.action_high + self.task.action_low)).astype(np.float32)
+        self.half = (0.5 * (self.task.action_high - self.task.action_low)).astype(np.float32)
 
     @property
     def digest(self) -> str:
@@ -63,56 +60,18 @@ class Teacher:
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) or (m,) in float32 for observations (n, d) or (d,)."""
         states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
-        return self._centre + self._half * np.tanh(_forward(self.layers, states)), None
-
-    def criticality(self, obs: np.ndarray) -> np.ndarray:
-        """Return the cost of a wrong action in the states (n, d): the weights of VIPER (Bastani et al. 2018). (n,)
-
-        This is the value of the teacher's own action minus that of the worst corner of the action box, by the lower of
-        its two critics, in units of the discounted return; at least 0. Raises ValueError for a teacher without critics.
-        """
-        states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
-        corners = np.array(list(itertools.product((-1, 1), repeat=len(self._half))), dtype=np.float32)
-        actions = (self.predict(states)[0] - self._centre) / self._half
-        worst = np.min([self._value(states, np.broadcast_to(corner, actions.shape)) for corner in corners], axis=0)
-        return np.maximum(self._value(states, actions) - worst, 0.0).astype(np.float64)
-
-    def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return the value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)
-
-        In units of the discounted return. Raises ValueError for a teacher without critics.
-        """
-        states = check_array("observations", obs, (-1, len(self.task.low))).astype(np.float32)
-        actions = check_array("actions", actions, (len(states), len(self._half))).astype(np.float32)
-        return self._value(states, (actions - self._centre) / self._half).astype(np.float64)
-
-    def critic_weights(self) -> dict[str, np.ndarray]:
-        """Return the tensors of both critics by Stable-Baselines3's names ("qf0.0.weight", ...).
-
-        Raises ValueError for a teacher without critics.
-        """
-        self._check_critics()
-        return self._critic
-
-    def _check_critics(self) -> None:
-        if not self._critics:
-            raise ValueError("the teacher has no critics, expected qf0.0.weight, ...: load a teacher with critics")
-
-    def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return the lower of the critics' values of `actions` (n, m), which are scaled to [-1, 1]. (n,)"""
-        self._check_critics()
-        inputs = np.column_stack([states, actions])
-        return np.min([_forward(layers, inputs)[:, 0] for layers in self._critics], axis=0)
+        return self.centre + self.half * np.tanh(forward(self.layers, states)), None
 
 
-def _forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) -> np.ndarray:
+def forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) -> np.ndarray:
+    """Return the outputs (n, m) of a network with ReLU between its layers, at the inputs (n, d) `hidden`."""
     for weight, bias in layers[:-1]:
         hidden = np.maximum(hidden @ weight + bias, 0.0)
     weight, bias = layers[-1]
     return hidden @ weight + bias
 
 
-def _layers(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
+def layers_of(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return weight and bias of every layer of the network called `name`; an empty list if there is no such network."""
     indices = sorted(int(m[1]) for m in (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors) if m)
     weights = [_tensor(tensors, f"{name}.{i}.weight", 2).T.copy() for i in indices]

@@ -20,6 +20,7 @@ from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
 from .config import Tuned, check_kind
+from .criticality import critics_of
 from .tune import Candidates, Objective, tune
 from .units import METRIC, Scaling, warn_outside
 
@@ -40,9 +41,8 @@ def distill_tuned(
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
-    if config.criticality and not hasattr(teacher, "criticality"):
-        name = type(teacher).__name__
-        raise ValueError(f"criticality is True, but {name} has no critics: load a teacher with critics")
+    if config.criticality:
+        critics_of(teacher)  # raises now, not after an hour
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))

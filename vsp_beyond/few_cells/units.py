@@ -12,7 +12,8 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, standard
 from vsp.tasks.base import Task
-from vsp.teachers.teacher import Teacher
+
+from .criticality import critics_of
 
 METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
 
@@ -74,10 +75,10 @@ class Scaling:
         coefficients = self.coefficients(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
         return Cells((policy.codewords - self.centre) / self.scale, coefficients)
 
-    def labelled(self, teacher: Policy | Teacher, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
+    def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
         """Return `states` (n, d) with the teacher's actions and, if asked for, their criticality."""
         actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
-        weights = teacher.criticality(states) if criticality else None
+        weights = critics_of(teacher).criticality(states) if criticality else None
         return LabelledStates(self.inputs(states), self.outputs(actions), weights)
 
 

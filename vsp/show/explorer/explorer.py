@@ -57,8 +57,6 @@ class Explorer:
         if len(tasks) != 1:
             raise ValueError(f"the policies play {sorted(tasks) or 'nothing'}, expected one task")
         self.policies, (self.task,), first = policies, tasks.values(), next(iter(policies.values()))
-        if not isinstance(history, History | None):
-            raise ValueError(f"history is a {type(history).__name__}, expected the History that `vsp.distill` returns")
         if history and not np.array_equal(history.policy_at(len(history.cells) - 1).codewords, first.codewords):
             raise ValueError("history is of another run than the first policy, expected the one that gave it")
         if guess is not None and not (isinstance(guess, str) and guess and self.task.name in PLANES):
