@@ -126,7 +126,6 @@ CASES = {
     "VoronoiPolicy.to_text": (TWO.to_text, digits),
     # The paper
     "paper.published_policy": (vsp.paper.published_policy, {"task": task}),
-    "paper.printed_spread": (vsp.paper.printed_spread, {"task": task}),
     "paper.printed_value": (vsp.paper.printed_value, {"id": name("sg_drl_mean")}),
     "paper.hyperparameter_table": (lambda task: vsp.paper.hyperparameter_table([task]), {"task": task}),
     "paper.interpretation_table": (vsp.paper.interpretation_table, {"task": task}),

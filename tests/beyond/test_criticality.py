@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher
 
 from vsp import get_task
 from vsp.teachers.teacher import Teacher
@@ -33,6 +33,8 @@ def test_the_value_of_an_action_is_that_of_the_lower_critic():
     )
     with pytest.raises(ValueError, match="no critics, expected qf0.0.weight"):
         Critics(teacher_with())
+    with pytest.raises(ValueError, match="CurvedTeacher has no critics"):
+        Critics(CurvedTeacher())
 
 
 def test_values_are_of_actions_in_the_units_of_the_task():

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
-from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
 import vsp_beyond
 from studies import comparison
 from vsp.run import sealed
 from vsp.tasks import GOAL
-from vsp_beyond.proofs import check, largest_disturbance, load_certificate, proved, steps_to_goal
+from vsp_beyond.proofs import PROVERS, check, largest_disturbance, load_certificate, proved, steps_to_goal
 from vsp_beyond.proofs.polygons import box, line_of, meet, total
 from vsp_beyond.proofs.proof import CERTIFICATES, RESULTS
 from vsp_beyond.proofs.simplegoal import follow
@@ -158,6 +158,11 @@ def test_other_policies_get_one_clear_error(policy, match):
             refuses(policy)
     with pytest.raises(ValueError, match="the policy is .*, expected a VoronoiPolicy for one of"):
         vsp_beyond.prove(vsp.VoronoiPolicy(np.zeros((1, 8)), np.zeros((1, 9, 2)), task=LUNARLANDER))
+
+
+def test_every_task_has_its_own_prover():
+    names = {task: prover.__name__ for task, prover in PROVERS.items()}
+    assert names == {SIMPLEGOAL: "prove_simplegoal", MOUNTAINCAR: "prove_mountaincar", PENDULUM: "prove_pendulum"}
 
 
 # Over a grid

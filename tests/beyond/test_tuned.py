@@ -139,6 +139,16 @@ def test_the_first_of_the_best_candidates_is_kept():
     assert [row["failing"] for row in rows] == [1, 0, 0] and rows[1]["mean"] > rows[0]["mean"]
 
 
+@pytest.mark.parametrize(("penalty", "best"), [(0.0, 0), (10.0, 1)])
+def test_the_penalty_decides_between_a_higher_mean_and_fewer_failures(monkeypatch, penalty, best):
+    results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
+    monkeypatch.setattr("vsp_beyond.few_cells.tune.rollout", lambda *_: next(results))
+    candidates = Candidates(UNSCALED, np.zeros((2, 2)), Objective(penalty))
+    for restart in range(2):
+        candidates.add("fit", restart, SLOW)
+    assert candidates.best_restart == best
+
+
 def test_tuning_returns_more_and_stays_closer_where_errors_cost():
     """For the return alone it pays to be faster than the teacher."""
     states = np.random.default_rng(0).random((200, 2))

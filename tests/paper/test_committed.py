@@ -7,7 +7,7 @@ from support import TASKS
 from vsp.paper.results import read_results, write_results
 from vsp.paper.runs import paper_experiment
 from vsp.paper.studies import interpretations
-from vsp.paper.studies.interpretations import CHOOSING, distance, landmarks
+from vsp.paper.studies.interpretations import CHOOSING, N_CONFIRMED, distance, landmarks, ranking
 from vsp.paper.studies.teachers import SEEDS
 
 
@@ -34,6 +34,12 @@ def test_distances_follow_from_the_other_columns(readings, teachers):
         own = {"mean": shipped.at[row["task"], "teacher_mean"], "std": shipped.at[row["task"], "teacher_std"]}
         away = distance(interpretations.standing(row, own), landmarks(row["task"]))
         assert row["distance"] == pytest.approx(away, rel=1e-4)
+
+
+def test_the_first_of_the_ranking_were_confirmed(readings):
+    chosen, confirmed = (readings[readings["phase"] == phase] for phase in ("choosing", "confirming"))
+    first = [name for name in ranking(chosen) if name != "default"][:N_CONFIRMED]
+    assert {"default", *first, *(ranking(chosen, task)[0] for task in TASKS)} == set(confirmed["variant"])
 
 
 def test_both_studies_saw_the_same_runs(readings, teachers):

@@ -30,6 +30,11 @@ def test_an_evaluation_is_that_of_the_loss(few):
     assert np.isfinite(two()[0])
 
 
+def test_seconds_are_those_of_the_quickest_call(monkeypatch):
+    monkeypatch.setattr("studies.benchmarks.time.process_time", iter([0.0, 0.3, 1.0, 1.1, 2.0, 2.2]).__next__)
+    assert benchmarks.seconds(lambda: None) == pytest.approx(0.1)
+
+
 def test_the_command_writes_both_tables(few, tmp_path, monkeypatch):
     monkeypatch.setattr(benchmarks, "seconds", lambda work: 0.125)
     monkeypatch.setattr("sys.argv", ["x", "--out", str(tmp_path)])

@@ -120,4 +120,6 @@ def test_budgets_of_simplegoal_by_hand():
     assert table["size"].tolist() == [close.n_cells, config.n_cells, 1] and (table["seconds"] > 0).all()
     # 4 cells of 2 numbers, and of 3 rows for 2 actions: 32 numbers, for which CMA-ES has 14 candidates; of 6, it has 9
     assert table["tuning"].tolist()[1:] == [n * config.n_generations * config.n_tuning_episodes for n in (14, 9)]
+    one_map = equal_tuning.episodes("one linear map, tuned", config, "Pendulum-v1")  # 3 inputs, 1 action: 4 numbers
+    assert one_map["tuning"] == 8 * config.n_generations * config.n_tuning_episodes
     assert table["teacher"][0] == close.n_episodes + close.n_validation + 20 * close.n_tuning_episodes

@@ -6,6 +6,7 @@ from studies.comparison import (
     all_rows,
     best_mean,
     limit_summary,
+    near,
     references,
     robots_summary,
     starts_summary,
@@ -63,6 +64,11 @@ def test_searches_stand_in_the_order_of_their_length(tmp_path):
 
 
 # Regret
+
+
+def test_what_is_best_is_that_of_the_finest_grid_and_near_is_below_it():
+    assert references()["best"].tolist() == [best_mean(task) for task in references()["task"]]
+    assert near(SIMPLEGOAL) == best_mean(SIMPLEGOAL) - 0.015
 
 
 def test_two_grids_differ_by_less_than_teachers_and_the_best():

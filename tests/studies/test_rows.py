@@ -14,7 +14,7 @@ from studies.comparison.rows import Job, jobs_of, kept_job, make_all, make_row
 from studies.comparison.summary import read_rows
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
-from vsp.run import sealed
+from vsp.run import atomic, sealed
 from vsp_beyond import Faithful, Tuned
 
 SMALL = Tuned(
@@ -130,6 +130,9 @@ def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
     jobs[2].path(tmp_path).unlink()
     make_all(tmp_path, jobs)
     assert made == [jobs[2]] and rows.rows(tmp_path, jobs)[0].equals(frame)
+    jobs[2].path(tmp_path).write_bytes(jobs[3].path(tmp_path).read_bytes())
+    with pytest.raises(atomic.DamagedFile, match="made with seed 1, expected 0: delete it"):
+        rows.rows(tmp_path, jobs)
 
 
 # Whole commands
@@ -171,6 +174,14 @@ def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     assert 1 <= len(VoronoiPolicy.load(results / "methods_SimpleGoal-v0.policy")) <= SMALL.n_cells
     assert about.items() >= rows.simplest_provenance(SIMPLEGOAL).items()
     assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5 and not (results / "optimum.csv").exists()
+
+
+def test_the_simplified_policy_may_lose_its_share_of_the_teachers_return(small):
+    asked, starts = [], start_states(SIMPLEGOAL, SMALL.n_validation, 0)
+    small.setattr(rows, "simplify", lambda *given, **how: asked.append(how) or ("policy", None))
+    assert rows.simplest(SIMPLEGOAL) == "policy"
+    of_teacher = rollout(load_teacher(SIMPLEGOAL), SIMPLEGOAL, starts).returns.mean()
+    assert asked == [{"tolerance": pytest.approx(0.02 * of_teacher), "seed": 0}]
 
 
 def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
