@@ -138,6 +138,3 @@ def test_other_tables_other_verdicts(monkeypatch):
     assert audit.dimensions().verdict == HOLDS
     put("printed_hyperparameters", {"n_epochs": 8, "n_split": 4, "n_freeze": 4})
     assert audit.frozen_iterations().verdict == HOLDS
-
-
-# Rounding of the printed values decides nothing

@@ -262,6 +262,13 @@ def test_intervals_are_those_of_the_phase_and_have_names_in_words(committed):
     assert as_intervals(committed, "both", "distance", "confirming")["here"].isna().any()
 
 
+def test_what_is_shown_are_the_extremes_and_no_panel_cuts_them_off(committed):
+    alone = committed[(committed["phase"] == "choosing") & ~committed["variant"].str.contains(r" \+ ")]
+    for task, column, _, (left, right) in interpretations.PANELS:
+        assert alone[alone["task"] == task].set_index("variant")["mean"].idxmin() in SHOWN
+        assert as_intervals(committed, task, column)["here"].between(left, right).all()
+
+
 def test_the_summary_has_a_row_per_variant_and_task(committed):
     frame, chosen = interpretations.interpretation_summary(committed), committed[committed["phase"] == "choosing"]
     assert frame["task"].tolist() == [task for task in TASKS for _ in SHOWN]

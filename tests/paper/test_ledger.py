@@ -65,6 +65,8 @@ def test_every_printed_value_has_one_row_a_verdict_and_a_cell(book):
     assert book[["id", "paper"]].equals(printed_values()[["id", "paper"]]) and book["id"].is_unique
     assert set(book["verdict"]) <= set(VERDICTS) and book["cell"].str.strip().ne("").all()
     assert book.columns.tolist() == ledger.COLUMNS
+    assert book["part"].eq("coefficients").equals(book["id"].str.contains("_cell_"))
+    assert ledger.verdict_counts(book).index.tolist() == ["settings", "results", "coefficients"]
 
 
 def test_the_values_that_nothing_here_compares_with_are_these(book):
@@ -260,6 +262,8 @@ def test_what_the_paper_leaves_out_by_hand():
         "interquartile mean of the runs": 4, "share of episodes: goal": 0.75, "share of episodes: pit": 0,
         "share of episodes: truncated": 0.25,
     }  # fmt: skip
+    best, low, high = ledger.measured(SIMPLEGOAL, BY_HAND, n_resamples=2).loc["sg_cells"]
+    assert best == 5 > low and high == 5  # runs 1, 2, 0, 3 in this order, of 5, 4, 3, 9 cells
 
 
 @pytest.mark.parametrize("task", TASKS)

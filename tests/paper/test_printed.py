@@ -120,6 +120,7 @@ def test_terms_that_the_paper_does_not_print_are_no_printed_values(printed):
     assert "sg_cell_3_dx_x" not in printed.index and printed.at["sg_cell_3_dx_y", "paper"] == "3.175"
     assert printed.at["sg_cell_3_dx_bias", "paper"] == "-1.000"
     assert printed.at["mc_cell_1_codeword_v", "paper"] == "0.000"  # printed, though zero
+    assert printed.at["mc_spread_ours_min", "paper"] == "71.050"  # its last digit decides on its verdict
 
 
 def test_a_column_of_the_spread_tables_has_the_names_of_our_spread():

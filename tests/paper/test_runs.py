@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 import support
 from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, network_teacher, same_arrays
+from threadpoolctl import threadpool_limits
 
 from vsp import distill
 from vsp.evaluation import rollout_from_seed
@@ -151,6 +152,16 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
         load_runs(SMALL, [0], runs=tmp_path)
 
 
+def test_a_run_of_another_seed_is_refused_and_a_failing_one_keeps_the_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: make_run(e, seed) if seed == 0 else 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        make_runs(SMALL, [0, 1], runs=tmp_path)
+    assert [*files(tmp_path)] == ["0000.run"]
+    (SMALL.folder(tmp_path) / "0000.run").rename(SMALL.folder(tmp_path) / "0005.run")
+    with pytest.raises(atomic.DamagedFile, match="0005.run: made with seed 0, expected 5"):
+        load_runs(SMALL, [5], runs=tmp_path)
+
+
 # What is made of runs
 
 
@@ -170,7 +181,8 @@ def test_best_goes_by_the_validation_starts_and_then_by_the_seed(results):
 def test_quick_results_of_the_paper(tmp_path, monkeypatch):
     monkeypatch.setattr(runs_module, "QUICK_RUNS", 1)
     found = paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1)
-    again = rollout_from_seed(found.experiment.teacher, SIMPLEGOAL, 100, seed=EVALUATION_SEED)
+    with threadpool_limits(1):
+        again = rollout_from_seed(found.experiment.teacher, SIMPLEGOAL, 100, seed=EVALUATION_SEED)
     assert found.returns.shape == (1, 100) and np.array_equal(found.teacher_returns, again.returns)
     monkeypatch.setattr(runs_module, "rollout_from_seed", None)  # what is kept is not played again
     kept = paper_results(SIMPLEGOAL, runs=tmp_path, quick=True, jobs=1).teacher_outcomes

@@ -162,6 +162,13 @@ def test_the_text_numbers_stand_beside_the_papers(task):
     assert frame.at[f"{prefix}_ours_runs_above_teacher_share", "here"] == pytest.approx(share)
 
 
+def test_hyperparameters_per_cent_and_names_of_rows(tmp_path):
+    assert hyperparameter_table(list(TASKS)).iloc[0].tolist() == ["n_epochs", 5000, 5000, 2000, 2000]
+    save_table(FRAME, "some_table", caption="5 %", out=tmp_path)
+    assert r"5 \%" in written(tmp_path)[0] and "$-$2" in written(tmp_path)[0]
+    assert cells(show_table(pd.DataFrame({"a": [1]}, index=["x"])).data)[1:] == ["a", "x", "1"]
+
+
 def test_readings_are_the_fields_that_the_papers_table_does_not_print():
     frame = tables.interpretation_table(SIMPLEGOAL).set_index("reading")["default"]
     assert frame["split_lookup"] == Readings().split_lookup and "n_epochs" not in frame

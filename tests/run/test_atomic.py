@@ -41,7 +41,10 @@ def test_a_killed_writer_leaves_the_old_file(tmp_path):
 
 
 def test_text_is_utf8_with_unix_line_ends_and_has_a_known_sum(tmp_path):
-    write_text(tmp_path / "x.txt", "é\nb\n")
+    write_text(tmp_path / "x.txt", "old")
+    with open(tmp_path / "x.txt") as reader:
+        write_text(tmp_path / "x.txt", "é\nb\n")
+        assert reader.read() == "old"  # whole, whoever writes meanwhile
     assert (tmp_path / "x.txt").read_bytes() == "é\nb\n".encode()
     write_text(tmp_path / "x", "abc")
     assert sha256(tmp_path / "x") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"

@@ -42,6 +42,7 @@ def test_every_result_comes_with_its_number(jobs):
 def test_a_job_has_one_thread(jobs):
     np.ones((2, 2)) @ np.ones((2, 2))  # BLAS is there
     assert ask(threads, [(), ()], jobs) == {0: {1}, 1: {1}}
+    assert ask(type, [(np.zeros(10**6),)], jobs) == {0: np.ndarray}  # no memory map, which a kill would leave
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

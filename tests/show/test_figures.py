@@ -15,7 +15,7 @@ import seaborn as sns
 from drawn import hexes, labels
 from PIL import Image, UnidentifiedImageError
 
-from vsp import geometry
+from vsp import geometry, show
 from vsp.paper import ledger
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
@@ -260,6 +260,23 @@ def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
     assert len({hexes(dots.get_facecolors())[0] for dots in named.values()}) == 3
     assert len({dots.get_paths()[0].vertices.tobytes() for dots in named.values()}) == 3  # markers, for grey printers
     assert labels(ax) == ["mean", "std", "q1", "absent", "max"] and ax.get_ylim() == (4.5, -0.5)
+    assert ax.patches[0].get_bbox().x1 == pytest.approx(2**0.5)
+    assert hexes(shown[0].get_facecolors()) == [style.GOAL, "#ffffff"]  # the wide one is hollow
+    assert ledger_gaps(ax, GAPS.assign(gap=-5e5), band=2**0.5).get_xlim()[0] < -5e5
+
+
+def test_lines_means_letters_and_rows_are_where_they_belong(ax):
+    goal, pit = state_space.square(ax).patches
+    assert [*goal.get_bbox().extents, *pit.get_bbox().extents] == pytest.approx([0, 0, 0.1, 0.1, 0.4, 0.4, 0.6, 0.6])
+    letter([ax], ["one"])
+    assert ax.get_title(loc="left") == "(a) one" and len({style.TEACHER, style.DISTILLED, style.GOAL, style.PIT}) == 4
+    show.run_means(show.over_iterations(ax, np.array([3.0, 1.0]), ylabel="cells"), np.array([3.0, 1.0]), 2.5)
+    show.reference(ax, 7.0, "x")
+    drawn = [np.column_stack(line.get_data()).tolist() for line in ax.lines]
+    assert drawn == [[[0, 3], [1, 1]], [[1, 1], [2, 3]], [[0, 2.5], [1, 2.5]], [[7, 0], [7, 1]]]
+    show.margin(show.again(ax, ROWS), ["1 %"], "fail")
+    assert ax.collections[-1].get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
+    assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
 
 
 def test_every_verdict_with_a_gap_has_a_colour():

@@ -35,10 +35,6 @@ def displayed(lab, monkeypatch):
     return outputs
 
 
-def fails(*_, **__):
-    raise RuntimeError("no <room> left")
-
-
 @pytest.fixture(scope="module")
 def lab():
     return Laboratory(CurvedTeacher(), SIMPLEGOAL, CONFIG, seed=3)

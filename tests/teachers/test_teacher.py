@@ -271,6 +271,14 @@ def test_crafted_zips_are_refused_within_memory_and_time(agents, tmp_path):
     assert int(peak) < 1.5 * 2**30 / (1 if sys.platform == "darwin" else 1024)
 
 
+def test_no_more_of_a_member_is_unpacked_than_is_allowed(agents, tmp_path, monkeypatch):
+    bad, read = rewritten(agents[1] / "small.zip", tmp_path / "x.zip", data=bytes(2**26)), zipfile.ZipExtFile.read
+    whole = pytest.fail  # no Exception, all of which `read_zip` catches
+    monkeypatch.setattr(zipfile.ZipExtFile, "read", lambda file, n=None: read(file, n) if n else whole("of any size"))
+    with pytest.raises(DamagedFile, match="bytes unpacked, expected at most"):
+        load_teacher(bad, SIMPLEGOAL)
+
+
 def test_loading_and_acting_needs_no_torch(agents):
     code = (
         f"import sys, vsp; vsp.load_teacher('{SIMPLEGOAL}').predict([[0.5, 0.5]])\n"

@@ -2,7 +2,7 @@
 
 Each finding is a function of the transcribed values in `data/paper`; `audit_findings()` runs them all.
 Returns have no unit, shares are in percent. Standard deviations divide by n, as NumPy's do; n - 1 makes a difference
-only for the 24 outliers of SimpleGoal's teacher. The rounding of the printed values changes no verdict.
+only for the 24 outliers of SimpleGoal's teacher.
 """
 
 from __future__ import annotations

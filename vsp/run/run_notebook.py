@@ -71,8 +71,8 @@ def run_notebook(
 
     `expect` names files, relative to `out`, that the notebook must make. An executed copy, without anything that varies
     between runs, goes to the folder `executed` in `out`. Raises CommandError if another process runs the same notebook
-    into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk; the earlier
-    files of `out` then stay.
+    into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk. The earlier
+    files of `out` then stay, unless the disk fails while files are moved.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source, declared = _read(notebook)
@@ -235,7 +235,7 @@ def _publish(staging: Path, out: Path) -> list[str]:
     changed = [name for name in names if name not in same]
     for name in changed:
         (out / name).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(staging / name, out / name)
+        shutil.move(staging / name, out / name)  # also to another disk
     for name in names:
         if name.startswith("data/results/"):
             list_file(out / name)  # unchanged files too: a run may have been killed before this line
