@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
 
 import vsp
+from vsp.checks import check_finite
 from vsp.geometry import METRICS, distances
 from vsp.paper.baselines import refit
 from vsp.policy import VoronoiPolicy
@@ -56,6 +57,21 @@ def test_a_batch_is_its_rows(task):
     assert (actions == task.action_high).any() and (actions == task.action_low).any()
     assert policy.cells(obs).tolist() == [policy.cells(row) for row in obs]
     assert np.array_equal(actions, np.clip(policy.linear(obs), task.action_low, task.action_high))
+
+
+@pytest.mark.parametrize("kind", [int, np.uint8, np.float16])
+def test_whole_numbers_are_observations_too(kind):
+    corners = np.array([[0, 0], [0, 1], [1, 1]])
+    for act in (TWO.linear, TWO.cells, lambda obs: TWO.explain(obs[0]).raw):
+        assert np.array_equal(act(corners.astype(kind)), act(corners.astype(np.float64)))
+    assert check_finite("numbers", corners.astype(kind)).dtype == np.float64
+
+
+def test_each_action_has_its_own_limits():
+    high = np.array([0.5, 2.0])
+    task = dataclasses.replace(get_task(SIMPLEGOAL), action_low=-high, action_high=high)
+    policy = VoronoiPolicy([[0, 0]], [[[0, 0], [0, 0], [3, 1.5]]], task=task)
+    assert policy.predict([0.5, 0.5])[0].tolist() == [0.5, 1.5]
 
 
 def test_the_caller_cannot_change_a_policy_through_its_arrays():

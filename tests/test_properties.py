@@ -1,5 +1,5 @@
 """Every public function that a reader calls refuses what it cannot work with: an error of ours that says what was
-expected, never a silent result. Numbers of another type are the same numbers, and the arithmetic of a NaN is a NaN.
+expected, never a silent result. Numbers of another type are the same numbers.
 """
 
 import dataclasses
@@ -194,6 +194,3 @@ def test_numbers_of_another_type_are_the_same_numbers(case):
         if arrays:
             changed = {argument: change(value) for argument, value in arrays.items()}
             np.testing.assert_equal(plain(function(**good | changed)), plain(function(**good)))
-
-
-# Arithmetic of what summaries say: what is not finite stays so

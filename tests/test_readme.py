@@ -108,6 +108,26 @@ def test_counts_are_those_of_the_ledger():
     assert f"{(once['verdict'] == 'reproduced').sum()} of {len(once)} reproduce." in said
 
 
+def test_settings_and_lost_landings_are_those_of_the_tables():
+    counts = read_table("ledger").query("part == 'settings'")["verdict"].value_counts()
+    share = f"{counts['reproduced']} of {counts['reproduced'] + counts['differs']}"
+    assert f"{share} settings" in " ".join(README.split())
+    assert f"{share} checkable settings agree" in " ".join(RESULTS.split())
+    tail = read_table("beyond/tail").set_index(["method", "size"])["failing"]
+    faithful, teacher = (1000 * tail[row] for row in (("our cells, faithful", 8), ("teacher", 0)))
+    said = f"{faithful:.0f} landings in a thousand fail, {teacher:.0f} of the teacher's"
+    assert said in " ".join(RESULTS.split())
+
+
+def test_the_printed_policy_is_that_of_the_table():
+    table = (ROOT / "figures/beyond/tables/pendulum_policy.csv").read_text("utf-8")
+    (block,) = re.findall(r"```text\n(Pendulum-v1: .*?)```", RESULTS, flags=re.S)
+    cells = re.findall(r"^nearest to (.*):\n  τ = (.*)$", block, flags=re.M)
+    for row, cell in zip(table.splitlines()[1:], cells, strict=True):
+        in_table, said = (re.findall(r"-?\d+\.?\d*", text.replace("- ", "-")) for text in (row, " ".join(cell)))
+        assert in_table == said
+
+
 def test_faithful_policies_are_those_of_the_table():
     table = read_table("beyond/faithful").set_index("task")
     teachers = read_table("beyond/headline").set_index("task")["teacher"]

@@ -254,6 +254,10 @@ def test_wrappers_act_and_an_environment_may_cut_off_an_episode(monkeypatch):
     assert found.lengths.tolist() == [10] * 3 and (found.outcomes == TRUNCATED).all()
 
 
+def test_a_thousand_starts_of_an_engine_are_a_thousand_seeds():
+    assert len(np.unique(vsp.start_states(LUNARLANDER, 1000, seed=0))) == 1000
+
+
 def test_an_environment_without_a_limit_of_steps_is_refused(monkeypatch):
     monkeypatch.setitem(gymnasium.registry, "Endless-v0", dataclasses.replace(gymnasium.spec(PENDULUM)))
     gymnasium.registry["Endless-v0"].max_episode_steps = None

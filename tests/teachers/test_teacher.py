@@ -79,6 +79,11 @@ def test_a_path_loads_as_the_name_does(copied):
     assert own.digest == shipped.digest == load_teacher(str(copied), SIMPLEGOAL).digest and own.task is shipped.task
 
 
+def test_a_teacher_of_another_task_is_refused(copied):
+    with pytest.raises(ValueError, match="2 inputs and 2 outputs, MountainCarContinuous-v0 has 2 and 1"):
+        load_teacher(copied, MOUNTAINCAR)
+
+
 @pytest.mark.parametrize("position", [0, 1000, -1])
 def test_damaged_weights_are_refused(copied, position):
     content = copied.read_bytes()
