@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vsp.checks import check_array, check_finite
+from vsp.checks import check_array, check_finite, check_seed
 
 
 @pytest.mark.filterwarnings("error")
@@ -33,3 +33,7 @@ def test_a_wrong_shape_shows_both():
         with pytest.raises(ValueError) as caught:
             check_array("weights", np.zeros(shape), (-1, 2))
         assert str(caught.value) == f"weights have shape {shape}, expected (n, 2)"
+
+
+def test_a_seed_may_be_an_integer_of_numpy():
+    check_seed(np.int64(3))

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support import nearest_brute, nearest_kdtree
 
-from vsp import nearest
+from vsp import geometry, nearest
 from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours
 from vsp.show import grid
 
@@ -158,3 +158,12 @@ def test_grid():
     x, y, states = grid(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), 5)
     assert x[0].tolist() == [-1, -0.5, 0, 0.5, 1] and y[:, 0].tolist() == [0, 1, 2, 3, 4]
     assert states[7].tolist() == [x.ravel()[7], y.ravel()[7]] == [0.0, 1.0]
+
+
+def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):
+    built, tree = [], geometry.cKDTree
+    monkeypatch.setattr(geometry, "KDTREE_FROM", 4)
+    monkeypatch.setattr(geometry, "cKDTree", lambda codewords: built.append(len(codewords)) or tree(codewords))
+    for k in (3, 4, 5):
+        assert geometry.nearest(np.arange(2.0 * k).reshape(k, 2), np.zeros((1, 2))).tolist() == [0]
+    assert built == [4, 5]

@@ -117,6 +117,13 @@ def test_cells_by_hand(book):
     assert book.set_index("id")["cell"][[*cells]].to_dict() == cells
 
 
+def test_limits_of_a_task_are_read_from_the_task(monkeypatch):
+    for name, limits in ((SIMPLEGOAL, {"max_steps": 51}), (MOUNTAINCAR, {"high": np.array([0.6, 0.08])})):
+        monkeypatch.setitem(registry._TASKS, name, dataclasses.replace(registry.get_task(name), **limits))
+    here = pd.Series(ledger._environments())
+    assert here[["sg_max_steps", "mc_velocity_high", "mc_max_steps"]].tolist() == [51, 0.08, 999]
+
+
 # The rules
 
 
@@ -326,3 +333,11 @@ def test_what_lies_inside_the_band_is_reproduced(here, below, above, number, dig
         assert found == REPRODUCED
     if abs(gap) > 1.001 * ROOT2 + 1:
         assert found == DIFFERS
+
+
+def test_a_tie_beats_nobody():
+    same = dataclasses.replace(BY_HAND, runs=[run(i, BY_HAND.teacher_returns) for i in range(2)])
+    here = ledger.left_out_by_quartiles(same, n_resamples=5)["here"]
+    assert (
+        here["probability that a run beats its teacher"] == here["probability that an episode beats the teacher's"] == 0
+    )

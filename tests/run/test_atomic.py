@@ -1,6 +1,7 @@
 """Files are whole or absent; what is no regular file is refused, not waited for."""
 
 import os
+import stat
 import subprocess
 import sys
 
@@ -79,3 +80,13 @@ def test_a_missing_file_and_links(tmp_path):
     (tmp_path / "x").write_bytes(b"content")
     (tmp_path / "link").symlink_to("x")
     assert read_bytes(tmp_path / "link") == b"content"
+
+
+def test_a_new_file_follows_the_umask(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "x.txt", "new")
+        write_text(tmp_path / "x.txt", "again")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "x.txt").stat().st_mode) == 0o640

@@ -315,3 +315,10 @@ def test_groups_are_columns_of_dots_with_a_bar_at_their_mean(ax):
 def test_nothing_of_a_committed_figure_is_cut_off(path):
     pixels = np.asarray(Image.open(path).convert("L"))
     assert min(edge.min() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1])) > 250
+
+
+def test_intervals_have_colours_of_their_own(ax):
+    colours = [style.TEACHER, style.DISTILLED, style.GOAL]
+    rows = pd.DataFrame({"here": [1.0, 2.0, 3.0], "low": [0.0, 1.0, 2.0], "high": [2.0, 3.0, 4.0]})
+    show.intervals(ax, rows, color=colours)
+    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
