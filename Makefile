@@ -77,8 +77,8 @@ lab: venv ## opens JupyterLab on the notebooks
 	@JUPYTER_CONFIG_PATH="$(CURDIR)/.jupyter" $(PY) -m jupyterlab notebooks/01_teacher.ipynb
 
 ## Reproduce
-beyond-figures: ## what goes beyond the paper, our own method (notebooks 06 onward): 2 to 5 minutes
-all: ## both: 3 to 8 minutes
+beyond-figures: ## what goes beyond the paper, our own method (notebooks 06 onward): 1 to 5 minutes
+all: ## both: 2 to 8 minutes
 paper-figures: GOALS = runs $(PAPER)
 beyond-figures: GOALS = $(BEYOND)
 all: GOALS = runs $(BEYOND) $(PAPER)
@@ -127,7 +127,7 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 # Tests have a temporary folder of their own, which is removed
 PYTEST = tmp=$$(mktemp -d) && trap 'rm -rf "$$tmp"' EXIT && TMPDIR="$$tmp" MPLBACKEND=Agg $(PY) -m pytest -q -rs
 
-test: venv-test-train-dask ## runs the tests, several at a time, and names the ten slowest: 3 to 7 minutes
+test: venv-test-train-dask ## runs the tests, several at a time, and names the ten slowest: 2 to 5 minutes
 	@$(PYTEST) -n logical --maxprocesses 4 --dist worksteal --durations=10 tests
 
 test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 6 minutes
