@@ -128,6 +128,17 @@ def test_the_printed_policy_is_that_of_the_table():
         assert in_table == said
 
 
+def test_what_cells_buy_is_that_of_the_table():
+    block = RESULTS.partition("### What do the cells buy?")[2]
+    shown = re.findall(r"^\| [^|]+ \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", block, flags=re.M)
+    for (_, kinds), place in zip(read_table("what_cells_buy").groupby("task", sort=False), (0, 2), strict=True):
+        rows = {
+            (f"{row.mean_:.2f}", f"{100 * row.failing:.1f}")
+            for row in kinds.rename(columns={"mean": "mean_"}).itertuples()
+        }
+        assert {row[place : place + 2] for row in shown} == rows
+
+
 def test_faithful_policies_are_those_of_the_table():
     table = read_table("beyond/faithful").set_index("task")
     teachers = read_table("beyond/headline").set_index("task")["teacher"]

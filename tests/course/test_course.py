@@ -3,6 +3,7 @@
 import _thread
 import ast
 import builtins
+import dataclasses
 import functools
 import os
 import re
@@ -272,6 +273,23 @@ def test_the_sealed_answers_are_those_of_the_pictures():
     assert spread(theirs)["median"] > box["median"] and (ours < 0).any() and ours[ours < 0].max() < box["lower_fence"]
     assert abs(((ours >= box["q1"]) & (ours <= box["q3"])).mean() - 0.5) < 0.1
     assert max(("median", "iqr", "mean"), key=lambda name: abs(kept[name] - box[name])) == "mean"
+
+
+def test_splits_and_merges_are_as_the_text_says():
+    """Exact maps make about as many splits, and more merges; ten cells exist early."""
+    texts = {cell.id: cell.source for cell in LESSONS["lesson_2_algorithms.ipynb"].cells}
+    teacher, quick = vsp.load_teacher("SimpleGoal-v0"), vsp.preset("SimpleGoal-v0").quick()
+    counts = {}
+    for fit in ("closed_form", "adam"):
+        config = dataclasses.replace(quick, fit=fit)
+        runs = [once(teacher, "SimpleGoal-v0", config, seed=seed)[1].events for seed in range(3)]
+        counts |= {
+            (fit, kind): [sum(event.kind == kind for event in run) for run in runs] for kind in ("split", "merge")
+        }
+    said = [int(n) for n in re.findall(r"\d+", texts["predict-notes"].partition("splits (")[2].partition(")")[0])]
+    assert said == counts["closed_form", "split"] + counts["adam", "split"]
+    history = once(teacher, "SimpleGoal-v0", seed=0)[1]
+    assert "Ten cells exist by iteration 40;" in texts["growth-see"] and history.cells[40] == 10
 
 
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):

@@ -282,3 +282,10 @@ def test_a_table_stands_below_its_caption():
     assert re.search(r"<table[^>]*>\s*<caption><b>Table 4.2.</b> \w.*</caption>", page)
     assert "<caption>Mine.</caption>" in show_table(frame, caption="Mine.").data
     assert "caption" not in show_table(frame, "unknown").data
+
+
+def test_a_frame_that_is_shown_stays_as_it_is():
+    frame = pd.DataFrame({"failing": [0.5], "low": [1.0], "high": [2.0]})
+    before = frame.copy()
+    tables.present(frame)
+    assert frame.equals(before)

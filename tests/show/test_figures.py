@@ -322,3 +322,9 @@ def test_intervals_have_colours_of_their_own(ax):
     rows = pd.DataFrame({"here": [1.0, 2.0, 3.0], "low": [0.0, 1.0, 2.0], "high": [2.0, 3.0, 4.0]})
     show.intervals(ax, rows, color=colours)
     assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
+
+
+def test_a_figure_without_an_alternative_text_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="figure 'mine' has no alternative text: pass alt="):
+        show.save_figure(show.panels(1)[0], "mine", out=tmp_path)
+    assert not list(tmp_path.rglob("*.png"))
