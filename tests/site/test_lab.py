@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import urllib.request
 from pathlib import Path
@@ -27,8 +28,9 @@ def home(tmp_path_factory):
     """The folder in which the command runs: a copy of the notebooks, nobody's settings, and what it says."""
     home = tmp_path_factory.mktemp("lab")
     shutil.copytree(ROOT / "notebooks", home / "notebooks")
-    names = ("HOME", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR")
+    names = ("HOME", "JUPYTER_DATA_DIR", "IPYTHONDIR")
     environment = os.environ | {name: str(home / name.lower()) for name in names}
+    environment["JUPYTER_RUNTIME_DIR"] = tempfile.mkdtemp()  # a short path: those of sockets have 107 characters
     environment["JUPYTER_CONFIG_PATH"] = str(ROOT / ".jupyter")
     options = ["--no-browser", "--allow-root", "--LabApp.expose_app_in_browser=True"]
     command = [sys.executable, "-m", "jupyterlab", f"notebooks/{FIRST}", *options]
