@@ -49,7 +49,7 @@ unexport MPLBACKEND MATPLOTLIBRC JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
-ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test venv-test-train-dask venv-site venv-site-test
+ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
 .PHONY: help list quick paper-figures beyond-figures all lab runs study lookup proofs proofs-teacher course site test \
   test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
@@ -133,7 +133,7 @@ test: venv-test-train-dask ## runs the tests, several at a time, and names the t
 test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 6 minutes
 	@$(PYTEST) tests/long
 
-lint: venv-test ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
+lint: venv-test-train ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
 test-site: site venv-site-test ##- tests site and JupyterLab in a browser, which needs Chromium: 7 to 15 minutes

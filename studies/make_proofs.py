@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from vsp import VoronoiPolicy, collect_episodes, load_teacher, rollout, start_states
+from vsp import VoronoiPolicy, load_teacher, start_states
 from vsp.algorithms import distill
 from vsp.config import paper_preset
 from vsp.paper import published_policy, results
 from vsp.paper.baselines import linear_map
+from vsp.rollouts import collect_episodes, rollout
 from vsp.run import command, listed
 from vsp.run.progress import progress
 from vsp.tasks import simplegoal

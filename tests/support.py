@@ -64,16 +64,17 @@ class PumpingTeacher:
         return softsign(60 * np.asarray(obs, dtype=np.float64)[..., 1:]), None
 
 
-class RandomPolicy:
-    """Uniform actions, also beyond the limits; `gain` pushes along the last state variable on top."""
+TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 
-    def __init__(self, m, *, seed=0, bound=1.5, gain=0.0):
-        self.m, self.bound, self.gain = m, bound, gain
-        self.rng = np.random.default_rng(seed)
+
+class RandomPolicy:
+    """Uniform actions, also beyond the limits."""
+
+    def __init__(self, m, *, seed=0, bound=1.5):
+        self.m, self.bound, self.rng = m, bound, np.random.default_rng(seed)
 
     def predict(self, obs):
-        noise = self.rng.uniform(-self.bound, self.bound, size=(len(obs), self.m))
-        return (noise + self.gain * np.sign(obs[:, -1:])).astype(np.float32), None
+        return self.rng.uniform(-self.bound, self.bound, size=(len(obs), self.m)).astype(np.float32), None
 
 
 class Constant:
@@ -132,6 +133,14 @@ def examples(task, n=300, seed=0):
     return states, states @ maps + 0.3 + 0.1 * rng.normal(size=(n, len(task.action_low)))
 
 
+def python(code, *arguments, cwd=ROOT, **options):
+    """What `code` prints in a fresh Python, where it must not fail."""
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, **options)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 _DISTIL = """
 import dataclasses, hashlib, sys
 import support, vsp
@@ -146,13 +155,8 @@ print(hashlib.sha256(policy.codewords.tobytes() + policy.coefficients.tobytes())
 
 def distilled_elsewhere(task, *, teacher="shipped", config="paper", seed=0, ahead=500, **environment):
     """SHA-256 of the codewords and coefficients that a fresh Python distils with these environment variables."""
-    arguments = [task, teacher, config, str(seed), str(ahead)]
-    paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
-    done = subprocess.run(
-        [sys.executable, "-c", _DISTIL, *arguments],
-        env=os.environ | {"PYTHONPATH": paths} | environment, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return done.stdout.strip()
+    environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])} | environment
+    return python(_DISTIL, task, teacher, config, seed, ahead, env=os.environ | environment).strip()
 
 
 def threads(n):
@@ -195,3 +199,13 @@ def write_story(folder: Path, *cells: str, parameters: str = STORY_PARAMETERS) -
     path = folder / "story.ipynb"
     nbformat.write(notebook, path)
     return path
+
+
+class Payload:
+    """Writes a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (str(self.path), "w")

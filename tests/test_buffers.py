@@ -110,11 +110,6 @@ def test_sampling_is_uniform_and_with_replacement():
     assert ((counts - 10_000) ** 2 / 10_000).sum() < 22.5  # chi square, 6 degrees of freedom, 0.1 %
 
 
-def test_sampling_repeats_with_its_generator():
-    draws = [filled(0, 1, 1).sample(np.array([1]), 9, np.random.default_rng(s))[0].tolist() for s in (0, 0, 1)]
-    assert draws[0] == draws[1] != draws[2]
-
-
 def test_clear_bounds_the_memory():
     buffers = filled(0)
     for _ in range(200):

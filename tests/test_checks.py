@@ -16,8 +16,7 @@ def test_numbers_whose_squares_overflow_are_finite():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ([[1, 2], [3, np.nan]], r"weights hold nan at index \(1, 1\), expected finite numbers"),
-        (-np.inf, r"weights hold -inf at index \(\)"),
+        (-np.inf, r"weights hold -inf at index \(\), expected finite numbers"),
         (["a"], "weights have type <U1, expected numbers"),
     ],
 )

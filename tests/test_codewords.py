@@ -52,10 +52,7 @@ def codewords_of(kind, d, seed):
 def graphs(codewords, states, metric):
     """The graph of every kind of neighbours."""
     low, high = states.min(axis=0), states.max(axis=0)
-    return {
-        "delaunay": delaunay_neighbours(codewords),
-        "lookup": lookup_neighbours(codewords, low, high, metric),
-    }
+    return {"delaunay": delaunay_neighbours(codewords), "lookup": lookup_neighbours(codewords, low, high, metric)}
 
 
 def box(d):

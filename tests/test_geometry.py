@@ -29,14 +29,6 @@ def test_distances_by_hand():
     assert by_metric == {"manhattan": [[7, 1]], "euclidean": [[5, 1]], "chebyshev": [[4, 1]]}
 
 
-@pytest.mark.parametrize("lookup", [nearest, nearest_kdtree])
-def test_nearest_by_hand_and_the_metric_matters(lookup):
-    codewords = np.array([[0.0, 0.75], [0.5, 0.5]])  # from the origin: 0.75 or 1; 0.75 or 0.71
-    origin = np.zeros((1, 2))
-    assert lookup(codewords, origin).tolist() == [0]
-    assert lookup(codewords, origin, "euclidean").tolist() == lookup(codewords, origin, "chebyshev").tolist() == [1]
-
-
 @each_metric
 def test_kdtree_equals_brute_force_on_grids(metric):
     """Codewords on a shuffled grid and states on a finer one: most states are between two or more codewords."""

@@ -4,12 +4,11 @@ import ast
 import html
 import json
 import re
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from support import python
 
 from vsp.run.notebook import nbformat
 from vsp.show import captions
@@ -106,10 +105,7 @@ def test_alternative_texts_are_sentences(executed):
 def test_first_code_cell_holds_the_parameters(notebook):
     first = code_cells(notebook)[0]
     assert first.metadata["tags"] == ["parameters"]
-    assert {node.targets[0].id for node in ast.parse(first.source).body} in (
-        {"out", "quick"},
-        {"out", "runs", "quick"},
-    )
+    assert {node.targets[0].id for node in ast.parse(first.source).body} in ({"out", "quick"}, {"out", "runs", "quick"})
 
 
 # What they import, and where they run
@@ -126,13 +122,6 @@ sys.meta_path.insert(0, Blocked())
 """
 
 
-def run_without_torch(code):
-    """Standard output of `code` in a fresh Python that has neither torch nor Stable-Baselines3."""
-    done = subprocess.run([sys.executable, "-c", BLOCKED + code], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def test_they_draw_without_torch():
     """Everything that they import, and a teacher."""
     statements = {
@@ -142,7 +131,7 @@ def test_they_draw_without_torch():
         for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Import | ast.ImportFrom)
     }  # fmt: skip
     assert len(statements) > 10
-    run_without_torch("\n".join([*sorted(statements), "vsp.load_teacher('SimpleGoal-v0')"]))
+    python("\n".join([BLOCKED, *sorted(statements), "vsp.load_teacher('SimpleGoal-v0')"]))
 
 
 def test_defaults_lie_in_the_checkout(notebook):

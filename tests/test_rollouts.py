@@ -5,7 +5,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
 
 import vsp
-from vsp import collect_episodes, get_task, rollout, visited_states
+from vsp import collect_episodes, get_task, rollout, rollouts, visited_states
 from vsp.rollouts import standard
 from vsp.tasks import GOAL, PIT, TRUNCATED
 
@@ -57,7 +57,7 @@ def test_the_policy_gets_float32_of_the_episodes_that_still_run():
             batches.append((obs.dtype, len(obs)))
             return super().predict(obs)
 
-    episodes = collect_episodes(Spy(-1.0, 0.0), SIMPLEGOAL, starts)
+    episodes = rollouts.collect_episodes(Spy(-1.0, 0.0), SIMPLEGOAL, starts)
     assert batches == [(np.float32, 3), (np.float32, 1)]
     assert np.array_equal(episodes[0].states[0], starts[0].astype(np.float32).astype(np.float64))
 

@@ -8,21 +8,22 @@ the public API: it checks arguments and resolves names of tasks. What goes beyon
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Callable
 from types import ModuleType
 
-from . import algorithms
+from . import algorithms, evaluation, rollouts
 from .algorithms import merge_regions, split_regions, teacher_episodes
 from .checks import check_seed
 from .config import Config, paper_preset
-from .evaluation import evaluate, rollout_from_seed, start_states
+from .evaluation import start_states
 from .export import distances_latex
 from .geometry import nearest
 from .history import History
 from .partition import Partition
 from .policy import VoronoiPolicy
-from .rollouts import Policy, collect_episodes, rollout, visited_states
+from .rollouts import Policy
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
 
@@ -44,9 +45,9 @@ def distill(
 ) -> tuple[VoronoiPolicy, History]:
     """Distil `teacher` to a `VoronoiPolicy` by the paper's method; its history can be replayed.
 
-    `teacher` is any object with `.predict(obs) -> (actions, None)` for batches. `config` defaults to the paper's preset
-    of the task. The same arguments give the same policy. Raises ValueError if the teacher does not fit the task, if
-    states or actions are not finite, for a task without a preset, or if `seed` is not a non-negative integer.
+    `teacher` is whatever `agent` takes. `config` defaults to the paper's preset of the task. The same arguments give
+    the same policy. Raises ValueError if the teacher does not fit the task, if states or actions are not finite, for a
+    task without a preset, or if `seed` is not a non-negative integer.
     """
     check_seed(seed)
     task = get_task(task)
@@ -54,7 +55,22 @@ def distill(
         config = paper_preset(task)
     if not isinstance(config, Config):
         raise ValueError(f"config is {config!r:.40}, expected a Config, such as vsp.preset({task.name!r})")
-    return algorithms.distill(teacher, task, config, seed=seed)
+    return algorithms.distill(agent(teacher, task), task, config, seed=seed)
+
+
+def _of_any_agent(function: Callable) -> Callable:
+    """Return `function` of a policy as a function of whatever `agent` takes."""
+
+    @functools.wraps(function)
+    def of_any_agent(policy: Policy, task: str | Task, *arguments, **options):
+        return function(agent(policy, task), task, *arguments, **options)
+
+    return of_any_agent
+
+
+evaluate, rollout_from_seed = _of_any_agent(evaluation.evaluate), _of_any_agent(evaluation.rollout_from_seed)
+rollout, collect_episodes = _of_any_agent(rollouts.rollout), _of_any_agent(rollouts.collect_episodes)
+visited_states = _of_any_agent(rollouts.visited_states)
 
 
 def preset(task: str | Task, kind: str = "paper", **_) -> Config:

@@ -11,7 +11,7 @@ import numpy as np
 from .checks import check_array, check_data, check_finite
 from .tasks import RUNNING, TRUNCATED, Task, get_task
 
-Step = tuple[np.ndarray, np.ndarray, np.ndarray]  # running episodes (a,), observations (a, d), actions (a, m)
+Steps = list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # running episodes (a,), observations (a, d), actions (a, m)
 
 
 class Policy(Protocol):
@@ -52,8 +52,7 @@ def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
     Raises ValueError for starts that are not finite or lie outside the box, and for a policy that does not fit the
     task or whose actions are not finite.
     """
-    task = get_task(task)
-    return _advance(policy, task, _begin(policy, task, starts))
+    return _play(policy, get_task(task), starts)
 
 
 def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
@@ -61,9 +60,8 @@ def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> li
 
     Raises ValueError as `rollout` does.
     """
-    task = get_task(task)
-    steps: list[Step] = []
-    n = len(_advance(policy, task, _begin(policy, task, starts), steps).returns)
+    steps: Steps = []
+    n = len(_play(policy, get_task(task), starts, steps).returns)
     if not n:
         return []
     index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
@@ -93,43 +91,56 @@ def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return states.mean(axis=0), np.where(varies, states.std(axis=0), 1.0)
 
 
-def _begin(policy: Policy, task: Task, starts: np.ndarray) -> np.ndarray:
-    """Return the first states of episodes from `starts` (n, s)."""
-    if not callable(getattr(policy, "predict", None)):
-        raise ValueError(f"the policy is {policy!r}, expected something with `predict`: `vsp.agent` wraps other agents")
-    starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
-    states = task.begin(starts)
-    seen = task.see(states)
-    outside = ((seen < task.low) | (seen > task.high)).any(axis=1)
-    if outside.any():
-        first, low, high = starts[outside.argmax()].tolist(), task.low.tolist(), task.high.tolist()
-        raise ValueError(f"start state {first} lies outside the box of {task.name}, {low} to {high}")
-    return states
-
-
-def _advance(policy: Policy, task: Task, states: np.ndarray, steps: list[Step] | None = None) -> Outcomes:
-    """Run episodes from `states` to their ends, all together; finished ones leave the batch.
+def _play(policy: Policy, task: Task, starts: np.ndarray, steps: Steps | None = None) -> Outcomes:
+    """Run episodes from `starts` (n, s) to their ends, at most `task.at_once` together.
 
     If `steps` is a list, the observations and actions of each step are appended to it.
     """
-    n = len(states)
-    returns, lengths, outcomes = np.zeros(n), np.zeros(n, dtype=np.int64), np.full(n, TRUNCATED)
-    active = np.arange(n)  # indices of the running episodes
+    if not callable(getattr(policy, "predict", None)):
+        raise ValueError(f"the policy is {policy!r}, expected something with `predict`: `vsp.agent` wraps other agents")
+    starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
+    n = len(starts)
+    result = Outcomes(np.zeros(n), np.zeros(n, dtype=np.int64), np.full(n, TRUNCATED))
+    size = task.at_once or max(1, n)
+    for first in range(0, max(1, n), size):
+        states = task.begin(starts[first : first + size])
+        try:
+            _check_inside(task, task.see(states))
+            _advance(policy, task, states, first, result, steps)
+        finally:  # also after an interrupt
+            task.end(states)
+        del states  # before the next ones begin
+    check_finite(f"the summed rewards of {task.name}", result.returns)
+    return result
+
+
+def _check_inside(task: Task, seen: np.ndarray) -> None:
+    """Raise ValueError if first observations `seen` (n, d) leave the box by more than the rounding of float32."""
+    inside = np.isclose(seen, np.clip(seen, task.low, task.high), rtol=np.finfo(np.float32).eps, atol=0.0).all(axis=1)
+    if not inside.all():
+        first, low, high = seen[inside.argmin()].tolist(), task.low.tolist(), task.high.tolist()
+        raise ValueError(f"first observation {first} lies outside the box of {task.name}, {low} to {high}: widen it")
+
+
+def _advance(policy: Policy, task: Task, states: np.ndarray, first: int, result: Outcomes, steps: Steps | None) -> None:
+    """Run episodes from `states` to their ends, all together; finished ones leave the batch.
+
+    They are entered in `result` from the number `first` on.
+    """
+    active = np.arange(first, first + len(states))  # numbers of the running episodes
     for t in range(task.max_steps):
         observations = task.observe(states)
         actions = _act(policy, task, observations)
         if steps is not None:
             steps.append((active, observations.astype(np.float64), actions))
         states, rewards, ended = task.step(states, actions)
-        returns[active] += rewards
+        result.returns[active] += rewards
         done = ended != RUNNING
-        outcomes[active[done]] = ended[done]
-        lengths[active] = t + 1
+        result.outcomes[active[done]] = ended[done]
+        result.lengths[active] = t + 1
         active, states = active[~done], states[~done]
         if not len(active):
             break
-    check_finite(f"the summed rewards of {task.name}", returns)
-    return Outcomes(returns, lengths, outcomes)
 
 
 def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:
@@ -140,8 +151,6 @@ def _act(policy: Policy, task: Task, observations: np.ndarray) -> np.ndarray:
     except (ValueError, TypeError, IndexError) as error:
         raise ValueError(f"the policy fails on the {d} inputs of {task.name}: {error}") from error
     if actions.shape != (n, m):
-        raise ValueError(
-            f"the policy's actions have shape {actions.shape}, expected {(n, m)} for {task.name}: a teacher or policy "
-            f"must be made for this task, and gets a batch of observations {(n, d)}"
-        )
+        what = f"the policy's actions have shape {actions.shape}, expected {(n, m)} for {task.name}"
+        raise ValueError(f"{what}: it must be made for this task, and gets a batch of observations {(n, d)}")
     return check_finite("the policy's actions", actions)

@@ -1,11 +1,15 @@
 """What goes beyond the paper: few cells that act like any agent or return much, and proofs of what they do.
 
 `faithful` and `tuned` distil an agent, `at_the_limit` searches for the highest return: each has defaults for any task.
-`simplify` reduces cells and numbers, `prove` proves what a policy does from every start. `few_cells`, `optimum`,
+`simplify` reduces cells and numbers, `likeness` compares a policy with its agent, `report` writes a page about both,
+`prove` proves what a policy does from every start. `few_cells`, `optimum`,
 `explain` and `proofs` hold the parts, `show` draws figures.
 """
 
 from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
 
 from vsp import agent as as_agent
 from vsp.policy import VoronoiPolicy
@@ -18,6 +22,7 @@ from .few_cells.duration import expected_time
 from .few_cells.faithful import distill_faithfully
 from .few_cells.limit import search_limit, whole_search
 from .few_cells.tuned import distill_tuned
+from .likeness import likeness
 from .proofs import prove
 
 
@@ -72,3 +77,10 @@ def at_the_limit(
     check_kind(config, Tuned)
     print(f"searching for {task.name}: {expected_time(task, whole_search(task, config))}")
     return search_limit(task, config, seed=seed, teacher=None if teacher is None else as_agent(teacher))
+
+
+def __getattr__(name: str) -> Callable:
+    """Import `vsp_beyond.report` on first use: it draws."""
+    if name == "report":
+        return importlib.import_module(".page", __name__).report
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

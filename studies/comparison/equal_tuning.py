@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from vsp import get_task, load_teacher, start_states, visited_states
+from vsp import get_task, load_teacher, start_states
+from vsp.rollouts import visited_states
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 

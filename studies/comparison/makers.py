@@ -14,8 +14,9 @@ from functools import partial
 
 import numpy as np
 
-from vsp import Policy, Task, VoronoiPolicy, agent, visited_states
+from vsp import Policy, Task, VoronoiPolicy, agent
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map
+from vsp.rollouts import visited_states
 from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit

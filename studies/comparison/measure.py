@@ -12,7 +12,8 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from vsp import Policy, Task, VoronoiPolicy, rollout, start_states, visited_states
+from vsp import Policy, Task, VoronoiPolicy, start_states
+from vsp.rollouts import rollout, visited_states
 from vsp.tasks.base import GOAL
 
 VERSION = 1  # raise it when the same policy gives different numbers

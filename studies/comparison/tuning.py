@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vsp import Policy, Task, VoronoiPolicy, visited_states
+from vsp import Policy, Task, VoronoiPolicy
 from vsp.paper.baselines import Tree
+from vsp.rollouts import visited_states
 from vsp.subpolicies import linear_outputs
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import Candidates, Objective, tune

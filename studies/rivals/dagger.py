@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vsp import Policy, Task, get_task, rollout, visited_states
+from vsp import Policy, Task, get_task
+from vsp.rollouts import rollout, visited_states
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import score
 

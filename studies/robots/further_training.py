@@ -10,7 +10,6 @@ import numpy as np
 
 from vsp import Policy
 from vsp.teachers.teacher import Teacher
-from vsp_beyond.few_cells.criticality import Critics
 from vsp_beyond.few_cells.units import Scaling
 
 from .imitation import most_rewarding
@@ -69,7 +68,9 @@ def _model(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int
                 for group in optimizer.param_groups:
                     group["lr"] = rate
 
-    critics = {name: torch.tensor(value) for name, value in Critics(teacher).teacher.critic.items()}
+    if not teacher.critic:
+        raise ValueError(f"{type(teacher).__name__} has no critics, expected qf0.0.weight, ...: load one with them")
+    critics = {name: torch.tensor(value) for name, value in teacher.critic.items()}
     biases = sorted(name for name in critics if name.startswith("qf0") and name.endswith("bias"))  # layer by layer
     hidden = [len(critics[name]) for name in biases[:-1]]
     m = len(frame.task.action_low)

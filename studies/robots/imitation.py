@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp import Policy, Task, VoronoiPolicy, get_task, rollout, visited_states
+from vsp import Policy, Task, VoronoiPolicy, get_task
+from vsp.rollouts import rollout, visited_states
 from vsp_beyond.few_cells.faithful import by_visits
 from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, spread
 from vsp_beyond.few_cells.units import LabelledStates, Scaling

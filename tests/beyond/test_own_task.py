@@ -1,13 +1,12 @@
 """A reader's own environment and pilot, through the public face alone."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import own_tasks
 import pytest
+from support import python
 
 import vsp
 import vsp_beyond
@@ -17,10 +16,7 @@ from vsp_beyond.few_cells.faithful import distill_faithfully
 LITTLE = vsp_beyond.Faithful(
     n_cells=4, n_episodes=15, n_restarts=2, n_generations=3, n_tuning_episodes=5, n_validation=10, tolerance=1.0
 )
-NAMES = {
-    "Dock-v0": (["east", "north", "ve", "vn"], ["push e", "push n"]),
-    "Tank-v0": (["level", "mark"], ["valve"]),
-}
+NAMES = {"Dock-v0": (["east", "north", "ve", "vn"], ["push e", "push n"]), "Tank-v0": (["level", "mark"], ["valve"])}
 PILOTS = {"Dock-v0": own_tasks.dock_pilot, "Tank-v0": own_tasks.tank_pilot}
 
 
@@ -75,8 +71,8 @@ def test_it_is_saved_with_names_and_box_and_acts_where_nobody_knows_the_task(dis
     task, _, policy, _ = distilled
     policy.save(tmp_path / "own.vsp")
     code = "import sys, vsp; print(vsp.VoronoiPolicy.load(sys.argv[1]).to_json())"
-    elsewhere = subprocess.run([sys.executable, "-c", code, tmp_path / "own.vsp"], capture_output=True, text=True)
-    assert elsewhere.stdout.strip() == policy.to_json().strip() and NAMES[task.name][0][0] in elsewhere.stdout
+    elsewhere = python(code, tmp_path / "own.vsp")
+    assert elsewhere.strip() == policy.to_json().strip() and NAMES[task.name][0][0] in elsewhere
     assert vsp.VoronoiPolicy.load(tmp_path / "own.vsp").task is task
 
 

@@ -1,18 +1,8 @@
-import matplotlib.pyplot as plt
 import numpy as np
-import pytest
 from matplotlib.colors import to_rgba
 
-from vsp.show import panels
 from vsp_beyond import show
 from vsp_beyond.show.proofs import FAILING, KEPT
-
-
-@pytest.fixture
-def ax():
-    fig, (ax,) = panels()
-    yield ax
-    plt.close(fig)
 
 
 def test_basins_show_failing_pieces_above_the_others(ax):

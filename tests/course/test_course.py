@@ -8,8 +8,6 @@ import functools
 import os
 import re
 import signal
-import subprocess
-import sys
 import zipfile
 from collections import Counter
 
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 from course_answers import EXERCISES
 from IPython.core.interactiveshell import InteractiveShell
+from support import python
 
 import vsp
 from vsp import distill, show
@@ -137,7 +136,7 @@ def test_students_get_stubs_and_no_answers(lesson):
         for i in range(max(1, len(lines) - 1)):  # a line alone may stand in a worked cell too, two do not
             assert "\n".join(lines[i : i + 2]) not in text, cell.id
     assert "SOLUTION" not in text and "lecturer" not in text and "Common mistakes" not in text
-    assert all(build.STUB[1] in cell.source for cell in by_kind(made, build.is_solution))
+    assert all(line in cell.source for cell in by_kind(made, build.is_solution) for line in build.STUB)
     assert all(cell.metadata.editable is False for cell in by_kind(made, build.is_check))
 
 
@@ -151,12 +150,6 @@ def test_answers_to_questions_cannot_be_read_in_a_students_copy(lesson):
         tree = ast.parse(cell.source)
         for node in (node for node in ast.walk(tree) if isinstance(node, ast.Dict)):
             assert all(isinstance(value, ast.Constant) and value.value is None for value in node.values), cell.id
-
-
-def test_a_stub_takes_the_place_of_an_answer():
-    source = "def f(x):\n    y = x\n    ### BEGIN SOLUTION\n    return y + 1\n    ### END SOLUTION\n"
-    stub = "def f(x):\n    y = x\n    # YOUR CODE HERE\n    raise NotImplementedError()\n"
-    assert build.without_answers(source) == stub
 
 
 @pytest.mark.parametrize("source", ["x = 1", "### BEGIN SOLUTION\nx = 1", "x = 1\n### END SOLUTION"])
@@ -533,15 +526,12 @@ def test_a_hand_out_stands_on_its_own(tmp_path):
     code = (
         "import vsp, vsp_beyond, vsp_course; from vsp_course import lesson_1, lesson_2, lesson_3; "
         "print(vsp.__file__, vsp_beyond.__file__, vsp_course.__file__); "
-        "from vsp.paper import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
+        "from vsp.paper.printed import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
     )
     assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))
     names = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    done = subprocess.run(
-        [sys.executable, "-c", code.format(SIMPLEGOAL)], cwd=folder, env=names, capture_output=True, text=True
-    )
     places = [str(folder / package / "__init__.py") for package in ("vsp", "vsp_beyond", "vsp_course")]
-    assert done.stdout.split() == places, done.stderr
+    assert python(code.format(SIMPLEGOAL), cwd=folder, env=names).split() == places
 
 
 def test_a_hand_out_asks_for_locked_versions_without_torch():

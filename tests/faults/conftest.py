@@ -1,4 +1,4 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # for `support`
+sys.path[:0] = map(str, (Path(__file__).parents[1], Path(__file__).parents[1] / "teachers"))  # `support`, `zips`

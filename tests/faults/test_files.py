@@ -15,23 +15,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from support import SIMPLEGOAL, TINY, CurvedTeacher
+from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload
 
 import vsp
+from studies import training
 from studies.comparison.rows import Job, make_row
+from studies.recipes import Recipe
 from vsp.paper import results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
 from vsp.run.listed import MANIFEST, list_folder, read_listed, read_table
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
-from vsp.teachers import train
 from vsp_course import build
 
 FLIPS, TRUNCATIONS = 100, 50
 PARSERS = ("json.loads", "numpy.load", "pandas.read_csv", "pickle.load", "pickle.loads", "safetensors.numpy.load",
            "torch.load")  # fmt: skip
-RECIPE = train.Recipe(steps=40, batch_size=8, learning_starts=20, buffer_size=200)
+RECIPE = Recipe(steps=40, batch_size=8, learning_starts=20, buffer_size=200)
 EXPERIMENT = runs.Experiment(SIMPLEGOAL, TINY, CurvedTeacher(), 5)
 WEIGHTS, CARD = f"teachers/{SIMPLEGOAL}.safetensors", f"teachers/{SIMPLEGOAL}.json"
 
@@ -71,7 +72,7 @@ def row(folder: Path) -> Path:
 
 
 def checkpoint(folder: Path) -> Path:
-    return train.train(SIMPLEGOAL, seed=0, cache=folder, recipe=RECIPE, report=lambda line: None)
+    return training.train(SIMPLEGOAL, seed=0, cache=folder, recipe=RECIPE, report=lambda line: None)
 
 
 def course(folder: Path) -> Path:
@@ -87,7 +88,7 @@ KINDS = {
     "run": Kind(run, lambda path: runs.load_run(path, EXPERIMENT)),
     "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
     "policy": Kind(copied("beyond/methods_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
-    "checkpoint of a training": Kind(checkpoint, train.read_checkpoint),
+    "checkpoint of a training": Kind(checkpoint, training.read_checkpoint),
     "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
     "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
     "results of a study": Kind(copied("results/readings.csv"), of_study),
@@ -145,16 +146,6 @@ def test_all_damage_is_refused(record):
 
 
 # Harm
-
-
-class Payload:
-    """Writes a file when it is unpickled."""
-
-    def __init__(self, path: Path):
-        self.path = path
-
-    def __reduce__(self):
-        return open, (str(self.path), "w")
 
 
 def as_zip(**parts: bytes) -> bytes:
@@ -231,7 +222,7 @@ LOADERS = {
     "policy": vsp.VoronoiPolicy.load,
     "run": lambda path: runs.load_run(path, EXPERIMENT),
     "row": partial(load_arrays, kind="Row"),
-    "checkpoint": train.read_checkpoint,
+    "checkpoint": training.read_checkpoint,
     "sealed": read_sealed,
     "listed": read_listed,
     "table": read_table,

@@ -1,9 +1,7 @@
 """The paper's five notebooks run on `vsp` alone."""
 
-import subprocess
-import sys
-
 import pytest
+from support import python
 
 from vsp.run.atomic import ROOT
 
@@ -23,8 +21,5 @@ print("modules:", *{name.partition(".")[0] for name in sys.modules})
 
 @pytest.mark.parametrize("name", FIVE)
 def test_one_loads_no_other_part(name, tmp_path):
-    command = [sys.executable, "-c", RUN, f"notebooks/{name}.ipynb", str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    loaded = set(done.stdout.rpartition("modules:")[2].split())
+    loaded = set(python(RUN, f"notebooks/{name}.ipynb", tmp_path).rpartition("modules:")[2].split())
     assert "vsp" in loaded and not loaded & {"vsp_beyond", "studies", "vsp_course"}

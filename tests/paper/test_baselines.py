@@ -4,7 +4,7 @@ import types
 import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
 
 from studies.rivals.dagger import dagger
 from vsp.evaluation import evaluate
@@ -12,9 +12,6 @@ from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_t
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import visited_states
 from vsp.tasks.registry import get_task
-
-TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
-
 
 # One linear map
 
@@ -25,13 +22,6 @@ def test_the_linear_map_is_that_of_least_squares(task):
     policy, model = linear_map(states, actions, task), LinearRegression().fit(states, actions)
     assert np.allclose(policy.coefficients[0], np.vstack([model.coef_.T, model.intercept_]))
     assert len(policy) == 1 and policy.codewords[0] == pytest.approx(states.mean(axis=0))
-
-
-def test_the_linear_map_acts_within_the_limits():
-    states, _ = examples(SIMPLEGOAL)
-    policy = linear_map(states, np.column_stack([6 * states[:, 0] - 3, np.full(300, -2.0)]), SIMPLEGOAL)
-    actions, _ = policy.predict(np.array([[0.0, 0.5], [0.6, 0.5], [1.0, 0.1]]))
-    assert np.allclose(actions, [[-1, -1], [0.6, -1], [1, -1]])
 
 
 # Cells of k-means, and DAgger

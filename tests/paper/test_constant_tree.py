@@ -27,3 +27,4 @@ def test_a_leaf_holds_the_mean_action_of_its_states():
     assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
     assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
     assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
+    assert np.allclose(Tree(states, actions, leaves=1).predict(states)[0], actions.mean(axis=0))

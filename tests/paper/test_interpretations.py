@@ -6,7 +6,7 @@ from typing import Literal, get_args, get_origin, get_type_hints
 import numpy as np
 import pandas as pd
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, CurvedTeacher, tiny
 
 from vsp.algorithms import distill
 from vsp.config import EXTENSIONS, Config, paper_preset
@@ -17,14 +17,7 @@ from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, paper_experiment
 from vsp.paper.statistics import interval, resample, spread
 from vsp.paper.studies import interpretations
-from vsp.paper.studies.interpretations import (
-    SHOWN,
-    as_intervals,
-    distance,
-    landmarks,
-    ranking,
-    study,
-)
+from vsp.paper.studies.interpretations import SHOWN, as_intervals, distance, landmarks, ranking, study
 from vsp.tasks import base, get_task
 
 CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer
@@ -119,7 +112,6 @@ def test_landmarks_by_hand():
 # The study
 
 TINY = tiny(n_epochs=30, n_freeze=5)
-TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 FEW = {"choosing": range(2), "confirming": range(10, 13)}  # seeds
 TRIED = {"default": {}, "one split": {"one_split": True}, "zeros": {"initial": "zeros"}, "box": {"scale": "box"}}
 

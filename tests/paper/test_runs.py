@@ -66,12 +66,6 @@ def test_runs_come_in_the_order_of_the_seeds(made):
     assert [run.seed for run in make_runs(SMALL, iter([2, 0]), runs=runs)] == [2, 0]
 
 
-@pytest.mark.parametrize(("jobs", "order"), [(1, [2, 1, 0]), (2, [0, 1, 2])])
-def test_workers_and_order_have_no_say_in_the_bytes(made, tmp_path, jobs, order):
-    make_runs(SMALL, order, runs=tmp_path, jobs=jobs)
-    assert files(tmp_path) == files(made[0])
-
-
 def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monkeypatch):
     shutil.copytree(made[0], tmp_path / "runs")
     (SMALL.folder(tmp_path / "runs") / "0001.run").unlink()

@@ -4,7 +4,7 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, tiny
+from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
 
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
@@ -20,7 +20,6 @@ from vsp.partition import Partition
 from vsp.run.listed import write_listed
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)
-TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 FITTED = [
     "one linear map", "tree, 13 leaves", "tree, 32 leaves", "same cells, least squares", "same cells, constants",
     "k-means cells",

@@ -4,6 +4,7 @@ import pytest
 from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, tiny
 
+from studies.make_teachers import SHORT_SEEDS
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import runs
 from vsp.paper.runs import EVALUATION_SEED, Experiment, load_runs, paper_experiment
@@ -12,7 +13,6 @@ from vsp.paper.studies.simpler import teacher_data
 from vsp.paper.studies.teachers import experiments, linear_error, study, teacher_summary, teachers, variance_shares
 from vsp.tasks import base
 from vsp.teachers.teacher import SHIPPED, load_teacher
-from vsp.teachers.train import SHORT_SEEDS
 
 # Variance between and within groups
 

@@ -8,12 +8,7 @@ import pytest
 
 from vsp.run import manifest
 from vsp.run.atomic import DamagedFile, sha256
-from vsp.run.listed import (
-    MANIFEST,
-    read_listed,
-    read_table,
-    write_listed,
-)
+from vsp.run.listed import MANIFEST, read_listed, read_table, write_listed
 
 
 def visible(folder):

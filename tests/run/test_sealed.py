@@ -54,13 +54,7 @@ def safetensors(about: str) -> bytes:
 
 @pytest.mark.parametrize(
     "payload",
-    [
-        b"",
-        b"\x80\x04N.",
-        (2).to_bytes(8, "little") + b"[]",
-        safetensors("null"),
-        safetensors("[" * 100_000),
-    ],
+    [b"", b"\x80\x04N.", (2).to_bytes(8, "little") + b"[]", safetensors("null"), safetensors("[" * 100_000)],
     ids=range(5),
 )
 def test_a_seal_alone_does_not_make_a_file_ours(tmp_path, payload):

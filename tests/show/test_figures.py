@@ -2,8 +2,6 @@ import base64
 import io
 import re
 import resource
-import subprocess
-import sys
 import zlib
 
 import matplotlib as mpl
@@ -14,20 +12,14 @@ import pytest
 import seaborn as sns
 from drawn import hexes, labels
 from PIL import Image, UnidentifiedImageError
+from support import python
 
 from vsp import geometry, show
 from vsp.paper import ledger
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.show import state_space, style
-from vsp.show.returns import (
-    _VERDICTS,
-    box_plot,
-    boxes,
-    by_group,
-    intervals,
-    ledger_gaps,
-)
+from vsp.show.returns import _VERDICTS, box_plot, boxes, by_group, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
 from vsp_beyond.show import explanation
@@ -218,7 +210,7 @@ def test_written_out_colours_are_those_of_seaborn():
 
 def test_importing_does_not_wait_for_what_few_notebooks_use():
     code = "import sys, vsp.show; print(sys.modules.keys() & {'seaborn', 'ipywidgets', 'scipy.stats', 'scipy.ndimage'})"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True, cwd=ROOT).strip() == "set()"
+    assert python(code).strip() == "set()"
 
 
 # Intervals, the ledger, the studies

@@ -2,7 +2,8 @@ import functools
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher, examples
+from small import Critic
+from support import SIMPLEGOAL, examples
 
 from studies.rivals import critics
 from studies.rivals.critics import advantage_weighted, critic_driven, trained, where_lost
@@ -10,16 +11,6 @@ from vsp import get_task
 from vsp.paper.baselines import kmeans_cells, linear_map
 
 TASK = get_task(SIMPLEGOAL)
-
-
-class Critic(CurvedTeacher):
-    """Values an action by how near it is to the teacher's, only where x > 0.5; a wrong action costs as much as x."""
-
-    def value(self, obs, actions):
-        return -np.square(actions - self.predict(obs)[0]).sum(axis=1) * (obs[:, 0] > 0.5)
-
-    def criticality(self, obs):
-        return obs[:, 0]
 
 
 def labelled(n=400, seed=0):
@@ -92,10 +83,13 @@ def test_the_codewords_and_maps_are_in_the_units_of_the_task():
 # Maps weighted by criticality
 
 
-def test_weights_that_are_all_the_same_change_nothing():
+@pytest.mark.parametrize("weight", [7.0, 0.0])
+def test_weights_that_are_all_the_same_change_nothing(weight):
+    """Nor do they where no action costs anything."""
+
     class Even(Critic):
         def criticality(self, obs):
-            return np.full(len(obs), 7.0)
+            return np.full(len(obs), weight)
 
     states, actions = examples(SIMPLEGOAL)
     found = advantage_weighted(states, actions, size=3, teacher=Even(), task=SIMPLEGOAL, seed=1)
@@ -114,16 +108,6 @@ def test_a_weight_is_as_good_as_so_many_copies():
     copies = np.repeat(np.arange(300), np.where(states[:, 0] > 0.5, 3, 1))
     found = advantage_weighted(states, actions, size=1, teacher=Twice(), task=SIMPLEGOAL, seed=0)
     assert np.allclose(found.coefficients, linear_map(states[copies], actions[copies], SIMPLEGOAL).coefficients)
-
-
-def test_where_no_action_costs_anything_the_map_is_unweighted():
-    class Careless(Critic):
-        def criticality(self, obs):
-            return np.zeros(len(obs))
-
-    states, actions = examples(SIMPLEGOAL)
-    found = advantage_weighted(states, actions, size=1, teacher=Careless(), task=SIMPLEGOAL, seed=0)
-    assert np.allclose(found.coefficients, linear_map(states, actions, SIMPLEGOAL).coefficients)
 
 
 # Both

@@ -3,28 +3,18 @@ import importlib
 import numpy as np
 import pandas as pd
 import pytest
+from small import SMALL
 from support import SIMPLEGOAL
 
 from studies.comparison import equal_tuning, measure
-from studies.comparison.equal_tuning import (
-    budgets,
-    equal_budget,
-    leaders,
-    possible,
-    tail,
-    with_r2,
-)
+from studies.comparison.equal_tuning import budgets, equal_budget, leaders, possible, tail, with_r2
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS
 from vsp import get_task, load_teacher, start_states, visited_states
-from vsp_beyond import Tuned, faithful_preset, tuned_preset
+from vsp_beyond import faithful_preset, tuned_preset
 
 MODULES = ("studies.rivals.dagger", "vsp_beyond.few_cells.tune", "vsp_beyond.few_cells.tuned")
 dagger, tune, refine = map(importlib.import_module, MODULES)  # and not the functions
-SMALL = Tuned(
-    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
-    n_generations=1, n_tuning_episodes=10, n_validation=20,
-)  # fmt: skip
 
 
 def row(method, size, seed, mean, r2=0.5):

@@ -52,16 +52,6 @@ def test_the_gradient_is_that_of_finite_differences():
     assert expected_loss(numbers.like(vector), seen, **about)[1] == pytest.approx(np.diff(ends)[:, 0] / -2e-6, abs=1e-6)
 
 
-def test_shares_by_hand():
-    """One node on the first input, at 0.5: a state 1 beyond it turns right with the sigmoid of 1 / temperature."""
-    _, _, numbers, _ = tree_of(leaves=2)
-    one = numbers.like(np.concatenate([[1.0, 0.0, 0.5], np.zeros(numbers.maps.size)]))
-    found = global_fit.shares(one, np.array([[1.5, 9.0], [0.5, 0.0]]), 0.5)
-    assert found[:, 0] == pytest.approx([1 / (1 + np.exp(2)), 1 / (1 + np.exp(-2))]) and found[:, 1] == pytest.approx(
-        0.5
-    )
-
-
 @pytest.mark.parametrize("leaves", [1, 2, 5])
 def test_in_the_cold_the_soft_tree_is_the_hard_one(leaves):
     tree, frame, numbers, seen = tree_of(leaves)

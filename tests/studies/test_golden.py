@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
+from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 
 from studies.comparison import measure, rows
 from studies.comparison.makers import Budget
@@ -70,7 +70,6 @@ class CriticalTeacher(CurvedTeacher):
         return {f"qf{i}.{name}": rng.normal(size=n).astype("f4") for i in range(2) for name, n in shapes.items()}
 
 
-TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SHORTER = {"TD-AVQ": {"n_steps": 1000}}  # settings of methods that would take long
 AT_LENGTH = {  # numbers that decide on a policy and are made small here
     "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,

@@ -2,6 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import small
 from support import SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import makers
@@ -10,21 +11,9 @@ from studies.comparison.methods import FOUND, METHODS, methods_of
 from studies.rivals import critics
 from vsp import get_task
 from vsp.paper import printed
-from vsp_beyond import Tuned
 
-SMALL = Tuned(
-    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
-    n_generations=1, n_tuning_episodes=10, failure_penalty=100.0, n_validation=30,
-)  # fmt: skip
+SMALL = dataclasses.replace(small.SMALL, failure_penalty=100.0, n_validation=30)
 SIZED = [name for name, method in methods_of(SIMPLEGOAL, "methods").items() if method.sizes != FOUND]
-
-
-class Critic(CurvedTeacher):
-    def value(self, obs, actions):
-        return -np.square(actions - self.predict(obs)[0]).sum(axis=1)
-
-    def criticality(self, obs):
-        return obs[:, 0]
 
 
 @pytest.fixture(autouse=True)
@@ -34,7 +23,7 @@ def quick(monkeypatch):
 
 def make(name, size=3, seed=0, task=None):
     method = METHODS[name]
-    return method.make(Budget(Critic(), task or get_task(SIMPLEGOAL), SMALL), size, seed, **method.settings)
+    return method.make(Budget(small.Critic(), task or get_task(SIMPLEGOAL), SMALL), size, seed, **method.settings)
 
 
 @pytest.mark.parametrize("name", SIZED)

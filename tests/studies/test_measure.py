@@ -80,9 +80,7 @@ def few(monkeypatch):
 
 def constants(codewords, actions):
     """A policy with one action per cell."""
-    maps = np.zeros((len(codewords), 3, 2))
-    maps[:, 2] = actions
-    return VoronoiPolicy(codewords, maps, task=get_task(SIMPLEGOAL))
+    return VoronoiPolicy(codewords, np.array(actions)[:, None], task=SIMPLEGOAL, sub_policy="constant")
 
 
 def test_the_same_cells_in_another_order_are_the_same(few):

@@ -4,6 +4,7 @@ from collections import Counter
 import numpy as np
 import pandas as pd
 import pytest
+from small import SMALL
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER
 
 from studies import make_rows
@@ -15,12 +16,8 @@ from studies.comparison.summary import read_rows
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.run import atomic, sealed
-from vsp_beyond import Faithful, Tuned
+from vsp_beyond import Faithful
 
-SMALL = Tuned(
-    n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
-    n_generations=1, n_tuning_episodes=10, n_validation=20,
-)  # fmt: skip
 CART, CART_3 = Job(SIMPLEGOAL, "CART", 1, 0), Job(SIMPLEGOAL, "CART", 3, 1)
 
 

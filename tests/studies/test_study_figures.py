@@ -1,4 +1,3 @@
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +10,7 @@ from studies import show
 from studies.comparison.methods import FOUND, METHODS
 from studies.show import gait as gait_module
 from studies.show.methods import IMITATIONS
-from vsp.show import panels, style
+from vsp.show import style
 
 POINTS = pd.DataFrame(
     [("teacher", 0, 10.0, 1.0), ("our cells, tuned", 2, 11.0, -3.0), ("faithful", 2, 10.1, 0.9),
@@ -22,13 +21,6 @@ POINTS = pd.DataFrame(
 )  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def closed():
-    """Other tests count the open figures."""
-    yield
-    plt.close("all")
-
-
 def drawn(ax):
     """The places of all marks and of the ends of lines, but of the two lines across."""
     marks = [np.asarray(marks.get_offsets()) for marks in ax.collections]
@@ -36,8 +28,7 @@ def drawn(ax):
     return np.vstack([*marks, *lines])
 
 
-def test_every_method_lies_on_the_map():
-    _, (ax,) = panels(1)
+def test_every_method_lies_on_the_map(ax):
     show.fidelity_map(ax, POINTS, 10.0, linear=0.1)
     places = drawn(ax)
     ax.figure.canvas.draw()
@@ -49,15 +40,13 @@ def test_every_method_lies_on_the_map():
     assert not any(place[0] < 0.001 for place in found)  # 32 leaves are left out
 
 
-def test_ours_are_joined_from_the_closest_to_the_highest_return():
-    _, (ax,) = panels(1)
+def test_ours_are_joined_from_the_closest_to_the_highest_return(ax):
     show.fidelity_map(ax, POINTS, 10.0, linear=0.1)
     (line,) = (line for line in ax.lines if line.get_label() == "ours, 2 cells")
     assert np.allclose(line.get_xydata(), [[0.1, 0.1], [4.0, 1.0]])
 
 
-def test_likeness_is_drawn_whole():
-    _, (ax,) = panels(1)
+def test_likeness_is_drawn_whole(ax):
     table = pd.DataFrame({"size": [1, 2, 4], "r2": [0.2, 0.8, 0.9], "r2_least": [-0.4, 0.7, 0.8],
                           "index": [np.nan, 0.9, 0.5], "ratio": [0.3, 0.7, 1.3]})  # fmt: skip
     show.likeness_over_cells(ax, table)
@@ -114,8 +103,7 @@ FEET = {"back": [1, 0, 0, 1, 0, 1], "front": [0, 0, 0, 1, 1, 0]}
 GAIT = pd.DataFrame({"step": range(6), "cell": [2, 2, 2, 0, 0, 5], **FEET, **LEG})
 
 
-def test_bands_are_the_cells_and_bars_the_feet_on_the_ground():
-    fig, (ax,) = style.panels(1)
+def test_bands_are_the_cells_and_bars_the_feet_on_the_ground(ax):
     show.footfall(ax, GAIT, step_seconds=0.5)
     band, front, back = (list(bars) for bars in ax.containers)
     colors = gait_module.cell_colors(GAIT)

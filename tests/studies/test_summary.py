@@ -109,11 +109,7 @@ def results(tmp_path):
     write(tmp_path, "tuned", pd.DataFrame([row("one linear map, tuned", 0, 0, 15.0, -2.0)]))
     pairs = [(2, 0, 1, 0.95, 0.2), (2, 0, 2, 0.85, 0.3), (2, 1, 2, 0.97, 0.4), (3, 0, 1, None, 0.5)]
     write(tmp_path, "same", pd.DataFrame(pairs, columns=["size", "seed", "other", "index", "ratio"]))
-    others = [
-        row("teacher", 0, 0, 10.0, 1.0),
-        row(TUNED, 2, 0, 10.5, 0.1),
-        row(TUNED, 2, 1, 9.5, 0.2),
-    ]
+    others = [row("teacher", 0, 0, 10.0, 1.0), row(TUNED, 2, 0, 10.5, 0.1), row(TUNED, 2, 1, 9.5, 0.2)]
     others = [{**other, "agent": 1} for other in others]
     others += [{**row(TUNED, 2, 0, 7.0, 0.3), "agent": 2}, {**row("teacher", 0, 0, 9.0, 1.0), "agent": 2}]
     write(tmp_path, "teachers", pd.DataFrame(others).sort_values("method", kind="stable"))  # agents take turns

@@ -5,22 +5,10 @@ import pytest
 from sklearn.linear_model import LinearRegression
 from support import MOUNTAINCAR, SIMPLEGOAL, examples
 
-from studies.rivals import trees
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
-from vsp.paper.baselines import Tree, linear_map
+from vsp.paper.baselines import Tree
 
 # Trees
-
-
-@pytest.mark.parametrize("kind", ["constants", "maps"])
-def test_one_leaf_is_the_root(kind):
-    states, actions = examples(SIMPLEGOAL)
-    if kind == "constants":
-        tree, expected = Tree(states, actions, leaves=1), np.tile(actions.mean(axis=0), (300, 1))
-    else:
-        tree = LinearTree(states, actions, leaves=1, task=SIMPLEGOAL)
-        expected = linear_map(states, actions, SIMPLEGOAL).predict(states)[0]
-    assert len(tree) == 1 and np.allclose(tree.predict(states)[0], expected)
 
 
 @pytest.mark.parametrize("make", [LinearTree, lambda *data, **about: ObliqueLinearTree(*data, **about, seed=0)])
@@ -33,11 +21,12 @@ def test_constant_leaves_hold_the_mean_action_of_their_states(make):
         assert np.allclose(tree.predict(states[node.rows])[0], own)
 
 
-def test_the_linear_leaves_are_fitted_to_their_states():
+@pytest.mark.parametrize("leaves", [1, 4])
+def test_the_linear_leaves_are_fitted_to_their_states(leaves):
     states, actions = examples(SIMPLEGOAL)
-    tree, other = LinearTree(states, actions, leaves=4, task=SIMPLEGOAL), examples(SIMPLEGOAL, seed=1)[0]
+    tree, other = LinearTree(states, actions, leaves=leaves, task=SIMPLEGOAL), examples(SIMPLEGOAL, seed=1)[0]
     leaf, asked = tree.apply(tree.inputs(states)), tree.apply(tree.inputs(other))
-    assert len(tree) == 4 == len(np.unique(leaf)) and np.bincount(leaf)[leaf].min() >= 6
+    assert len(tree) == leaves == len(np.unique(leaf)) and np.bincount(leaf)[leaf].min() >= 6
     for node in np.unique(leaf):
         assert np.array_equal(np.flatnonzero(leaf == node), tree.nodes[node].rows)
         own = LinearRegression().fit(states[leaf == node], actions[leaf == node])
@@ -54,14 +43,6 @@ def test_a_linear_tree_splits_where_lines_break_and_not_where_means_differ():
     assert split.direction.tolist() == [0, 1] and constant.model.tree_.feature[0] == 0
     assert split.threshold * linear.scale[1] + linear.centre[1] == pytest.approx(0.5, abs=0.02)
     assert np.abs(linear.predict(states)[0] - action).max() < 0.02
-
-
-def test_squared_errors_from_moments_are_those_of_the_regression():
-    states, actions = examples(SIMPLEGOAL)
-    rows = np.column_stack([states, np.ones(300), actions])
-    model = LinearRegression().fit(states, actions)
-    expected = np.square(model.predict(states) - actions).sum()
-    assert trees._squared_errors((rows.T @ rows)[None], 2) == pytest.approx([expected])
 
 
 def test_a_constant_variable_and_too_few_states_are_no_trouble():

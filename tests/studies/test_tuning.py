@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, CurvedTeacher, PumpingTeacher, examples
+from support import SIMPLEGOAL, TASKS, TEACHERS, examples
 
 from studies.comparison.tuning import TreeNumbers, in_units, tuned
 from studies.rivals.small_network import SmallNetwork
@@ -12,7 +12,6 @@ from vsp.paper.baselines import Tree, kmeans_cells, linear_map
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.units import Scaling
 
-TEACHERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 SMALL = Tuned(n_cells=2, n_episodes=20, n_generations=6, n_tuning_episodes=20, n_validation=100, failure_penalty=10.0)
 
 

@@ -31,20 +31,6 @@ def minibatch(rng, c, size, d=2, m=2):
 # Training
 
 
-def test_one_step_by_hand():
-    """Map 0, one state x = 2 with action 1: error -1, gradient (-4, -2); Adam's first step moves by the rate."""
-    models = models_of(1, d=1, m=1, initial="zeros")
-    loss = models.train(np.array([0]), np.array([[[2.0, 1.0]]]), np.array([[[1.0]]]), learning_rate=0.125)
-    assert loss.tolist() == [1.0]
-    assert models.coefficients[0, :, 0] == pytest.approx([0.125, 0.125], abs=1e-9)
-
-
-def test_predict_by_hand():
-    models = models_of(1)
-    models.coefficients[0] = [[1, 2], [3, 4], [5, 6]]
-    assert models.predict(0, np.array([10.0, 100.0])).tolist() == [315, 426]
-
-
 @pytest.mark.parametrize("m", [1, 3])
 def test_training_equals_torch_cell_by_cell(m):
     torch = pytest.importorskip("torch")

@@ -135,12 +135,14 @@ def replay(env, task, start, actions):
     return np.array(states), rewards, outcome
 
 
-def compare(name, n, **policy):
+@pytest.mark.parametrize(
+    ("name", "n", "outcomes"), [(SIMPLEGOAL, 300, {GOAL, PIT, TRUNCATED}), (MOUNTAINCAR, 20, {TRUNCATED})]
+)
+def test_batched_equals_step_by_step(name, n, outcomes):
     task = get_task(name)
     starts = task.start(np.random.default_rng(7), n)
     m = len(task.action_low)
-    episodes = collect_episodes(RandomPolicy(m, **policy), task, starts)
-    result = rollout(RandomPolicy(m, **policy), task, starts)
+    episodes, result = (play(RandomPolicy(m), task, starts) for play in (collect_episodes, rollout))
     env = gymnasium.make(name, disable_env_checker=True)
     for i, (start, episode) in enumerate(zip(starts, episodes)):
         states, rewards, outcome = replay(env, task, start, episode.actions.astype(np.float32))
@@ -148,22 +150,7 @@ def compare(name, n, **policy):
         assert outcome == OUTCOMES[result.outcomes[i]]
         assert np.abs(states[:-1] - episode.states).max() <= 1e-3
         assert sum(rewards) == pytest.approx(result.returns[i], abs=1e-3)
-    return result
-
-
-@pytest.mark.parametrize(
-    ("task", "n", "policy", "outcomes"),
-    [
-        (SIMPLEGOAL, 300, {}, {GOAL, PIT, TRUNCATED}),
-        (MOUNTAINCAR, 20, {}, {TRUNCATED}),
-        (MOUNTAINCAR, 40, {"gain": 0.9, "seed": 2}, {GOAL}),
-    ],
-)
-def test_batched_equals_step_by_step(task, n, policy, outcomes):
-    result = compare(task, n, **policy)
     assert outcomes <= set(result.outcomes)
-    if outcomes == {GOAL}:
-        assert (result.outcomes == GOAL).mean() > 0.9 and result.returns.max() > 50
 
 
 def test_mountaincar_batched_equals_gymnasium_from_anywhere():
@@ -293,8 +280,7 @@ def test_tasks_by_name():
 
 
 @pytest.mark.parametrize(
-    ("typo", "near"),
-    [("simplegoal", SIMPLEGOAL), ("MountainCar", MOUNTAINCAR), ("BipedalWalker-v2", WALKER)],
+    ("typo", "near"), [("simplegoal", SIMPLEGOAL), ("MountainCar", MOUNTAINCAR), ("BipedalWalker-v2", WALKER)]
 )
 def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
     with pytest.raises(ValueError, match=f"unknown task '{typo}', expected one of .*did you mean '{near}'"):

@@ -2,23 +2,35 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import PENDULUM, SIMPLEGOAL, CurvedTeacher, tiny
+from support import SIMPLEGOAL, CurvedTeacher, same_arrays, tiny
+from zips import made
 
 import vsp
 from vsp.teachers.agents import agent
 
-STATES = np.random.default_rng(0).random((50, 2))
+STATES = np.random.default_rng(0).random((50, 2)).astype(np.float32)
 
 
 def straight(obs):
     return np.full((len(obs), 2), -0.5)
 
 
-def test_a_function_is_a_teacher():
-    actions, state = agent(straight).predict(STATES)
+def predicting(predict):
+    return SimpleNamespace(predict=predict)
+
+
+def told(obs, **options):
+    return options["deterministic"] - 1.5 + 0 * obs, None
+
+
+SOURCES = [straight, predicting(lambda obs: (straight(obs), None)), predicting(straight), predicting(told)]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_function_and_whatever_predicts_is_a_teacher(source):
+    actions, state = agent(source).predict(STATES)
     assert state is None and np.array_equal(actions, np.full((50, 2), -0.5))
-    plain = SimpleNamespace(predict=lambda obs: (straight(obs), None))
-    policies = [vsp.distill(teacher, SIMPLEGOAL, tiny(), seed=0)[0] for teacher in (agent(straight), plain)]
+    policies = [vsp.distill(teacher, SIMPLEGOAL, tiny(), seed=0)[0] for teacher in (agent(straight), source)]
     assert np.array_equal(*(policy.coefficients for policy in policies))
 
 
@@ -27,14 +39,19 @@ def test_what_predicts_is_asked_as_it_is():
     assert np.array_equal(one.predict(STATES)[0], CurvedTeacher().predict(STATES)[0]) and agent(one) is one
 
 
-@pytest.mark.parametrize("algorithm", ["PPO", "TD3"])
-def test_agents_of_stable_baselines_act_without_dice(algorithm):
-    import stable_baselines3
+def test_dice_and_memory_are_refused():
+    dice, memory = np.random.default_rng(0).permutation, predicting(lambda obs: (straight(obs), obs))
+    for source, message in ((dice, "same observations differently"), (memory, "keeps a state between steps")):
+        with pytest.raises(ValueError, match=message):
+            vsp.distill(source, SIMPLEGOAL, tiny(), seed=0)
 
-    trained = getattr(stable_baselines3, algorithm)("MlpPolicy", PENDULUM, seed=0, policy_kwargs={"net_arch": [8]})
-    states = np.random.default_rng(1).uniform(-1, 1, (20, 3)).astype(np.float32)
-    expected = trained.predict(states, deterministic=True)[0]
-    first, second = (agent(trained).predict(states)[0] for _ in range(2))
-    assert np.array_equal(first, second) and np.array_equal(first, expected)
+
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC", "TD3"])
+def test_agents_of_stable_baselines_act_without_dice(algorithm):
+    trained, starts = made(algorithm, net_arch=[8]), vsp.start_states(SIMPLEGOAL, 20, seed=0)
+    first, second = (agent(trained).predict(STATES)[0] for _ in range(2))
+    assert np.array_equal(first, second) and np.array_equal(first, trained.predict(STATES, deterministic=True)[0])
+    returns = [vsp.rollout(source, SIMPLEGOAL, starts).returns for source in (trained, trained, agent(trained))]
+    assert same_arrays(returns[:2], returns[1:])
     if algorithm != "TD3":
-        assert not np.array_equal(trained.predict(states)[0], expected)
+        assert not np.array_equal(trained.predict(STATES)[0], first)

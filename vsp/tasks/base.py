@@ -28,8 +28,8 @@ class Task:
 
     `start(rng, n)` draws n starts (n, s) in float64. `begin` turns starts into states, a batch of n. `step(states,
     actions)` takes actions (n, m) and returns the next states, the rewards (n,) and the outcomes (n,), indices of
-    `OUTCOMES`. The caller counts steps and truncates. `see` turns states into observations (n, d). In most tasks start,
-    state and observation are the same array (n, d).
+    `OUTCOMES`. The caller counts steps, truncates, and at last calls `end` with what `begin` returned. `see` turns
+    states into observations (n, d). In most tasks start, state and observation are the same array (n, d).
     """
 
     name: str
@@ -47,6 +47,8 @@ class Task:
     begin: Callable[[np.ndarray], np.ndarray] = _unchanged
     start_size: int | None = None  # s; None: s is d
     slowness: int = 1  # evaluations divide their number of episodes by this, because an engine steps slowly
+    at_once: int | None = None  # at most so many episodes run together, because each holds an engine; None: all
+    end: Callable[[np.ndarray], object] = _unchanged  # closes what `begin` opened; arrays hold nothing open
 
     @property
     def one_by_one(self) -> bool:

@@ -6,19 +6,25 @@ This suits physics engines, which step one state at a time.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import find_highest_version, get_env_id, parse_env_id
 
 from .base import ENDED, GOAL, PIT, RUNNING, TRUNCATED, Task
 
 Outcome = Callable[[np.ndarray, float, dict], bool]  # (last observation, reward, info) to success
 
-# Remedies for spaces that do not fit
+AT_ONCE = 500  # environments open together: as many as episodes of a teacher that a distillation rolls out together
+API = {"reset": "(observation, info)", "step": "(observation, reward, terminated, truncated, info)"}
+
+# Remedies for environments that do not fit
 FLATTEN = "gymnasium.wrappers.FlattenObservation converts most of them"
 CONTINUOUS = "linear maps give continuous actions, so choose another environment"
+RAW = "expected the raw environment, and the agent's statistics by vsp.load_teacher(..., normalize=...)"
 
 
 @dataclass
@@ -35,12 +41,39 @@ def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
-    """Return a freshly reset environment per start. (n,) objects"""
+    """Return a freshly reset environment per start, which `end_live` closes. (n,) objects
+
+    Raises ValueError for an environment of old Gym's API.
+    """
     episodes = np.empty(len(starts), dtype=object)
-    for i, (seed,) in enumerate(starts):
-        env = gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)  # no step limit: the caller counts
-        episodes[i] = _Episode(env, env.reset(seed=int(seed))[0])
+    with ExitStack() as opened:  # closes them unless all begin
+        for i, (seed,) in enumerate(starts):
+            env = gymnasium.make(name, max_episode_steps=-1, disable_env_checker=True)  # the caller counts steps
+            opened.callback(env.close)
+            episodes[i] = _Episode(env, _answer(env, "reset", seed=int(seed))[0])
+        opened.pop_all()
     return episodes
+
+
+def end_live(states: np.ndarray) -> None:
+    """Close the environments among `states`, all of them even if one fails to close."""
+    with ExitStack() as opened:
+        for episode in (state for state in states.flat if isinstance(state, _Episode)):  # others may be numbers
+            opened.callback(episode.env.close)
+
+
+def _answer(env: gymnasium.Env, method: str, *arguments: np.ndarray, **options: int) -> tuple:
+    """Return what a method of `env` returns. Raises ValueError unless it takes and returns what Gymnasium's does."""
+    try:
+        answer, cause = getattr(env, method)(*arguments, **options), None
+    except TypeError as error:
+        if "unexpected keyword argument 'seed'" not in str(error):
+            raise
+        answer, cause = "an error for a seed", error
+    if not isinstance(answer, tuple) or len(answer) != len(API[method].split(",")):
+        given = f"`{method}` of {env.unwrapped.spec.id} gives {answer!r:.60}"  # before an array breaks the line
+        raise ValueError(f"{given}, expected {API[method]}: change it from old Gym's API to Gymnasium's") from cause
+    return answer
 
 
 def _see_live(states: np.ndarray) -> np.ndarray:
@@ -57,11 +90,9 @@ def _step_live(
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (episode, action) in enumerate(zip(states, actions)):
         action = action.astype(episode.env.action_space.dtype)
-        episode.observation, rewards[i], ended, cut, info = episode.env.step(action)
-        if ended and outcome:
-            outcomes[i] = GOAL if outcome(episode.observation, rewards[i], info) else PIT
-        elif ended:
-            outcomes[i] = ENDED
+        episode.observation, rewards[i], ended, cut, info = _answer(episode.env, "step", action)
+        if ended:
+            outcomes[i] = (GOAL if outcome(episode.observation, rewards[i], info) else PIT) if outcome else ENDED
         elif cut:
             outcomes[i] = TRUNCATED
     return states, rewards, outcomes
@@ -74,7 +105,8 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
     """Return the `Task` of a Gymnasium environment whose observations and actions are boxes of one dimension.
 
     `outcome` tells whether an episode that ended succeeded; None: success is undefined. Raises ValueError for other
-    spaces, an action box without limits, or an environment without a step limit. An environment that is registered anew
+    spaces, an action box of integers or without limits, an environment without a step limit, one that normalises its
+    observations by their running statistics, and an old version that is gone. An environment that is registered anew
     gives a new task.
     """
     entry, known = gymnasium.registry.get(name), _KNOWN.get((name, outcome))
@@ -84,12 +116,24 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
 
 
 def _made(name: str, outcome: Outcome | None) -> Task:
-    env = gymnasium.make(name)
+    try:
+        env = gymnasium.make(name)
+    except ImportError as error:
+        newest = get_env_id(*(kin := parse_env_id(name)[:2]), find_highest_version(*kin))
+        raise ValueError(f"cannot open {name}: {error if newest == name else f'use {newest}'}") from error
     observations, actions, max_steps = env.observation_space, env.action_space, env.spec.max_episode_steps
     env.close()
-    for what, space, remedy in (("observations", observations, FLATTEN), ("actions", actions, CONTINUOUS)):
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, gymnasium.wrappers.NormalizeObservation) and env.update_running_mean:
+            raise ValueError(f"statistics of NormalizeObservation in {name} start anew in every episode: {RAW}")
+        env = env.env
+    similar = "Continuous-".join(name.rsplit("-", 1))
+    choose = f"{CONTINUOUS}, such as {similar}" if similar in gymnasium.registry else CONTINUOUS
+    for what, space, remedy in (("observations", observations, FLATTEN), ("actions", actions, choose)):
         if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
             raise ValueError(f"{what} of {name} are {space}, expected a Box of one dimension: {remedy}")
+    if actions.dtype.kind != "f":
+        raise ValueError(f"actions of {name} are {actions}, expected floats, as -1.9 would act as -1: round in `step`")
     if not actions.is_bounded():
         raise ValueError(f"actions of {name} are {actions}, expected limits, as gymnasium.wrappers.RescaleAction sets")
     if max_steps is None:
@@ -104,10 +148,10 @@ def live_task(
 ) -> Task:  # fmt: skip
     """Return the `Task` of the environment `name` with the given boxes (d,) and (m,).
 
-    Each episode opens the environment when it begins.
+    Each episode opens the environment when it begins, at most `AT_ONCE` together.
     """
     inputs, outputs = tuple(f"s{i}" for i in range(len(low))), tuple(f"a{j}" for j in range(len(action_low)))
     return Task(
-        name, inputs, outputs, inputs, low, high, action_low, action_high, max_steps, start=_draw_seeds,
-        step=partial(_step_live, outcome), see=_see_live, begin=partial(begin_live, name), start_size=1,
+        name, inputs, outputs, inputs, low, high, action_low, action_high, max_steps, _draw_seeds,
+        partial(_step_live, outcome), _see_live, partial(begin_live, name), 1, at_once=AT_ONCE, end=end_live,
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -39,23 +40,27 @@ def task_names() -> list[str]:
 def get_task(name: str | Task) -> Task:
     """Return the `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry.
 
-    A `Task` is returned as it is. Raises ValueError for an unknown name, with the most similar one, and as
-    `gymnasium_task` does.
+    "module:Name-v0" imports the module that registers Name-v0 first. A `Task` is returned as it is. Raises ValueError
+    for an unknown name, with the most similar one, and as `gymnasium_task` does; what an import raises.
     """
     if isinstance(name, Task):
         return name
-    _check_registered(name)
-    if name in _TASKS or name in _ADDED:
-        return _TASKS.get(name) or _ADDED[name]
-    return _LATER.get(name, partial(gymnasium_task, name))()
+    name = _registered(name)
+    return _TASKS.get(name) or _ADDED.get(name) or _LATER.get(name, partial(gymnasium_task, name))()
 
 
-def _check_registered(name: str) -> None:
-    """Raise ValueError for a name that Gymnasium does not know. The message suggests a similar name if there is one."""
+def _registered(name: str) -> str:
+    """Return `name` without its module, which is imported, if any.
+
+    Raises ValueError for a name that Gymnasium does not know. The message suggests a similar name if there is one.
+    """
     if not isinstance(name, str):
         raise ValueError(f"task is a {type(name).__name__}, expected a name or a Task: are the arguments in order?")
+    module, colon, name = name.rpartition(":")
+    if colon:
+        importlib.import_module(module)
     if name in gymnasium.registry:
-        return
+        return name
     known = task_names()
     near = difflib.get_close_matches(name, known) or difflib.get_close_matches(name, gymnasium.registry, cutoff=0.75)
     guess = f"did you mean {near[0]!r}?" if near else "if it is yours, import what registers it"
@@ -73,11 +78,11 @@ def register(
     Raises ValueError for one of vsp's own tasks, for names that are too few, too many or not distinct, and as
     `get_task` does.
     """
+    name = _registered(name)
     if name in (*_TASKS, *_LATER):
         raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another environment")
     if outcome is not None and not callable(outcome):
         raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
-    _check_registered(name)
     plain = gymnasium_task(name, outcome)
     inputs = _names("inputs", inputs, plain.inputs)
     _ADDED[name] = replace(plain, inputs=inputs, input_labels=inputs, outputs=_names("outputs", outputs, plain.outputs))
@@ -102,7 +107,7 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     """
     labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
     try:
-        known = get_task(name)
+        known = get_task(name.rpartition(":")[2])  # a file must not make us import a module
     except (ValueError, gymnasium.error.Error):  # the latter if packages that it needs are missing
         absent = partial(_absent, name)
         return Task(name, **labels, **box, max_steps=1, start=absent, step=absent)

@@ -1,47 +1,49 @@
-"""Load a trained TD3 actor as a teacher and act with it in batches. This needs only NumPy: three matrix products."""
+"""Load a trained actor as a teacher and act with it in batches. This needs only NumPy: some matrix products."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..checks import check_array, check_observations
+from ..checks import check_observations
 from ..run import atomic, listed
 from ..tasks.base import Task
 from ..tasks.registry import get_task, task_names
-from .agent_zip import part_of, read_zip
+from . import actors
+from .actors import Actor, layers_of, part_of
+
+if TYPE_CHECKING:
+    from .normalization import Normalization
 
 SHIPPED = atomic.data_folder("teachers")
-MOST_WEIGHT = 1e6  # largest absolute value in a tensor, so that 3 layers of 1000 units stay far below float32's 3e38
 
 
 class Teacher:
-    """A deterministic TD3 actor as arrays: ReLU layers and a tanh, scaled to the action box.
+    """An actor as arrays: a network whose actions are scaled, or limited, to the action box.
 
-    `weights` maps Stable-Baselines3's names of the actor's tensors ("mu.0.weight", ...) to arrays. `critic` does the
-    same for the critics ("qf0.0.weight", ...), which are only kept. Raises ValueError if the actor does not fit the
-    task, and for numbers that are not finite or beyond `MOST_WEIGHT`.
+    `weights` is an `Actor`, or maps Stable-Baselines3's names of a TD3 actor's tensors ("mu.0.weight", ...) to arrays.
+    `critic` does the same for the critics ("qf0.0.weight", ...), which are only kept. With `normalization` it takes raw
+    observations all the same. Raises ValueError if the actor does not fit the task, and for numbers that are not finite
+    or beyond `actors.MOST_WEIGHT`.
     """
 
     def __init__(
         self,
-        weights: dict[str, np.ndarray],
+        weights: dict[str, np.ndarray] | Actor,
         task: str | Task,
         *,
         card: dict | None = None,
         critic: dict[str, np.ndarray] | None = None,
+        normalization: Normalization | None = None,
     ):
         self.task, self.card, self.critic = get_task(task), card or {}, critic or {}
-        self.layers = layers_of(weights, "mu")
-        if not self.layers:
-            raise ValueError(
-                f"expected the tensors of a TD3 or DDPG actor (mu.0.weight, ...), got {sorted(weights)[:6]}"
-            )
+        self.actor = weights if isinstance(weights, Actor) else Actor(layers_of(weights, "mu"))
+        self.layers, self.normalization = self.actor.layers, normalization
         inputs, outputs = self.layers[0][0].shape[0], self.layers[-1][0].shape[1]
         d, m = len(self.task.low), len(self.task.action_low)
         if (inputs, outputs) != (d, m):
@@ -54,56 +56,44 @@ class Teacher:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the actor's weights: the identity of a teacher."""
-        return hashlib.sha256(b"".join(part.tobytes() for layer in self.layers for part in layer)).hexdigest()
+        """SHA-256 of the numbers and settings that act: the identity of a teacher."""
+        numbers = [*(part for layer in self.layers for part in layer), *(self.normalization or ())]
+        actor = (self.actor.activation, self.actor.squashed, self.actor.clip_mean)
+        more = "" if actor == ("ReLU", True, np.inf) else repr(actor)  # nothing, so that TD3's identity stays
+        return hashlib.sha256(b"".join(np.asarray(x).tobytes() for x in numbers) + more.encode()).hexdigest()
+
+    def inputs(self, obs: np.ndarray) -> np.ndarray:
+        """Return what the network sees of the raw observations (n, d) or (d,), in float32."""
+        states = check_observations(obs, len(self.task.low), self.task.name)
+        return (self.normalization(states) if self.normalization else states).astype(np.float32)
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) or (m,) in float32 for observations (n, d) or (d,)."""
-        states = check_observations(obs, len(self.task.low), self.task.name).astype(np.float32)
-        return self.centre + self.half * np.tanh(forward(self.layers, states)), None
+        outputs = self.actor.forward(self.inputs(obs))
+        if self.actor.squashed:
+            return self.centre + self.half * outputs, None
+        return np.clip(outputs, self.task.action_low, self.task.action_high).astype(np.float32), None
 
 
-def forward(layers: list[tuple[np.ndarray, np.ndarray]], hidden: np.ndarray) -> np.ndarray:
-    """Return the outputs (n, m) of a network with ReLU between its layers, at the inputs (n, d) `hidden`."""
-    for weight, bias in layers[:-1]:
-        hidden = np.maximum(hidden @ weight + bias, 0.0)
-    weight, bias = layers[-1]
-    return hidden @ weight + bias
-
-
-def layers_of(tensors: dict[str, np.ndarray], name: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return weight and bias of every layer of the network called `name`; an empty list if there is no such network."""
-    indices = sorted(int(m[1]) for m in (re.fullmatch(rf"{name}\.(\d+)\.weight", key) for key in tensors) if m)
-    weights = [_tensor(tensors, f"{name}.{i}.weight", 2).T.copy() for i in indices]
-    biases = [_tensor(tensors, f"{name}.{i}.bias", 1) for i in indices]
-    shapes, outputs = [weight.shape for weight in weights], [len(bias) for bias in biases]
-    if [given for _, given in shapes] != outputs or [taken for taken, _ in shapes[1:]] != outputs[:-1]:
-        raise ValueError(
-            f"the layers of {name} are {shapes} (inputs, outputs) with {outputs} biases, expected one for each output, "
-            "and as many inputs as the layer before has outputs"
-        )
-    return list(zip(weights, biases))
-
-
-def _tensor(weights: dict[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
-    if name not in weights:
-        raise ValueError(f"expected a tensor {name} among {sorted(weights)[:6]}")
-    return check_array(name, weights[name], (-1,) * ndim, most=MOST_WEIGHT).astype(np.float32)
-
-
-def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
+def load_teacher(
+    source: str | os.PathLike, task: str | Task | None = None, *, normalize: str | os.PathLike | bool | None = None
+) -> Teacher:
     """Load a teacher: the one shipped for a task, or one from a file.
 
-    `source` is a task's name, a `.safetensors` file with its JSON card and their manifest beside it, or a `.zip` of a
-    TD3 or DDPG agent with ReLU layers that Stable-Baselines3 saved; for a zip, `task` names the task. Only tensors are
-    read: no code from the file runs. Raises ValueError for an unknown task or a teacher that does not fit,
+    `source` is a task's name, a `.safetensors` file with its JSON card and their manifest beside it, or a `.zip` of an
+    agent that Stable-Baselines3 or sb3-contrib saved (`actors.POLICIES`); for a zip, `task` names the task. `normalize`
+    is the file of `VecNormalize` for an agent that was trained on normalised observations; False says that it was not.
+    Only numbers are read: no code from a file runs. Raises ValueError for an unknown task, an agent that does not fit
+    it or that says what is not modelled here, and without `normalize` where something shows that it is needed;
     FileNotFoundError, and `run.atomic.DamagedFile`.
     """
     path = Path(source)
-    if path.suffix == ".zip":
+    if path.suffix.lower() == ".zip":
         if task is None:
             raise ValueError(f'{path}: name the task of the agent: load_teacher("{path}", "{task_names()[0]}")')
-        return Teacher(read_zip(path), task)
+        return _from_zip(path, get_task(task), normalize)
+    if normalize:
+        raise ValueError(f"{path}: normalize is {normalize!r}, expected none: it belongs to a .zip")
     if path.suffix and path.suffix != ".safetensors":
         raise ValueError(
             f"{path}: expected a .safetensors file, a .zip, or the name of a task, one of {task_names()} (a "
@@ -116,7 +106,35 @@ def load_teacher(source: str | os.PathLike, task: str | None = None) -> Teacher:
     tensors = load(listed.read_listed(path))
     card = json.loads(listed.read_listed(path.with_suffix(".json")))
     critic = part_of(tensors, "critic")
-    return Teacher(part_of(tensors, "actor"), task or card.get("task"), card=card, critic=critic)
+    named = str(card.get("task")).rpartition(":")[2]  # a file imports no module
+    return Teacher(part_of(tensors, "actor"), task or named, card=card, critic=critic)
+
+
+def _from_zip(path: Path, task: Task, normalize: str | os.PathLike | bool | None) -> Teacher:
+    from . import agent_zip, normalization  # here: most teachers are no zips
+
+    saved = agent_zip.read_zip(path)
+    try:
+        actor = actors.actor_of(saved)
+        actors.check_box(saved, "observation_space", task.low, task.high, task.name)
+        actors.check_box(saved, "action_space", task.action_low, task.action_high, task.name)
+    except actors.Unknown as error:
+        raise ValueError(
+            f"{path}: {error}. If its own library loads it: vsp.agent(PPO.load({path.name!r})), with the class of its "
+            "algorithm; where the zip names gym, with custom_objects={'observation_space': ..., 'action_space': ...}"
+        ) from error
+    except Exception as error:  # of any kind: the content is not trusted
+        raise atomic.DamagedFile(f"{path}: its tensors make no network: {error!r:.300}") from error
+    why = "normalize is True" if normalize is True else normalization.sign(path, saved) if normalize is None else ""
+    if why:
+        raise ValueError(
+            f"{path}: the agent was trained on normalised observations: {why}. Pass their statistics, "
+            'normalize="vecnormalize.pkl", or normalize=False if there are none'
+        )
+    given = normalize if isinstance(normalize, str | os.PathLike) else None
+    statistics = None if given is None else normalization.read_normalization(given, len(task.low))
+    card = {"task": task.name, "normalised": statistics is not None}
+    return Teacher(actor, task, card=card, critic=part_of(saved.tensors, "critic"), normalization=statistics)
 
 
 def further_teachers(task: str) -> dict[str, Path]:

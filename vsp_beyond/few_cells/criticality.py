@@ -7,40 +7,42 @@ from typing import Any
 
 import numpy as np
 
-from vsp.checks import check_array, check_observations
-from vsp.teachers.teacher import Teacher, forward, layers_of
+from vsp.checks import check_array
+from vsp.teachers.actors import Actor, layers_of
+from vsp.teachers.teacher import Teacher
 
 
 class Critics:
-    """The two critics of a TD3 teacher. Values are in units of the discounted return.
+    """The critics of a teacher. Values are in units of the discounted return.
 
-    Raises ValueError for a teacher without critics.
+    Raises ValueError for a teacher without critics, or whose critics give more than a value, as TQC's quantiles.
     """
 
     def __init__(self, teacher: Teacher):
-        named = (layers_of(getattr(teacher, "critic", {}), name) for name in ("qf0", "qf1"))
-        self.teacher, self.networks = teacher, [layers for layers in named if layers]
-        if not self.networks:
+        tensors, self.teacher = getattr(teacher, "critic", {}), teacher
+        if not tensors:
             raise ValueError(f"{type(teacher).__name__} has no critics, expected qf0.0.weight, ...: load one with them")
+        names, act = sorted({name.partition(".")[0] for name in tensors}), teacher.actor.activation
+        self.networks = [Actor(layers_of(tensors, name), act, squashed=False) for name in names]
+        if any(len(network.layers[-1][1]) != 1 for network in self.networks):
+            raise ValueError("the critics give several numbers for an action, expected one value: not those of TQC")
 
     def criticality(self, obs: np.ndarray) -> np.ndarray:
         """Return the cost of a wrong action in the states (n, d): the weights of VIPER (Bastani et al. 2018). (n,)
 
         This is the value of the teacher's own action minus that of the worst corner of the action box, by the lower of
-        its two critics; at least 0.
+        its critics; at least 0.
         """
-        task = self.teacher.task
-        states = check_observations(obs, len(task.low), task.name).astype(np.float32)
-        corners = np.array(list(itertools.product((-1, 1), repeat=len(task.action_low))), dtype=np.float32)
-        actions = self._scaled(self.teacher.predict(states)[0])
+        states = self.teacher.inputs(obs)
+        corners = np.array(list(itertools.product((-1, 1), repeat=len(self.teacher.half))), dtype=np.float32)
+        actions = self._scaled(self.teacher.predict(obs)[0])
         worst = np.min([self._value(states, np.broadcast_to(corner, actions.shape)) for corner in corners], axis=0)
         return np.maximum(self._value(states, actions) - worst, 0.0).astype(np.float64)
 
     def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return the value of `actions` (n, m) in the states (n, d), by the lower of the two critics. (n,)"""
-        task = self.teacher.task
-        states = check_array("observations", obs, (-1, len(task.low))).astype(np.float32)
-        actions = check_array("actions", actions, (len(states), len(task.action_low))).astype(np.float32)
+        """Return the value of `actions` (n, m) in the states (n, d), by the lower of the critics. (n,)"""
+        states = self.teacher.inputs(obs)
+        actions = check_array("actions", actions, (len(states), len(self.teacher.half))).astype(np.float32)
         return self._value(states, self._scaled(actions)).astype(np.float64)
 
     def _scaled(self, actions: np.ndarray) -> np.ndarray:
@@ -49,7 +51,7 @@ class Critics:
 
     def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         inputs = np.column_stack([states, actions])
-        return np.min([forward(layers, inputs)[:, 0] for layers in self.networks], axis=0)
+        return np.min([network.forward(inputs)[:, 0] for network in self.networks], axis=0)
 
 
 def critics_of(teacher: Any) -> Critics:

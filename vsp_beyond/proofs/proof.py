@@ -8,6 +8,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -43,6 +44,11 @@ class Proof(ABC):
     @abstractmethod
     def parts(self) -> list:
         """Return the parts of the proof, as JSON-serialisable values."""
+
+    def __str__(self) -> str:
+        """Say the claim in one line."""
+        numbers = (f"{name.replace('_', ' ')} {float(Fraction(value)):.6g}" for name, value in self.claim.items())
+        return f"{self.policy.task.name}, cells: {len(self.policy)}, proved: {', '.join(numbers)}"
 
     def certificate(self) -> dict:
         """Return task, policy, claim and pieces, as JSON-serialisable values."""

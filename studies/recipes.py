@@ -1,4 +1,4 @@
-"""How each teacher is trained, and which score is required."""
+"""How each teacher is trained."""
 
 from __future__ import annotations
 
@@ -47,19 +47,3 @@ RECIPES = {
 
 # Tasks whose teacher is the best snapshot of the learning curve; for other tasks it is the last one
 BEST_OF_CURVE = ("LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5")
-
-# Further trainings, to study the influence of the teacher; shorter if the shipped one took long. SimpleGoal's seed 1 is
-# left out: its actor saturated within 10,000 steps at (-1, -1) for every state and stayed there.
-SHORT_STEPS = {"SimpleGoal-v0": 60_000, "MountainCarContinuous-v0": 120_000, "Pendulum-v1": 20_000}
-SHORT_SEEDS = {"SimpleGoal-v0": (2, 3), "MountainCarContinuous-v0": (1, 2), "Pendulum-v1": (1, 2)}
-
-# Requirements for a shipped teacher, over SCORE_EPISODES episodes: least mean return, largest share of episodes that do
-# not reach the goal (Pendulum and HalfCheetah have no goal; BipedalWalker reaches it unless it falls).
-BARS = {
-    "SimpleGoal-v0": (16.3, 0.01),
-    "MountainCarContinuous-v0": (93.3, 0.0),
-    "Pendulum-v1": (-155.0, 1.0),
-    "LunarLanderContinuous-v3": (270.0, 0.05),
-    "BipedalWalker-v3": (300.0, 0.03),
-    "HalfCheetah-v5": (6000.0, 1.0),
-}

@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER
 
+from studies import make_teachers, training
+from studies.make_teachers import BARS, export, main, short_recipe
+from studies.recipes import BEST_OF_CURVE, RECIPES, Recipe
+from studies.training import read_checkpoint
 from vsp.evaluation import rollout_from_seed
 from vsp.run import atomic, listed
 from vsp.tasks.base import GOAL
-from vsp.teachers import train
 from vsp.teachers.teacher import SHIPPED, load_teacher
-from vsp.teachers.train import BARS, BEST_OF_CURVE, RECIPES, Recipe, export, main, read_checkpoint, short_recipe
 from vsp_beyond.few_cells.criticality import Critics
 
 
@@ -43,7 +45,7 @@ def test_a_shipped_teacher_is_what_its_card_says(task):
     assert steps[-1] >= card["recipe"]["steps"]
     tried = card["seeds_tried"][-1]
     assert tried["seed"] == card["seed"] and tried["mean"] == (max(means) if task in BEST_OF_CURVE else means[-1])
-    assert {*train.PACKAGES, *train.ENGINES.get(task, ())} == set(card["versions"])
+    assert {*make_teachers.PACKAGES, *make_teachers.ENGINES.get(task, ())} == set(card["versions"])
     assert card["sha256"] == atomic.sha256(SHIPPED / f"{task}.safetensors")
     n = {LUNARLANDER: 12, WALKER: 3, CHEETAH: 3}.get(task, 400)  # a physics engine takes longer
     found = rollout_from_seed(teacher, task, n, seed=20_242)  # starts that no one chose a seed on
@@ -60,8 +62,9 @@ EPISODIC = Recipe(
 
 @pytest.fixture
 def short(monkeypatch):
-    monkeypatch.setattr(train, "CHUNK", 31)  # an odd number of updates, so that the delay of the policy matters
-    monkeypatch.setattr(train, "RECIPES", {SIMPLEGOAL: SHORT, MOUNTAINCAR: SHORT})
+    monkeypatch.setattr(training, "CHUNK", 31)  # an odd number of updates, so that the delay of the policy matters
+    for module in (training, make_teachers):
+        monkeypatch.setattr(module, "RECIPES", {SIMPLEGOAL: SHORT, MOUNTAINCAR: SHORT})
 
 
 def weights(path):
@@ -77,8 +80,8 @@ WANDERING = dataclasses.replace(SHORT, noise="ornstein-uhlenbeck", noise_std=0.5
 
 @pytest.mark.parametrize("recipe", [SHORT, EPISODIC, WANDERING])
 def test_a_resumed_training_ends_with_the_same_weights(short, tmp_path, monkeypatch, recipe):
-    monkeypatch.setattr(train, "RECIPES", {SIMPLEGOAL: recipe})
-    whole = train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "whole", report=lambda line: None)
+    monkeypatch.setattr(training, "RECIPES", {SIMPLEGOAL: recipe})
+    whole = training.train(SIMPLEGOAL, seed=3, cache=tmp_path / "whole", report=lambda line: None)
     lines = []
 
     def interrupt(line):
@@ -87,23 +90,23 @@ def test_a_resumed_training_ends_with_the_same_weights(short, tmp_path, monkeypa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=interrupt)
-    cut = train.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=lines.append)
+        training.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=interrupt)
+    cut = training.train(SIMPLEGOAL, seed=3, cache=tmp_path / "cut", report=lines.append)
     assert same(weights(whole), weights(cut)) and len(lines) > 2
     if recipe is SHORT:
-        other = train.train(SIMPLEGOAL, seed=4, cache=tmp_path / "whole", report=lambda line: None)
+        other = training.train(SIMPLEGOAL, seed=4, cache=tmp_path / "whole", report=lambda line: None)
         assert not same(weights(whole), weights(other))
 
 
 def test_a_damaged_checkpoint_is_not_resumed_and_a_whole_one_not_trained_again(short, tmp_path, monkeypatch):
-    path, lines = train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None), []
+    path, lines = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None), []
     content = path.read_bytes()
-    assert train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lines.append) == path and not lines
+    assert training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lines.append) == path and not lines
     monkeypatch.setattr("torch.load", lambda *given: pytest.fail("parsed"))
     for damaged in (content[:-1], b"", content[:5000] + b"?" + content[5001:]):
         path.write_bytes(damaged)
         with pytest.raises(atomic.DamagedFile, match="SHA-256 is .*delete it"):
-            train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lines.append)
+            training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lines.append)
 
 
 def test_a_changed_recipe_does_not_resume():
@@ -114,29 +117,29 @@ def test_a_changed_recipe_does_not_resume():
 
 
 def test_export_writes_what_load_teacher_reads(short, tmp_path, monkeypatch):
-    monkeypatch.setattr(train, "BARS", {SIMPLEGOAL: (-100.0, 1.0)})
-    paths = {seed: train.train(SIMPLEGOAL, seed=seed, cache=tmp_path, report=lambda line: None) for seed in (0, 1)}
+    monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (-100.0, 1.0)})
+    paths = {seed: training.train(SIMPLEGOAL, seed=seed, cache=tmp_path, report=lambda line: None) for seed in (0, 1)}
     reached = export(SIMPLEGOAL, paths, tmp_path / "out")
     teacher = load_teacher(tmp_path / "out" / f"{SIMPLEGOAL}.safetensors")
     assert reached and teacher.card["seed"] == 1 and [t["seed"] for t in teacher.card["seeds_tried"]] == [0, 1]
     assert np.array_equal(teacher.layers[0][0].T, weights(paths[1])["actor.mu.0.weight"])
     assert [point["steps"] for point in teacher.card["learning_curve"]] == [31, 62, 90]
-    found = train.score(teacher, SIMPLEGOAL)
+    found = training.score(teacher, SIMPLEGOAL)
     assert {name: teacher.card["score"][name] for name in found} == found
 
 
 def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp_path, monkeypatch):
     """The curve is made up: the second of three points is the best."""
-    monkeypatch.setattr(train, "BEST_OF_CURVE", (SIMPLEGOAL,))
-    monkeypatch.setattr(train, "BARS", {SIMPLEGOAL: (-1000.0, 1.0)})
+    monkeypatch.setattr(training, "BEST_OF_CURVE", (SIMPLEGOAL,))
+    monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (-1000.0, 1.0)})
     means, seen = iter([1.0, 3.0, 2.0]), []
 
     def score(model, task):
         seen.append({name: tensor.numpy().copy() for name, tensor in model.policy.state_dict().items()})
         return {"steps": model.num_timesteps, "mean": next(means)}
 
-    monkeypatch.setattr(train, "_score", score)
-    path = train.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
+    monkeypatch.setattr(training, "_score", score)
+    path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
     snapshot = read_checkpoint(path)
     assert len(seen) == 3 and same({n: t.numpy() for n, t in snapshot["best"]["policy"].items()}, seen[1])
     assert same({n: t.numpy() for n, t in snapshot["policy"].items()}, seen[2]) and not same(seen[1], seen[2])
@@ -147,8 +150,8 @@ def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp
 
 
 def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatch):
-    monkeypatch.setattr(train, "BARS", {SIMPLEGOAL: (1000.0, 0.0)})
-    monkeypatch.setattr(train, "MOST_SEEDS", 2)
+    monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (1000.0, 0.0)})
+    monkeypatch.setattr(make_teachers, "MOST_SEEDS", 2)
     out = tmp_path / "out"
     monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out), "--task", SIMPLEGOAL])
     with pytest.raises(SystemExit, match="none of the seeds 0 to 1 met the requirements"):
@@ -163,12 +166,12 @@ def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatc
     ],
 )  # fmt: skip
 def test_reaches_bar(task, mean, goal, reached):
-    assert train.reaches_bar({"mean": mean, "goal": goal, "pit": 1 - goal}, task) == reached
+    assert make_teachers.reaches_bar({"mean": mean, "goal": goal, "pit": 1 - goal}, task) == reached
 
 
 # The shorter trainings of a study
 
-SHIPPED_SHORT = [(task, seed) for task, seeds in train.SHORT_SEEDS.items() for seed in seeds]
+SHIPPED_SHORT = [(task, seed) for task, seeds in make_teachers.SHORT_SEEDS.items() for seed in seeds]
 
 
 def test_the_short_teachers_are_shipped_and_no_others():
@@ -176,7 +179,7 @@ def test_the_short_teachers_are_shipped_and_no_others():
     files = [path.name for path in (SHIPPED / "short").iterdir() if path.name != listed.MANIFEST]
     assert sorted(files) == sorted(f"{name}.{kind}" for name in names for kind in ("json", "safetensors"))
     digests = {load_teacher(SHIPPED / "short" / f"{name}.safetensors").digest for name in names}
-    shipped = {load_teacher(task).digest for task in train.SHORT_SEEDS}
+    shipped = {load_teacher(task).digest for task in make_teachers.SHORT_SEEDS}
     assert len(digests | shipped) == len(names) + len(shipped)
 
 
@@ -187,7 +190,7 @@ def test_a_short_teacher_scores_what_its_card_says(task, seed):
     recipe = in_json(short_recipe(task))
     assert (card["task"], card["seed"], card["recipe"], teacher.task.name) == (task, seed, recipe, task)
     assert card["learning_curve"][-1]["steps"] >= recipe["steps"] > card["learning_curve"][-2]["steps"]
-    assert {*train.PACKAGES, *train.ENGINES.get(task, ())} == set(card["versions"])
+    assert {*make_teachers.PACKAGES, *make_teachers.ENGINES.get(task, ())} == set(card["versions"])
     found = rollout_from_seed(teacher, task, 200, seed=20_241)  # starts that no one has seen
     assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / np.sqrt(200)
     missed = np.mean(found.outcomes != GOAL)
@@ -196,16 +199,16 @@ def test_a_short_teacher_scores_what_its_card_says(task, seed):
 
 @pytest.fixture
 def fewer_episodes(monkeypatch):
-    score = train.score
-    monkeypatch.setattr(train, "score", lambda teacher, task, n=40, *, seed=102: score(teacher, task, 40, seed=seed))
-    monkeypatch.setattr(train, "SHORT_STEPS", {SIMPLEGOAL: 40, MOUNTAINCAR: 40})
-    monkeypatch.setattr(train, "BARS", dict.fromkeys(TASKS, (1000.0, 0.0)))  # which nobody reaches
+    score = training.score
+    monkeypatch.setattr(training, "score", lambda teacher, task, n=40, *, seed=102: score(teacher, task, 40, seed=seed))
+    monkeypatch.setattr(make_teachers, "SHORT_STEPS", {SIMPLEGOAL: 40, MOUNTAINCAR: 40})
+    monkeypatch.setattr(make_teachers, "BARS", dict.fromkeys(TASKS, (1000.0, 0.0)))  # which nobody reaches
 
 
 def test_make_short_teachers_trains_and_exports_actors_of_every_seed(short, fewer_episodes, tmp_path, monkeypatch):
     from safetensors.numpy import load_file
 
-    monkeypatch.setattr(train, "SHORT_SEEDS", {SIMPLEGOAL: (4, 5), MOUNTAINCAR: (7,)})
+    monkeypatch.setattr(make_teachers, "SHORT_SEEDS", {SIMPLEGOAL: (4, 5), MOUNTAINCAR: (7,)})
     monkeypatch.setattr("sys.argv", ["x", "--short", "--cache", str(tmp_path / "in"), "--out", str(tmp_path / "out")])
     main()
     cards = sorted((tmp_path / "out" / "short").glob("*.json"))  # nobody takes the shipped teacher's place
@@ -215,7 +218,7 @@ def test_make_short_teachers_trains_and_exports_actors_of_every_seed(short, fewe
     checkpoint = tmp_path / "in" / f"{SIMPLEGOAL}-{short_recipe(SIMPLEGOAL).id}-5.pt"
     actor = {name: tensor for name, tensor in weights(checkpoint).items() if name.startswith("actor.")}
     assert same(load_file(cards[2].with_suffix(".safetensors")), actor) and len(actor) == 6
-    card, scores = teachers[2].card, train.score(teachers[2], SIMPLEGOAL)
+    card, scores = teachers[2].card, training.score(teachers[2], SIMPLEGOAL)
     assert card["recipe"] == dataclasses.asdict(SHORT) | {"steps": 40, "train_freq": [1, "step"]}
     assert [point["steps"] for point in card["learning_curve"]] == [31, 40] and "seeds_tried" not in card
     assert {name: card["score"][name] for name in scores} == scores

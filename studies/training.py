@@ -1,0 +1,134 @@
+"""Train a TD3 teacher with Stable-Baselines3, resumably. `studies.make_teachers` makes the shipped ones.
+
+Only the functions that train import torch and stable_baselines3.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import os
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from vsp.evaluation import rollout_from_seed
+from vsp.run import sealed
+from vsp.tasks.base import GOAL, PIT
+from vsp.tasks.registry import get_task
+from vsp.teachers import Teacher
+
+from .recipes import BEST_OF_CURVE, RECIPES, Recipe
+
+CHUNK = 10_000  # steps between two checkpoints
+SCORE_EPISODES, CURVE_EPISODES = 10_000, 500
+OFTEN = {"BipedalWalker-v3": 4}  # factor on CURVE_EPISODES where a rare fall decides
+SELECTION_SEED, SCORE_SEED = 101, 102  # seeds of start states: to select a training seed, and to report scores
+
+
+def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | None = None, report=print) -> Path:
+    """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint.
+
+    Training proceeds in chunks of `CHUNK` steps. Each chunk begins a new episode with new random streams from (seed,
+    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one.
+    """
+    import torch
+
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
+    recipe = RECIPES[task] if recipe is None else recipe
+    path = Path(cache) / f"{task}-{recipe.id}-{seed}.pt"
+    model = _new_model(task, recipe, seed)
+    snapshot: dict = {"curve": []}
+    if path.exists():
+        snapshot = read_checkpoint(path)
+        _restore(model, snapshot)
+    while model.num_timesteps < recipe.steps:
+        chunk_seed = np.random.SeedSequence([seed, model.num_timesteps]).generate_state(1)[0]
+        model.set_random_seed(int(chunk_seed))
+        model._last_obs = None  # begin a fresh episode
+        model.action_noise.reset()
+        model.learn(min(CHUNK, recipe.steps - model.num_timesteps), reset_num_timesteps=False, log_interval=None)
+        point = _score(model, task)
+        report(f"{task} seed {seed}: {point}")
+        snapshot |= _snapshot(model) | {"curve": [*snapshot["curve"], point]}
+        if task in BEST_OF_CURVE and ("best" not in snapshot or point["mean"] > snapshot["best"]["point"]["mean"]):
+            snapshot["best"] = {"point": point, "policy": copy.deepcopy(snapshot["policy"])}
+        torch.save(snapshot, content := io.BytesIO())
+        sealed.write_sealed(path, content.getvalue())
+    return path
+
+
+def read_checkpoint(path: str | os.PathLike) -> dict:
+    """Read a checkpoint that `train` wrote. Raises FileNotFoundError or `run.atomic.DamagedFile`.
+
+    torch's `weights_only` loading runs no code from the file.
+    """
+    import torch
+
+    return torch.load(io.BytesIO(sealed.read_sealed(path)), weights_only=True)
+
+
+def _new_model(task: str, recipe: Recipe, seed: int):
+    import gymnasium
+    from stable_baselines3 import TD3
+    from stable_baselines3.common.noise import NormalActionNoise, OrnsteinUhlenbeckActionNoise
+
+    arguments = asdict(recipe)
+    arguments.pop("steps")
+    kind = {"normal": NormalActionNoise, "ornstein-uhlenbeck": OrnsteinUhlenbeckActionNoise}[arguments.pop("noise")]
+    m = len(get_task(task).action_low)
+    noise = kind(np.zeros(m), arguments.pop("noise_std") * np.ones(m))
+    return TD3("MlpPolicy", gymnasium.make(task), action_noise=noise, seed=seed, device="cpu", **arguments)
+
+
+_BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def _snapshot(model) -> dict:
+    """Return the state of training between two chunks, in types that `weights_only` loading accepts."""
+    import torch
+
+    buffer = model.replay_buffer
+    n = buffer.buffer_size if buffer.full else buffer.pos
+    return {
+        "policy": model.policy.state_dict(),
+        "actor_optimizer": model.actor.optimizer.state_dict(),
+        "critic_optimizer": model.critic.optimizer.state_dict(),
+        "buffer": {name: torch.from_numpy(getattr(buffer, name)[:n].copy()) for name in _BUFFER},
+        "buffer_at": [buffer.pos, buffer.full],
+        "counters": [model.num_timesteps, model._n_updates, model._episode_num],
+    }
+
+
+def _restore(model, snapshot: dict) -> None:
+    """Restore a snapshot into a new model."""
+    model.policy.load_state_dict(snapshot["policy"])
+    model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
+    model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
+    for name, rows in snapshot["buffer"].items():
+        getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
+    model.replay_buffer.pos, model.replay_buffer.full = snapshot["buffer_at"]
+    model.num_timesteps, model._n_updates, model._episode_num = snapshot["counters"]
+
+
+def _score(model, task: str) -> dict:
+    """Return one point of the learning curve, over `CURVE_EPISODES` (fewer for slow tasks) from fixed starts."""
+    n_episodes = CURVE_EPISODES * OFTEN.get(task, 1)
+    weights = {name: tensor.numpy() for name, tensor in model.actor.state_dict().items()}
+    return {"steps": model.num_timesteps, **score(Teacher(weights, task), task, n_episodes, seed=SELECTION_SEED)}
+
+
+def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed: int = SCORE_SEED) -> dict:
+    """Return the mean and standard deviation of the return, and the shares of episodes that end in goal and pit.
+
+    Slow tasks are scored over fewer episodes.
+    """
+    result = rollout_from_seed(teacher, task, n_episodes // get_task(task).slowness, seed=seed)
+    return {
+        "mean": round(float(result.returns.mean()), 4),
+        "std": round(float(result.returns.std(ddof=1)), 4),
+        "goal": float(np.mean(result.outcomes == GOAL)),
+        "pit": float(np.mean(result.outcomes == PIT)),
+    }

@@ -1,0 +1,117 @@
+"""Agents that were trained on normalised observations: with their statistics they act as there, without they do not."""
+
+import shutil
+
+import gymnasium
+import numpy as np
+import pytest
+from support import SIMPLEGOAL
+from zips import made
+
+import vsp
+from vsp import load_teacher
+
+OBS = np.random.default_rng(0).random((10_000, 2)).astype(np.float32)
+RMS = {"count": 9.0, "mean": np.array([0.25, 0.5]), "var": np.array([0.25, 0.0])}
+
+
+def normalised(**options):
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    return VecNormalize(DummyVecEnv([lambda: gymnasium.make(SIMPLEGOAL)]), **options)
+
+
+def written(path, **changes):
+    """The file that the library saves, with some attributes (and those of `obs_rms`) set anew."""
+    env = normalised()
+    vars(env.obs_rms).update(RMS | {name: changes.pop(name) for name in ("mean", "var") if name in changes})
+    vars(env).update(changes)
+    env.save(path)
+    return env
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A folder with an on-policy agent, saved, and its statistics; and the agent itself."""
+    folder, env = tmp_path_factory.mktemp("trained"), normalised(clip_obs=1.5)
+    model = made("PPO", env, about={"n_steps": 8, "batch_size": 4}, net_arch=[8]).learn(16)
+    model.save(folder / "ppo.zip")
+    env.save(folder / "statistics.pkl")
+    return folder, model, env
+
+
+def test_an_agent_with_its_statistics_acts_as_the_library_does_and_asks_for_them(trained):
+    folder, model, env = trained
+    path, given = folder / "ppo.zip", {"normalize": folder / "statistics.pkl"}
+    alone, unaware = type(model).load(path), load_teacher(path, SIMPLEGOAL, normalize=False)
+    expected = model.predict(env.normalize_obs(OBS), deterministic=True)[0]
+    for agent in (load_teacher(path, SIMPLEGOAL, **given), vsp.agent(model), vsp.agent(alone, **given)):
+        assert np.abs(agent.predict(OBS)[0] - expected).max() < 1e-4
+    for agent in (unaware, vsp.agent(alone, normalize=False), vsp.agent(model, normalize=False)):
+        assert np.abs(agent.predict(OBS)[0] - expected).max() > 0.05
+    for source, normalize in ((path, None), (path, True), (alone, None), (alone, True)):
+        with pytest.raises(ValueError, match="normalised observations.*normalize="):
+            vsp.agent(source, SIMPLEGOAL, normalize=normalize)
+    rewards = made("PPO", normalised(norm_obs=False), about={"n_steps": 8, "batch_size": 4}).learn(8)
+    assert np.array_equal(vsp.agent(rewards).predict(OBS)[0], rewards.predict(OBS, deterministic=True)[0])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"clip_obs": 0.3}, {"epsilon": 0.5}, {"var": np.zeros(2)}, {"norm_obs": False}, {"norm_obs": np.bool_(False)}],
+)
+def test_statistics_are_used_as_the_library_does(changes, small, tmp_path):
+    env = written(tmp_path / "s.pkl", **changes)
+    teacher, raw = (load_teacher(small, SIMPLEGOAL, normalize=n) for n in (str(tmp_path / "s.pkl"), False))
+    assert np.abs(teacher.predict(OBS)[0] - raw.predict(env.normalize_obs(OBS))[0]).max() < 1e-6
+    assert teacher.card["normalised"] == env.norm_obs == (teacher.digest != raw.digest)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mean": np.zeros(3), "var": np.ones(3)}, r"mean have shape \(3,\), expected \(2,\)"),
+        ({"var": np.array([1.0, -1.0])}, "variance .*-1.0.*expected positive ones"),
+        ({"var": np.array([1.0, np.nan])}, "var hold nan"), ({"mean": np.array([np.inf, 1.0])}, "mean hold inf"),
+        ({"var": np.zeros(2), "epsilon": 0.0}, "expected pos"), ({"epsilon": -1.0}, "expected positive ones"),
+        ({"clip_obs": 0.0}, "expected positive ones"), ({"clip_obs": np.nan}, "expected positive ones"),
+        ({"obs_rms": RMS}, "of a dictionary"), ({"mean": np.array(["a", "b"])}, "not the statistics"),
+    ],
+)  # fmt: skip
+def test_statistics_that_do_not_fit_are_refused(changes, message, small, tmp_path):
+    written(tmp_path / "s.pkl", **changes)
+    with pytest.raises(ValueError, match=rf"s.pkl: .*{message}"):
+        load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.pkl")
+
+
+# Signs
+
+SIGNS = {
+    "x_5_steps.vecnormalize.pkl": "", "x_5_steps/vecnormalize.pkl": "", "vecnormalize.pkl": "", "vec_normalize.pkl": "",
+    "x_vecnormalize_5_steps.pkl": "", "config.yml": "normalize: {norm_reward: true}",
+    "x_5_steps.config.yml": "normalize: true",
+    "x_5_steps/config.yml": "!!python/object/apply:collections.OrderedDict\n- - - normalize\n    - dict(norm_obs=True)",
+}  # fmt: skip
+NO_SIGNS = [f"n_envs: 4\nnormalize: {value}" for value in (
+    "false", "False", "", "~", "'no'", "dict(norm_obs=False, norm_reward=True)", "{norm_obs: false}",
+    '"{\'norm_obs\': False}"', f'"{" " * 500_000}x{" " * 100_000}norm_obs=False"')]  # fmt: skip
+NO_SIGNS += ["&a [*a, *a]", "normalise: true", "a: [", ": : :", "[" * 9999]
+
+
+@pytest.mark.parametrize("name", SIGNS)
+def test_a_file_nearby_tells_of_a_normalisation(name, small, tmp_path):
+    path = shutil.copy(small, tmp_path / "x_5_steps.zip")
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    for text in NO_SIGNS if name == "config.yml" else ():
+        (tmp_path / name).write_text(text)
+        load_teacher(path, SIMPLEGOAL)
+    (tmp_path / name).write_text(SIGNS[name])
+    with pytest.raises(ValueError, match=rf"x_5_steps.zip: .*{name} .*Pass their statistics, normalize="):
+        load_teacher(path, SIMPLEGOAL)
+    load_teacher(path, SIMPLEGOAL, normalize=False)
+
+
+def test_what_has_no_normalisation_refuses_one(small):
+    for source in (SIMPLEGOAL, load_teacher(small, SIMPLEGOAL), lambda obs: obs):
+        with pytest.raises(ValueError, match="normalize.*expected no"):
+            vsp.agent(source, normalize="statistics.pkl")

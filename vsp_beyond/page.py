@@ -1,0 +1,155 @@
+"""One page about a policy and the agent that it imitates, in one file to send: it needs no other file or host."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from vsp import agent as as_agent
+from vsp.paper.statistics import percentile_interval, share_interval
+from vsp.policy import VoronoiPolicy
+from vsp.rollouts import Policy
+from vsp.run import atomic
+from vsp.show.explorer import SCRIPT, explore
+from vsp.subpolicies.base import number
+from vsp.tasks import Task, get_task
+
+from .likeness import Likeness, likeness
+from .proofs import PROVERS
+
+MOST_INPUTS = 8  # in an equation; of more, the five that contribute most
+PROOF_SECONDS = 60
+_PROVE = "import sys, vsp, vsp_beyond; print(vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1])))"
+_PAGE = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title}</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem }}
+h1 {{ overflow-wrap: anywhere }}
+table {{ border-collapse: collapse }} td, th {{ padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }}
+.cards {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem }}
+.vsp-explorer {{ margin-top: 1.5rem }}
+.cards > div {{ border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem; overflow-x: auto }}
+</style>
+<h1>{title}</h1>
+{body}
+<script type="module">
+{script}
+mountAll()
+</script>
+</html>
+"""
+
+
+def report(policy: VoronoiPolicy, agent: Policy, task: str | Task, *, name: str = "agent", remarks: str = "") -> str:
+    """Return a page as HTML: equations, the explorer, how alike they act, where they differ most, what is proved, and
+    the policy as files to save. `name` and `remarks` stand on the page as text.
+
+    Raises ValueError unless the policy is linear and both fit the task.
+    """
+    task, agent = get_task(task), as_agent(agent)
+    policy.check_linear()
+    alike = likeness(policy, agent, task)
+    cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
+    parts = [
+        f"<p>{html.escape(name)} on {html.escape(task.name)}, imitated by linear maps in {cells}.</p>",
+        "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in remarks.splitlines()),
+        _numbers(alike), _cards(policy, alike), explore(policy, teacher=agent).element(), _worst(policy, agent, alike),
+        _kept(policy),
+    ]  # fmt: skip
+    title = html.escape(f"{task.name}: {name} in {cells}")
+    return _PAGE.format(title=title, body="\n".join(parts), script=SCRIPT.read_text("utf-8"))
+
+
+def _numbers(alike: Likeness) -> str:
+    rng, rows = np.random.default_rng(0), ""
+    for name, returns in alike.returns.items():
+        low, high = percentile_interval(returns[rng.integers(len(returns), size=(2000, len(returns)))].mean(axis=1))
+        failed, n = alike.failures[name], len(returns)
+        least, most = (0, 0) if failed is None else share_interval(failed, n)
+        said = "not defined" if failed is None else f"{failed} of {n} ({least:.1%} to {most:.1%})"
+        rows += f"<tr><td>{name}</td><td>{returns.mean():.2f} ({low:.2f} to {high:.2f})</td><td>{said}</td></tr>"
+    head = "<tr><th></th><th>mean return (95 %)</th><th>failed episodes (95 %)</th></tr>"
+    return (
+        f"<h2>How alike?</h2><p>The policy reproduces {alike.r2:.1%} of the variance of the agent's actions (R²), on "
+        f"{len(alike.states):,} states of the agent that no fit saw.</p><table>{head}{rows}</table>"
+    )
+
+
+def _cards(policy: VoronoiPolicy, alike: Likeness) -> str:
+    """Return a card per cell: its codeword, the share of the agent's states in it, and its equations."""
+    names, inside, cards = policy.task.inputs, policy.cells(alike.states), ""
+    typical = np.abs(alike.states).mean(axis=0)
+    for cell, codeword in enumerate(policy.codewords):
+        where = ", ".join(f"{name} {number(c, 3)}" for name, c in zip(names, codeword))
+        lines = policy.equations(cell)
+        if len(names) > MOST_INPUTS:
+            weights = policy.coefficients[cell, :-1]
+            largest = np.argsort(-np.abs(weights) * typical[:, None], axis=0)[:5].T
+            lines = tuple(
+                f"{output} = " + " ".join(f"{weights[i, j]:+.3f} {names[i]}" for i in rows) + " + ..."
+                for j, (output, rows) in enumerate(zip(policy.task.outputs, largest))
+            )
+        text = "<br>".join(html.escape(line) for line in lines)
+        cards += f"<div><b>Cell {cell + 1}</b>, {np.mean(inside == cell):.0%} of the states<br>"
+        cards += f"nearest to {html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
+    distance = html.escape(policy.to_text().splitlines()[1]) if len(policy) > 1 else ""
+    return f'<h2>The policy</h2><p>{distance}</p><div class="cards">{cards}</div>'
+
+
+def _worst(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
+    """Return the states in which the actions differ most, one per cell at most."""
+    cells, rows, seen = policy.cells(alike.states), "", set()
+    for i in np.argsort(-alike.errors):
+        if cells[i] in seen or len(seen) == 3:
+            continue
+        seen.add(cells[i])
+        state = ", ".join(f"{name} {value:.3g}" for name, value in zip(policy.task.inputs, alike.states[i]))
+        actions = (
+            ", ".join(f"{a:.3g}" for a in np.ravel(one.predict(alike.states[i : i + 1])[0])) for one in (policy, agent)
+        )
+        rows += f"<tr><td>{html.escape(state)}</td>" + "".join(f"<td>{said}</td>" for said in actions) + "</tr>"
+    return (
+        f"<h2>Where do they differ most?</h2><table><tr><th>state</th><th>policy</th><th>agent</th></tr>{rows}</table>"
+    )
+
+
+def _kept(policy: VoronoiPolicy) -> str:
+    """Return what is proved, if the task has a prover and it is done within a minute, and the policy as files."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "policy.vsp"
+        policy.save(path)
+        proof, saved = _proof(path) if policy.task.name in PROVERS else "", path.read_bytes()
+    files = {"policy.vsp": saved, "policy.c": policy.to_c().encode(), "policy.py": policy.to_python().encode()}
+    data = {name: base64.b64encode(content).decode() for name, content in files.items()}
+    links = (
+        f'<a download="{name}" href="data:application/octet-stream;base64,{code}">{name}</a>'
+        for name, code in data.items()
+    )
+    return f"{proof}<h2>The policy as a file</h2><p>{', '.join(links)}</p>"
+
+
+def _proof(path: Path) -> str:
+    said = f"Nothing is proved within {PROOF_SECONDS} s; vsp_beyond.prove(policy) may take minutes."
+    try:  # in a process of its own, which can be stopped
+        done = subprocess.run(
+            [sys.executable, "-c", _PROVE, path], capture_output=True, text=True, timeout=PROOF_SECONDS
+        )
+        said = done.stdout or f"Nothing is proved: {done.stderr.strip().rpartition(': ')[2]}."
+    except subprocess.TimeoutExpired:
+        pass
+    return f"<h2>What is certain?</h2><p>{html.escape(said)}</p>"
+
+
+def write_report(page: str, path: str | os.PathLike, *, force: bool = False) -> None:
+    """Write a page to one file. Raises FileExistsError for a file that exists, unless `force`."""
+    if Path(path).exists() and not force:
+        raise FileExistsError(f"{path} exists and is kept: name another file, or say --force")
+    atomic.write_text(path, page)
