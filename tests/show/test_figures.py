@@ -319,4 +319,5 @@ def test_intervals_have_colours_of_their_own(ax):
 def test_a_figure_without_an_alternative_text_is_refused(tmp_path):
     with pytest.raises(ValueError, match="figure 'mine' has no alternative text: pass alt="):
         show.save_figure(show.panels(1)[0], "mine", out=tmp_path)
+    plt.close("all")
     assert not list(tmp_path.rglob("*.png"))
