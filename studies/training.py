@@ -8,13 +8,14 @@ from __future__ import annotations
 import copy
 import io
 import os
+import pickle
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from vsp.evaluation import rollout_from_seed
-from vsp.run import sealed
+from vsp.run import atomic, sealed
 from vsp.tasks.base import GOAL, PIT
 from vsp.tasks.registry import get_task
 from vsp.teachers import Teacher
@@ -67,7 +68,11 @@ def read_checkpoint(path: str | os.PathLike) -> dict:
     """
     import torch
 
-    return torch.load(io.BytesIO(sealed.read_sealed(path)), weights_only=True)
+    content = io.BytesIO(sealed.read_sealed(path))
+    try:
+        return torch.load(content, weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError) as error:
+        raise atomic.DamagedFile(f"{path}: its checksum is right, but it is no checkpoint: {error!r:.300}") from error
 
 
 def _new_model(task: str, recipe: Recipe, seed: int):

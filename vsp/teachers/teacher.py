@@ -101,9 +101,13 @@ def load_teacher(
         )
     if not path.suffix:
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
+    from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    tensors = load(listed.read_listed(path))
+    try:
+        tensors = load(listed.read_listed(path))
+    except SafetensorError as error:
+        raise atomic.DamagedFile(f"{path}: its checksum is right, but it holds no tensors: {error!r:.300}") from error
     card = json.loads(listed.read_listed(path.with_suffix(".json")))
     critic = part_of(tensors, "critic")
     named = str(card.get("task")).rpartition(":")[2]  # a file imports no module
