@@ -44,6 +44,13 @@ def check_count(what: str, value: int, *, least: int = 1, most: int | None = Non
         raise ValueError(f"{what} is {value!r}, expected an integer from {least} {end}")
 
 
+def check_number(what: str, value: float, *, least: float = -np.inf, most: float = np.inf) -> None:
+    """Raise ValueError unless `value` is a finite number from `least` to `most`."""
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not number or not np.isfinite(value) or not least <= value <= most:
+        raise ValueError(f"{what} is {value!r}, expected a finite number from {least} to {most}")
+
+
 def check_choice(what: str, value: str, known: Collection[str]) -> None:
     """Raise ValueError unless `value` is one of the names `known`."""
     if not isinstance(value, str) or value not in known:

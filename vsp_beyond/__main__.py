@@ -10,10 +10,10 @@ from pathlib import Path
 import gymnasium
 
 import vsp
-from vsp.run.atomic import DamagedFile
+from vsp.run import atomic
 
 from . import faithful
-from .page import report, write_report
+from .page import report
 
 
 def main() -> None:
@@ -31,14 +31,15 @@ def main() -> None:
         if given.out.exists() and not given.force:
             raise FileExistsError(f"{given.out} exists and is kept: name another file, or say --force")
         options = {"normalize": False if given.normalize == "no" else given.normalize} if given.normalize else {}
-        agent, task = vsp.agent(given.agent, vsp.get_task(given.task), **options), vsp.get_task(given.task)
+        task = vsp.get_task(given.task)
+        agent = vsp.agent(given.agent, task, **options)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", UserWarning)
             policy = faithful(agent, task, n_cells=given.cells, seed=given.seed)
         remarks = "\n".join(str(one.message) for one in said if issubclass(one.category, UserWarning))
         page = report(policy, agent, task, name=Path(given.agent).name, remarks=remarks)
-        write_report(page, given.out, force=given.force)
-    except (ValueError, FileNotFoundError, FileExistsError, DamagedFile, gymnasium.error.Error, ImportError) as error:
+        atomic.write_text(given.out, page)
+    except (ValueError, FileNotFoundError, FileExistsError, gymnasium.error.Error, ImportError) as error:
         sys.stderr.write(f"error: {str(error).splitlines()[0]}\n")
         sys.exit(2)
     print(f"{given.out}: {len(page) / 1e6:.1f} MB; open it in a browser")

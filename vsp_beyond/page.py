@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import os
 import subprocess
 import sys
 import tempfile
@@ -13,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from vsp import agent as as_agent
-from vsp.paper.statistics import percentile_interval, share_interval
+from vsp.paper.statistics import interval, share_interval
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
-from vsp.run import atomic
-from vsp.show.explorer import SCRIPT, explore
+from vsp.show.explorer import explore, standalone
 from vsp.subpolicies.base import number
 from vsp.tasks import Task, get_task
 
@@ -27,24 +25,12 @@ from .proofs import PROVERS
 MOST_INPUTS = 8  # in an equation; of more, the five that contribute most
 PROOF_SECONDS = 60
 _PROVE = "import sys, vsp, vsp_beyond; print(vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1])))"
-_PAGE = """<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem }}
-h1 {{ overflow-wrap: anywhere }}
-table {{ border-collapse: collapse }} td, th {{ padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }}
-.cards {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem }}
-.vsp-explorer {{ margin-top: 1.5rem }}
-.cards > div {{ border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem; overflow-x: auto }}
-</style>
-<h1>{title}</h1>
-{body}
-<script type="module">
-{script}
-mountAll()
-</script>
-</html>
+_STYLE = """body { line-height: 1.5 }
+table { border-collapse: collapse }
+td, th { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem }
+.cards > div { border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem; overflow-x: auto }
+.vsp-explorer { margin-top: 1.5rem }
 """
 
 
@@ -64,14 +50,13 @@ def report(policy: VoronoiPolicy, agent: Policy, task: str | Task, *, name: str 
         _numbers(alike), _cards(policy, alike), explore(policy, teacher=agent).element(), _worst(policy, agent, alike),
         _kept(policy),
     ]  # fmt: skip
-    title = html.escape(f"{task.name}: {name} in {cells}")
-    return _PAGE.format(title=title, body="\n".join(parts), script=SCRIPT.read_text("utf-8"))
+    return standalone(f"{task.name}: {name} in {cells}", "\n".join(parts), _STYLE)
 
 
 def _numbers(alike: Likeness) -> str:
-    rng, rows = np.random.default_rng(0), ""
+    rows = ""
     for name, returns in alike.returns.items():
-        low, high = percentile_interval(returns[rng.integers(len(returns), size=(2000, len(returns)))].mean(axis=1))
+        low, high = interval(returns, np.mean, vectorized=True)
         failed, n = alike.failures[name], len(returns)
         least, most = (0, 0) if failed is None else share_interval(failed, n)
         said = "not defined" if failed is None else f"{failed} of {n} ({least:.1%} to {most:.1%})"
@@ -146,10 +131,3 @@ def _proof(path: Path) -> str:
     except subprocess.TimeoutExpired:
         pass
     return f"<h2>What is certain?</h2><p>{html.escape(said)}</p>"
-
-
-def write_report(page: str, path: str | os.PathLike, *, force: bool = False) -> None:
-    """Write a page to one file. Raises FileExistsError for a file that exists, unless `force`."""
-    if Path(path).exists() and not force:
-        raise FileExistsError(f"{path} exists and is kept: name another file, or say --force")
-    atomic.write_text(path, page)

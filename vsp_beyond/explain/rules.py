@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vsp.checks import check_array, check_count
+from vsp.checks import check_array, check_count, check_number
 from vsp.policy import VoronoiPolicy
 from vsp.subpolicies.base import linear_outputs, number
-
-from ..checks import check_number
 
 MOST = 200  # leaves of the largest tree to try
 _DIGITS = range(1, 17)  # how many digits to try for the numbers in rules, in this order

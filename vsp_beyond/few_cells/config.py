@@ -6,11 +6,9 @@ import dataclasses
 from dataclasses import dataclass
 from typing import get_type_hints
 
-from vsp.checks import check_count
+from vsp.checks import check_count, check_number
 from vsp.config import check_field
 from vsp.tasks import Task, get_task
-
-from ..checks import check_number
 
 MOST_CELLS, MOST = 1000, 10**8  # largest plausible number of cells, and of anything else: a larger value is a mistake
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 
-from vsp.checks import check_array, check_count, check_seed
+from vsp.checks import check_array, check_count, check_number, check_seed
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout, visited_states
@@ -15,7 +15,6 @@ from vsp.run.progress import progress
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
-from ..checks import check_number
 from .config import Tuned, check_kind
 from .tune import score
 from .tuned import distill_tuned

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsp.checks import check_array
+from vsp.checks import check_array, check_number
 from vsp.rollouts import Policy
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE
 
-from ..checks import check_number
 from .grid import Grid, GridPolicy, best_values
 
 BESIDE = 1e-6  # distance from the goal's edge: stays outside the goal, however the observation is rounded

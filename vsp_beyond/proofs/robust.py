@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsp.checks import check_count
+from vsp.checks import check_count, check_number
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
 
-from ..checks import check_number
 from .grid import Way, around, steps_into
 from .proof import check_provable
 

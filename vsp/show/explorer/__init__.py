@@ -3,7 +3,7 @@
 `explorer.js` draws on the site, in JupyterLab and in standalone HTML files; `scene` collects the data to draw.
 """
 
-from .explorer import SCRIPT, Explorer, explore
+from .explorer import SCRIPT, Explorer, explore, standalone
 from .scene import PLANES, scene_of
 
-__all__ = ["PLANES", "SCRIPT", "Explorer", "explore", "scene_of"]
+__all__ = ["PLANES", "SCRIPT", "Explorer", "explore", "scene_of", "standalone"]

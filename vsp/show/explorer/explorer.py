@@ -25,7 +25,7 @@ _PAGE = """<!doctype html>
 <style>
 body {{ font-family: system-ui, sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem }}
 h1 {{ overflow-wrap: anywhere }}
-</style>
+{style}</style>
 <h1>{title}</h1>
 {body}
 <script type="module">
@@ -34,6 +34,11 @@ mountAll()
 </script>
 </html>
 """
+
+
+def standalone(title: str, body: str, style: str = "") -> str:
+    """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS."""
+    return _PAGE.format(title=html.escape(title), body=body, style=style, script=SCRIPT.read_text("utf-8"))
 
 
 class Explorer:
@@ -67,8 +72,7 @@ class Explorer:
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a standalone HTML file, which opens from disk and needs no other file or host."""
-        title = html.escape(f"{self.task.name}: explore the policy")
-        atomic.write_text(path, _PAGE.format(title=title, body=self.element(), script=SCRIPT.read_text("utf-8")))
+        atomic.write_text(path, standalone(f"{self.task.name}: explore the policy", self.element()))
 
     def element(self, *, source: str | None = None) -> str:
         """Return HTML with the script's scene (inside, or in the file `source`) and a picture to show without it."""
