@@ -23,21 +23,19 @@ inputs = notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml en
   $(if $(filter $(1),$(BEYOND)),vsp_beyond studies data/beyond) \
   $(if $(filter 05_ledger,$(1)),$(addprefix data/results/,readings.csv teachers.csv simpler.csv))
 
-# What a user may set. Recipes read it from the environment, as "$$OUT", so that no character in it means anything to
-# make or to the shell. MAKEOVERRIDES is empty, for a make inside a recipe would expand what it holds.
+# What a user may set is read from the environment ("$$OUT"), and MAKEOVERRIDES is empty, so that nothing expands it.
 OUT ?= .
 # How many processes and notebooks at a time; with DASK, a scheduler's address, its workers make the runs.
 JOBS := $(or $(value JOBS),$(shell getconf _NPROCESSORS_ONLN || echo 1))
 $(if $(strip $(value OUT)),,$(error OUT is empty, expected a folder, as in OUT=scratch))
 override OUT := $(if $(filter /% .%,$(firstword $(value OUT))),,./)$(value OUT)
-$(foreach v,JOBS DASK PYTHON QUICK,$(eval override $(v) := $$(value $(v))))
+$(foreach v,JOBS DASK PYTHON QUICK AGENT AGENTS,$(eval override $(v) := $$(value $(v))))
 STAMPS := $(OUT)/build/stamps
-export OUT JOBS DASK PYTHON QUICK STAMPS
+export OUT JOBS DASK PYTHON QUICK STAMPS AGENT AGENTS
 MAKEOVERRIDES :=
 PY := .venv/bin/python
 
-# The same bytes everywhere: no dates in files, no order by hash, one thread per process, nobody's personal settings.
-# vsp/run/kernels.py says how the kernels of NumPy and OpenBLAS are fixed.
+# The same bytes everywhere: no dates, no order by hash, one thread, nobody's settings; kernels: vsp/run/kernels.py.
 export SOURCE_DATE_EPOCH := 1763337600
 export PYTHONHASHSEED := 0
 export PYTHONUTF8 := 1
@@ -50,7 +48,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
-.PHONY: help list quick paper-figures beyond-figures all lab runs study lookup proofs proofs-teacher course site test \
+.PHONY: help list quick paper-figures beyond-figures all lab runs study hub-teacher agents proofs proofs-teacher course site test \
   test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
@@ -74,7 +72,7 @@ quick: ## all steps of the paper with few runs, figures watermarked, into build/
 
 paper-figures: ## every figure and table of the paper, at the paper's scale (notebooks 01 to 05): 1 to 4 minutes
 lab: venv ## opens JupyterLab on the notebooks
-	@JUPYTER_CONFIG_PATH="$(CURDIR)/.jupyter" $(PY) -m jupyterlab notebooks/01_teacher.ipynb
+	@env -u MAKELEVEL JUPYTER_CONFIG_PATH="$(CURDIR)/.jupyter" $(PY) -m jupyterlab notebooks/01_teacher.ipynb
 
 ## Reproduce
 beyond-figures: ## what goes beyond the paper, our own method (notebooks 06 onward): 1 to 5 minutes
@@ -95,8 +93,11 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
 	$(PY) -m vsp.paper.make_runs --study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-lookup: begin venv ##- times of look-ups, neighbour graphs and fits in many dimensions, into data/beyond/: 2 to 5 minutes
-	$(PY) -m studies.benchmarks --out="$$OUT"
+	$(PY) -m studies.hub_teacher $${AGENT:+"$$AGENT"} --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
+	$(PY) -m studies.hub_teacher "$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
+agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent at most, resumable
+	$(PY) -m studies.agents "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
@@ -108,8 +109,7 @@ proofs-teacher: begin venv ##- proofs for a network: an HOUR at most
 course: begin venv ## three lessons: hand-out, solutions, slides, the lecturer's guide, into build/course/: 3 to 10 s
 	@$(PY) -m vsp_course.build --out="$$OUT"
 
-# The pages are laid out as the repository is, so that a link of the README leads to the same thing on the site. The old
-# site stays until the new one is whole.
+# Pages are laid out as the repository is, so that links work on both. The old site stays until the new one is whole.
 site test-site: export SITE := $(OUT)/build/site
 site: begin venv-site ## the companion as pages for a browser, into build/site/: 1 to 3 minutes
 	@$(PY) -m vsp_course.pages --out="$$OUT"

@@ -17,20 +17,21 @@ from . import algorithms, evaluation, rollouts
 from .algorithms import merge_regions, split_regions, teacher_episodes
 from .checks import check_seed
 from .config import Config, paper_preset
-from .evaluation import start_states
+from .evaluation import Likeness, start_states
 from .export import distances_latex
 from .geometry import nearest
 from .history import History
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .rollouts import Policy
+from .run.progress import shown
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
 
 __all__ = [
     "Config", "History", "Partition", "Policy", "Task", "VoronoiPolicy", "agent", "collect_episodes",
-    "distances_latex", "distill", "evaluate", "explore", "get_task", "load_teacher", "merge_regions", "nearest",
-    "preset", "register", "rollout", "rollout_from_seed", "split_regions", "start_states", "task_names",
+    "distances_latex", "distill", "evaluate", "explore", "get_task", "likeness", "load_teacher", "merge_regions",
+    "nearest", "preset", "register", "rollout", "rollout_from_seed", "split_regions", "start_states", "task_names",
     "teacher_episodes", "visited_states",
 ]  # fmt: skip
 
@@ -41,13 +42,14 @@ _MOVED = {
 
 
 def distill(
-    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int
+    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int, progress: bool = True
 ) -> tuple[VoronoiPolicy, History]:
     """Distil `teacher` to a `VoronoiPolicy` by the paper's method; its history can be replayed.
 
     `teacher` is whatever `agent` takes. `config` defaults to the paper's preset of the task. The same arguments give
-    the same policy. Raises ValueError if the teacher does not fit the task, if states or actions are not finite, for a
-    task without a preset, or if `seed` is not a non-negative integer.
+    the same policy. `progress` shows how far it is, and at last how alike teacher and policy are. Raises ValueError if
+    the teacher does not fit the task, if states or actions are not finite, for a task without a preset, or if `seed` is
+    not a non-negative integer.
     """
     check_seed(seed)
     task = get_task(task)
@@ -55,7 +57,19 @@ def distill(
         config = paper_preset(task)
     if not isinstance(config, Config):
         raise ValueError(f"config is {config!r:.40}, expected a Config, such as vsp.preset({task.name!r})")
-    return algorithms.distill(agent(teacher, task), task, config, seed=seed)
+    teacher = agent(teacher, task)
+    with shown(progress):
+        policy, history = algorithms.distill(teacher, task, config, seed=seed)
+        evaluation.remark(policy, teacher, task, config.n_iterations, "vsp_beyond.faithful")
+    return policy, history
+
+
+def likeness(policy: Policy, other: Policy, task: str | Task, n: int = 1000, *, seed: int = 7) -> Likeness:
+    """Compare `policy` with the agent `other`: actions, returns and failures in n episodes from the starts of `seed`.
+
+    An engine that is slow plays fewer. Raises ValueError unless both fit the task.
+    """
+    return evaluation.likeness(agent(policy, task), agent(other, task), task, n, seed=seed)
 
 
 def _of_any_agent(function: Callable) -> Callable:

@@ -18,6 +18,7 @@ from .history import History
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .rollouts import Episode, Policy, collect_episodes
+from .run.progress import steps
 from .tasks import Task
 
 # Number of teacher episodes rolled out together. The last bits of the teacher's float32 actions depend on the batch,
@@ -42,7 +43,8 @@ def distill(
     split, merge = split or split_regions, merge or merge_regions
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     partition, history = Partition(task, config), History(config.n_iterations)
-    for n, episode in enumerate(teacher_episodes(teacher, task, config.n_iterations, starts)):
+    episodes = teacher_episodes(teacher, task, config.n_iterations, starts)
+    for n, episode in enumerate(steps(episodes, "distilling", total=config.n_iterations, unit="iterations")):
         if n == 0:
             partition.add(episode.states[0], init)  # l. 1: the first state is the first codeword
         partition.observe(episode)  # l. 3-12

@@ -1,18 +1,50 @@
-"""Evaluate policies: episodic returns from start states that are the same for all policies."""
+"""Evaluate policies from start states that are the same for all, and compare a policy with the agent it imitates."""
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .checks import check_count, check_seed
-from .rollouts import Outcomes, Policy, rollout
-from .tasks.base import OUTCOMES, Task
+from .rollouts import Outcomes, Policy, record, rollout
+from .run import progress
+from .tasks.base import GOAL, OUTCOMES, Task
 from .tasks.registry import get_task
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ALIKE = 0.9  # R² from which a policy acts much like its agent
+FAILING = 0.02  # share of the episodes in which it may fail more often without a warning
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How much a policy acts like the agent that it imitates, and what both return."""
+
+    r2: float  # share of the variance of the agent's actions that the policy reproduces, on the agent's own states
+    states: np.ndarray  # (t, d) these states
+    errors: np.ndarray  # (t,) distance of the actions there, in half ranges
+    returns: dict[str, np.ndarray]  # by "policy" and "agent", (n,) from the same starts
+    failures: dict[str, int | None]  # episodes that do not reach the goal; None where nobody reaches one
+
+    @property
+    def poor(self) -> bool:
+        """Whether the actions differ much, or the policy fails more often."""
+        more = (self.failures["policy"] or 0) - (self.failures["agent"] or 0)
+        return self.r2 < ALIKE or more > FAILING * len(self.returns["policy"])
+
+    def __str__(self) -> str:
+        ours, theirs = (self.returns[name].mean() for name in ("policy", "agent"))
+        failed, n = self.failures, len(self.returns["policy"])
+        text = f"R² {self.r2:.3f} on {len(self.states):,} new states, return {ours:.5g} (agent: {theirs:.5g})"
+        ended = (
+            "" if failed["policy"] is None else f", {failed['policy']} of {n} episodes fail (agent: {failed['agent']})"
+        )
+        return "warning: " * self.poor + text + ended
 
 
 def start_states(task: str | Task, n_episodes: int, seed: int) -> np.ndarray:
@@ -35,6 +67,37 @@ def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: 
     result = rollout_from_seed(policy, task, n_episodes, seed=seed)
     named = np.array(OUTCOMES)[result.outcomes]
     return pd.DataFrame({"return": result.returns, "length": result.lengths, "outcome": named}).rename_axis("episode")
+
+
+def likeness(policy: Policy, agent: Policy, task: str | Task, n: int = 1000, *, seed: int = 7) -> Likeness:
+    """Compare `policy` with `agent` over n episodes from the starts of `seed`, fewer where an engine is slow.
+
+    Raises ValueError unless both fit the task.
+    """
+    task = get_task(task)
+    starts = start_states(task, max(10, n // task.slowness), seed)
+    played, episodes = record(agent, task, starts)
+    states, actions = (np.concatenate([getattr(one, part) for one in episodes]) for part in ("states", "actions"))
+    half = (task.action_high - task.action_low) / 2
+    theirs, ours = actions / half, np.asarray(policy.predict(states)[0]) / half
+    both = {"policy": rollout(policy, task, starts), "agent": played}
+    failures = {name: int((one.outcomes != GOAL).sum()) for name, one in both.items()}
+    spread = np.square(theirs - theirs.mean(axis=0)).sum()
+    r2 = 1 - np.square(ours - theirs).sum() / spread if spread else float(np.array_equal(ours, theirs))
+    nobody = all(count == len(starts) for count in failures.values())  # as in a task that has no goal
+    ended: dict[str, int | None] = dict.fromkeys(both) if nobody else {**failures}
+    returns = {name: one.returns for name, one in both.items()}
+    return Likeness(float(r2), states, np.linalg.norm(ours - theirs, axis=1), returns, ended)
+
+
+def remark(policy: Policy, agent: Policy, task: Task, n: int, advice: str) -> None:
+    """Print on standard error how alike they are in n / 40 episodes, at most 100, and `advice`, unless all is silent.
+
+    n is the number of episodes that the distillation played, so that this takes a small share of its time.
+    """
+    if progress.is_shown():
+        alike = likeness(policy, agent, task, min(100, n // 40))
+        print(f"{alike}; closer: {advice}", file=sys.stderr)
 
 
 def fences(q1: float, q3: float) -> tuple[float, float]:

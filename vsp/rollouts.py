@@ -55,20 +55,26 @@ def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
     return _play(policy, get_task(task), starts)
 
 
-def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
-    """Run one episode from each start state (n, s) and keep every state and action, in the order of `starts`.
+def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcomes, list[Episode]]:
+    """Run one episode from each start state (n, s); return how they ended, and every state and action of each.
 
     Raises ValueError as `rollout` does.
     """
     steps: Steps = []
-    n = len(_play(policy, get_task(task), starts, steps).returns)
+    outcomes = _play(policy, get_task(task), starts, steps)
+    n = len(outcomes.returns)
     if not n:
-        return []
+        return outcomes, []
     index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
     order = np.argsort(index, kind="stable")  # by episode; steps stay in time order
     states, actions = check_data(states[order], actions[order])
     ends = np.cumsum(np.bincount(index, minlength=n))
-    return [Episode(states[i:j], actions[i:j], checked=True) for i, j in pairwise([0, *ends.tolist()])]
+    return outcomes, [Episode(states[i:j], actions[i:j], checked=True) for i, j in pairwise([0, *ends.tolist()])]
+
+
+def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
+    """Return the episodes of `record`, in the order of `starts`. Raises ValueError as `rollout` does."""
+    return record(policy, task, starts)[1]
 
 
 def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:

@@ -1,9 +1,8 @@
 """What goes beyond the paper: few cells that act like any agent or return much, and proofs of what they do.
 
 `faithful` and `tuned` distil an agent, `at_the_limit` searches for the highest return: each has defaults for any task.
-`simplify` reduces cells and numbers, `likeness` compares a policy with its agent, `report` writes a page about both,
-`prove` proves what a policy does from every start. `few_cells`, `optimum`,
-`explain` and `proofs` hold the parts, `show` draws figures.
+`simplify` reduces cells and numbers, `report` writes a page about a policy and its agent, `prove` proves what a policy
+does from every start. `few_cells`, `optimum`, `explain` and `proofs` hold the parts, `show` draws figures.
 """
 
 from __future__ import annotations
@@ -12,8 +11,10 @@ import importlib
 from collections.abc import Callable
 
 from vsp import agent as as_agent
+from vsp.evaluation import remark
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
+from vsp.run.progress import shown
 from vsp.tasks import Task, get_task
 
 from .few_cells import Faithful, Tuned, faithful_preset, limit_preset, simplify, tuned_preset
@@ -22,20 +23,19 @@ from .few_cells.duration import expected_time
 from .few_cells.faithful import distill_faithfully
 from .few_cells.limit import search_limit, whole_search
 from .few_cells.tuned import distill_tuned
-from .likeness import likeness
 from .proofs import prove
 
 
 def faithful(
     agent: Policy, task: str | Task, config: Faithful | None = None, *,
-    n_cells: int | None = None, min_r2: float | None = None, seed: int,
+    n_cells: int | None = None, min_r2: float | None = None, seed: int, progress: bool = True,
 ) -> VoronoiPolicy:  # fmt: skip
     """Distil `agent` to few cells that act like it and return as much, in any task. Prints how long it will take.
 
     `config` defaults to `faithful_preset(task)`. `n_cells` is the largest number of cells. Given `min_r2`, the policy
     has the highest return among those whose actions have at least this R² against the agent's. The same arguments give
-    the same policy. Warns if no such policy is found. Raises ValueError if the agent does not fit the task, and for
-    numbers out of range.
+    the same policy. `progress` shows how far it is, and at last how alike agent and policy are. Warns if no such policy
+    is found. Raises ValueError if the agent does not fit the task, and for numbers out of range.
     """
     agent, task = as_agent(agent), get_task(task)
     if config is None:
@@ -44,10 +44,16 @@ def faithful(
         raise ValueError("n_cells and min_r2 are settings of config, expected either these or a config")
     check_kind(config, Faithful)
     print(f"distilling for {task.name}: {expected_time(task, config)}")
-    return distill_faithfully(agent, task, config, seed=seed)[0]
+    with shown(progress):
+        policy = distill_faithfully(agent, task, config, seed=seed)[0]
+        played = config.n_episodes + 2 * config.n_validation
+        remark(policy, agent, task, played, f"n_cells={2 * config.n_cells}")
+    return policy
 
 
-def tuned(agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int) -> VoronoiPolicy:
+def tuned(
+    agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int, progress: bool = True
+) -> VoronoiPolicy:
     """Distil `agent` to few cells and tune them on the return alone: they may act unlike it. Prints how long it will
     take.
 
@@ -59,11 +65,12 @@ def tuned(agent: Policy, task: str | Task, config: Tuned | None = None, *, seed:
     check_kind(config, Tuned)
     agent = agent if config.criticality else as_agent(agent)  # which would hide the critics
     print(f"distilling for {task.name}: {expected_time(task, config)}")
-    return distill_tuned(agent, task, config, seed=seed)[0]
+    with shown(progress):
+        return distill_tuned(agent, task, config, seed=seed)[0]
 
 
 def at_the_limit(
-    task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None
+    task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None, progress: bool = True
 ) -> VoronoiPolicy:
     """Search for at most `config.n_cells` cells whose return is as high as possible. Prints how long it will take.
 
@@ -76,7 +83,8 @@ def at_the_limit(
     config = limit_preset(task) if config is None else config
     check_kind(config, Tuned)
     print(f"searching for {task.name}: {expected_time(task, whole_search(task, config))}")
-    return search_limit(task, config, seed=seed, teacher=None if teacher is None else as_agent(teacher))
+    with shown(progress):
+        return search_limit(task, config, seed=seed, teacher=None if teacher is None else as_agent(teacher))
 
 
 def __getattr__(name: str) -> Callable:

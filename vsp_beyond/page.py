@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from vsp import agent as as_agent
+from vsp.evaluation import Likeness, likeness
 from vsp.paper.statistics import interval, share_interval
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
@@ -19,7 +20,6 @@ from vsp.show.explorer import explore, standalone
 from vsp.subpolicies.base import number
 from vsp.tasks import Task, get_task
 
-from .likeness import Likeness, likeness
 from .proofs import PROVERS
 
 MOST_INPUTS = 8  # in an equation; of more, the five that contribute most
@@ -43,10 +43,11 @@ def report(policy: VoronoiPolicy, agent: Policy, task: str | Task, *, name: str 
     task, agent = get_task(task), as_agent(agent)
     policy.check_linear()
     alike = likeness(policy, agent, task)
+    warning = [str(alike)] if alike.poor else []
     cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
     parts = [
         f"<p>{html.escape(name)} on {html.escape(task.name)}, imitated by linear maps in {cells}.</p>",
-        "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in remarks.splitlines()),
+        "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in [*remarks.splitlines(), *warning]),
         _numbers(alike), _cards(policy, alike), explore(policy, teacher=agent).element(), _worst(policy, agent, alike),
         _kept(policy),
     ]  # fmt: skip

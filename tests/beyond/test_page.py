@@ -10,20 +10,8 @@ import vsp
 import vsp_beyond
 from vsp_beyond import __main__ as command
 from vsp_beyond import page
-from vsp_beyond.likeness import likeness
 
 TWO = vsp.VoronoiPolicy([[-0.5, 0.01], [-0.5, -0.01]], [[[0], [0], [1]], [[0], [0], [-1]]], task=MOUNTAINCAR)
-
-
-def test_how_alike_by_hand():
-    """The teacher pushes with the velocity; half of its variance is that of a constant in each direction."""
-    same = likeness(PumpingTeacher(), PumpingTeacher(), MOUNTAINCAR, 20)
-    assert same.r2 == 1 and not same.errors.any() and same.failures == {"policy": 0, "agent": 0}
-    alike = likeness(TWO, PumpingTeacher(), MOUNTAINCAR, 20)
-    theirs, ours = (one.predict(alike.states)[0] for one in (PumpingTeacher(), TWO))
-    assert alike.r2 == pytest.approx(1 - np.mean((ours - theirs) ** 2) / theirs.var())
-    still = vsp.VoronoiPolicy([[0.0, 0.0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR)
-    assert likeness(still, PumpingTeacher(), MOUNTAINCAR, 20).failures["policy"] == 20
 
 
 def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):

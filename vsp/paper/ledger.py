@@ -151,7 +151,7 @@ def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _settings(results: dict[str, Results]) -> dict[str, float]:
     """Return the rerun's settings under the ids of the paper's: limits, rewards, hyperparameters, counts."""
-    settings = _environments() | {"initial_subpolicies": float(results[printed.TASKS[0]].runs[0].cells[0])}
+    settings = _environments() | {"initial_subpolicies": float(next(iter(results.values())).runs[0].cells[0])}
     for task, result in results.items():
         prefix, (runs, episodes) = printed.PREFIX[task], result.returns.shape
         counts = {"policies": runs, "episodes_per_policy": episodes, "total_episodes": runs * episodes}

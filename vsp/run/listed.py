@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .atomic import DamagedFile, atomic_path, read_bytes, remedy, sha256, write_text
-from .locks import folder_lock
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +34,8 @@ def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
 
 def list_file(path: str | os.PathLike) -> None:
     """Add the file at `path`, as it is, to the manifest of its folder."""
+    from .locks import folder_lock  # here: who reads needs no lock
+
     path = Path(path)
     with folder_lock(path.parent):
         _write_manifest(path.parent, {**_listed(path.parent), path.name: sha256(path)})

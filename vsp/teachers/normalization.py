@@ -90,14 +90,20 @@ def checked(moments: dict, epsilon: float, clip: float, d: int, where: str) -> N
     return Normalization(mean, variance, epsilon, clip)
 
 
-def sign(path: Path, saved: Saved) -> str:
-    """Return what shows that the agent in the zip at `path` was trained on normalised observations; empty: nothing."""
+def statistics_beside(path: Path) -> Path | None:
+    """Return the file of `VecNormalize` that lies beside the zip at `path` under a common name; None: there is none."""
     name, plain = path.with_suffix(""), ("vecnormalize.pkl", "vec_normalize.pkl")
     checkpoint = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", str(name))
-    statistics = [folder / file for folder in (name, path.parent) for file in plain]  # of the zoo, and of its hub
-    for beside in (Path(f"{name}.vecnormalize.pkl"), Path(f"{checkpoint}.pkl"), *statistics):
-        if beside.exists():
-            return f"{beside} lies beside it"
+    in_folders = [folder / file for folder in (name, path.parent) for file in plain]  # of the zoo, and of its hub
+    files = Path(f"{name}.vecnormalize.pkl"), Path(f"{checkpoint}.pkl"), *in_folders
+    return next((file for file in files if file.exists()), None)
+
+
+def sign(path: Path, saved: Saved) -> str:
+    """Return what shows that the agent in the zip at `path` was trained on normalised observations; empty: nothing."""
+    name = path.with_suffix("")
+    if beside := statistics_beside(path):
+        return f"{beside} lies beside it"
     for settings in (Path(f"{name}.config.yml"), name / "config.yml", path.parent / "config.yml"):
         if settings.is_file() and _says_normalize(settings):
             return f"{settings} says so"

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout, visited_states
+from vsp.run import progress
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
@@ -162,7 +163,7 @@ def _tune(
     pool = task.start(rng, POOL * config.n_tuning_episodes)
     result = rollout(teacher, task, pool)
     scores = result.returns - config.failure_penalty * (result.outcomes != GOAL)
-    for i in range(config.n_generations):
+    for i in progress.steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
         rows, steps = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
         starts, target = pool[rows], scores[rows].mean() + config.margin
         moved = [move(vector) for vector in steps]

@@ -14,6 +14,7 @@ import numpy as np
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout
+from vsp.run.progress import steps
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task, task_names
 from vsp.teachers.teacher import load_teacher
@@ -59,7 +60,8 @@ def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy 
     n_starts = N_SLOW if task.one_by_one else N_STARTS
     last, *seeds = np.random.SeedSequence(seed).generate_state(1 + n_starts + N_AGAIN).tolist()
     brief, again = (replace(config, n_generations=round(part * config.n_generations)) for part in (SCREENING, AGAIN))
-    screened = [_screened(teacher, task, brief, seeds[i], closest=i % 2 == 0) for i in range(n_starts)]
+    tried = steps(range(n_starts), "initial policies", total=n_starts, unit="searches")
+    screened = [_screened(teacher, task, brief, seeds[i], closest=i % 2 == 0) for i in tried]
     validation = task.start(np.random.default_rng(last), config.n_validation)
     best = max(screened, key=lambda policy: score(rollout(policy, task, validation), config.failure_penalty))
     best = _tuned(best, teacher, task, config, last)

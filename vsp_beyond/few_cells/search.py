@@ -11,6 +11,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
+from vsp.run.progress import steps
+
 from .anneal import expected_loss, squared_error, temperature_unit
 from .units import Cells, LabelledStates
 
@@ -31,7 +33,8 @@ def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.r
     some = labelled.rows(spread(labelled.inputs[:, :-1], FEW, rng))
     live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
-        ends = [descend(some, cells, stages) for cells in live]
+        tried = steps(live, f"fits with {n_cells} cells", total=len(live), unit="starts")
+        ends = [descend(some, cells, stages) for cells in tried]
         live = sorted(ends, key=lambda cells: squared_error(labelled, cells))[:n_kept]
     return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsp.rollouts import Outcomes, rollout
+from vsp.run.progress import steps
 from vsp.tasks.base import GOAL
 
 from .anneal import squared_error
@@ -58,7 +59,7 @@ def tune(
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
     """
     search = cma_es(cells.vector, config.tuning_step, rng)
-    for i in range(config.n_generations):
+    for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
         starts = scaling.task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
         candidates = [cells.like(vector) for vector in vectors]

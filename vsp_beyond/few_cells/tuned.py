@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, visited_states
+from vsp.run.progress import steps
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
@@ -57,7 +58,7 @@ def distill_tuned(
     first = linear_init(labelled, config.n_cells, init) if start is None else scaling.cells(start)
     candidates.add("line" if start is None else "start", 0, first)
     hot = config if start is None else replace(warm(config), n_steps=config.n_steps)
-    for restart in range(config.n_restarts):
+    for restart in steps(range(config.n_restarts), "fits", total=config.n_restarts, unit="starts"):
         cells = random_init(labelled, config.n_cells, init) if start is None else first
         candidates.add("fit", restart, anneal(labelled, cells, hot, batches))
     cells = candidates.best

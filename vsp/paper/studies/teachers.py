@@ -15,7 +15,7 @@ from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
 from ..baselines import linear_map
 from ..results import settings_id
-from ..runs import EVALUATION_SEED, Experiment, load_runs, make_all, outcome_shares, paper_experiment
+from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
 from .simpler import teacher_data
 
 VERSION = 1  # raise it when the same runs give other rows
@@ -34,21 +34,25 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) 
     """
     work = experiments(tasks)
     make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
-    rows = []
-    for (task, name), experiment in work.items():
-        teacher = rollout_from_seed(experiment.teacher, task, seed=EVALUATION_SEED).returns
-        made_with = provenance_of(experiment)
-        about = {
-            "task": task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"],
-            "version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"],
-            "linear_error": linear_error(experiment),
-        }  # fmt: skip
-        for run in load_runs(experiment, SEEDS, runs=runs):
-            returns = run.outcomes.returns
-            scores = {"mean": returns.mean(), "std": returns.std(ddof=1)}
-            scores |= {"teacher_mean": teacher.mean(), "teacher_std": teacher.std(ddof=1)}
-            shares = outcome_shares(run.outcomes.outcomes)
-            rows.append({**about, "seed": run.seed, "cells": len(run.policy), **scores, **shares})
+    parts = (rows_of(one, name, load_runs(one, SEEDS, runs=runs)) for (_, name), one in work.items())
+    return pd.concat(parts, ignore_index=True)
+
+
+def rows_of(experiment: Experiment, name: str, made: list[Run]) -> pd.DataFrame:
+    """Return the rows of the teacher with this `name`, one per run of `made`."""
+    rows, made_with = [], provenance_of(experiment)
+    teacher = rollout_from_seed(experiment.teacher, experiment.task, seed=EVALUATION_SEED).returns
+    about = {
+        "task": experiment.task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"],
+        "version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"],
+        "linear_error": linear_error(experiment),
+    }  # fmt: skip
+    for run in made:
+        returns = run.outcomes.returns
+        scores = {"mean": returns.mean(), "std": returns.std(ddof=1)}
+        scores |= {"teacher_mean": teacher.mean(), "teacher_std": teacher.std(ddof=1)}
+        shares = outcome_shares(run.outcomes.outcomes)
+        rows.append({**about, "seed": run.seed, "cells": len(run.policy), **scores, **shares})
     return pd.DataFrame(rows)
 
 

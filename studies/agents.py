@@ -1,0 +1,197 @@
+"""`make agents AGENTS=folder`: read, play and distil every agent of a folder, such as a clone of the public collection.
+
+Agents are zips of Stable-Baselines3 and sb3-contrib, ALGORITHM-TASK.zip or TASK.zip below a folder ALGORITHM. Each is
+distilled to the fewest of `SIZES` cells that act like it. What cannot be read or takes too long gets a row with the
+reason.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pandas as pd
+
+from vsp.evaluation import likeness
+from vsp.paper.results import load_made, make_missing, provenance
+from vsp.policy import VoronoiPolicy
+from vsp.run import atomic, command, sealed
+from vsp.tasks import Task, get_task
+from vsp.teachers.normalization import statistics_beside
+from vsp.teachers.teacher import Teacher, load_teacher
+from vsp_beyond.few_cells import faithful_preset
+from vsp_beyond.few_cells.duration import expected_seconds
+from vsp_beyond.few_cells.faithful import distill_faithfully
+
+from .comparison.methods import METHODS
+from .results import BEYOND, RESULTS, read_results, write_results
+
+SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
+N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw
+SECONDS = 600  # of processor time for one agent
+POINTS = 61  # of a map, along each axis
+ALGORITHMS = ("a2c", "ars", "crossq", "ddpg", "ppo", "sac", "td3", "tqc", "trpo")
+OF_AGENT = ["algorithm", "task", "weights", "zoo", "zoo_std", "agent", "agent_std", "agent_failing"]
+OF_POLICIES = ["cells", "numbers", "r2", "r2_least", "mean", "least", "most", "failing", "reason"]
+
+
+def agents_in(folder: Path) -> dict[tuple[str, str], Path]:
+    """Return the zips below `folder` by algorithm and task, the last version of each."""
+    found = {}
+    for path in sorted(folder.rglob("*.zip")):
+        first, _, rest = path.stem.partition("-")
+        named = (first, rest) if first in ALGORITHMS else (path.relative_to(folder).parts[0], path.stem)
+        found[named] = path
+    return found
+
+
+def read(path: Path, task: str | Task) -> Teacher:
+    """Return the agent in the zip at `path`, with the statistics of observations that lie beside it."""
+    return load_teacher(path, task, normalize=statistics_beside(path))
+
+
+def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
+    """Distil one agent; return the arrays and about of its file: the kept policy, the map of its actions, its row."""
+    row: dict = {"algorithm": algorithm, "task": name}
+    arrays: dict = {}
+    try:
+        with _at_most(SECONDS), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the row says how good the policies are
+            agent = read(path, name)
+            size, policies = _fewest(agent)
+            row |= _numbers(agent, size, policies)
+            arrays = {part: getattr(policies[0], part) for part in ("codewords", "coefficients", "scale")}
+            arrays["actions"] = agent.predict(plane(agent.task)[2])[0] if name in PLANES else np.zeros((0, 1))
+    except TimeoutError:
+        row["reason"] = f"slower than {SECONDS // 60} minutes"
+    except (ValueError, OSError, ImportError, gymnasium.error.Error) as error:
+        row["reason"] = str(error).splitlines()[0].replace(f"{path}: ", "")
+    return arrays, {"kind": "Agent", "checksum": atomic.sha256(path), **row}
+
+
+def _fewest(agent: Teacher) -> tuple[int, list[VoronoiPolicy]]:
+    """Return the fewest of `SIZES` cells whose policies act like the agent, else the most, and these policies."""
+    least, _ = expected_seconds(agent.task, faithful_preset(agent.task, n_cells=1))
+    if least * len(SEEDS) > SECONDS:
+        raise TimeoutError
+    for size in SIZES:
+        config = faithful_preset(agent.task, n_cells=size)
+        policies = [distill_faithfully(agent, agent.task, config, seed=seed)[0] for seed in SEEDS]
+        alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED).r2 for policy in policies]
+        if np.mean(alike) >= ENOUGH:
+            break
+    return size, policies
+
+
+def _numbers(agent: Teacher, size: int, policies: list[VoronoiPolicy]) -> dict:
+    """Return the numbers of a row: of the agent, and of the policies of all seeds."""
+    alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED) for policy in policies]
+    returns, n = alike[0].returns["agent"], len(alike[0].returns["agent"])
+    means = [float(one.returns["policy"].mean()) for one in alike]
+    numbers = {
+        "weights": sum(part.size for layer in agent.layers for part in layer),
+        "agent": float(returns.mean()), "agent_std": float(returns.std(ddof=1)),
+        "cells": size, "numbers": policies[0].coefficients.size + policies[0].codewords.size * (len(policies[0]) > 1),
+        "r2": float(np.mean([one.r2 for one in alike])), "r2_least": min(one.r2 for one in alike),
+        "mean": float(np.mean(means)), "least": min(means), "most": max(means),
+    }  # fmt: skip
+    if alike[0].failures["agent"] is not None:
+        numbers["failing"] = float(np.mean([one.failures["policy"] for one in alike])) / n
+        numbers["agent_failing"] = alike[0].failures["agent"] / n
+    return numbers | provenance_of(agent.task, agent.digest)
+
+
+def provenance_of(task: Task, digest: str) -> dict:
+    """Return what the row of an agent was made with, apart from the agent's file."""
+    presets = [vars(faithful_preset(task, n_cells=size)) for size in SIZES]
+    settings = {"presets": presets, "seeds": [*SEEDS], "r2": ENOUGH, "starts": [N_EPISODES, START_SEED]}
+    return provenance(settings, digest, METHODS["faithful"].version)
+
+
+def today() -> list[dict]:
+    """Return today's provenance of the committed rows that have one."""
+    rows = read_results("agents").dropna(subset=["settings"])
+    return [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
+
+
+@contextlib.contextmanager
+def _at_most(seconds: int) -> Iterator[None]:
+    """Raise TimeoutError in a block that takes more processor time."""
+
+    def late(*_) -> None:
+        raise TimeoutError
+
+    signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+
+
+def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a grid over the two variables of a task in `PLANES`: x (r, r), y (r, r), observations (r * r, d)."""
+    low, high, observed = PLANES[get_task(task).name]
+    x, y = np.meshgrid(*(np.linspace(*ends, POINTS) for ends in zip(low, high)))
+    return x, y, observed(x.ravel(), y.ravel())
+
+
+PLANES = {
+    "MountainCarContinuous-v0": ((-1.2, -0.07), (0.6, 0.07), lambda x, v: np.stack([x, v], axis=1)),
+    "Pendulum-v1": ((-np.pi, -8.0), (np.pi, 8.0), lambda a, speed: np.stack([np.cos(a), np.sin(a), speed], axis=1)),
+}
+
+
+def policy_of(algorithm: str, task: str) -> VoronoiPolicy:
+    """Return the committed policy of an agent, that of the first seed."""
+    return VoronoiPolicy.load(RESULTS / "agents" / f"{algorithm}-{task}.policy")
+
+
+def actions_of(algorithm: str, task: str) -> np.ndarray:
+    """Return the committed actions of an agent on the `plane` of its task. (r * r, m)"""
+    return sealed.load_arrays(RESULTS / "agents" / "actions.arrays", kind="Agents")[0][f"{algorithm}-{task}"]
+
+
+def write(made: dict[tuple[str, str], tuple[dict, dict]], out: Path) -> None:
+    """Write the table, the policies and the maps to OUT/data/beyond; arrays and about by algorithm and task."""
+    folder, maps = out / BEYOND / "agents", {}
+    for (algorithm, task), (arrays, _) in made.items():
+        if arrays:
+            maps[f"{algorithm}-{task}"] = arrays.pop("actions")
+            VoronoiPolicy(**arrays, task=task, metric="euclidean").save(folder / f"{algorithm}-{task}.policy")
+    sealed.save_arrays(folder / "actions.arrays", maps, {"kind": "Agents"})
+    frame = pd.DataFrame([about for _, about in made.values()]).merge(read_results("zoo"), "left")
+    columns = [*OF_AGENT, *OF_POLICIES, "checksum", "settings", "teacher", "version"]
+    frame = frame.reindex(columns=columns).sort_values(["task", "algorithm"])
+    whole = dict.fromkeys(("version", "cells", "numbers", "weights"), "Int64")  # also where a row lacks them
+    write_results(frame.astype(whole), "agents", out=out)
+
+
+def main() -> None:
+    """Study every agent of the folder that has no file yet, and write agents.csv, policies and maps."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("agents", type=Path, help="a folder of zips")
+    parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
+    parser.add_argument("--jobs", type=command.jobs, default=-1, help="worker processes, -1 for one per core")
+    given = parser.parse_args()
+    agents = agents_in(given.agents)
+    if not agents:
+        raise command.CommandError(f"{given.agents}: no .zip below it, expected a folder of agents: AGENTS=folder")
+    files = {given.out / "build" / "agents" / f"{'-'.join(name)}.agent": (*name, path) for name, path in agents.items()}
+    make_missing(study, files, "agents", jobs=given.jobs, unit="agents")
+    made = {
+        tuple(name): load_made(file, "Agent", {"checksum": atomic.sha256(path)})
+        for file, (*name, path) in files.items()
+    }
+    write(made, given.out)
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

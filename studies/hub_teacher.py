@@ -1,0 +1,55 @@
+"""`make hub-teacher AGENT=file.zip`: the paper's MountainCar part with another teacher, such as one of a model hub.
+
+The paper's own teacher is the RL Zoo's TD3 agent, whose weights we do not have. `make study AGENT=file.zip` does the
+same with the zoo's DDPG agent, its sibling.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from vsp.paper.ledger import ledger_table, results_of
+from vsp.paper.results import write_results
+from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher_outcomes
+from vsp.paper.studies.teachers import rows_of
+from vsp.run import command
+
+from .agents import read
+
+TASK = "MountainCarContinuous-v0"
+
+
+def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Distil the agent as often as the paper does; return a row per run, and the ledger of the task's results."""
+    experiment = replace(paper_experiment(TASK), teacher=read(agent, TASK))
+    made = make_runs(experiment, range(N_RUNS[TASK]), runs=runs, jobs=jobs)
+    results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+    return rows_of(experiment, agent.stem, made), results_of(ledger_table({TASK: results}), TASK)
+
+
+def main() -> None:
+    """Write hub_teacher.csv and hub_teacher_ledger.csv, and print the second."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("agent", type=Path, nargs="?", help="a zip of Stable-Baselines3, trained for this task")
+    parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/results, runs to OUT/build/study")
+    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
+    given = parser.parse_args()
+    if given.agent is None:
+        print("hub_teacher.csv is kept, because it needs the zoo's DDPG agent: make study AGENT=file.zip")
+        return
+    try:
+        rows, ledger = study(given.agent, given.out / "build" / "study", jobs=given.jobs)
+    except ValueError as error:
+        raise command.CommandError(error) from error
+    write_results(rows, "hub_teacher", out=given.out)
+    write_results(ledger, "hub_teacher_ledger", out=given.out)
+    print(ledger[["subject", "quantity", "paper", "here", "low", "high", "verdict"]].to_string(index=False))
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()
