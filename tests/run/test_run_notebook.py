@@ -46,6 +46,7 @@ def test_success_twice(tmp_path):
     """Files arrive; the executed copy is clean; a second run touches nothing; another value changes one file."""
     show = "print(Path(runs).name)\ndisplay(1)\nprint('two', flush=True)\nprint('three')\n40 + 2"
     notebook, out = write(tmp_path, DRAW, "", show), tmp_path / "out with space"
+    notebook.write_text(notebook.read_text().replace("python", "julia"))  # saved with another kernel
     run(notebook, "--out", out, "--expect", "figures/a.txt", "figures/b.txt")
     first = tree(out)
     assert set(first) == {"figures/a.txt", "figures/b.txt", "figures/executed/story.ipynb"}

@@ -135,7 +135,7 @@ def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[Note
     from nbclient.exceptions import CellTimeoutError, DeadKernelError
 
     # The folder as in JupyterLab
-    options = {"kernel_name": KERNEL, "cwd": notebook.parent, "execution_timeout": TIMEOUT}
+    options = {"kernel_name": KERNEL, "language": "python", "cwd": notebook.parent, "execution_timeout": TIMEOUT}
     quiet = {"progress_bar": False, "extra_arguments": ["--log-level=CRITICAL"]}  # no log messages on standard error
     try:
         with _environment(work):
