@@ -93,6 +93,8 @@ def student(lesson: NotebookNode) -> NotebookNode:
 def solution(lesson: NotebookNode) -> NotebookNode:
     """Return the solution: answers between their marks, no lecturer's cells. nbgrader takes it as its source."""
     made = copy.deepcopy(lesson)
+    # A kernel of the author's own, as in Conda, is unknown to nbgrader and to students
+    made.metadata.kernelspec = {"name": "python3", "display_name": "Python 3 (ipykernel)", "language": "python"}
     made.cells = [cell for cell in made.cells if not for_lecturer(cell) and not is_slide(cell)]
     return made
 

@@ -181,6 +181,12 @@ def test_slides_are_in_no_copy_and_nothing_of_the_lecturers_in_the_hand_out(tmp_
     assert "project.md" in names and not names & {"project_marking.md", "project_solution.py", "guide.md", "reveal.js"}
 
 
+def test_copies_name_the_kernel_of_every_installation():
+    lesson = build.solution(LESSONS["lesson_1_black_box.ipynb"])
+    lesson.metadata = {"kernelspec": {"name": "mine", "display_name": "Mine", "language": "python"}}
+    assert build.student(lesson).metadata.kernelspec["name"] == "python3"
+
+
 def test_a_lesson_without_slides_is_refused():
     with pytest.raises(ValueError, match="no cell tagged 'slide'"):
         slides.slides(build.student(LESSONS["lesson_1_black_box.ipynb"]))
