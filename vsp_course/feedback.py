@@ -21,7 +21,7 @@ import numpy as np
 
 from vsp.rollouts import Episode
 
-WIDTH = 90  # characters of a message's lines
+WIDTH = 83  # characters of a message's lines: nbgrader's Validate cuts longer ones
 _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with questions
 
 
@@ -118,6 +118,8 @@ class Exercise:
 
     def _failure(self, function: Callable, error: BaseException) -> NotYet:
         """Return the exception to raise if a student's function ends with `error`."""
+        if type(error).__name__ == "StdinNotImplementedError":  # a kind of NotImplementedError
+            return self.wrong(f"a call of `input` {_place(function, error)}", "a result from the arguments alone")
         if isinstance(error, NotImplementedError):
             stub = traceback.extract_tb(error.__traceback__)[-1].name
             if stub == getattr(function, "__name__", stub):

@@ -473,6 +473,9 @@ def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
         feedback.Exercise("1.2", "fit").call(names["fit"], [1])
     with pytest.raises(feedback.NotYet, match="TypeError.* when it is called"):
         feedback.Exercise("1.2", "fit").call(len, 1)
+    exec("from IPython.core.error import StdinNotImplementedError as error\ndef fit():\n    raise error", names)
+    with pytest.raises(feedback.NotYet, match="found a call of `input` .*, expected a result from the arguments"):
+        feedback.Exercise("1.2", "fit").call(names["fit"])
 
 
 def test_errors_of_many_lines_and_what_is_no_number_are_told_in_one_line():
