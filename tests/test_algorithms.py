@@ -98,13 +98,6 @@ def test_split_loss_clipped_forgives_what_the_action_box_hides(loss, bias, split
     assert len(split(partition, walk([[0.5, 0.5]], [1]))) == splits and partition.buffers.counts[0] == 1 - splits
 
 
-def test_the_new_cell_is_random_and_empty():
-    partition = partition_of([[0, 0.5]], config=tiny(max_pol_loss=0.01, min_pol_distance=0.1))
-    split(partition, walk([[0.5, 0.5]], [1]))
-    assert np.ptp(partition.models.coefficients[1]) > 0 and partition.buffers.counts[1] == 0
-    assert not partition.models.coefficients[0].any()
-
-
 def test_scale_box_divides_by_the_width_of_the_box():
     episode = Episode(np.array([[-0.5, 0.03]]), np.ones((1, 1)))  # 0.03 of a velocity range of 0.14
     for scale, splits in (("raw", 0), ("box", 1)):
@@ -178,17 +171,6 @@ def test_merge_resets_neighbours_that_stay():
     partition = partition_of(ROW, [5, 0, 0.1], config=tiny(min_param_distance=0.25))
     merge_regions(partition, partition.config)  # the middle one swallows the last: the first is a neighbour
     assert partition.codewords.tolist() == ROW[:2] and partition.buffers.counts.tolist() == [0, 0]
-
-
-def test_a_merge_of_equal_cells_leaves_one():
-    partition = partition_of(np.random.default_rng(2).random((9, 2)))
-    removed = merge_regions(partition, partition.config)
-    assert len(removed) == 8 and len(partition.codewords) == 1
-
-
-def test_one_cell_neither_merges_nor_fails():
-    partition = partition_of(ROW[:1])
-    assert merge_regions(partition, TINY) == [] and partition.buffers.counts.tolist() == [1]
 
 
 def test_adam_on_reset_restart_forgets_the_moments():

@@ -78,11 +78,6 @@ def test_delaunay_by_hand(points, expected):
     assert is_graph(graph) and edges(graph) == expected
 
 
-def test_a_square_has_its_sides_and_one_diagonal():
-    square = edges(delaunay_neighbours(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])))
-    assert square - {(0, 3), (1, 2)} == {(0, 1), (0, 2), (1, 3), (2, 3)} and len(square) == 5
-
-
 def test_all_differ():
     points = np.array([[0.25, 0.5], [0.5, 0.25], [0.25, 0.75]])
     assert all_differ(points) and all_differ(points[:1]) and all_differ(points[:0])

@@ -28,9 +28,8 @@ def test_criticality_is_the_value_of_the_own_action_over_that_of_the_worst():
 def test_the_value_of_an_action_is_that_of_the_lower_critic():
     states, actions = np.array([[0.2, 0.4], [0.5, 0.5]]), np.array([[0.5, -1.0], [0.0, 0.25]])
     both = Critics(teacher_with(qf0=[0, 0, 2, -1], qf1=[1, 0, 0, 0]))  # 2 a - b and x
-    assert (
-        both.value(states, actions) == pytest.approx([0.2, -0.25]) and both.value(states, actions).dtype == np.float64
-    )
+    value = both.value(states, actions)
+    assert value == pytest.approx([0.2, -0.25]) and value.dtype == np.float64
     with pytest.raises(ValueError, match="no critics, expected qf0.0.weight"):
         Critics(teacher_with())
     with pytest.raises(ValueError, match="CurvedTeacher has no critics"):
@@ -41,8 +40,5 @@ def test_values_are_of_actions_in_the_units_of_the_task():
     task = dataclasses.replace(get_task(MOUNTAINCAR), action_low=np.array([2.0]), action_high=np.array([6.0]))
     actor = {"mu.0.weight": np.zeros((1, 2)), "mu.0.bias": np.zeros(1)}
     critic = {"qf0.0.weight": np.array([[0.0, 0.0, 1.0]]), "qf0.0.bias": np.zeros(1)}
-    assert Critics(Teacher(actor, task, critic=critic)).value(np.zeros((3, 2)), [[2.0], [4.0], [5.0]]).tolist() == [
-        -1,
-        0,
-        0.5,
-    ]
+    value = Critics(Teacher(actor, task, critic=critic)).value(np.zeros((3, 2)), [[2.0], [4.0], [5.0]])
+    assert value.tolist() == [-1, 0, 0.5]

@@ -9,24 +9,10 @@ from vsp_beyond.explain.lime import compare_maps, gradient_map, local_map
 
 SCALE = np.array([0.2, 0.3])
 STATE = np.array([0.6, 0.4])
-LINE = np.array([[0.5, -0.2], [0.1, 0.7], [0.05, -0.3]])  # two weights and a bias for each of two actions
-
-
-class Line:
-    """Actions that are linear everywhere, beyond the limits too."""
-
-    def predict(self, obs):
-        return np.asarray(obs, dtype=np.float64) @ LINE[:-1] + LINE[-1], None
 
 
 def rng():
     return np.random.default_rng(0)
-
-
-def test_of_a_linear_teacher_lime_finds_the_line():
-    line = local_map(Line(), SIMPLEGOAL, STATE, scale=SCALE, rng=rng())
-    assert np.allclose(line, LINE, atol=2e-3) and not np.allclose(line, LINE, atol=1e-6)  # the ridge shrinks a little
-    assert np.allclose(gradient_map(Line(), STATE, scale=SCALE), LINE, atol=1e-12)
 
 
 def test_lime_by_hand():

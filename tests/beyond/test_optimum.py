@@ -56,11 +56,8 @@ def test_the_shortest_way_earns_the_closed_form():
 
 def test_the_best_policy_returns_more_than_the_teacher_by_what_its_actions_lose():
     """On a coarse grid, by which some cars come too late."""
-    starts, best, teacher = (
-        start_states(MOUNTAINCAR, 50, 0),
-        best_policy(MOUNTAINCAR, finer=0.5),
-        load_teacher(MOUNTAINCAR),
-    )
+    best, teacher = best_policy(MOUNTAINCAR, finer=0.5), load_teacher(MOUNTAINCAR)
+    starts = start_states(MOUNTAINCAR, 50, 0)
     of_best, of_teacher = (rollout(policy, MOUNTAINCAR, starts) for policy in (best, teacher))
     there = of_best.lengths < 999
     regret = (of_best.returns - of_teacher.returns)[there].mean()

@@ -20,10 +20,8 @@ TRIED = (SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER)
 def test_any_task_has_settings_that_suit_its_size(preset):
     """A physics engine steps one state at a time: fewer episodes there."""
     assert all(preset(task).n_cells <= 8 for task in TRIED)
-    walker, like_pendulum = (
-        preset("BipedalWalker-v3"),
-        preset(dataclasses.replace(vsp.get_task(PENDULUM), name="My-v0")),
-    )
+    walker = preset("BipedalWalker-v3")
+    like_pendulum = preset(dataclasses.replace(vsp.get_task(PENDULUM), name="My-v0"))
     assert walker.n_episodes == 100 < like_pendulum.n_episodes
     assert walker.n_tuning_episodes < like_pendulum.n_tuning_episodes
     assert all(limit_preset(task).n_generations > tuned_preset(task).n_generations for task in TRIED)

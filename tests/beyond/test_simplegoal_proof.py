@@ -16,7 +16,6 @@ import vsp
 import vsp_beyond
 from studies import comparison
 from vsp.run import sealed
-from vsp.tasks import GOAL
 from vsp_beyond.proofs import PROVERS, check, largest_disturbance, load_certificate, proved, steps_to_goal
 from vsp_beyond.proofs.polygons import box, line_of, meet, total
 from vsp_beyond.proofs.proof import CERTIFICATES, RESULTS
@@ -74,14 +73,6 @@ def test_lines_meet_and_are_in_smallest_integers():
     assert line_of((HALF, Fraction(1, 3), -ONE)) == (3, 2, -6)
     x, y, w = meet((1, 0, -2), (0, 3, -1))
     assert (Fraction(x, w), Fraction(y, w)) == (2, Fraction(1, 3)) and w > 0
-
-
-@given(st.lists(st.tuples(*[st.integers(-9, 9)] * 3).filter(any), max_size=6))
-def test_parts_add_up_to_the_whole(lines):
-    parts = [SQUARE]
-    for line in lines:
-        parts = [half for part in parts for half in part.cut(line) if half]
-    assert total([part.area() for part in parts]) == 1 and all(part.area() > 0 for part in parts)
 
 
 # The closed loop
@@ -168,15 +159,6 @@ def test_every_task_has_its_own_prover():
 
 
 # Over a grid
-
-
-def test_boxes_agree_with_pieces():
-    steps = steps_to_goal(TWO, n=100)
-    assert 0 < (steps > 0).mean() <= vsp_beyond.prove(TWO).areas["goal"]
-    starts = np.random.default_rng(2).uniform(size=(20_000, 2))
-    result, promised = vsp.rollout(TWO, SIMPLEGOAL, starts), steps[tuple((starts * 100).astype(int).T)]
-    assert (result.outcomes[promised > 0] == GOAL).all()
-    assert (result.lengths <= promised)[promised > 0].all()
 
 
 def test_the_largest_disturbance_is_smaller_than_what_breaks_it():

@@ -7,8 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
 from scipy.stats import trim_mean
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
@@ -317,27 +315,8 @@ def test_gaps_by_hand():
     assert found.index.name == "statistic" and found["wide"].tolist() == [True, False, False, True, True, True]
 
 
-NUMBERS = st.floats(-100, 100)
-
-
-@given(NUMBERS, st.floats(0, 20), st.floats(0, 20), st.integers(-100_000, 100_000), st.integers(0, 3))
-def test_what_lies_inside_the_band_is_reproduced(here, below, above, number, digits):
-    """The figure's band and the verdict agree, up to the half unit that the verdict adds."""
-    printed = f"{number / 10**digits:.{digits}f}"
-    assume(abs(float(printed)) < 200)
-    low, high = here - below, here + above
-    found = verdict(row(printed, here, low, high))
-    gap = largest_gaps(rows(("sg_ours_mean", "Ours", printed, here, low, high, found)))["gap"].item()
-    wide = (above if gap > 0 else below) > 0.5 * ledger.last_digit(printed)
-    if abs(gap) < (0.999 * ROOT2 if wide else 0.999):
-        assert found == REPRODUCED
-    if abs(gap) > 1.001 * ROOT2 + 1:
-        assert found == DIFFERS
-
-
 def test_a_tie_beats_nobody():
     same = dataclasses.replace(BY_HAND, runs=[run(i, BY_HAND.teacher_returns) for i in range(2)])
     here = ledger.left_out_by_quartiles(same, n_resamples=5)["here"]
-    assert (
-        here["probability that a run beats its teacher"] == here["probability that an episode beats the teacher's"] == 0
-    )
+    beats = here[["probability that a run beats its teacher", "probability that an episode beats the teacher's"]]
+    assert (beats == 0).all()

@@ -28,19 +28,6 @@ def test_every_row_says_where_it_was_read(file):
         assert len({row["where"] for row in rows}) == len(rows)
 
 
-def test_hyperparameters():
-    assert printed_hyperparameters(SIMPLEGOAL) == {
-        "n_epochs": 5000, "n_split": 20, "n_merge": 100, "n_freeze": 1000, "n_reset": 500,
-        "min_param_distance": 0.5, "min_pol_distance": 0.3, "max_pol_loss": 1e-4, "one_split": False,
-    }  # fmt: skip
-    assert printed_hyperparameters(MOUNTAINCAR) == {
-        "n_epochs": 2000, "n_split": 50, "n_merge": 100, "n_freeze": 400, "n_reset": 500,
-        "min_param_distance": 0.3, "min_pol_distance": 0.04, "max_pol_loss": 1e-5, "one_split": False,
-    }  # fmt: skip
-    assert type(printed_hyperparameters(SIMPLEGOAL)["one_split"]) is bool
-    assert type(printed_hyperparameters(SIMPLEGOAL)["n_epochs"]) is int
-
-
 def test_text_numbers_are_what_is_printed():
     frame = printed_text_numbers()
     assert not (frame[["task", "quantity", "subject", "printed", "where"]] == "").any(axis=None)
@@ -104,7 +91,8 @@ def test_values_of_the_tables_are_among_the_printed(printed, task, prefix):
             assert found["value"] == float(found["paper"]) == row[subject] and found["where"] == row["where"]
     for name, value in printed_hyperparameters(task).items():
         found = printed.loc[f"{prefix}_hyper_{name}"]
-        assert (found["task"], found["value"], ast.literal_eval(found["paper"])) == (task, float(value), value)
+        literal = ast.literal_eval(found["paper"])
+        assert (found["task"], found["value"], literal, type(literal)) == (task, float(value), value, type(value))
     cells = printed[printed.index.str.startswith(f"{prefix}_cell_")]
     frame = printed_module.linear_policies(task)
     for id, found in cells.iterrows():

@@ -94,9 +94,8 @@ def test_weights_that_are_all_the_same_change_nothing(weight):
     states, actions = examples(SIMPLEGOAL)
     found = advantage_weighted(states, actions, size=3, teacher=Even(), task=SIMPLEGOAL, seed=1)
     expected = kmeans_cells(states, actions, cells=3, task=SIMPLEGOAL, seed=1)
-    assert np.allclose(found.coefficients, expected.coefficients) and np.array_equal(
-        found.codewords, expected.codewords
-    )
+    assert np.array_equal(found.codewords, expected.codewords)
+    assert np.allclose(found.coefficients, expected.coefficients)
 
 
 def test_a_weight_is_as_good_as_so_many_copies():

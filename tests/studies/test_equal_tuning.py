@@ -45,10 +45,8 @@ def test_every_method_stands_beside_its_imitation(rows):
 
 def test_who_leads(rows):
     table = leaders(equal_budget(rows))
-    assert table[["size", "rival", "ahead"]].to_numpy().tolist() == [
-        [2, "axis tree, constants", "ours"],
-        [4, "axis tree, constants", "level"],
-    ]
+    assert set(table["rival"]) == {"axis tree, constants"}
+    assert table[["size", "ahead"]].to_numpy().tolist() == [[2, "ours"], [4, "level"]]
 
 
 def test_a_size_without_rivals_is_left_out(rows):

@@ -2,16 +2,8 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS
 
-from studies.comparison import (
-    all_rows,
-    best_mean,
-    limit_summary,
-    near,
-    references,
-    robots_summary,
-    starts_summary,
-    with_regret,
-)  # fmt: skip
+from studies import comparison
+from studies.comparison import all_rows, best_mean, near, references, with_regret
 from studies.results import read_results, write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3}
@@ -28,7 +20,7 @@ def test_shares_regret_and_failures_by_hand(tmp_path):
     frame = rows(*(("at the limit", 3, seed, mean) for seed, mean in enumerate((99.2, 99.4, 99.0, 99.4))))
     frame.loc[2, "failing"] = 0.25
     write_results(frame, f"limit_{MOUNTAINCAR}", out=tmp_path)
-    found = limit_summary(MOUNTAINCAR, tmp_path / "data/beyond").iloc[0]
+    found = comparison.limit_summary(MOUNTAINCAR, tmp_path / "data/beyond").iloc[0]
     assert (found["size"], found["policies"], found["near"], found["least"], found["failing"]) == (3, 4, 0.75, 99, 0.25)
     assert found["regret"] == pytest.approx(99.6 - 99.25) and found["low"] < 99.25 < found["high"]
 
@@ -38,7 +30,7 @@ def test_robots_stand_beside_their_teacher(tmp_path):
     found += [("one map, random search", 0, 0, 20.0), ("robot's teacher", 0, 0, 100.0)]
     frame = rows(*found).assign(r2=[0.8, 0.9, 0.7, -1.0, 1.0])
     write_results(frame, f"robots_{CHEETAH}", out=tmp_path)
-    table = robots_summary(CHEETAH, tmp_path / "data/beyond").set_index("method")
+    table = comparison.robots_summary(CHEETAH, tmp_path / "data/beyond").set_index("method")
     assert table.index[0] == "robot's teacher" and table.loc["cells", "share"] == 0.5
     assert table.loc["cells", "r2"] == pytest.approx(0.85) and table.loc["cells", "policies"] == 2
     assert table.loc["one map, random search", "share"] == 0.2 and table.loc["oblique tree", "share"] == 0.3
@@ -57,7 +49,7 @@ def test_searches_stand_in_the_order_of_their_length(tmp_path):
     }
     for table, found in of_table.items():
         write_results(rows(*found), f"{table}_{MOUNTAINCAR}", out=tmp_path)
-    table = starts_summary(MOUNTAINCAR, tmp_path / "data/beyond")
+    table = comparison.starts_summary(MOUNTAINCAR, tmp_path / "data/beyond")
     by_length = ["our cells, tuned", "our cells, 800 generations", "at the limit, from the teacher", "at the limit"]
     assert table["method"].tolist() == by_length
     assert table["mean"].tolist() == [95.5, 96.0, 97.0, 99.4] and table["least"].iloc[0] == 95

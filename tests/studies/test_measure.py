@@ -5,15 +5,7 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import measure as measure_module
-from studies.comparison.measure import (
-    ERROR_SEED,
-    REPORT_SEED,
-    action_error,
-    common_states,
-    fidelity,
-    measure,
-    sameness,
-)  # fmt: skip
+from studies.comparison.measure import action_error, common_states, fidelity, measure, sameness
 from studies.rivals.dagger import dagger
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout_from_seed, start_states
 from vsp.paper.baselines import Tree
@@ -26,9 +18,9 @@ def test_what_is_reported_by_hand(monkeypatch):
     monkeypatch.setattr(measure_module, "N_ERROR", 10)
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
     policy = VoronoiPolicy(np.zeros((1, 2)), [[[0, 0], [0, 0], [-1, -1]]], task=task)
-    row, result = measure(policy, teacher, task), rollout_from_seed(policy, task, 30, seed=REPORT_SEED)
+    row, result = measure(policy, teacher, task), rollout_from_seed(policy, task, 30, seed=measure_module.REPORT_SEED)
     assert row["mean"] == result.returns.mean() and row["failing"] == np.mean(result.outcomes != 1)
-    starts = start_states(task, 10, ERROR_SEED)
+    starts = start_states(task, 10, measure_module.ERROR_SEED)
     assert row["error_own"] == action_error(policy, teacher, task, starts, by=policy)
     assert row["error_teacher"] == action_error(policy, teacher, task, starts, by=teacher) != row["error_own"]
     assert row["cells"] == 1
@@ -50,7 +42,7 @@ def test_no_start_that_is_reported_was_chosen_on(seed=0):
     distill_tuned(CurvedTeacher(), task, config, seed=seed)
     dagger([lambda states, actions: Tree(states, actions, leaves=2)], CurvedTeacher(), task, rounds=config, seed=seed)
     seen = {tuple(row) for rows in drawn for row in rows}
-    for own in (REPORT_SEED, ERROR_SEED):
+    for own in (measure_module.REPORT_SEED, measure_module.ERROR_SEED):
         assert not seen & {tuple(row) for row in start_states(get_task(SIMPLEGOAL), 10_000, own)}
     assert len(seen) == 20 + 5 + 2 * 50 + 2 * 5  # both begin their episodes alike, and validate each for itself
 
@@ -101,12 +93,8 @@ def test_other_cells_and_actions_by_hand(few):
 
 
 def test_one_cell_has_no_index(few):
-    single = constants([[0.5, 0.5]], [[0, 0]])
-    rows = sameness(
-        {0: single, 1: constants([[0.2, 0.5], [0.8, 0.5]], [[0, 0], [1, 1]]), 2: single},
-        CurvedTeacher(),
-        get_task(SIMPLEGOAL),
-    )
+    single, two = constants([[0.5, 0.5]], [[0, 0]]), constants([[0.2, 0.5], [0.8, 0.5]], [[0, 0], [1, 1]])
+    rows = sameness({0: single, 1: two, 2: single}, CurvedTeacher(), get_task(SIMPLEGOAL))
     assert rows["index"].isna().all() and rows["ratio"].tolist()[1] == 0.0 and len(rows) == 3
 
 

@@ -3,22 +3,9 @@ import pandas as pd
 import pytest
 from support import SIMPLEGOAL
 
+from studies.comparison import summary
 from studies.comparison.methods import METHODS
-from studies.comparison.summary import (
-    AS_GOOD,
-    LEAST_R2,
-    PARTS,
-    TUNED,
-    ablation,
-    ahead,
-    headline,
-    largest_alike,
-    likeness,
-    method_summary,
-    other_teachers,
-    over_groups,
-    teacher_of,
-)  # fmt: skip
+from studies.comparison.summary import TUNED
 from vsp.run import listed
 
 ROWS = pd.DataFrame(
@@ -34,7 +21,7 @@ ROWS = pd.DataFrame(
 
 
 def test_a_summary_has_a_row_per_method_and_size():
-    table = method_summary(ROWS)
+    table = summary.method_summary(ROWS)
     (row,) = table[(table["method"] == TUNED) & (table["size"] == 2)].to_dict("records")
     assert (row["policies"], row["mean"], row["median"]) == (3, pytest.approx(8.4), 9.0)
     assert row["failing"] == pytest.approx(0.1 / 3)
@@ -47,9 +34,9 @@ def test_a_summary_has_a_row_per_method_and_size():
 
 @pytest.mark.parametrize(("lift", "expected"), [(0, "level"), (10, "ours"), (-10, "theirs")])
 def test_who_is_ahead(lift, expected):
-    table = method_summary(ROWS.assign(mean=ROWS["mean"] + lift * (ROWS["method"] == TUNED)))
+    table = summary.method_summary(ROWS.assign(mean=ROWS["mean"] + lift * (ROWS["method"] == TUNED)))
     ours, theirs = (table[(table["method"] == m) & (table["size"] == 2)].iloc[0] for m in (TUNED, "CART"))
-    assert ahead(ours, theirs) == expected
+    assert summary.ahead(ours, theirs) == expected
 
 
 @pytest.mark.parametrize(
@@ -59,12 +46,12 @@ def test_who_is_ahead(lift, expected):
 def test_what_is_as_good_as_the_teacher(task, shares):
     """Of a teacher with 9.01: at least 8.98 and few failures, above it and none, at least 8.92."""
     rows = ROWS[ROWS["method"] == TUNED]
-    good = AS_GOOD[task](rows, teacher_of(ROWS)).groupby(rows["size"]).mean()
+    good = summary.AS_GOOD[task](rows, summary.teacher_of(ROWS)).groupby(rows["size"]).mean()
     assert good.tolist() == pytest.approx(shares)
 
 
 def test_the_headline_is_of_the_size_of_the_preset():
-    (row,) = headline({SIMPLEGOAL: ROWS}).to_dict("records")
+    (row,) = summary.headline({SIMPLEGOAL: ROWS}).to_dict("records")
     half = 4.3027 / np.sqrt(3)  # three seeds: 9, 10 and 11
     low, high = (pytest.approx(end, abs=1e-3) for end in (10 - half, 10 + half))
     assert row == {
@@ -75,15 +62,15 @@ def test_the_headline_is_of_the_size_of_the_preset():
 
 def test_a_hundredth_of_a_negative_return_is_below_it():
     teacher, own = pd.Series({"mean": -100.0}), pd.DataFrame({"mean": [-101.0, -101.1, -99.0]})
-    assert AS_GOOD["Pendulum-v1"](own, teacher).tolist() == [True, False, True]
+    assert summary.AS_GOOD["Pendulum-v1"](own, teacher).tolist() == [True, False, True]
 
 
 def test_an_ablation_is_that_of_the_size_of_the_preset():
     one = ROWS[ROWS["method"] == "our cells, no annealing"].assign(method="our cells, one restart", mean=5.0)
-    table = ablation(pd.concat([ROWS, one]))
+    table = summary.ablation(pd.concat([ROWS, one]))
     assert table["part"].tolist() == ["all parts", "no annealing", "one restart", "no tuning"]
     assert table["mean"].tolist() == [10.0, 3.0, 5.0, 20.0] and set(table["size"]) == {4}
-    assert set(PARTS) <= set(METHODS)
+    assert set(summary.PARTS) <= set(METHODS)
 
 
 # Policies that act like their teacher
@@ -117,7 +104,7 @@ def results(tmp_path):
 
 
 def test_a_row_says_how_many_are_like_the_teacher_and_as_good(results):
-    two, three = likeness(SIMPLEGOAL, results).to_dict("records")
+    two, three = summary.likeness(SIMPLEGOAL, results).to_dict("records")
     assert (two["policies"], two["like"], two["good"], two["both"]) == (4, 0.75, 0.75, 0.5)
     assert (two["r2"], two["r2_least"], two["mean"]) == (pytest.approx(0.965), 0.94, 16.6)
     assert (two["index"], two["ratio"]) == (0.95, 0.3)
@@ -125,15 +112,15 @@ def test_a_row_says_how_many_are_like_the_teacher_and_as_good(results):
 
 
 def test_the_largest_size_with_the_same_cells(results):
-    table = likeness(SIMPLEGOAL, results)
-    assert largest_alike(table) == 2
-    assert largest_alike(table.assign(index=0.8)) is None
+    table = summary.likeness(SIMPLEGOAL, results)
+    assert summary.largest_alike(table) == 2
+    assert summary.largest_alike(table.assign(index=0.8)) is None
     more = pd.DataFrame({"size": [1, 2, 3, 4], "index": [None, 0.95, 0.8, 0.99]})
-    assert largest_alike(more) == 2
+    assert summary.largest_alike(more) == 2
 
 
 def test_every_teacher_is_compared_with_its_own_policies(results):
-    shipped, one, other, every = other_teachers(SIMPLEGOAL, results).to_dict("records")
+    shipped, one, other, every = summary.other_teachers(SIMPLEGOAL, results).to_dict("records")
     assert (shipped["teacher"], shipped["own"], shipped["gap"]) == (0, 16.6, pytest.approx(0.3))
     assert (one["teacher"], one["own"], one["gap"], one["policies"]) == (1, 10.0, 0.0, 2)
     half = 12.706 * 0.5  # Student's t with one degree of freedom
@@ -146,11 +133,11 @@ def test_every_teacher_is_compared_with_its_own_policies(results):
 
 def test_intervals_over_groups_by_enumeration():
     """Of two groups of one value each, the mean of two draws is one value, the middle, or the other: 1 : 2 : 1."""
-    assert over_groups([np.array([0.0]), np.array([1.0])]) == (0.0, 1.0)
-    assert over_groups([np.array([1.0, 3.0])]) == (1.0, 3.0)
-    low, high = over_groups([np.full(50, 1.0), np.full(5, 2.0), np.full(5, 6.0)])  # each group counts alike
+    assert summary.over_groups([np.array([0.0]), np.array([1.0])]) == (0.0, 1.0)
+    assert summary.over_groups([np.array([1.0, 3.0])]) == (1.0, 3.0)
+    low, high = summary.over_groups([np.full(50, 1.0), np.full(5, 2.0), np.full(5, 6.0)])  # each group counts alike
     assert (low, high) == (1.0, 6.0)
 
 
 def test_targets_are_of_tasks_that_are_known():
-    assert LEAST_R2.keys() == AS_GOOD.keys()
+    assert summary.LEAST_R2.keys() == summary.AS_GOOD.keys()
