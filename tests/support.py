@@ -8,18 +8,26 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
+from vsp import geometry
 from vsp.config import Config
-from vsp.geometry import nearest
 from vsp.partition import Partition
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import Teacher
 
-nearest_brute, nearest_kdtree = (functools.partial(nearest, kdtree=kdtree) for kdtree in (False, True))
+
+def nearest_from(least, codewords, states, metric):
+    """`vsp.nearest` with the kd-tree for `least` codewords or more."""
+    with mock.patch.object(geometry, "KDTREE_FROM", least):
+        return geometry.nearest(codewords, states, metric)
+
+
+nearest_brute, nearest_kdtree = (functools.partial(nearest_from, least) for least in (np.inf, 2))
 
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
 PENDULUM, LUNARLANDER = "Pendulum-v1", "LunarLanderContinuous-v3"

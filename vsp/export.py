@@ -188,16 +188,13 @@ void vsp_act(const double *state, double *action) {{
     def to_latex(self, digits: int | None = 3) -> str:
         """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
         outputs = [f"${symbol(output)}$" for output in self.task.outputs]
-        rows = [
-            " & ".join([codeword_latex(self, i, digits), *equations_latex(self, i, digits)]) for i in range(len(self))
-        ]
-        head = " & ".join(["codeword", *outputs])
-        body = "".join(rf"{row} \\" + "\n" for row in rows)
+        cells = ([codeword_latex(self, i, digits), *equations_latex(self, i, digits)] for i in range(len(self)))
+        head, *rows = (" & ".join(row) + " \\\\\n" for row in (["codeword", *outputs], *cells))
         columns = "l" * (1 + len(outputs))
         note = rf"\multicolumn{{{len(columns)}}}{{l}}{{{distances_latex(self, digits)}}} \\" + "\n"
         return (
-            f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head} \\\\\n\\midrule\n"
-            f"{body}\\midrule\n{note}\\bottomrule\n\\end{{tabular}}\n"
+            f"\\begin{{tabular}}{{{columns}}}\n\\toprule\n{head}\\midrule\n"
+            f"{''.join(rows)}\\midrule\n{note}\\bottomrule\n\\end{{tabular}}\n"
         )
 
 

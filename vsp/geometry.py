@@ -25,24 +25,19 @@ def distances(states: np.ndarray, codewords: np.ndarray, metric: str = LOOKUP) -
     return cdist(states, codewords, METRICS[metric][0])
 
 
-def nearest(
-    codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
-) -> np.ndarray:
+def nearest(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """Index of the nearest codeword (k, d) of each state (n, d); the lowest index if several are equally near. (n,)
 
     Paper, Algorithm 1 line 6: kd-tree(C, s_t). Brute force gives the same indices and is faster for the few dozen
-    codewords of the paper. `kdtree` selects the kd-tree (True), brute force (False), or the faster one (None).
+    codewords of the paper. So the kd-tree is used for `KDTREE_FROM` codewords or more.
     """
-    codewords, states = _checked(codewords, states, metric)
-    return look_up(codewords, states, metric, kdtree=kdtree)
+    return look_up(*_checked(codewords, states, metric), metric)
 
 
-def look_up(
-    codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP, *, kdtree: bool | None = None
-) -> np.ndarray:
+def look_up(codewords: np.ndarray, states: np.ndarray, metric: str = LOOKUP) -> np.ndarray:
     """`nearest` without checks, for arrays checked before: a distillation and a policy call it thousands of times."""
     kind, order = METRICS[metric]
-    if len(codewords) == 1 or not (len(codewords) >= KDTREE_FROM if kdtree is None else kdtree):
+    if len(codewords) < KDTREE_FROM:
         return cdist(states, codewords, kind).argmin(axis=1)
     gaps, index = cKDTree(codewords).query(states, k=2, p=order)
     index = index[:, 0]

@@ -122,6 +122,5 @@ class Partition:
 
     def policy(self) -> VoronoiPolicy:
         """Return the partition as a policy that later changes do not affect."""
-        scale = None if self.config.scale == "raw" else self.scale
         coefficients, name = self.models.coefficients, self.config.sub_policy
-        return VoronoiPolicy(self.codewords, coefficients, task=self.task, scale=scale, sub_policy=name)
+        return VoronoiPolicy(self.codewords, coefficients, task=self.task, scale=self.scale, sub_policy=name)

@@ -193,10 +193,8 @@ def teacher_outliers() -> Finding:
     (p,), n = column.outliers, column.n
     for k in range(1, p.size):
         pit = [Part(k, p.low, 0, p.low, p.low)]
-        other, std = (
-            statistics.remaining_mean(p.size, p.mean, pit),
-            statistics.remaining_std(p.size, p.mean, p.std, pit),
-        )
+        other = statistics.remaining_mean(p.size, p.mean, pit)
+        std = statistics.remaining_std(p.size, p.mean, p.std, pit)
         if std <= p.high - other:  # false for NaN: k at the minimum alone would spread wider than printed
             sums.append(f"{k} at {p.low:g} and {p.size - k} with mean {other:.2f} and std {std:.1f}")
     near, reward = n * (GOAL_EDGE + STRIDE) ** 2, printed_value("sg_goal_reward")

@@ -106,11 +106,8 @@ def linear_policies(task: str) -> pd.DataFrame:
     Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
     such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
     """
-    file = _POLICIES[check_task(task)]
-    frame = _read(file)
-    numbers = _numbers(frame.columns)
-    frame[numbers] = frame[numbers].astype(np.float64)
-    return frame
+    frame = _read(_POLICIES[check_task(task)])
+    return frame.astype(dict.fromkeys(_numbers(frame), np.float64))
 
 
 def published_policy(task: str) -> VoronoiPolicy:

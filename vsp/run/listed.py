@@ -13,7 +13,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .atomic import DamagedFile, atomic_path, read_bytes, remedy, sha256, write_text
+from .atomic import DamagedFile, read_bytes, remedy, sha256, write_bytes, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +27,7 @@ def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
     Concurrent writers keep each other's lines. If a writer is killed between the two steps, readers refuse the file
     until it is written again.
     """
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    write_bytes(path, content.encode() if isinstance(content, str) else content)
     list_file(path)
 
 

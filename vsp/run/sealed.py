@@ -8,13 +8,12 @@ import os
 
 import numpy as np
 
-from .atomic import DamagedFile, atomic_path, read_bytes, remedy
+from .atomic import DamagedFile, read_bytes, remedy, write_bytes
 
 
 def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
     """Write one line with the SHA-256 of `payload`, then `payload`, atomically."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload)
+    write_bytes(path, hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload)
 
 
 def read_sealed(path: str | os.PathLike) -> bytes:

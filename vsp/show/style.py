@@ -110,8 +110,7 @@ def save_figure(
     for form, metadata in said:
         drawn = io.BytesIO()  # on a full disk, matplotlib's PDF writer would replace the disk's error by one of zlib's
         fig.savefig(drawn, format=form, metadata={"Title": path.name, **metadata})
-        with atomic.atomic_path(path.with_suffix(f".{form}")) as temporary:
-            temporary.write_bytes(drawn.getvalue())
+        atomic.write_bytes(path.with_suffix(f".{form}"), drawn.getvalue())
     plt.close(fig)
     return Picture(drawn.getvalue(), about)
 
