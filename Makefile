@@ -5,7 +5,7 @@
 
 # In an order in which no core waits
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
-BEYOND := 08_proofs 09_methods 06_few_equations 07_limits
+BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents
 NOTEBOOKS := $(sort $(PAPER) $(BEYOND))
 USE_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SUMMARIES := data/results/SimpleGoal-v0.csv data/results/MountainCarContinuous-v0.csv

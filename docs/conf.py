@@ -16,13 +16,12 @@ extensions = [
     "outputs",
     "docstrings",
     "pages",
-    "reference",
     "tables",
     "explorer",
     "folding",
     "sphinx_copybutton",
 ]
-exclude_patterns = ["README.md"]  # its parts are included in the pages
+exclude_patterns = ["README.md", "data/README.md"]  # they are included in the pages
 
 # Notebooks: shown as they were executed
 nb_execution_mode = "off"

@@ -2,7 +2,7 @@
 
 Agents are zips of Stable-Baselines3 and sb3-contrib, ALGORITHM-TASK.zip or TASK.zip below a folder ALGORITHM. Each is
 distilled to the fewest of `SIZES` cells that act like it. What cannot be read or takes too long gets a row with the
-reason.
+reason. Those of MountainCar are distilled by the paper's method, too.
 """
 
 from __future__ import annotations
@@ -11,16 +11,21 @@ import argparse
 import contextlib
 import signal
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pandas as pd
 
-from vsp.evaluation import likeness
+from vsp.algorithms import VERSION, distill
+from vsp.config import paper_preset
+from vsp.evaluation import likeness, start_states
+from vsp.paper.baselines import refit
 from vsp.paper.results import load_made, make_missing, provenance
 from vsp.policy import VoronoiPolicy
+from vsp.rollouts import visited_states
 from vsp.run import atomic, command, sealed
 from vsp.tasks import Task, get_task
 from vsp.teachers.normalization import statistics_beside
@@ -36,6 +41,8 @@ SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of e
 N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw
 SECONDS = 600  # of processor time for one agent
 POINTS = 61  # of a map, along each axis
+CAR = "MountainCarContinuous-v0"
+N_SEEN, SEEN_SEED = 400, 8  # episodes for maps by least squares, from starts of their own
 ALGORITHMS = ("a2c", "ars", "crossq", "ddpg", "ppo", "sac", "td3", "tqc", "trpo")
 OF_AGENT = ["algorithm", "task", "weights", "zoo", "zoo_std", "agent", "agent_std", "agent_failing"]
 OF_POLICIES = ["cells", "numbers", "r2", "r2_least", "mean", "least", "most", "failing", "reason"]
@@ -114,10 +121,46 @@ def provenance_of(task: Task, digest: str) -> dict:
     return provenance(settings, digest, METHODS["faithful"].version)
 
 
-def today() -> list[dict]:
-    """Return today's provenance of the committed rows that have one."""
+def by_the_paper_with(digest: str) -> dict:
+    """Return what the rows of `by_the_paper` were made with, apart from the agent's file."""
+    settings = {"config": paper_preset(CAR).settings(), "starts": [N_EPISODES, START_SEED, N_SEEN, SEEN_SEED]}
+    return provenance(settings, digest, VERSION)
+
+
+def committed() -> Iterator[tuple[str, str, list[dict]]]:
+    """Yield the committed tables as `comparison.stale` does: name, make target, provenance today of each row."""
     rows = read_results("agents").dropna(subset=["settings"])
-    return [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
+    yield "agents.csv", "agents", [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
+    yield "agents_paper.csv", "agents", [by_the_paper_with(name) for name in read_results("agents_paper")["teacher"]]
+
+
+def by_the_paper(algorithm: str, path: Path) -> tuple[dict, dict]:
+    """Distil an agent of MountainCar by the paper's method; return no arrays, and the about of its file.
+
+    Rows of three ways: the paper's settings; the same cells with maps by least squares; Adam with ten times the step
+    size. `apart` is how many of the agent's states are farther from each other than a codeword must be from a state,
+    `slope` the median coefficient of the velocity, without its sign, over the agent's states.
+    """
+    agent, config, rows = read(path, CAR), paper_preset(CAR), []
+    made_with = by_the_paper_with(agent.digest)
+    states = visited_states(agent, CAR, start_states(CAR, N_SEEN, SEEN_SEED))
+    for seed in SEEDS:
+        policy, apart = distill(agent, agent.task, config, seed=seed)[0], np.zeros((0, 2))
+        larger = replace(config, learning_rate=10 * config.learning_rate)
+        ways = {
+            "paper": policy, "least squares": refit(policy, states, agent.predict(states)[0]),
+            "larger steps": distill(agent, agent.task, larger, seed=seed)[0],
+        }  # fmt: skip
+        for state in visited_states(agent, CAR, start_states(CAR, 32, seed)):
+            if (np.abs(apart - state).sum(axis=1) > config.min_pol_distance).all():
+                apart = np.vstack([apart, state])
+        for way, one in ways.items():
+            alike = likeness(one, agent, CAR, N_EPISODES, seed=START_SEED)
+            row = {"algorithm": algorithm, "way": way, "seed": seed, "cells": len(one), "apart": len(apart)}
+            slope = float(np.median(np.abs(one.coefficients[one.cells(states), 1, 0])))
+            scores = {"slope": slope, "r2": alike.r2, "mean": float(alike.returns["policy"].mean())}
+            rows.append(row | scores | {"failing": (alike.failures["policy"] or 0) / N_EPISODES} | made_with)
+    return {}, {"kind": "Paper", "checksum": atomic.sha256(path), "rows": rows}
 
 
 @contextlib.contextmanager
@@ -158,23 +201,25 @@ def actions_of(algorithm: str, task: str) -> np.ndarray:
     return sealed.load_arrays(RESULTS / "agents" / "actions.arrays", kind="Agents")[0][f"{algorithm}-{task}"]
 
 
-def write(made: dict[tuple[str, str], tuple[dict, dict]], out: Path) -> None:
-    """Write the table, the policies and the maps to OUT/data/beyond; arrays and about by algorithm and task."""
+def write(made: list[tuple[dict, dict]], papers: list[tuple[dict, dict]], out: Path) -> None:
+    """Write tables, policies and maps to OUT/data/beyond, from what `study` and `by_the_paper` returned."""
     folder, maps = out / BEYOND / "agents", {}
-    for (algorithm, task), (arrays, _) in made.items():
+    for arrays, about in made:
         if arrays:
-            maps[f"{algorithm}-{task}"] = arrays.pop("actions")
-            VoronoiPolicy(**arrays, task=task, metric="euclidean").save(folder / f"{algorithm}-{task}.policy")
+            name = f"{about['algorithm']}-{about['task']}"
+            maps[name] = arrays.pop("actions")
+            VoronoiPolicy(**arrays, task=about["task"], metric="euclidean").save(folder / f"{name}.policy")
     sealed.save_arrays(folder / "actions.arrays", maps, {"kind": "Agents"})
-    frame = pd.DataFrame([about for _, about in made.values()]).merge(read_results("zoo"), "left")
+    frame = pd.DataFrame([about for _, about in made]).merge(read_results("zoo"), "left")
     columns = [*OF_AGENT, *OF_POLICIES, "checksum", "settings", "teacher", "version"]
     frame = frame.reindex(columns=columns).sort_values(["task", "algorithm"])
     whole = dict.fromkeys(("version", "cells", "numbers", "weights"), "Int64")  # also where a row lacks them
     write_results(frame.astype(whole), "agents", out=out)
+    write_results(pd.DataFrame([row for _, about in papers for row in about["rows"]]), "agents_paper", out=out)
 
 
 def main() -> None:
-    """Study every agent of the folder that has no file yet, and write agents.csv, policies and maps."""
+    """Study every agent of the folder that has no file yet; write agents.csv, agents_paper.csv, policies and maps."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("agents", type=Path, help="a folder of zips")
     parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
@@ -183,13 +228,17 @@ def main() -> None:
     agents = agents_in(given.agents)
     if not agents:
         raise command.CommandError(f"{given.agents}: no .zip below it, expected a folder of agents: AGENTS=folder")
-    files = {given.out / "build" / "agents" / f"{'-'.join(name)}.agent": (*name, path) for name, path in agents.items()}
-    make_missing(study, files, "agents", jobs=given.jobs, unit="agents")
-    made = {
-        tuple(name): load_made(file, "Agent", {"checksum": atomic.sha256(path)})
-        for file, (*name, path) in files.items()
-    }
-    write(made, given.out)
+
+    def made(make: Callable, kind: str, work: dict[str, tuple]) -> list[tuple[dict, dict]]:
+        files = {given.out / "build" / "agents" / f"{name}.agent": job for name, job in work.items()}
+        make_missing(make, files, kind, jobs=given.jobs, unit="agents")
+        return [load_made(file, kind, {"checksum": atomic.sha256(job[-1])}) for file, job in files.items()]
+
+    cars = {f"paper-{algorithm}": (algorithm, path) for (algorithm, task), path in agents.items() if task == CAR}
+    write(
+        made(study, "Agent", {f"{name}-{task}": (name, task, path) for (name, task), path in agents.items()}),
+        made(by_the_paper, "Paper", cars), given.out,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vsp.paper.ledger import ledger_table, results_of
+from vsp.paper.ledger import distinct_results, ledger_table
 from vsp.paper.results import write_results
 from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher_outcomes
 from vsp.paper.studies.teachers import rows_of
@@ -28,7 +28,7 @@ def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd
     experiment = replace(paper_experiment(TASK), teacher=read(agent, TASK))
     made = make_runs(experiment, range(N_RUNS[TASK]), runs=runs, jobs=jobs)
     results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
-    return rows_of(experiment, agent.stem, made), results_of(ledger_table({TASK: results}), TASK)
+    return rows_of(experiment, agent.stem, made), distinct_results(ledger_table({TASK: results})).query("task == @TASK")
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Collects what `make bench` and `make faults` measure in one table, trust.csv, which docs/trust.md shows.
+"""Collects what `make bench` and `make faults` measure in one table, trust.csv, which docs/reference.md shows.
 
     python tests/measured.py build/measured data/results
 

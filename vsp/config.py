@@ -1,8 +1,8 @@
-"""`Config`: the hyperparameters of the paper (table T2), and its open questions R1 to R15 as fields with defaults.
+"""`Config`: the hyperparameters of the paper (table T2), and most of its open questions R1 to R15 as fields.
 
 Code that depends on an open question names it: search this folder for "R9", for example. R2, R6, R13 and R14, which
-change the passes themselves, are in `paper.readings`. R11 (which states a splitting pass reads) is answered by the
-paper's prose: "this iteration's episode".
+change the passes themselves, are fields of `paper.readings.Readings`. R11 (which states a splitting pass reads) has no
+field: the paper's prose answers it, "this iteration's episode".
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ def fit_linear(function: Callable) -> None:
         inputs = np.column_stack([states, np.ones(len(states))])
         best = np.linalg.lstsq(inputs, actions, rcond=None)[0]
         error, least = (np.square(inputs @ c - actions).mean() for c in (coefficients, best))
-        if error > 1.001 * least:  # a map found by gradient descent is right too
+        if error > 1.0001 * least:  # a map found by gradient descent is right too
             aim = f"{least:.4g}, the least that a linear map of these arguments can have (not of other variables)"
             mistakes = [
                 Mistake(np.roll(best, 1, axis=0), "the bias in the first row", "it in the last one", 2),

@@ -168,9 +168,9 @@ class MergeCase(NamedTuple):
 # fmt: off
 MERGES = (
     MergeCase([0, 0], [[0], [1]], "two equal cells: one goes, one stays", 2),
-    MergeCase([0, [0, 0, 0.7, 0, 0, 0]], [[0, 1]],
+    MergeCase([0, [0, 0, 0, 0, 0, 0.7]], [[0, 1]],
               "one coefficient that differs by more than the limit (its size counts, not its sign), others equal", 1),
-    MergeCase([0, [0.5, -0.5, 0.5, 0.5, -0.5, 0.5]], [[0], [1]],
+    MergeCase([0, [0.59, -0.59, 0.59, 0.59, -0.59, 0.59]], [[0], [1]],
               "six coefficients that each differ by less than the limit", 1),
     MergeCase([0, [SMALL.min_param_distance, 0, 0, 0, 0, 0]], [[0, 1]],
               "a difference of exactly the limit: only less than the limit counts", 1),

@@ -119,13 +119,13 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
     kept = np.allclose(new.coefficients[empty], before[empty])
     REFIT.refuse_if(not kept, "another map in a cell without states", "the one it had: nothing is known there", 3)
     best, few = baselines.refit(policy, states, actions), cells == 3
-    missed = few.sum() < 3 and not np.allclose(new.linear(states[few]), actions[few], atol=0.1)
+    missed = few.sum() < 3 and not np.allclose(new.linear(states[few]), actions[few], atol=1e-4)
     whole = baselines.linear_map(states, actions, TASK)
     if np.allclose(new.coefficients[0], whole.coefficients[0]):
         raise REFIT.wrong("the same map in every cell", "one per cell, from the states in it", 2)
     REFIT.refuse_if(missed, f"a map that misses the actions {where}", "one that meets them", 3)
     error, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
-    REFIT.refuse_if(error > 1.01 * least, f"a squared error of {error:.3g}", f"the least there is, {least:.3g}", 2)
+    REFIT.refuse_if(error > 1.0001 * least, f"a squared error of {error:.3g}", f"the least there is, {least:.3g}", 2)
 
 
 @DAGGER.checks

@@ -4,10 +4,7 @@ import inspect
 import re
 from dataclasses import fields, is_dataclass
 
-import vsp
-
 _CODE = re.compile(r"(`[^`]*`)")
-_PUBLIC = re.compile(r"`vsp\.(\w+)`")
 _PARAMETERS = re.compile(r'<dl>\s*(<dd><em class="sig-param.*?</dd>)\s*</dl>', re.DOTALL)
 _PARAMETER = re.compile(r'<dd>(<em class="sig-param.*?)</dd>', re.DOTALL)
 _FIELD = re.compile(r"^    (\w+): [^#\n]+  # (.+)$", re.MULTILINE)
@@ -44,13 +41,7 @@ def escape(text: str) -> str:
     """`text` with a backslash before what reStructuredText would take for mark-up, outside of `code`."""
     parts = _CODE.split(text)
     parts[::2] = [re.sub(r"([*|\\]|_\b)", r"\\\1", part) for part in parts[::2]]
-    return _PUBLIC.sub(_public, "".join(parts))
-
-
-def _public(name: re.Match) -> str:
-    """A link to the page of `vsp.name`, which is written down in a module of vsp."""
-    home = getattr(getattr(vsp, name[1], None), "__module__", None)
-    return f":py:obj:`vsp.{name[1]} <{home}.{name[1]}>`" if home else name[0]
+    return "".join(parts)
 
 
 def _lines(app, pagename, templatename, context, doctree):

@@ -15,7 +15,7 @@ from PIL import Image
 
 _IMAGE = re.compile(r"data:image/(?:png|gif);base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
-_NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?|nan|NaN|inf|True|False|[–—]|")
+_NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?(\sto\s[-−]?[\d.,]+)?|nan|NaN|inf|True|False|[–—]|")
 
 
 def _outputs(app, doctree, docname):

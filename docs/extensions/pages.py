@@ -9,14 +9,21 @@ from fontTools import subset
 
 _UNUSED = ("*.js.map", "*.css.map", "scripts/fontawesome.js")
 _ICON = re.compile(r'((?:\.fa-[\w-]+,?)+)\{--fa:"\\([0-9a-f]+)"\}')
+_UNFOLDS = '<summary><span class="toctree-toggle"'
+_NAMED = _UNFOLDS.replace(">", ' aria-label="unfold">', 1)
+_DATA = re.compile(r"(\]\((?:\.\./)*)data/README\.md")
 _MAP = re.compile(rb"\n?(//# |/\*# )sourceMappingURL=[^\n*]*( \*/|\*/)?")
 
 
 def _move_links(app, docname, source):
-    """The pages of docs/ lie in the root of the site, so links between them and other pages lose a folder."""
-    source[0] = source[0].replace("](../docs/", "](../")
+    """The pages of docs/ lie in the root of the site, so links lose a folder; data/README.md is part of a page."""
+    source[0] = _DATA.sub(r"\1reference.md", source[0].replace("](../docs/", "](../"))
     if "/" not in docname:
-        source[0] = source[0].replace("](../", "](")
+        source[0] = source[0].replace("](../", "](").replace("](docs/", "](")
+
+
+def _move_links_of_included(app, path, docname, source):
+    _move_links(app, docname, source)
 
 
 def _describe(app, pagename, templatename, context, doctree):
@@ -35,6 +42,8 @@ def _thin(app, error):
         path.unlink()
     for path in [*static.rglob("*.js"), *static.rglob("*.css")]:
         path.write_bytes(_MAP.sub(b"", path.read_bytes()))
+    for path in app.outdir.rglob("*.html"):  # the theme's button that unfolds a group has no name
+        path.write_text(path.read_text("utf-8").replace(_UNFOLDS, _NAMED), "utf-8")
     _thin_icons(app.outdir, static)
 
 
@@ -61,6 +70,7 @@ def _thin_icons(pages, static):
 
 def setup(app):
     app.connect("source-read", _move_links)
+    app.connect("include-read", _move_links_of_included)
     app.connect("html-page-context", _describe)
     app.connect("build-finished", _thin)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The directives `measured`, a table of data/results/trust.csv, and `artefacts`, what the notebooks make."""
+"""The directives `measured`, what missed its target in data/results/trust.csv, and `artefacts`, what notebooks make."""
 
 import re
 import tomllib
@@ -17,45 +17,42 @@ _SAVES = {"figures": "save_(?:figure|gait)", "tables": "save_table"}
 
 
 def measured(frame: pd.DataFrame) -> str:
-    """Rows of trust.csv as a Markdown table, with the machines that they were measured on."""
-    lines = ["| what | measured | target | met | note |", "|---|---|---|---|---|"]
-    for row in frame.fillna("").itertuples():
-        value = f"{row.measured:g} {row.unit}" + (f" ({row.low:g} to {row.high:g})" if row.low else "")
-        lines.append(f"| {row.what} | {value} | {row.rule} {row.target:g} | {row.met} | {row.note} |")
-    return "\n".join([*lines, "", f"Measured on {'; '.join(frame['machine'].unique())}."])
+    """Rows of trust.csv that missed their target as a Markdown table, then how many did not and the machines."""
+    lines = ["| what | measured | target |", "|---|---|---|"]
+    missed = frame[frame["met"] == "no"].fillna("")
+    for row in missed.itertuples():
+        range_ = f" ({row.low:.3g} to {row.high:.3g})" if row.low else ""
+        lines.append(f"| {row.what} | {row.measured:.3g} {row.unit}{range_} | {row.rule} {row.target:g} |")
+    met = f"The other {len(frame) - len(missed)} of {len(frame)} measurements met their target."
+    return "\n".join([*lines, "", f"{met} Measured on {'; '.join(frame['machine'].unique())}."])
 
 
 def artefacts() -> str:
-    """Every figure and table of notebooks/captions.toml as Markdown: label, file, cell and what it shows."""
-    lines = ["| label | file | notebook, cell | what it shows |", "|---|---|---|---|"]
+    """Every figure and table of notebooks/captions.toml as Markdown: label, file and cell."""
+    lines = ["| label | file | notebook, cell |", "|---|---|---|"]
     for notebook, kinds in tomllib.loads(BOOK.read_text("utf-8")).items():
         cells = nbformat.read(ROOT / "notebooks" / f"{notebook}.ipynb", as_version=4).cells
         for kind, names in kinds.items():
             for name in names:
                 cell = next(cell.id for cell in cells if re.search(rf'{_SAVES[kind]}\(.*"{name}"', cell.source))
-                caption, (folder, _, file) = caption_of(kind, name), name.rpartition("/")
+                folder, _, file = name.rpartition("/")
                 path = "/".join(filter(None, ("figures", folder, "tables" if kind == "tables" else "", file)))
-                shows = re.split(r"(?<=[a-z)]\.) ", caption.text)[0]
-                lines.append(f"| {caption.label} | `{path}` | {notebook[:2]}, `{cell}` | {shows} |")
+                lines.append(f"| {caption_of(kind, name).label} | `{path}` | {notebook[:2]}, `{cell}` |")
     return "\n".join(lines)
 
 
-class Measured(SphinxDirective):
-    """Shows the rows of the table that its argument names. The content is for readers of the source, on GitHub."""
+class _Table(SphinxDirective):
+    """A table made when the site is built. The content is for readers of the source, on GitHub."""
 
     has_content = True
-    required_arguments = 1
 
+
+class Measured(_Table):
     def run(self):
-        frame = read_table(TRUST)
-        return self.parse_text_to_nodes(measured(frame[frame["table"] == self.arguments[0]]))
+        return self.parse_text_to_nodes(measured(read_table(TRUST)))
 
 
-class Artefacts(SphinxDirective):
-    """Shows the table of artefacts. The content is for readers of the source, on GitHub."""
-
-    has_content = True
-
+class Artefacts(_Table):
     def run(self):
         return self.parse_text_to_nodes(artefacts())
 

@@ -1,7 +1,7 @@
 """The comparison of methods: how each row is made, and what the committed rows show."""
 
 from ..results import RESULTS, read_results
-from .equal_tuning import all_rows, budgets, equal_budget, fit_and_geometry, leaders, possible, tail
+from .equal_tuning import all_rows, budgets, closest, equal_budget, fit_and_geometry, leaders, possible
 from .limits import best_mean, limit_summary, near, references, robots_summary, starts_summary, with_regret
 from .methods import TASKS
-from .summary import ablation, headline, largest_alike, likeness, method_summary, other_teachers, read_rows
+from .summary import ablation, largest_alike, likeness, method_summary, other_teachers, read_rows

@@ -16,7 +16,7 @@ from vsp_beyond.few_cells import faithful, tune
 from ..results import read_results
 from .measure import ERROR_SEED, N_ERROR
 from .methods import LONG, TABLES
-from .summary import INTERVAL, OURS, TUNED, ahead, method_summary, read_rows
+from .summary import AS_GOOD, INTERVAL, OURS, TUNED, ahead, method_summary, read_rows, teacher_of
 
 # By the name in tables: the untuned method; the same method tuned is "..., tuned"
 IMITATIONS = {
@@ -96,21 +96,21 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(compared)
 
 
-def possible(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the medians over seeds for the plot of return against fidelity, one row per method and size."""
-    return frame.groupby(["method", "size"], sort=False)[["mean", "r2"]].median().reset_index()
+def closest(frame: pd.DataFrame, task: str) -> dict[str, str | float]:
+    """Return who acts most like the teacher among those that are as good (`AS_GOOD`), with up to 13 cells or leaves.
 
-
-def tail(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the worst returns beside the mean, one row per method and size of `all_rows` that has them.
-
-    Columns: method, size; mean, worst (the mean return of the worst `measure.TAIL` of the episodes) and failing, each
-    as a mean over the seeds.
+    Keys: size, r2 and mean of our faithful policies; rival (the other method), "rival size" and so on.
     """
-    table = frame[frame["worst"].notna()].groupby(["method", "size"])[["mean", "worst", "failing"]].mean()
-    names = {f"{untuned}, tuned": f"{name}, tuned" for name, untuned in IMITATIONS.items()}
-    table = table.rename(index=names | {"faithful": f"{OURS}, faithful"})
-    return table.sort_values("mean", ascending=False, kind="stable").reset_index()
+    points = possible(frame[(frame["size"] <= SHOWN[-1]) & (frame["method"] != "teacher")])
+    good = points[AS_GOOD[task](points, teacher_of(frame))].sort_values("r2")
+    ours, rival = (good[good["method"].str.match(kind)].iloc[-1] for kind in ("faithful$", "(?!faithful|our cells)"))
+    scores = ["size", "r2", "mean"]
+    return {**ours[scores], "rival": rival["method"], **rival[scores].add_prefix("rival ")}
+
+
+def possible(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the medians over seeds of mean, r2 and failing, one row per method and size."""
+    return frame.groupby(["method", "size"], sort=False)[["mean", "r2", "failing"]].median().reset_index()
 
 
 def fit_and_geometry(task: str) -> pd.DataFrame:

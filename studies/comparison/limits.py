@@ -61,40 +61,43 @@ def near(task: str, folder: str | os.PathLike | None = None) -> float:
 def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Summarise the policies at the limit, one row per number of cells.
 
-    Columns: size, policies; mean, low and high (its 95 % interval), least (lowest mean return of a seed), regret (of
-    the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the policies that are
-    at the limit).
+    Columns: size, policies; mean, low and high (its 95 % interval), least and most (lowest and highest mean return of a
+    seed), regret (of the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the
+    policies that are at the limit).
     """
     rows = read_rows(task, folder, table="limit")
     by_size, is_near = rows.groupby("size"), rows["mean"] >= near(task, folder)
     table = method_summary(rows).set_index("size").sort_index()[["policies", *INTERVAL]]
-    table = table.assign(least=by_size["mean"].min(), regret=best_mean(task, folder) - table["mean"])
-    table = table.assign(failing=by_size["failing"].max(), near=is_near.groupby(rows["size"]).mean())
-    return table.reset_index()
+    table = table.assign(least=by_size["mean"].min(), most=by_size["mean"].max())
+    table = table.assign(regret=best_mean(task, folder) - table["mean"], failing=by_size["failing"].max())
+    return table.assign(near=is_near.groupby(rows["size"]).mean()).reset_index()
 
 
 def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Compare the `SEARCHES` by their start and their length, one row per search.
 
-    Columns: method, policies, mean, low, high (its 95 % interval), least (lowest mean return of a seed) and failing
-    (highest of a seed).
+    Columns: method, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return of a
+    seed) and failing (highest of a seed).
     """
     rows = pd.concat([read_rows(task, folder, table=table) for table in ("methods", "starts", "limit")])
     rows = rows[(rows["size"] == PRESETS["limit"](task).n_cells) & rows["method"].isin(SEARCHES)]
     table, by_method = method_summary(rows).set_index("method")[["policies", *INTERVAL]], rows.groupby("method")
-    table = table.assign(least=by_method["mean"].min(), failing=by_method["failing"].max())
+    extremes = {"least": by_method["mean"].min(), "most": by_method["mean"].max()}
+    table = table.assign(**extremes, failing=by_method["failing"].max())
     return table.loc[list(SEARCHES)].reset_index()
 
 
 def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Summarise the policies of a robot, one row per method and size, the teacher first.
 
-    Columns: method, size, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return
-    of a seed), failing, share (mean divided by the teacher's mean return), and r2 (the median).
+    Columns: method, size, policies, mean, low, high (its 95 % interval), seeds (the mean return of each, the lowest
+    first), failing, share (mean divided by the teacher's mean return), and r2 (the median).
     """
     rows, kind = read_rows(task, folder, table="robots"), ["method", "size"]
     teacher = rows.loc[rows["method"] == WALKER, "mean"].iloc[0]
-    extremes = rows.groupby(kind).agg(least=("mean", "min"), most=("mean", "max"), r2=("r2", "median"))
-    table = method_summary(rows).join(extremes, on=kind).assign(share=lambda means: means["mean"] / teacher)
-    columns = [*kind, "policies", *INTERVAL, "least", "most", "failing", "share", "r2"]
+    each = rows.groupby(kind).agg(
+        seeds=("mean", lambda means: ", ".join(f"{m:.0f}" for m in sorted(means))), r2=("r2", "median")
+    )
+    table = method_summary(rows).join(each, on=kind).assign(share=lambda means: means["mean"] / teacher)
+    columns = [*kind, "policies", *INTERVAL, "seeds", "failing", "share", "r2"]
     return table.loc[(table["method"] != WALKER).sort_values(kind="stable").index, columns]

@@ -14,6 +14,7 @@ import pandas as pd
 from vsp.paper.results import PROVENANCE
 from vsp.run import atomic, command, sealed
 
+from .. import agents
 from ..results import RESULTS, read_results
 from .methods import LONG, TABLES
 from .rows import WAYS, best_provenance, by_seed, extras, jobs_of
@@ -49,6 +50,7 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
             for name, today, _ in extras(task, table):
                 yield name, target, today
     yield "optimum.csv", "beyond", [best_provenance(*way) for way in WAYS]
+    yield from agents.committed()
 
 
 def _differing(name: str, today: list[dict]) -> list[str]:

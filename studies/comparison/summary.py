@@ -11,7 +11,6 @@ from scipy import stats
 from vsp.paper.statistics import percentile_interval, share_interval
 
 from ..results import read_results
-from .methods import METHODS, PRESETS, UNTUNED
 
 OURS, TUNED = "our cells", "our cells, tuned"
 MEANS = ("failing", "error_teacher", "error_own", "cells")
@@ -82,29 +81,6 @@ def mean_interval(values: np.ndarray) -> tuple[float, float]:
 def ahead(ours: pd.Series, other: dict | pd.Series) -> str:
     """Return which is ahead: "ours" or "theirs" if the intervals from low to high do not overlap, else "level"."""
     return "ours" if ours["low"] > other["high"] else "theirs" if other["low"] > ours["high"] else "level"
-
-
-def headline(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Summarise our tuned cells at the size of the preset, one row per task. `frames` holds the rows by task.
-
-    Columns: task, teacher (its mean return), cells, mean, low, high, reached (share of the seeds that match the
-    teacher, as `AS_GOOD` defines it), failing (highest of a seed), rival (the best other method with as many cells or
-    leaves that is not tuned), rival mean, and rival reached.
-    """
-    known = {name for name, method in METHODS.items() if method.table == "methods"} | set(UNTUNED)
-    table = []
-    for task, frame in frames.items():
-        size, teacher = PRESETS["tuned"](task).n_cells, teacher_of(frame)
-        rows = frame[(frame["size"] == size) & frame["method"].isin(known)]
-        means = method_summary(rows)
-        ours = means[means["method"] == TUNED].iloc[0]
-        rival = means[~means["method"].str.startswith(OURS)].iloc[0]
-        reached = AS_GOOD[task](rows, teacher).groupby(rows["method"]).mean()
-        failing = rows.loc[rows["method"] == TUNED, "failing"].max()
-        about = {"task": task, "teacher": teacher["mean"], "cells": size, **ours[list(INTERVAL)]}
-        about |= {"reached": reached[TUNED], "failing": failing, "rival": rival["method"]}
-        table.append({**about, "rival mean": rival["mean"], "rival reached": reached[rival["method"]]})
-    return pd.DataFrame(table)
 
 
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:

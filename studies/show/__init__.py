@@ -1,4 +1,5 @@
 """Figures of the studies."""
 
-from .gait import footfall, save_gait
-from .methods import LIMITS, ROBOTS, fidelity_map, likeness_over_cells, over_cells, return_over_cells
+from .agents import agent_maps
+from .gait import save_gait
+from .methods import LIMITS, ROBOTS, TUNING, fidelity_map, likeness_over_cells, over_cells

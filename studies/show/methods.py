@@ -6,140 +6,85 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from vsp.show.style import COLOURS, DISTILLED, OTHER, TEACHER
+from vsp.show.style import OTHER, OURS, TEACHER
 
-# Methods before tuning, and our cells after it. Ours has its own colour; the two weakest methods are grey
-IMITATIONS: dict[str, dict] = {
-    "our cells, tuned": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, tuned on the return"},
-    "our cells": {"color": DISTILLED, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
-    "oblique tree, linear leaves, DAgger": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
-    "small network, DAgger": {"color": COLOURS[9], "label": "small network"},
-    "CART, DAgger": {"color": OTHER, "label": "axis tree, constants"},
-    "k-means cells, DAgger": {"color": "0.65", "ls": "--", "label": "k-means cells, linear maps"},
+# Methods of tables, after tuning (solid) and before it (dashed). Ours have their colour, others a grey and a marker
+TUNING: dict[str, dict] = {
+    "our cells, tuned": {"color": OURS, "lw": 1.8, "zorder": 5, "label": "our cells, tuned"},
+    "oblique tree, linear leaves, DAgger, tuned": {"color": OTHER, "marker": "^", "label": "oblique tree, tuned"},
+    "small network, DAgger, tuned": {"color": "0.65", "marker": "P", "label": "small network, tuned"},
+    "our cells": {"color": OURS, "ls": "--", "lw": 1.4, "zorder": 4, "label": "our cells"},
+    "oblique tree, linear leaves, DAgger": {"color": OTHER, "ls": "--", "marker": "^", "label": "oblique tree"},
+    "small network, DAgger": {"color": "0.65", "ls": "--", "marker": "P", "label": "small network"},
 }
 
-# Our policies, from the best policy and from the teacher, and their rivals
+# Our policies, by where their search begins
 LIMITS: dict[str, dict] = {
-    "at the limit": {"color": COLOURS[2], "lw": 1.8, "zorder": 6, "label": "our cells, from the best policy"},
-    "our cells, tuned": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, from the teacher"},
-    "oblique tree, linear leaves, DAgger, tuned": {"color": COLOURS[3], "label": "oblique tree, linear leaves"},
-    "small network, DAgger, tuned": {"color": COLOURS[9], "label": "small network"},
-    "one linear map, tuned": {"color": "black", "marker": "s", "label": "one linear map"},
+    "at the limit": {"color": OURS, "lw": 1.8, "zorder": 6, "label": "search begins at the best policy"},
+    "our cells, tuned": {"color": OURS, "ls": "--", "label": "search begins at the teacher"},
 }
 
-
-# Policies of robots
+# Policies of robots, in the order of their returns with sixteen cells or leaves
 ROBOTS: dict[str, dict] = {
-    "cells, trained further": {"color": DISTILLED, "lw": 1.8, "zorder": 5, "label": "our cells, trained further"},
-    "cells": {"color": DISTILLED, "ls": "--", "label": "our cells, imitation alone"},
-    "one map, random search": {"color": "black", "marker": "s", "label": "one linear map, random search"},
-    "one map, longer search": {"color": "black", "marker": "D", "label": "one linear map, longer search"},
-    "oblique tree, trained further": {"color": COLOURS[3], "label": "oblique tree, trained further"},
-    "oblique tree": {"color": COLOURS[3], "ls": "--", "label": "oblique tree, imitation alone"},
+    "oblique tree, trained further": {"color": OTHER, "marker": "^", "label": "oblique tree, trained further"},
+    "cells, trained further": {"color": OURS, "lw": 1.8, "zorder": 5, "label": "our cells, trained further"},
+    "oblique tree": {"color": OTHER, "ls": "--", "marker": "^", "label": "oblique tree, imitation alone"},
+    "cells": {"color": OURS, "ls": "--", "label": "our cells, imitation alone"},
 }
 
-# Marker and label of other methods, by the beginning of their names
-RIVAL_KINDS = {"oblique tree": ("^", "oblique tree"), "CART": ("s", "axis tree"), "k-means": ("D", "k-means"),
-               "small network": ("P", "small network"),
-               "critic-driven": ("<", "critic-driven"), "advantage-weighted": (">", "advantage-weighted")}  # fmt: skip
-OUR_SIZES = {2: COLOURS[1], 4: COLOURS[2], 8: COLOURS[4]}  # colours of our lines in `fidelity_map`, by number of cells
-MARK = {"ls": "", "ms": 4.5, "mec": "white", "mew": 0.4, "elinewidth": 0.7, "zorder": 6}  # of a method without a size
-LARGEST = 13  # most leaves of a method drawn there
+# Marks of `fidelity_map`: label, its side of the mark, colour and marker
+MARKED = {
+    "teacher": ("teacher", "bottom", TEACHER, "D"),
+    "faithful": ("ours, most like the teacher and as good", "left", OURS, "o"),
+    "faithful, R² 0.9": ("ours, with an R² of 0.9", "top", OURS, "o"),
+    "our cells, tuned": ("ours, tuned for the return", "top", OURS, "o"),
+    "oblique tree, linear leaves, DAgger": ("tree, fitted to the teacher", "left", OTHER, "^"),
+    "oblique tree, our fit": ("tree, fitted as our cells are", "left", OTHER, "^"),
+    "oblique tree, linear leaves, DAgger, tuned": ("tree, tuned for the return", "right", OTHER, "^"),
+}
+SIDES = {"left": ((-6, 0), "right", "center"), "right": ((6, 0), "left", "center"),
+         "top": ((0, 5), "center", "bottom"), "bottom": ((0, -5), "center", "top")}  # fmt: skip
 
 
-def fidelity_map(ax: Axes, points: pd.DataFrame, teacher: float, *, linear: float) -> Axes:
-    """Plot return over fidelity. Policies further right act more like the teacher; policies higher up return more.
+def fidelity_map(ax: Axes, points: pd.DataFrame) -> Axes:
+    """Plot mean return over R²: policies further right act more like the teacher, policies higher up return more.
 
-    `points` has the columns method, size, mean and r2 of `studies.comparison.possible`. Each line is ours with one
-    number of cells. It runs from the highest R² (circle), through the highest returns at a given R², to the highest
-    return (star). Marks are other methods by kind: open for imitation, filled if tuned, larger for more leaves. The
-    scale is logarithmic in 1 - R², and in the return beyond `linear`.
+    `points` has the columns method, mean and r2. Methods in `MARKED` are drawn; a line joins ours.
     """
-    points = points.assign(unlike=1.0 - points["r2"], gap=points["mean"] - teacher)
-    others = points[points["size"] <= LARGEST]
-    for start, (marker, kind) in RIVAL_KINDS.items():
-        rows = others[others["method"].str.startswith(start)]
-        tuned = rows["method"].str.endswith(", tuned")
-        look = {"marker": marker, "edgecolor": OTHER, "lw": 0.5, "alpha": 0.7}
-        for part, face, name in ((rows[~tuned], "none", kind), (rows[tuned], OTHER, None)):
-            ax.scatter(part["unlike"], part["gap"], s=6 + 1.5 * part["size"], facecolor=face, label=name, **look)
-    maps = points[points["method"].str.startswith("one linear map")]
-    ax.scatter(maps["unlike"], maps["gap"], marker="x", s=18, color="black", lw=1.0, label="one linear map", zorder=4)
-    for size, color in OUR_SIZES.items():
-        _our_line(ax, points[points["size"] == size], color, f"ours, {size} cells")
-    ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher’s return")
-    ax.axvline(1, color=OTHER, ls=":", lw=0.8, label="a constant")
-    ax.set_yscale("symlog", linthresh=linear)
-    ax.margins(y=0.08)
-    ax.yaxis.set_major_formatter("{x:g}")
-    drawn = points.loc[(points["size"] <= LARGEST) & (points["method"] != "teacher"), "unlike"]
-    ax.set(xscale="log", xlim=(1.3 * drawn.max(), drawn.min() / 1.3), xlabel="R² of the actions")
-    ticks = {5: "−4", 1: "0", 0.3: ".7", 0.1: ".9", 0.05: ".95", 0.01: ".99", 0.001: ".999"}
-    ax.set_xticks(list(ticks), list(ticks.values()))
-    ax.set_xlim(1.3 * drawn.max(), drawn.min() / 1.3)  # again: ticks beyond these limits widen them
-    ax.minorticks_off()
+    places = points.set_index("method").loc[list(MARKED), ["r2", "mean"]]
+    ax.plot(*places[places.index.str.match("faithful|our cells")].sort_values("r2").T.to_numpy(), color=OURS)
+    for method, (label, side, color, marker) in MARKED.items():
+        place, (away, ha, va) = places.loc[method], SIDES[side]
+        ax.plot(*place, marker, color=color, mec="white", mew=0.4, ms=6, zorder=5)
+        ax.annotate(label, place, away, textcoords="offset points", ha=ha, va=va, fontsize=7, color=color)
+    ax.set(xlabel="R² of the actions", ylabel="mean return")
     return ax
 
 
-def _our_line(ax: Axes, points: pd.DataFrame, color: str, label: str) -> None:
-    rows = points[points["method"].str.match("faithful|our cells, tuned$")].sort_values("unlike")
-    ax.plot(rows["unlike"], rows["gap"], color=color, lw=1.2, marker=".", ms=4, zorder=5, label=label)
-    for method, marker in (("faithful", "o"), ("our cells, tuned", "*")):
-        end = rows[rows["method"] == method]
-        ax.plot(end["unlike"], end["gap"], marker, color=color, mec="white", mew=0.4, ms=6, zorder=6)
-
-
-def likeness_over_cells(ax: Axes, table: pd.DataFrame) -> Axes:
-    """Plot three measures of likeness over the number of cells, from the `table` of `studies.comparison.likeness`.
-
-    These are R² of the actions (band: from the lowest seed to the median), sameness of the cells, and ratio of the
-    actions' differences.
-    """
+def likeness_over_cells(ax: Axes, tables: dict[str, pd.DataFrame]) -> Axes:
+    """Plot R² over the number of cells, a line per task, from tables of `studies.comparison.likeness` by title."""
     ax.set_xscale("log")
-    ax.fill_between(table["size"], table["r2_least"], table["r2"], color=TEACHER, alpha=0.2, lw=0)
-    for column, color, marker, label in (
-        ("r2", TEACHER, "o", "R², median (band: to the lowest)"),
-        ("index", DISTILLED, "s", "sameness of the cells"),
-        ("ratio", COLOURS[2], "^", "ratio of the actions’ differences"),
-    ):
-        ax.plot(table["size"], table[column], color=color, marker=marker, ms=3.5, label=label)
-    ax.set_ylim(min(0.0, table["r2_least"].min()) - 0.05, 0.05 + max(1.0, table["ratio"].max()))
-    ax.set_xlabel("cells")
-    return _ticks_at(ax, table.loc[table["size"] != 7, "size"])  # the label of 7 would touch that of 8
+    for (title, table), marker in zip(tables.items(), "os^D"):
+        ax.plot(table["size"], table["r2"], color=OURS, marker=marker, ms=3.5)
+        first = table.loc[0, ["size", "r2"]]
+        ax.annotate(title, first, (-6, 0), textcoords="offset points", ha="right", va="center", fontsize=7)
+    ax.set(xlim=(0.58, 14), xlabel="cells", ylabel="R² of the actions")
+    return _ticks_at(ax, pd.concat(tables)["size"])
 
 
-def return_over_cells(
-    ax: Axes, frame: pd.DataFrame, teacher: float, *, linear: float, looks: dict[str, dict] = IMITATIONS
-) -> Axes:
-    """Plot `over_cells` of the mean return minus the teacher's, on a scale linear up to `linear`, then logarithmic."""
-    ax.set_yscale("symlog", linthresh=linear)
-    over_cells(ax, frame.assign(gap=frame["mean"] - teacher), "gap", looks)
-    ax.axhline(0, color=TEACHER, ls="--", lw=1.0, zorder=3, label="teacher")
-    ax.set_ylabel("mean return − teacher’s")
-    ax.yaxis.set_major_formatter("{x:g}")
-    return ax
-
-
-def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict] = IMITATIONS) -> Axes:
+def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict]) -> Axes:
     """Plot a column of `frame` over the number of cells or leaves: one line per method, the median of its seeds.
 
-    `frame` has the columns method, size, seed and cells of `studies.comparison`. Only the methods in `looks` are drawn.
-    A method that chooses its own size (size 0) is a mark at its median number of cells. Our bands and the error bars of
-    marks span the 10 % to 90 % quantiles over the seeds.
+    `frame` has the columns method, size and seed of `studies.comparison`. Only the methods in `looks` are drawn. Our
+    bands span the 10 % to 90 % quantiles over the seeds.
     """
     ax.set_xscale("log")
-    for method, style in looks.items():
+    for method, look in looks.items():
         rows = frame[frame["method"] == method]
-        if not len(rows):
-            continue
         low, middle, high = (rows.groupby("size")[column].quantile(share) for share in (0.1, 0.5, 0.9))
-        if "marker" not in style:
-            ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, "label": method, **style})
-            if style["color"] == DISTILLED and len(middle) > 2:  # a band over fewer sizes would hide more than it shows
-                ax.fill_between(middle.index, low, high, color=DISTILLED, alpha=0.2, lw=0)
-            continue
-        bounds = [middle - low, high - middle]
-        ax.errorbar(max(1, rows["cells"].median()), middle, bounds, **MARK | {"label": method} | style)
+        ax.plot(middle.index, middle, **{"lw": 0.9, "marker": ".", "ms": 4, "label": method, **look})
+        if look["color"] == OURS:
+            ax.fill_between(middle.index, low, high, color=OURS, alpha=0.2, lw=0)
     ax.set_xlabel("cells or leaves")
     return _ticks_at(ax, frame.loc[frame["method"].isin(looks) & (frame["size"] > 0), "size"])
 

@@ -45,7 +45,7 @@ def test_the_own_cell_and_the_one_behind_the_border_are_tinted(ax):
     explanation.whereabouts(ax, policy, np.array([0.1, 0.5]))
     shades = ax.images[0].get_array()[200]
     left, middle, right = (tuple(shades[i][:3]) for i in (20, 200, 380))
-    assert right == (1, 1, 1) and middle[0] == middle[1] == middle[2] < 1 and left[0] > left[2]  # white, grey, orange
+    assert right == (1, 1, 1) and middle[0] == middle[1] == middle[2] < 1 and left == mpl.colors.to_rgb(style.OURS)
 
 
 def test_the_view_holds_a_codeword_outside_the_box(ax):

@@ -9,7 +9,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, tiny
 
 import vsp
 import vsp_beyond
-from vsp_beyond.explain import RulePolicy, compare_maps, describe_rules, find_rules
+from vsp_beyond.explain import RulePolicy, describe_rules, find_rules
 from vsp_beyond.optimum import best_policy, best_returns
 from vsp_beyond.proofs import largest_disturbance, steps_to_goal
 
@@ -46,10 +46,6 @@ CASES = {
     "explain.find_rules": (functools.partial(find_rules, TWO), of_rules),
     "explain.describe_rules": (functools.partial(describe_rules, TWO), of_rules),
     "explain.RulePolicy.predict": (RulePolicy(TWO, find_rules(TWO, STATES, STATES)[0]).predict, {"obs": array(STATES)}),
-    "explain.compare_maps": (
-        functools.partial(compare_maps, TWO, TWO, rng=np.random.default_rng(0)),
-        {"states": array(STATES), "scale": array([0.5, 0.25], free=(), also=[[1.0, 0.0], [-1.0, 1.0]])},
-    ),
     "optimum.best_returns": (best_returns, {"starts": array(STATES)}),
     "optimum.best_policy": (
         best_policy,
@@ -86,10 +82,6 @@ def test_only_linear_policies_are_proved(policy):
         vsp_beyond.prove(policy)
 
 
-def test_what_explains_linear_policies_alone_refuses_others():
-    for use in (
-        lambda: RulePolicy(FLAT, []),
-        lambda: compare_maps(FLAT, FLAT, np.zeros((1, 2)), scale=np.ones(2), rng=np.random.default_rng(0)),
-    ):
-        with pytest.raises(ValueError, match="sub_policy 'constant', expected 'linear'"):
-            use()
+def test_rules_for_linear_policies_alone_refuse_others():
+    with pytest.raises(ValueError, match="sub_policy 'constant', expected 'linear'"):
+        RulePolicy(FLAT, [])

@@ -85,6 +85,7 @@ wrongs(
     ("None as the result", "return np", "np"),
     ("not of other variables", "inputs =", "actions = states = np.eye(9)[:, :2]; inputs ="),
     ("the least that a linear map", LSTSQ, RIDGE),
+    ("the least that a linear map", LSTSQ, RIDGE.replace("np.eye", "0.1 * np.eye")),
     ("argument 2 altered in place", "return", "actions -= actions.mean(axis=0); return"),
 )
 right("1.2")(changed("1.2", LSTSQ, "np.array([np.linalg.pinv(inputs) @ column for column in actions.T]).T.tolist()"))
@@ -275,6 +276,8 @@ wrongs(
     "2.4",
     ("six coefficients that each differ", SIZE, "np.linalg.norm(coefficients - coefficients[i], axis=1)"),
     ("one coefficient that differs", "apart < config", "apart < 2 * config"),
+    ("one coefficient that differs", SIZE, SIZE.replace("[i])", "[i])[:, :-1]")),
+    ("six coefficients that each differ", "apart < config", "apart < 0.95 * config"),
     ("its size counts, not its sign", SIZE, SIZE.replace("np.abs", "")),
     ("cells that are not neighbours", "partition.neighbours()[i]", "np.arange(len(partition.codewords)) != i"),
     ("whose turn comes first stays", "removed +=", "alike = np.arange(len(alike)) == i; removed +="),
@@ -456,6 +459,9 @@ wrongs(
     ("half a 95 % interval", ERROR, f"1.96 * {ERROR}"),
     ("the gap and its standard error", f", {ERROR}", ""),
     ("a standard error of", "difference.std(ddof=1)", "np.square(difference).mean() ** 0.5"),
+    ("a standard error of", "difference.std(ddof=1)", "np.ptp(np.percentile(difference, [25, 75])) / 1.349"),
+    ("a standard error of", "difference.std(ddof=1)", "1.4826 * np.median(np.abs(difference - np.median(difference)))"),
+    ("a standard error of", "len(difference)", "(len(ours) + len(theirs))"),
 )
 
 
@@ -476,6 +482,8 @@ wrongs(
     ("for 90 %", "[2.5, 97.5]", "[5, 95]"),
     ("of a few thousand draws", "4000", "20"),
     ("an interval that is too wide", "[2.5, 97.5]", "[1, 99]"),
+    ("aside of the mean", "[2.5, 97.5]", "[1, 96]"),
+    ("aside of the mean", "rng.integers(p,", "rng.integers(p - 1,"),
     ("the range of single policies", MEANS, "returns.mean(axis=1)"),
     ("without the mean", "returns.mean(axis=1)", "np.median(returns, axis=1)"),
     ("the upper end first", "return low, high", "return high, low"),
@@ -512,7 +520,8 @@ wrongs(
 # 3.5 refit
 
 FIT = "np.linalg.lstsq(inputs[mine], actions[mine], rcond=None)[0]"
-INVERSE = "np.linalg.inv(inputs[mine].T @ inputs[mine]) @ inputs[mine].T @ actions[mine]"
+SQUARES = "inputs[mine].T @ inputs[mine]"
+INVERSE = f"np.linalg.inv({SQUARES}) @ inputs[mine].T @ actions[mine]"
 wrongs(
     "3.5",
     ("→ Hint 3", FIT, INVERSE, "np.unique(cells)", "range(len(policy))"),
@@ -520,6 +529,8 @@ wrongs(
     ("the same map in every cell", FIT, "np.linalg.lstsq(inputs, actions, rcond=None)[0]"),
     ("the old policy altered", "policy.coefficients.copy()", "policy.coefficients"),
     ("the least there is", FIT, "[[0, 0], [0, 0], actions[mine].mean(axis=0)]"),
+    ("the least there is", FIT, f"0.99 * {FIT}"),
+    ("that misses the actions", FIT, f"np.linalg.solve({SQUARES} + 1e-3 * np.eye(3), inputs[mine].T @ actions[mine])"),
     ("a vsp.VoronoiPolicy", "return vsp", "return coefficients; vsp"),
     ("is not written yet", "cells, coefficients =", "raise NotImplementedError(); cells, coefficients ="),
 )

@@ -312,16 +312,6 @@ def test_pictures_are_shown_and_written_nowhere(tmp_path, monkeypatch):
     assert 'alt="a policy"' in picture._repr_html_() and picture.png[:4] == b"\x89PNG" and not list(tmp_path.iterdir())
 
 
-def test_two_squares_side_by_side_are_of_one_size():
-    _, teacher, states, _ = examples()
-    fig, axes = drawing.actions_and_error(baselines.rule_of_thumb(SIMPLEGOAL)[1], teacher, states)
-    fig.canvas.draw()
-    one, other = (ax.get_window_extent() for ax in axes)
-    drawing.plt.close(fig)
-    assert (one.width, one.y0, one.y1) == pytest.approx((other.width, other.y0, other.y1))
-    assert one.width == pytest.approx(one.height)
-
-
 # Checks
 
 

@@ -14,7 +14,7 @@ VERDICTS = {
     "MountainCar: quartiles of the distilled policies, in table and text": CONTRADICTS,
     "The same rule for outliers in every column": OPEN,
     "SimpleGoal: what the teacher's outliers are": HOLDS,
-    "T3 and T4: coefficients rounded to four digits": CONTRADICTS,
+    "Published policies: coefficients rounded to four digits": CONTRADICTS,
     "Dimensions of states and actions": CONTRADICTS,
     "Which iterations may change the partition": CONTRADICTS,
 }
@@ -88,7 +88,7 @@ def test_what_is_in_doubt_exists(found):
         # (24 * 8.369 + 20)/22 = 10.0389; 0.2 * 0.2 * 1000 = 40
         ("SimpleGoal: what the teacher's outliers are", ["24 = 2 at -10 and 22 with mean 10.04", "40 of 1000"]),
         # 13 * 2 + 13 * 6 - 2 numbers in T3, 32 * 5 in T4
-        ("T3 and T4: coefficients rounded to four digits", ["Of 262 numbers 6 have 4 decimals (all 2 to 4)"]),
+        ("Published policies: coefficients rounded to four digits", ["Of 262 numbers 6 have 4 decimals (all 2 to 4)"]),
         ("Dimensions of states and actions", ["[2, 2]", "[2, 1]"]),
         ("Which iterations may change the partition", ["4000, 1000, 5000 - 20 = 4980", "1600, 400, 2000 - 50 = 1950"]),
     ],

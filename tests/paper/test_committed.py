@@ -2,12 +2,13 @@
 
 import pandas as pd
 import pytest
-from support import TASKS
+from support import MOUNTAINCAR, TASKS
 
-from vsp.paper.results import read_results, write_results
-from vsp.paper.runs import paper_experiment
-from vsp.paper.studies import interpretations
-from vsp.paper.studies.interpretations import CHOOSING, N_CONFIRMED, distance, landmarks, ranking
+from vsp.paper.results import PROVENANCE, read_results, write_results
+from vsp.paper.runs import N_RUNS, paper_experiment
+from vsp.paper.studies import interpretations, simpler
+from vsp.paper.studies import teachers as teachers_study
+from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
 from vsp.paper.studies.teachers import SEEDS
 
 
@@ -15,6 +16,32 @@ from vsp.paper.studies.teachers import SEEDS
 def test_the_committed_summaries_of_the_runs_are_too(task):
     made_with = read_results(task)[["settings", "teacher", "version"]].drop_duplicates()
     assert made_with.to_dict("records") == [paper_experiment(task).provenance]
+
+
+def made_today(name, frame):
+    """What the rows of a study are made with today. Of the readings, the rows show which were confirmed."""
+    if name == "readings":
+        confirmed = set(frame.loc[frame["phase"] == "confirming", "variant"])
+        for (variant, _), one in interpretations.experiments(interpretations.variants()).items():
+            for seeds in (CHOOSING, CONFIRMING)[: 1 + (variant in confirmed)]:
+                yield interpretations.provenance_of(one, seeds)
+    elif name == "teachers":
+        for one in teachers_study.experiments().values():
+            yield from ({**teachers_study.provenance_of(one), "seed": seed} for seed in SEEDS)
+    elif name == "hub_teacher":
+        made_with = teachers_study.provenance_of(paper_experiment(MOUNTAINCAR)) | {"teacher": frame["checksum"][0]}
+        yield from ({**made_with, "seed": seed} for seed in range(N_RUNS[MOUNTAINCAR]))
+    else:
+        yield from (simpler.provenance_of(paper_experiment(task)) for task in TASKS)
+
+
+@pytest.mark.parametrize("name", ["readings", "teachers", "hub_teacher", "simpler"])
+def test_the_committed_studies_were_made_with_todays_settings_teachers_and_versions(name):
+    frame = read_results(name)
+    now = pd.DataFrame(made_today(name, frame)).astype(str)
+    made = frame.assign(teacher=frame["checksum"]) if "checksum" in frame else frame
+    made = made[[*now]].dropna(subset=[*PROVENANCE]).astype(str)
+    assert {*now.itertuples(index=False)} == {*made.itertuples(index=False)}, "`make study` makes it anew"
 
 
 @pytest.fixture(scope="module")

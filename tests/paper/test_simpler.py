@@ -1,5 +1,4 @@
 import dataclasses
-import shutil
 
 import numpy as np
 import pandas as pd
@@ -9,7 +8,7 @@ from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
 from vsp.paper import make_runs as command
-from vsp.paper import printed, results, studies
+from vsp.paper import printed
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
@@ -17,7 +16,6 @@ from vsp.paper.statistics import crossed_interval
 from vsp.paper.studies import interpretations, simpler, teachers
 from vsp.paper.studies.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp.partition import Partition
-from vsp.run.listed import write_listed
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)
 FITTED = [
@@ -100,16 +98,3 @@ def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tm
     folder = tmp_path / "data" / "results"
     written = [read_results(name, folder)["a"].item() for name in ("readings", "teachers", "simpler")]
     assert written == [0.3, 0.3, 0.1 + 0.2]
-
-
-def test_tables_of_other_settings_seeds_or_teachers_are_stale(tmp_path, monkeypatch):
-    assert studies.stale() == []
-    shutil.copytree(results.RESULTS, tmp_path / "results")
-    monkeypatch.setattr(results, "RESULTS", tmp_path / "results")
-    changes = {"readings": ("settings", "0123456789"), "teachers": ("seed", 7), "simpler": ("teacher", "0123456789")}
-    for name, (column, value) in changes.items():
-        frame = read_results(name)
-        frame.loc[0, column] = value
-        write_listed(tmp_path / "results" / f"{name}.csv", frame.to_csv(index=False))
-    says = "data/results/{}.csv was made with other {}: `make study` makes it anew"
-    assert studies.stale() == [says.format(name, column) for name, (column, _) in changes.items()]

@@ -10,42 +10,9 @@ from vsp.paper import runs
 from vsp.paper.runs import EVALUATION_SEED, Experiment, load_runs, paper_experiment
 from vsp.paper.studies import teachers as teachers_module
 from vsp.paper.studies.simpler import teacher_data
-from vsp.paper.studies.teachers import experiments, linear_error, study, teacher_summary, teachers, variance_shares
+from vsp.paper.studies.teachers import experiments, linear_error, study, teacher_summary, teachers
 from vsp.tasks import base
 from vsp.teachers.teacher import SHIPPED, load_teacher
-
-# Variance between and within groups
-
-
-def shares(table):
-    """`variance_shares` of a table (k, n), one row per group."""
-    table = np.asarray(table, dtype=float)
-    values, groups = pd.Series(table.ravel()), pd.Series(np.repeat(np.arange(len(table)), table.shape[1]))
-    return variance_shares(values, groups)
-
-
-def simulated(seed, k, n, between, within):
-    rng = np.random.default_rng(seed)
-    return rng.normal(0, between**0.5, (k, 1)) + rng.normal(5, within**0.5, (k, n))
-
-
-def test_shares_by_hand():
-    """Means 2 and 6 with variance 8; inside 2 and 2. Of the 8, 2 / 2 comes from within."""
-    found = shares([[1, 3], [5, 7]])
-    assert (found["within"], found["between"], found["share"]) == pytest.approx((2, 7, 7 / 9))
-    found = shares([[0, 1, 2], [4, 4, 4], [2, 6, 10]])  # means 1, 4, 6; variances 1, 0, 16
-    mean = 11 / 3
-    between = ((1 - mean) ** 2 + (4 - mean) ** 2 + (6 - mean) ** 2) / 2 - 17 / 3 / 3
-    assert (found["within"], found["between"]) == pytest.approx((17 / 3, between))
-    assert found["share"] == pytest.approx(between / (between + 17 / 3))
-
-
-def test_the_interval_of_the_share_holds_the_truth():
-    found = [shares(simulated(seed, 3, 10, 1.0, 1.0)) for seed in range(300)]
-    covered = np.mean([one["share_low"] <= 0.5 <= one["share_high"] for one in found])
-    assert 0.92 <= covered <= 0.98
-    assert all(0 <= one["share_low"] <= one["share"] <= one["share_high"] <= 1 for one in found)
-
 
 # Teachers
 

@@ -193,6 +193,13 @@ def test_box_plots_show_the_quartiles_and_no_outliers(ax):
     assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
     heights = np.concatenate([line.get_ydata() for line in ax.lines])
     assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
+    assert [100] in [line.get_ydata().tolist() for line in box_plot(ax, returns, outliers=True).lines]
+
+
+def test_returns_stand_under_what_is_possible_and_events_have_ticks(ax):
+    show.histogram(ax, np.array([1.0, 2.0]), bound=np.array([2.0, 3.0]))
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["teacher, mean 1.50", "at most, mean 2.50"]
+    assert show.ticks(ax, np.array([1, 2]), "splits", row=0).lines[0].get_xdata().tolist() == [1, 2]
 
 
 def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
@@ -232,36 +239,36 @@ def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
 
 GAPS = pd.DataFrame(
     {
-        "gap": [0.5, -300.0, 12.0, np.nan, -1.2],
-        "verdict": ["reproduced", "differs", "contradicts itself", np.nan, "reproduced"],
-        "wide": [False, False, False, np.nan, True],
+        "subject": ["teacher", "teacher", "distilled", "distilled"],
+        "verdict": ["reproduced", "differs", "contradicts itself", "cannot be told"],
+        "gap": [0.5, -300.0, 12.0, -1.2],
     },
-    index=["mean", "std", "q1", "absent", "max"],
+    index=["mean", "std", "q1", "max"],
 )
 
 
-def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
-    ledger_gaps(ax, GAPS, band=2**0.5)
+def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict_and_subject(ax):
+    ledger_gaps(ax, GAPS, band=2**0.5, limit=20)
     shown = [dots for dots in ax.collections if len(dots.get_offsets())]
-    assert [dots.get_offsets().tolist() for dots in shown] == [[[0.5, 0], [-1.2, 4]], [[-300, 1]], [[12, 2]]]
+    assert [dots.get_offsets().tolist() for dots in shown] == [[[0.5, 0]], [[-1.2, 3]], [[-20, 1]], [[12, 2]]]
+    colours = [style.TEACHER, style.DISTILLED, style.TEACHER, style.DISTILLED]
+    assert [hexes(dots.get_edgecolors()) for dots in shown] == [[colour] for colour in colours]
+    assert [hexes(dots.get_facecolors()) == ["#ffffff"] for dots in shown] == [False, True, False, False]
     named = {dots.get_label(): dots for dots in ax.collections if not len(dots.get_offsets())}  # for the legend
-    assert list(named) == ["reproduced", "differs", "contradicts itself"]
+    assert list(named) == ["reproduced", "cannot be told", "differs", "contradicts itself"]
     for dots, same in zip(shown, named.values(), strict=True):
-        assert set(hexes(dots.get_edgecolors())) == set(hexes(same.get_facecolors()))
         assert dots.get_paths()[0].vertices.tolist() == same.get_paths()[0].vertices.tolist()
-    assert len({hexes(dots.get_facecolors())[0] for dots in named.values()}) == 3
-    assert len({dots.get_paths()[0].vertices.tobytes() for dots in named.values()}) == 3  # markers, for grey printers
-    assert labels(ax) == ["mean", "std", "q1", "absent", "max"] and ax.get_ylim() == (4.5, -0.5)
+    assert [text.get_text() for text in ax.texts] == ["−300"] and ax.get_xlim() == pytest.approx((-22, 22))
+    assert labels(ax) == ["mean", "std", "q1", "max"] and ax.get_ylim() == (3.5, -0.5)
     assert ax.patches[0].get_bbox().x1 == pytest.approx(2**0.5)
-    assert hexes(shown[0].get_facecolors()) == [style.GOAL, "#ffffff"]  # the wide one is hollow
-    assert ledger_gaps(ax, GAPS.assign(gap=-5e5), band=2**0.5).get_xlim()[0] < -5e5
 
 
 def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     goal, pit = state_space.square(ax).patches
     assert [*goal.get_bbox().extents, *pit.get_bbox().extents] == pytest.approx([0, 0, 0.1, 0.1, 0.4, 0.4, 0.6, 0.6])
     letter([ax], ["one"])
-    assert ax.get_title(loc="left") == "(a) one" and len({style.TEACHER, style.DISTILLED, style.GOAL, style.PIT}) == 4
+    named = "TEACHER DISTILLED OURS GOAL PIT FAILING OTHER".split()
+    assert ax.get_title(loc="left") == "(a) one" and len({getattr(style, name) for name in named}) == 7
     show.run_means(show.over_iterations(ax, np.array([3.0, 1.0]), ylabel="cells"), np.array([3.0, 1.0]), 2.5)
     show.reference(ax, 7.0, "x")
     drawn = [np.column_stack(line.get_data()).tolist() for line in ax.lines]
@@ -271,7 +278,7 @@ def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
 
 
-def test_every_verdict_with_a_gap_has_a_colour():
+def test_every_verdict_with_a_gap_has_a_mark():
     assert set(_VERDICTS) == set(ledger.VERDICTS) - {ledger.UNCHECKED}
 
 

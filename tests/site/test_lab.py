@@ -76,6 +76,8 @@ def test_the_first_notebook_opens_clean_and_saving_changes_no_byte(home, lab, br
     menus = page.locator(".lm-MenuBar-itemLabel").all_inner_texts()
     assert "File" in menus and not any("nbgrader" in menu.lower() for menu in menus)
     assert page.get_by_role("button", name="Validate").count() == 0  # nbgrader's
+    assert not any(name.endswith(".toml") for name in page.locator(".jp-DirListing-itemText").all_inner_texts())
+    assert page.get_by_text("Jupyter news").count() == 0
     if json.loads(before)["metadata"]["language_info"]["version"] == platform.python_version():
         page.wait_for_timeout(3000)  # until the kernel has said what it is
         assert page.locator(".jp-mod-dirty").count() == 0

@@ -7,7 +7,7 @@ from small import SMALL
 from support import SIMPLEGOAL
 
 from studies.comparison import equal_tuning, measure
-from studies.comparison.equal_tuning import budgets, equal_budget, leaders, possible, tail, with_r2
+from studies.comparison.equal_tuning import budgets, closest, equal_budget, leaders, with_r2
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS
 from vsp import get_task, load_teacher, start_states, visited_states
@@ -54,14 +54,6 @@ def test_a_size_without_rivals_is_left_out(rows):
     assert equal_budget(pd.concat([rows, alone])).equals(equal_budget(rows))
 
 
-def test_the_tail_stands_beside_the_mean(rows):
-    worst = rows["seed"].where(rows["method"] == "our cells, tuned").astype(float)  # of the others it was not measured
-    table = tail(rows.assign(worst=worst, failing=0.01))
-    name = "our cells, tuned"
-    assert table[["method", "size"]].to_numpy().tolist() == [[name, 4], [name, 2]]
-    assert table[["worst", "failing"]].to_numpy().tolist() == [[1.0, pytest.approx(0.01)]] * 2
-
-
 def test_r2_follows_from_the_action_error_and_from_the_states():
     """By two routes: from the error of a policy, and from its actions."""
     task, teacher = get_task(SIMPLEGOAL), load_teacher(SIMPLEGOAL)
@@ -74,9 +66,10 @@ def test_r2_follows_from_the_action_error_and_from_the_states():
     assert with_r2(frame, SIMPLEGOAL)["r2"].tolist() == pytest.approx([by_hand, 1.0])
 
 
-def test_the_map_has_a_point_for_every_method_and_size(rows):
-    points = possible(rows).set_index(["method", "size"])
-    assert len(points) == 10 and points.loc[("our cells, tuned", 4), "mean"] == pytest.approx(9.6)
+def test_what_is_closest_is_as_good(rows):
+    more = [row("teacher", 0, 0, 9.0, 1.0), row("faithful", 2, 0, 9.1, 0.8), row("faithful", 4, 0, 8.0, 0.9)]
+    found = closest(pd.concat([rows, pd.DataFrame(more)]), SIMPLEGOAL)
+    assert (found["size"], found["r2"], found["rival"], found["rival size"]) == (2, 0.8, "CART, DAgger, tuned", 4)
 
 
 @pytest.mark.parametrize("name", ["our cells, tuned", "one linear map, tuned"])

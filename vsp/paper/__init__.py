@@ -2,7 +2,7 @@
 
 from . import baselines
 from .audit import audit_findings, audit_table, mean_inside
-from .ledger import N_RESAMPLES, largest_gaps, ledger_table, left_out_by_quartiles, results_of, verdict_counts
+from .ledger import N_RESAMPLES, ledger_gaps, ledger_table, left_out_by_quartiles, verdict_counts
 from .printed import (
     SHORT,
     SUBJECTS,

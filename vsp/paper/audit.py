@@ -223,7 +223,7 @@ def printed_digits() -> Finding:
     notes = [f"{(n == digits).sum()} have {digits:g} {kind} (all {n.min()} to {n.max()})" for kind, n in counts.items()]
     agrees = any((n == digits).all() for n in counts.values())
     text = f"Of {len(numbers)} numbers {', '.join(notes)}"
-    return Finding("T3 and T4: coefficients rounded to four digits", quote(*ids), text, agrees, ids)
+    return Finding("Published policies: coefficients rounded to four digits", quote(*ids), text, agrees, ids)
 
 
 def dimensions() -> Finding:

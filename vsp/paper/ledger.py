@@ -9,11 +9,10 @@ Rules:
    interval; else it "differs". The interval is widened by the square root of 2, because the paper's value comes from a
    sample of the same size. Intervals come from 10,000 resamples: of runs for distilled policies, of start states for
    the one teacher.
-4. A value that no rerun can show, or that is not measured here (the parameters of one run, the machine), "cannot be
+4. A return "cannot be told" if the printed value lies in an interval that, widened, is longer than the standard
+   deviation that the paper prints for these returns: such an interval contains nearly anything.
+5. A value that no rerun can show, or that is not measured here (the parameters of one run, the machine), "cannot be
    checked".
-
-A verdict on a return is marked "wide" if the widened interval is longer than the standard deviation that the paper
-prints for these returns. Then "reproduced" says little.
 """
 
 from __future__ import annotations
@@ -29,8 +28,8 @@ from . import audit, printed
 from .runs import SHARES, Results
 from .statistics import interval, outlier_numbers, resample, share_interval, spread
 
-VERDICTS = REPRODUCED, DIFFERS, UNCHECKED, CONTRADICTED = (
-    "reproduced", "differs", "cannot be checked", "contradicts itself"
+VERDICTS = REPRODUCED, UNTOLD, DIFFERS, UNCHECKED, CONTRADICTED = (
+    "reproduced", "cannot be told", "differs", "cannot be checked", "contradicts itself"
 )  # fmt: skip
 N_RESAMPLES = 10_000
 # Parts of the paper by patterns of ids; the first match counts
@@ -45,7 +44,17 @@ CELLS = {
     "_hyper_": "04, hyperparameters", "^sg_spread_": "04, simplegoal-spread", "^mc_spread_": "04, mountaincar-spread",
     "^.._(?:drl|ours)_": "04, text-numbers", "_cell_": "05, replay", "": "05, ledger",
 }  # fmt: skip
-COLUMNS = "id part task where quantity subject paper value here low high verdict wide cell".split()
+# The results that the notebook shows, in words
+SHOWN = {
+    "mean": "mean",
+    "std": "standard deviation",
+    "q1": "first quartile",
+    "median": "median",
+    "q3": "third quartile",
+}
+SHOWN = {f"spread_{who}_{name}": words for who in ("drl", "ours") for name, words in SHOWN.items()}
+SHOWN |= {"spread_ours_coverage": "share of non-outliers", "cells": "cells of the best"}
+COLUMNS = "id part task where quantity subject paper value here low high verdict cell".split()
 
 
 def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
@@ -58,8 +67,8 @@ def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES)
     parts = [measured(task, result, n_resamples=n_resamples) for task, result in results.items()]
     frame = printed.printed_values().join(pd.concat([settings, *parts]), on="id")
     doubted = audit.in_doubt()
-    frame["verdict"] = [verdict(row, in_doubt=row.id in doubted) for row in frame.itertuples()]
-    frame["wide"] = _wide(frame)
+    rows = zip(frame.itertuples(), _wide(frame))
+    frame["verdict"] = [verdict(row, in_doubt=row.id in doubted, wide=wide) for row, wide in rows]
     frame["part"] = _first_match(frame["id"], PARTS)
     frame["cell"] = _first_match(frame["id"], CELLS)
     return frame[COLUMNS]
@@ -78,12 +87,14 @@ def _wide(frame: pd.DataFrame) -> pd.Series:
 
 
 def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
-    """Count the values of each part of the paper by verdict."""
-    table = pd.crosstab(book["part"], book["verdict"])
-    return table.reindex(index=[*PARTS.values()][::-1], columns=VERDICTS, fill_value=0).rename_axis(columns=None)
+    """Count the values of each part of the paper by verdict, and the results once more, each distinct value once."""
+    once = distinct_results(book).assign(part="results, each value once")
+    table = pd.concat([book, once]).groupby("part")["verdict"].value_counts().unstack()
+    parts = ["settings", "results", "results, each value once", "coefficients"]
+    return table.reindex(index=parts, columns=VERDICTS).fillna(0).astype(int).rename_axis(columns=None)
 
 
-def verdict(row, *, in_doubt: bool = False) -> str:
+def verdict(row, *, in_doubt: bool = False, wide: bool = False) -> str:
     """Return the verdict by this module's rules; `row` has paper (as printed), value, here, low and high."""
     if in_doubt:
         return CONTRADICTED
@@ -93,7 +104,7 @@ def verdict(row, *, in_doubt: bool = False) -> str:
         return REPRODUCED if np.isclose(row.here, row.value, rtol=1e-9) else DIFFERS
     half = 0.5 * last_digit(row.paper)
     low, high = row.here - np.sqrt(2) * (row.here - row.low), row.here + np.sqrt(2) * (row.high - row.here)
-    return REPRODUCED if low - half <= row.value <= high + half else DIFFERS
+    return DIFFERS if not low - half <= row.value <= high + half else UNTOLD if wide else REPRODUCED
 
 
 def last_digit(printed: str) -> float:
@@ -119,31 +130,22 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
     return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
 
 
-def results_of(book: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Return one task's results in the ledger `book`, the teacher's first; values in both table and text once."""
-    rows = book[(book["task"] == task) & (book["part"] == "results")]
-    statistic = rows["id"].str.split("_(?:drl|ours)_", regex=True).str[-1]
-    twice = ~rows["id"].str.contains("_spread_") & statistic.isin(["min", "max", "mean", "std"])
-    twice |= rows["id"].str.contains("caption")
-    rows = rows[~twice].assign(text=~rows["id"].str.contains("_spread_"))
-    return rows.sort_values(["subject", "text"], kind="stable").drop(columns="text")
+def distinct_results(book: pd.DataFrame) -> pd.DataFrame:
+    """Return the results in the ledger `book`; of values that the paper prints twice, the row of its table."""
+    return book[book["part"] == "results"].drop_duplicates(["task", "subject", "value"], keep="last")
 
 
-def largest_gaps(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return gap (the printed value minus the rerun's, in half-widths of the rerun's interval), verdict and wide.
+def ledger_gaps(book: pd.DataFrame, task: str) -> pd.DataFrame:
+    """Return the results of `SHOWN`: columns subject, verdict and gap (index: names in words).
 
-    A half-width counts as at least half a unit of the last printed digit. Some intervals have no width: the smallest
-    of all returns may be the same in every resample.
+    The gap is the printed value minus the rerun's, in half-widths of the rerun's interval on that side, which count as
+    at least half a unit of the last printed digit.
     """
-    rows = rows[rows["low"].notna()]
-    value = rows["value"]
-    half = np.where(value > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
+    rows = book.set_index("id").loc[[f"{printed.PREFIX[task]}_{name}" for name in SHOWN]]
+    half = np.where(rows["value"] > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
     half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))
-    statistic = rows["id"].str.replace("^.._(spread_)?(drl_|ours_)?", "", regex=True).str.replace("_", " ")
-    statistic = statistic.str.replace("whisker low", "lower bound").str.replace("whisker high", "upper bound")
-    name = rows["subject"].replace(printed.SUBJECTS) + ": " + statistic
-    frame = pd.DataFrame({"gap": (value - rows["here"]) / half, "verdict": rows["verdict"], "wide": rows["wide"]})
-    return frame.set_index(pd.Index(name, name="statistic"))
+    rows = rows.assign(gap=(rows["value"] - rows["here"]) / half).replace({"subject": printed.SUBJECTS})
+    return rows[["subject", "verdict", "gap"]].set_axis(rows["subject"] + ": " + [*SHOWN.values()])
 
 
 # Settings, read from the code that uses them
@@ -206,7 +208,7 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     from scipy.stats import trim_mean  # here: it takes long to import
 
     teacher, means = result.teacher_returns, result.returns.mean(axis=1)
-    cells, task = np.array([len(run.policy) for run in result.runs]), result.runs[0].policy.task
+    task = result.runs[0].policy.task
     measures: dict[str, tuple] = {
         "interquartile mean of the runs": (means, partial(trim_mean, proportiontocut=0.25), teacher.mean()),
         "probability that an episode beats the teacher's": ((result.returns > teacher).mean(axis=1), np.mean, np.nan),
@@ -216,8 +218,6 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
             shares = (result.outcomes == code).mean(axis=1)
             teachers = np.mean(result.teacher_outcomes.outcomes == code)
             measures[f"share of episodes: {name}"] = shares, np.mean, teachers
-    for name, q in {"lowest": 0, "first quartile": 25, "median": 50, "third quartile": 75, "highest": 100}.items():
-        measures[f"cells per run: {name}"] = cells, partial(np.percentile, q=q), np.nan
     rows = {
         name: (statistic(values, axis=0), *interval(values, statistic, vectorized=True, n_resamples=n_resamples), value)
         for name, (values, statistic, value) in measures.items()

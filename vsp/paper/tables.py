@@ -11,7 +11,6 @@ import os
 import re
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 
@@ -21,19 +20,21 @@ from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
 from ..run import atomic
 from ..show.captions import caption_of, file_of, headings
-from ..show.style import FORCE_MAP
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .readings import defaults
 from .results import write_results
-from .runs import SHARES, Experiment, Results, Run, outcome_shares
+from .runs import Experiment, Results, Run, outcome_shares
 from .statistics import interval, outlier_numbers, spread
 
 if TYPE_CHECKING:
     from IPython.display import HTML
 
 PAGE = 40  # rows that fit on one page
+ROWS = 12  # a longer table is folded in a notebook
 MISSING = "–"  # where there is no number
 INTERVAL = "95 % interval"
+_MINUS = r"(?<![\w.)-])-(?=\d)"
+_FOR_NOTEBOOKS = {_MINUS: "−", r"(?<=\d) (?=%)": "\xa0", r"(?<=\d) to (?=[−\d])": "\xa0to\xa0"}
 QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting", "hyperparameter"}
 
 
@@ -47,8 +48,8 @@ def save_table(
     """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
     A name "beyond/x" writes OUT/figures/beyond/tables/x. `shown` replaces the whole table for readers: a part of it, or
-    equations as LaTeX code. The default `caption` is in notebooks/captions.toml. The LaTeX needs the packages booktabs
-    and xcolor, and longtable for more than `PAGE` rows.
+    equations as LaTeX code. The default `caption` is in notebooks/captions.toml. The LaTeX needs the package booktabs,
+    and longtable for more than `PAGE` rows.
     """
     path, shown = file_of("tables", name, out), frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
@@ -62,13 +63,19 @@ def save_table(
 
 
 def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
-    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml."""
+    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml.
+
+    A table of more than `ROWS` rows is folded below its caption. Numbers have true minus signs, and intervals do not
+    wrap.
+    """
     from IPython.display import HTML
 
-    above = caption_of("tables", name, text=caption).to_html("caption")
+    about, fold = caption_of("tables", name, text=caption), len(frame) > ROWS
+    above = f"<caption>All {len(frame)} rows</caption>" if fold else about.to_html("caption")
     with pd.option_context("display.max_colwidth", None):
-        page = as_text(present(frame)).to_html(index=False, border=0)
-    return HTML(page.replace(">", f">\n  {above}", 1) if above else page)
+        page = as_text(present(frame)).map(_typeset).rename(columns=_typeset).to_html(index=False, border=0)
+    page = page.replace(">", f">\n  {above}", 1) if above else page
+    return HTML(f"<details>{about.to_html('summary')}\n{page}\n</details>" if fold else page)
 
 
 def present(frame: pd.DataFrame) -> pd.DataFrame:
@@ -147,9 +154,14 @@ def _text(value: Any, digits: int) -> str:
 
 def _escape(text: str) -> str:
     """Escape text for LaTeX and typeset minus signs; mathematics between dollars stays as it is."""
-    parts = re.split(r"(\$[^$]*\$|\\textcolor.*?}} )", text)
-    parts[::2] = [re.sub(r"([_%&])", r"\\\1", part) for part in parts[::2]]
-    parts[::2] = [re.sub(r"(?<![\w.)-])-(?=\d)", "$-$", part) for part in parts[::2]]
+    return _typeset(text, {r"([_%&])": r"\\\1", _MINUS: "$-$"})
+
+
+def _typeset(text: str, signs: dict[str, str] = _FOR_NOTEBOOKS) -> str:
+    """Replace `signs` (patterns) in text outside of mathematics: minus signs, and spaces where a line must not end."""
+    parts = re.split(r"(\$[^$]*\$)", text)
+    for pattern, sign in signs.items():
+        parts[::2] = [re.sub(pattern, sign, part) for part in parts[::2]]
     return "".join(parts)
 
 
@@ -174,24 +186,12 @@ def interpretation_table(task: str) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["reading", "default"], dtype=object)
 
 
-def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3, swatch: bool = False) -> pd.DataFrame:
-    """Return T3 or T4: one row per cell, with its codeword and one equation per action, in LaTeX.
-
-    `swatch` puts a patch before each equation, in the force map's colour of the action at the codeword (one action).
-    """
-    rows = []
-    for i, codeword in enumerate(policy.codewords):
-        row = {"codeword": codeword_latex(policy, i, digits)}
-        patches = [_patch(action) if swatch else "" for action in policy.predict(codeword)[0]]
-        for output, patch, equation in zip(policy.task.outputs, patches, equations_latex(policy, i, digits)):
-            row[f"${symbol(output)}$"] = patch + equation
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
-def _patch(force: float) -> str:
-    colour = mpl.colors.to_hex(mpl.colormaps[FORCE_MAP]((force + 1) / 2)).lstrip("#").upper()
-    return rf"\textcolor[HTML]{{{colour}}}{{\rule{{1.2em}}{{1.4ex}}}} "
+def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3) -> pd.DataFrame:
+    """Return T3 or T4: one row per cell, with its codeword and one equation per action, in LaTeX."""
+    codewords = [codeword_latex(policy, i, digits) for i in range(len(policy))]
+    equations = zip(*(equations_latex(policy, i, digits) for i in range(len(policy))))
+    columns = {f"${symbol(name)}$": column for name, column in zip(policy.task.outputs, equations)}
+    return pd.DataFrame({"codeword": codewords, **columns})
 
 
 def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
@@ -275,25 +275,23 @@ def write_summary(results: Results, *, out: str | os.PathLike) -> None:
 def run_overview(results: Results) -> pd.DataFrame:
     """Return mean, lowest and highest value over the runs, one row per property of a run."""
     frame = run_summary(results.runs, results.experiment).rename(columns={"mean": "mean return"})
-    table = frame[["cells", "splits", "merges", "mean return", *SHARES]].agg(["mean", "min", "max"]).T
+    table = frame[["cells", "splits", "merges", "mean return", "goal"]].agg(["mean", "min", "max"]).T
     return table.set_axis(["mean over runs", "lowest", "highest"], axis=1)
 
 
-def teacher_beside_runs(results: Results) -> dict[str, float]:
-    """Compare the teacher with the distilled policies: means, and 95 % intervals that resample policies.
+def teacher_beside_runs(results: Results) -> pd.DataFrame:
+    """Compare the teacher with the distilled policies: means, and 95 % intervals (low, high) that resample policies.
 
-    Differences are taken start by start. "± if independent" is the half-width for independent episodes, which these
-    are not.
+    Differences are taken start by start. The interval for independent episodes is too short: they are not independent.
     """
     teacher, runs = results.teacher_returns, results.returns
-    means = runs.mean(axis=1)
-    low, high = interval(means, np.mean, vectorized=True)
-    gap_low, gap_high = interval((runs - teacher).mean(axis=1), np.mean, vectorized=True)
-    return {
-        "teacher, mean": teacher.mean(), "distilled, mean": runs.mean(),
-        "95 % interval from": low, "to": high, "± of it": (high - low) / 2,
-        "± if independent": 1.96 * runs.std(ddof=1) / np.sqrt(runs.size),
-        "difference, from": gap_low, "difference, to": gap_high,
-        "runs above the teacher": np.mean(means > teacher.mean()),
-        "lowest run": means.min(), "median run": np.median(means), "highest run": means.max(),
-    }  # fmt: skip
+    means, half = runs.mean(axis=1), 1.96 * runs.std(ddof=1) / np.sqrt(runs.size)
+    gap = (runs - teacher).mean(axis=1)
+    rows = {
+        "teacher": (teacher.mean(), np.nan, np.nan),
+        "distilled": (runs.mean(), *interval(means, np.mean, vectorized=True)),
+        "  as if all episodes were independent": (runs.mean(), runs.mean() - half, runs.mean() + half),
+        "distilled minus teacher": (gap.mean(), *interval(gap, np.mean, vectorized=True)),
+        "median of the distilled": (np.median(means), np.nan, np.nan),
+    }
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["mean", "low", "high"])

@@ -19,9 +19,10 @@ from .returns import (
     phase,
     reference,
     run_means,
+    ticks,
 )
 from .state_space import arrows, cells, codewords, error_map, force_bar, force_map, grid, square, trail
-from .style import DISTILLED, OTHER, TEACHER, Picture, legend_below, letter, panels, save_figure
+from .style import DISTILLED, FAILING, OTHER, OURS, TEACHER, Picture, legend_below, letter, panels, save_figure
 
 
 def __getattr__(name: str) -> type:

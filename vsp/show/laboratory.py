@@ -25,6 +25,7 @@ REACH = {"max_pol_loss": (1e-2, 1e4), "min_pol_distance": (0.5, 3.0), "min_param
 DRAWN = ("linear", "constant")  # sub-policies that the explorer draws: a constant is a linear map without weights
 SHOWN = 8  # trials in the table and in the explorer
 
+_WITHOUT = "<p>The laboratory's controls need a kernel: <code>make lab</code> opens JupyterLab. Here is trial 1.</p>"
 _LABELS = {"style": {"description_width": "145px"}, "layout": {"width": "455px"}}
 
 
@@ -51,7 +52,7 @@ class Laboratory:
         about = {"options": DRAWN, "description": "sub-policy", **_LABELS}
         self.settings["sub_policy"] = widgets.Dropdown(value=self.config.sub_policy, **about)
         self.back = widgets.Button(description="back to trial 1", layout={"width": "auto", "align_self": "flex-start"})
-        self.status, self.text = widgets.HTML(self.ready), widgets.HTML(layout={"flex": "1 1 440px", "min_width": "0"})
+        self.status, self.text = widgets.HTML(self.ready), widgets.HTML(layout={"flex": "1 1 560px", "min_width": "0"})
         self.explorer = View()
         self._put(self.trial({}))
         controls = widgets.VBox([*self.settings.values(), self.back, self.status], layout={"max_width": "100%"})
@@ -94,8 +95,7 @@ class Laboratory:
 
         Settings that were tried before give the index of the earlier trial.
         """
-        rounded = {name: _rounded(value) for name, value in changes.items()}
-        changed = {name: value for name, value in rounded.items() if value != _rounded(getattr(self.config, name))}
+        changed = {n: _rounded(v) for n, v in changes.items() if _rounded(v) != _rounded(getattr(self.config, n))}
         config = dataclasses.replace(self.config, **changed)
         for place, (earlier, _, _) in enumerate(self.trials):
             if earlier == config:
@@ -143,8 +143,8 @@ class Laboratory:
         return scene_of(policies, self.task) | {"teacher": self._teacher_scene}
 
     def _ipython_display_(self) -> None:
-        first = Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher)
-        page.show(self.view._repr_mimebundle_(), first.element(), type(self).__doc__.split("\n")[0])
+        still = _WITHOUT + Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher).element()
+        page.show(self.view._repr_mimebundle_(), still, type(self).__doc__.split("\n")[0])
 
 
 def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:

@@ -8,24 +8,33 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 
 from ..checks import check_array, check_finite
 from ..evaluation import fences
-from .style import COLOURS, DISTILLED, GOAL, TEACHER
+from .style import DISTILLED, OTHER, TEACHER
 
-_VERDICTS = {"reproduced": (GOAL, "o"), "differs": (COLOURS[3], "D"), "contradicts itself": (COLOURS[4], "X")}
+_VERDICTS = {  # marker, and whether it is filled
+    "reproduced": ("o", True), "cannot be told": ("o", False), "differs": ("D", True), "contradicts itself": ("X", True)
+}  # fmt: skip
+_SUBJECTS = {"teacher": TEACHER, "distilled": DISTILLED}
 
 
-def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> Axes:
-    """Draw box plots of the returns of the teacher and of the distilled policies, in this order."""
-    import seaborn as sns
+def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
+    """Draw box plots of the returns of the teacher and of the distilled policies, in this order.
 
-    returns = {name: check_finite(f"returns of {name}", values) for name, values in returns.items()}
-    colours = dict(zip(returns, (TEACHER, DISTILLED)))
-    sns.boxplot(data=returns, ax=ax, palette=colours, width=0.5, showfliers=False, linewidth=0.8)
+    `outliers`: draw them too, as a strip of dots.
+    """
+    returns = {name: check_finite(f"returns of {name}", values).ravel() for name, values in returns.items()}
+    names = [f"{name}\n(n = {values.size:,})" for name, values in returns.items()]
+    look = {"widths": 0.5, "patch_artist": True, "medianprops": {"color": "black"}, "showfliers": False}
+    boxes = ax.boxplot([*returns.values()], tick_labels=names, **look)["boxes"]
+    for place, (box, colour, values) in enumerate(zip(boxes, (TEACHER, DISTILLED), returns.values()), start=1):
+        box.set(facecolor=colour)
+        low, high = fences(*np.quantile(values, [0.25, 0.75]))
+        beyond = values[(values < low) | (values > high)] if outliers else values[:0]
+        jitter = np.random.default_rng(0).uniform(-0.2, 0.2, beyond.size)
+        ax.plot(place + jitter, beyond, ".", color=colour, ms=2, mew=0, alpha=0.5, rasterized=True)
     ax.set(ylabel="return per episode")
-    ax.set_xticks(range(len(returns)), [f"{name}\n(n = {values.size:,})" for name, values in returns.items()])
     return ax
 
 
@@ -35,14 +44,22 @@ def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = Fa
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
     if not log:
-        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.locator_params("y", integer=True)
+    return ax
+
+
+def ticks(ax: Axes, iterations: np.ndarray, name: str, *, row: int) -> Axes:
+    """Mark iterations by ticks in a row above the axis, the first at the bottom, with a name at the right."""
+    height, place = 0.08 * (row + 0.6), ax.get_xaxis_transform()
+    ax.plot(iterations, np.full(len(iterations), height), "|", color="black", ms=4, mew=0.5, transform=place)
+    ax.text(ax.dataLim.x1, height, name, transform=place, ha="right", va="center", fontsize=7)
     return ax
 
 
 def phase(ax: Axes, begin: int, name: str) -> Axes:
     """Shade the iterations from `begin` on and name them."""
     ax.axvspan(begin, ax.dataLim.x1, color="0.9", lw=0, zorder=0)
-    ax.text(begin, 1.0, f" {name}", transform=ax.get_xaxis_transform(), va="bottom", fontsize=6)
+    ax.text(begin, 1.0, f" {name}", transform=ax.get_xaxis_transform(), va="bottom", fontsize=7)
     return ax
 
 
@@ -56,15 +73,14 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
     return ax
 
 
-def histogram(ax: Axes, returns: np.ndarray, *, bound: float | None = None) -> Axes:
-    """Draw a histogram of the teacher's returns (n,), and their mean as a line; `bound`: the highest possible mean."""
-    import seaborn as sns
-
-    returns = check_array("returns", returns, (-1,))
-    sns.histplot(returns, ax=ax, color=TEACHER, bins=40, edgecolor="white", linewidth=0.3)
-    most = "" if bound is None else f"\n(at most\n{bound:.2f})"
-    ax.axvline(returns.mean(), color="black", lw=0.8, label=f"mean {returns.mean():.2f}{most}")
-    ax.set(xlabel="return per episode", ylabel="episodes")
+def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None) -> Axes:
+    """Draw a histogram of the teacher's returns (n,). `bound` (n,), an outline: the most from the same starts."""
+    drawn = {"teacher": returns} | ({} if bound is None else {"at most": bound})
+    drawn = {name: check_array("returns", values, (-1,)) for name, values in drawn.items()}
+    bins = np.histogram_bin_edges(np.concatenate([*drawn.values()]), bins=30)
+    for (name, values), look in zip(drawn.items(), ({"color": TEACHER}, {"histtype": "step", "color": "black"})):
+        ax.hist(values, bins=bins, label=f"{name}, mean {values.mean():.2f}", **look)
+    ax.set(xlabel="return per episode", ylabel="episodes", ymargin=0.3)  # room for the legend
     ax.legend(frameon=False, loc="upper left")
     return ax
 
@@ -102,23 +118,24 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
     return ax
 
 
-def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float) -> Axes:
+def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> Axes:
     """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value.
 
-    `frame` (index: names) has the columns gap, verdict and wide (drawn hollow). Values inside the shaded `band` count
-    as reproduced. The scale is linear in the band and logarithmic outside.
+    `frame` (index: names) has the columns subject (its colour), verdict (its marker) and gap. Values inside the shaded
+    `band` count as reproduced. A gap beyond `limit` is a number at the edge.
     """
-    ax.axvspan(-band, band, color="0.9", lw=0, label="reproduced if here")
+    ax.axvspan(-band, band, color="0.9", lw=0)
     ax.axvline(0, color="0.6", lw=0.6)
-    for verdict, (color, marker) in _VERDICTS.items():
-        rows = np.flatnonzero(frame["verdict"] == verdict)
-        faces = ["white" if wide is True else color for wide in frame["wide"].iloc[rows]]
-        ax.scatter(frame["gap"].iloc[rows], rows, color=faces, edgecolor=color, marker=marker, s=14, lw=0.8, zorder=3)
-        ax.scatter([], [], color=color, marker=marker, s=14, label=verdict)
-    limit = max(10_000, 2 * frame["gap"].abs().max())
-    ax.set_xscale("symlog", linthresh=band)
-    ax.set(xlim=(-limit, limit), xticks=[-1000, -10, 0, 10, 1000])
-    ax.xaxis.set_major_formatter("{x:g}")
+    ax.axhline((frame["subject"] == "teacher").sum() - 0.5, color="0.6", lw=0.6)
+    gaps, colours = frame["gap"].clip(-limit, limit).to_numpy(), frame["subject"].map(_SUBJECTS).to_numpy()
+    for verdict, (marker, filled) in _VERDICTS.items():
+        rows, look = np.flatnonzero(frame["verdict"] == verdict), {"marker": marker, "s": 16, "lw": 0.8, "zorder": 3}
+        ax.scatter(gaps[rows], rows, edgecolor=colours[rows], color=colours[rows] if filled else "white", **look)
+        ax.scatter([], [], edgecolor=OTHER, color=OTHER if filled else "white", label=verdict, **look)
+    for row in np.flatnonzero(gaps != frame["gap"]):
+        text = f"{frame['gap'].iloc[row]:.0f}".replace("-", "−")
+        ax.text(0.9 * gaps[row], row, text, va="center", ha="left" if gaps[row] < 0 else "right", fontsize=7)
+    ax.set_xlim(-1.1 * limit, 1.1 * limit)
     ax.set_yticks(np.arange(len(frame)), frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
     return ax

@@ -24,8 +24,15 @@ TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
 COLOURS = (  # seaborn's "colorblind" palette, written out: importing seaborn takes a second
     "#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#fbafe4", "#949494", "#ece133", "#56b4e9",
 )  # fmt: skip
-TEACHER, DISTILLED, GOAL, PIT = COLOURS[0], COLOURS[1], COLOURS[2], "0.35"
-BORDER, CODEWORD, OTHER = "0.25", "black", "0.4"
+# One colour, one meaning. What is none of these has no colour of its own: a shade of grey, a marker, a line style.
+#   TEACHER    blue        the teacher, and what it returns
+#   DISTILLED  orange      policies distilled by the paper's method, and one linear map fitted to the teacher
+#   OURS       purple      policies of our own method, fitted to the teacher or tuned for the return
+#   GOAL       green       the goal, the flag
+#   PIT        dark grey   the pit
+#   FAILING    vermilion   a start or an episode that fails
+#   OTHER      grey        everything else: trees, small networks, limits
+TEACHER, DISTILLED, GOAL, FAILING, OURS, PIT, BORDER, CODEWORD, OTHER = *COLOURS[:5], "0.35", "0.25", "black", "0.4"
 FORCE_MAP = "PuOr_r"
 
 _STYLE = {
@@ -87,8 +94,7 @@ class Picture:
 
 def watermark(fig: Figure) -> None:
     """Mark a figure as that of a quick run."""
-    look = {"fontsize": 36, "color": "0.5", "alpha": 0.4, "ha": "center", "va": "center", "rotation": 20}
-    fig.text(0.5, 0.5, "quick run", **look)
+    fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
 
 
 def save_figure(

@@ -263,4 +263,5 @@ def check_box(saved: Saved, name: str, low: np.ndarray, high: np.ndarray, task: 
             raise Unknown(f"{limit} of its {name} is no array of numbers") from error
         free = np.isinf(theirs) & (name == "observation_space")
         if theirs.shape != ours.shape or not (np.isclose(theirs, ours, rtol=1e-5) | free).all():
-            raise Unknown(f"{limit} of its {name} is {theirs.tolist()!s:.200}, {task} has {ours.tolist()}")
+            text = f"{limit} of its {name} is {theirs.tolist()!s:.200}, {task} has {ours.tolist()}"
+            raise Unknown(f"{text}: name the task that it was trained for")

@@ -1,4 +1,3 @@
-"""Explanations in addition to the equations: rules over the inputs, and LIME for comparison."""
+"""Explanations in addition to the equations: rules over the inputs."""
 
-from .lime import compare_maps
 from .rules import RulePolicy, describe_rules, find_rules

@@ -12,11 +12,10 @@ from matplotlib.ticker import MaxNLocator
 
 from vsp.show import state_space
 from vsp.show.state_space import cells, codewords, image
-from vsp.show.style import CODEWORD, DISTILLED, FORCE_MAP, OTHER
+from vsp.show.style import CODEWORD, FORCE_MAP, OTHER, OURS
 
 if TYPE_CHECKING:
     from vsp.policy import Explanation, VoronoiPolicy
-_TINT = (0.9289269797269006, 0.8326402247329995, 0.6730050641684175)  # of DISTILLED: seaborn's light_palette(..., 8)[2]
 
 
 def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
@@ -39,7 +38,7 @@ def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
     for cell in set(index[inside]) - {why.cell}:
         _number(ax, x, y, inside & (index == cell), cell)
     values = ", ".join(f"{name} = {value:.3g}" for name, value in zip(task.inputs, state)).replace("-", "−")
-    ax.plot(*state, "o", color=DISTILLED, mec="white", mew=0.6, ms=5, zorder=5, ls="", label=f"state: {values}")
+    ax.plot(*state, "o", color=OURS, mec="white", mew=0.6, ms=5, zorder=5, ls="", label=f"state: {values}")
     ax.plot(*np.transpose([state, why.codeword]), color=CODEWORD, lw=0.7, ls=":", zorder=3)
     codewords(ax, why.codeword[None], label=f"its codeword, of cell {why.cell}")
     if way:
@@ -64,7 +63,7 @@ def _two_cells(ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, cell: 
     """Draw the borders of all cells. Tint cell `cell` in the policy's colour and cell `behind` in grey."""
     shades = np.ones((*x.shape, 4))
     shades[index == behind] = mpl.colors.to_rgba("0.91")
-    shades[index == cell] = mpl.colors.to_rgba(_TINT)
+    shades[index == cell] = mpl.colors.to_rgba(OURS, 0.4)
     image(ax, x, y, shades, interpolation="nearest", zorder=0)
     cells(ax, x, y, index)
 

@@ -10,10 +10,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
-from vsp.show.style import COLOURS, PIT
+from vsp.show.style import FAILING, PIT
 from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW
 
-FAILING, KEPT = COLOURS[3], COLOURS[4]
+KEPT = "0.6"
 STEPS = "viridis_r"  # few steps are light
 
 
@@ -21,7 +21,7 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
     """Draw the pieces of SimpleGoal's starts.
 
     Each of the n `polygons` (k, 2) has the `steps` (n,) of its episodes and whether these `reached` (n,) the goal.
-    Colours run to `most` steps. Failing pieces are orange, with an outline that keeps narrow ones visible.
+    Colours run to `most` steps. Failing pieces are vermilion, with an outline that keeps narrow ones visible.
     """
     colours = ScalarMappable(Normalize(0, most), STEPS)
     faces = colours.to_rgba(np.asarray(steps, dtype=float))
@@ -41,7 +41,7 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
 def upright(ax: Axes, numbers: np.ndarray, most: int) -> ScalarMappable:
     """Draw what is proved for boxes of Pendulum's states: angle by angular velocity.
 
-    `numbers` (n, n) are the steps to a set around upright that is never left. They are -1 in the set (pink) and 0 where
+    `numbers` (n, n) are the steps to a set around upright that is never left. They are -1 in the set (grey) and 0 where
     nothing is proved (white). Colours run to `most` steps.
     """
     colours = ScalarMappable(Normalize(0, most), STEPS)

@@ -182,38 +182,27 @@ def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
 
 # Figures and tables of the notebook
 
-PANELS = [  # panels of the figure: task, column, axis label, axis limits
-    ("SimpleGoal-v0", "mean", "mean return", (12.3, 16)),
-    ("MountainCarContinuous-v0", "mean", "mean return", (81, 96)),
-    ("SimpleGoal-v0", "distance", "distance", (0.04, 1.5)),
-    ("MountainCarContinuous-v0", "distance", "distance", (0.6, 40)),
-]
-
-
 SHOWN = {  # the variants that change a result most, with their labels
     "default": "default",
-    "R1 freeze last_n_split": "R1: split to the end",
-    "R4 one_split": "R4: one split a pass",
-    "R7 n_minibatches 5": "R7: five minibatches",
-    "R7 learning_rate 0.01": "R7: ten times the step",
-    "R7 learning_rate 0.0003": "R7: a third of the step",
-    "R7 initial zeros": "R7: maps from zero",
+    "R1 freeze last_n_split": "split to the end",
+    "R4 one_split": "one split per pass",
+    "R7 n_minibatches 5": "five minibatches",
+    "R7 learning_rate 0.01": "ten times the step size",
+    "R7 learning_rate 0.0003": "a third of the step size",
+    "R7 initial zeros": "maps start from zero",
+}
+LABELS = SHOWN | {  # and those that were run again
+    "R13 split_reset neighbours": "a split keeps the buffer of its cell",
+    "R13 split_neighbours new": "a split resets the new cell's neighbours",
+    "R7 batch_size 16": "minibatches of 16 states",
+    "R6 merge_visits_removed": "merging visits removed cells",
+    "R3 + R4 + R7 zeros": "Euclidean, one split per pass, from zero",
 }
 
 
-def as_intervals(frame: pd.DataFrame, task: str, column: str, phase: str = "choosing") -> pd.DataFrame:
-    """Return one column of a phase with its interval, one row per variant of `SHOWN`: columns here, low, high.
-
-    Rows are NaN where the phase does not have the variant.
-    """
+def shown_variants(frame: pd.DataFrame, task: str, phase: str = "choosing") -> pd.DataFrame:
+    """Return mean return (here, low, high), cells and failures per variant of `SHOWN`; NaN if not in `phase`."""
     rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant").reindex(SHOWN)
-    found = rows[[column, f"{column}_low", f"{column}_high"]].set_axis(["here", "low", "high"], axis=1)
-    return found.rename(index=SHOWN)
-
-
-def interpretation_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """Summarise the choosing phase: one row per variant of `SHOWN` and task."""
-    rows = frame[(frame["phase"] == "choosing") & frame["variant"].isin(SHOWN) & frame["task"].isin(printed.TASKS)]
-    rows = rows.assign(failing=1 - rows["goal"], order=rows["variant"].map(list(SHOWN).index))
-    rows = rows.sort_values(["task", "order"], ascending=[False, True], kind="stable").replace({"variant": SHOWN})
-    return rows[["task", "variant", "cells", "mean", "std", "failing", "distance"]].reset_index(drop=True)
+    rows = rows.assign(failed=100 * (1 - rows["goal"])).rename(index=SHOWN)
+    names = {"mean": "here", "mean_low": "low", "mean_high": "high", "cells": "cells", "failed": "failed (%)"}
+    return rows[[*names]].rename(columns=names)

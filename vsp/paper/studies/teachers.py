@@ -78,25 +78,6 @@ def experiments(tasks=printed.TASKS) -> dict[tuple[str, str], Experiment]:
     }
 
 
-def variance_shares(values: pd.Series, groups: pd.Series) -> dict[str, float]:
-    """Return the variance of `values` between and within groups of equal size: one-way random effects.
-
-    Keys: between, within (variances, by moments; between is cut at zero), share (between / sum of both), share_low and
-    share_high (95 %, from the F distribution: Searle et al. 1992, section 3.6).
-    """
-    from scipy.stats import f  # here: it takes long to import
-
-    table = values.groupby(groups)
-    size, means = table.size(), table.mean()
-    k, n = len(size), size.iloc[0]
-    within = table.var().mean()
-    ratio = n * means.var() / within
-    low, high = (ratio / f.ppf(q, k - 1, k * (n - 1)) for q in (0.975, 0.025))
-    shares = {name: max(0.0, (x - 1) / (x + n - 1)) for name, x in (("", ratio), ("_low", low), ("_high", high))}
-    between = max(0.0, means.var() - within / n)
-    return {"between": between, "within": within} | {f"share{name}": share for name, share in shares.items()}
-
-
 def teacher_summary(frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per teacher: its own return, and the return, deviation, cells and failures over its runs."""
     groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)

@@ -3,11 +3,13 @@
 // a scene, which vsp/show/explorer/scene.py describes.
 
 const PALETTE = ["#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#56b4e9", "#949494", "#ece133"]
-const [GOAL, FAILED, HIDDEN, INK, PAPER] = ["#029e73", "#d55e00", "#777777", "#222222", "#ffffff"]
+const [GOAL, FAILED, START, INK, PAPER] = ["#029e73", "#d55e00", "#777777", "#222222", "#ffffff"]
 const [COARSE, FINE] = [100, 240] // points per axis of the map: while something moves, and afterwards
 const IN_MOTION = 8 // milliseconds for episodes while something moves; afterwards all starts are played
 const STRIDE = 149 // a prime: the first starts played are spread over all
 const ARROWS = 14
+const TIE = 1e-9 // the map draws distances as equal that differ by less: rounding would make a checkerboard of them
+const ON_BORDER = 1e-9 // a state is on a border if a change by this share of an input's range leads to another cell
 
 const clip = (value, low, high) => Math.min(Math.max(value, low), high)
 
@@ -41,11 +43,11 @@ function distances({ scaled, scale, metric, place, far }, seen) {
   return far
 }
 
-/** The index of the nearest codeword; among equally near ones, the first. */
-export function cellOf(policy, seen) {
+/** The index of the nearest codeword; among equally near ones, up to `slack`, the first. */
+export function cellOf(policy, seen, slack = 0) {
   const far = distances(policy, seen)
   let best = 0
-  for (let j = 1; j < far.length; j++) if (far[j] < far[best]) best = j
+  for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j
   return best
 }
 
@@ -256,7 +258,7 @@ function drawMap(view, n) {
     for (let column = 0; column < n; column++) {
       const seen = view.see([low[0] + ((column + 0.5) / n) * (high[0] - low[0]), y])
       const at = row * n + column,
-        cell = (cells[at] = cellOf(policy, seen))
+        cell = (cells[at] = cellOf(policy, seen, TIE))
       let colour = TINTS[cell % TINTS.length]
       if (single) {
         const rows = policy.coefficients[cell],
@@ -309,9 +311,8 @@ function drawAll(view) {
     view.task.furniture(picture)
     if (scene.task.outputs.length === 2) drawArrows(view)
     scene.starts.forEach((start, i) => {
-      const lost = view.guessed && view.ends[i],
-        known = view.guessed && view.ends[i] !== undefined
-      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : known ? GOAL : HIDDEN)
+      const lost = view.guessed && view.ends[i]
+      picture.dot(view.place(start), lost ? 3 : 1.3, lost ? FAILED : START)
     })
   }
   picture.line(view.path.map(view.place), PAPER, 4)
@@ -325,12 +326,12 @@ function drawAll(view) {
   picture.axes()
 }
 
-/** Draw the chosen state: a ring, with a white rim if it lies on coloured dots. */
+/** Draw the chosen state: a ring with a white rim. */
 function drawChosen({ picture, stored, asked, seen, place }) {
   const point = stored ? place(seen) : asked
-  if (stored) picture.dot(point, 8, PAPER, INK)
-  picture.dot(point, stored ? 5 : 7, null, FAILED)
-  picture.dot(point, 2, FAILED)
+  picture.dot(point, 8, PAPER)
+  picture.dot(point, 6, null, INK)
+  picture.dot(point, 2.5, INK)
 }
 
 /** Draw the states of all stored episodes in the colours of their cells: one path per colour. */
@@ -386,13 +387,14 @@ const STYLE = `
 .vsp-explorer table { border-collapse: collapse; margin: 0.3rem 0; display: block; overflow-x: auto }
 .vsp-explorer .vsp-scroll { overflow: auto; max-height: 15rem }
 .vsp-explorer .vsp-scroll table { overflow: visible } .vsp-explorer .vsp-scroll th { white-space: nowrap }
-.vsp-explorer :is(td, th) { padding: 0.1rem 0.5rem; text-align: right; font-weight: normal }
+.vsp-explorer :is(td, th) { padding: 0.1rem 0.4rem; text-align: right; font-weight: normal }
+.vsp-explorer fieldset :is(td, th) { padding: 0.1rem }
 .vsp-explorer legend { font-size: inherit }
 .vsp-explorer [hidden] { display: none }
 .vsp-explorer .vsp-note { font-size: 0.85rem; opacity: 0.85 }
-.vsp-explorer fieldset { border: 1px solid #888; padding: 0.3rem 0.6rem; margin: 0.5rem 0; min-width: 0 }
+.vsp-explorer fieldset { border: 1px solid #888; padding: 0.2rem 0.3rem; margin: 0.5rem 0; min-width: 0 }
 .vsp-explorer code { overflow-wrap: anywhere }
-.vsp-explorer input[type=number] { width: 5rem } .vsp-explorer input[type=range] { flex: 1 1 140px }
+.vsp-explorer input[type=number] { width: 4.3rem; box-sizing: border-box; padding: 0 0.2rem } .vsp-explorer input[type=range] { flex: 1 1 140px }
 .vsp-explorer p { margin: 0.3rem 0 }`
 
 /** Make an element with attributes, listeners (functions) and children. */
@@ -448,8 +450,13 @@ class Player {
   }
   to(i) {
     this.slider.value = i
-    this.said.textContent = this.turn(this.at)
-    this.slider.setAttribute("aria-valuetext", this.said.textContent)
+    this.text = this.turn(this.at)
+  }
+  /** Say where it is: along with the picture and all other texts, which are drawn with the next frame. */
+  tell() {
+    if (this.text === undefined || this.said.textContent === this.text) return
+    this.said.textContent = this.text
+    this.slider.setAttribute("aria-valuetext", this.text)
   }
   start() {
     this.playing = true
@@ -608,6 +615,7 @@ class Explorer {
     const box = stored ?? (this.angular ? turn : scene.plane)
     const found = leastChange(stored ? this.seen : this.asked, this.cell, box, cellAt)
     if (found.axis === undefined) return "No change of one input leads to another cell."
+    if (found.share < ON_BORDER) return `The state is on the border to cell ${found.to + 1}.`
     const gap = Math.abs(found.gap) < 0.005 ? minus(found.gap.toPrecision(2)) : digits(found.gap)
     const share = stored ? ` (${(100 * found.share).toPrecision(2)} % of its range)` : ""
     return `A change of ${gap} in ${labels[found.axis]}${share} leads to cell ${found.to + 1}.`
@@ -629,21 +637,21 @@ class Explorer {
     this.failures = this.ends.filter(Boolean).length
     const fails = scene.lost.length ? ` ${this.failures} of ${this.played} fail.` : ""
     const teacher = scene.teacher ? ` The teacher: ${scene.teacher.mean.toFixed(2)}.` : ""
-    const text = minus(`Mean return from ${this.played} starts: ${this.mean.toFixed(2)}.${fails}`)
-    this.result.textContent = this.guessed ? text + minus(teacher) : ""
-    return text
+    const text = minus(`Mean return from ${this.played} starts: ${this.mean.toFixed(2)}.${fails}${teacher}`)
+    this.result.textContent = this.guessed ? text : ""
   }
   /** Ask the question. Results stay hidden until the reader guesses or asks to see them; then show guess and results. */
   question() {
-    const { guess, policies } = this.scene
+    const { guess, policies, lost } = this.scene
     const row = element("div", { class: "vsp-row" })
     const show = guessed => () => {
       if (guessed && !Number.isFinite(input.valueAsNumber)) return input.focus()
       const first = ready(copied(policies[0])),
-        answer = this.judge(first) // of the original policy, whatever the reader chose or changed meanwhile
-      const own = guessed ? ` Your guess: ${input.valueAsNumber}.` : ""
+        own = guessed ? ` Your guess: ${input.valueAsNumber}.` : ""
+      this.judge(first) // the original policy, whatever the reader chose or changed meanwhile
       this.guessed = true
-      const said = element("p", { tabindex: -1 }, `${guess}${own} `, element("b", {}, `${first.name}: ${answer}`))
+      const answer = lost.length ? `${this.failures} of ${this.played} fail` : `mean return ${this.mean.toFixed(2)}`
+      const said = element("p", { tabindex: -1 }, minus(`${guess}${own} ${first.name}: ${answer}.`))
       row.replaceWith(said)
       said.focus()
       this.changed({ policy: true, whole: false })
@@ -677,7 +685,7 @@ class Explorer {
     const input = element("input", {
       type: "number",
       step,
-      value: +value.toFixed(4),
+      value: +value.toFixed(3),
       "aria-label": label,
       input: () => {
         if (!Number.isFinite(input.valueAsNumber)) return (this.stale = true)
@@ -722,6 +730,7 @@ class Explorer {
     if (!this.stored && (this.whole || (this.cell !== before && !writing))) this.showForm()
     else this.stale ||= this.cell !== before
     this.whole = false
+    for (const player of [this.replay, this.steps]) player.tell()
     draw(this)
     this.frames += 1
   }

@@ -1,0 +1,134 @@
+"""`make agents` and `make hub-teacher`: agents in a folder, what is kept of them, and what is refused in one line."""
+
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from support import MOUNTAINCAR, PENDULUM, tiny
+
+from studies import agents, hub_teacher
+from studies.results import RESULTS
+from vsp.evaluation import likeness
+from vsp.paper.runs import Experiment
+from vsp.run import command
+from vsp.teachers.teacher import load_teacher
+from vsp_beyond.few_cells import Faithful
+
+ROWS = pd.read_csv(RESULTS / "agents.csv")
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Short distillations of the shipped teacher, whatever the zip."""
+    settings = {"n_episodes": 20, "n_states": 500, "n_restarts": 1, "n_generations": 0, "n_validation": 5}
+    settings["n_tuning_episodes"] = 1
+    monkeypatch.setattr(agents, "faithful_preset", lambda task, *, n_cells: Faithful(n_cells=n_cells, **settings))
+    monkeypatch.setattr(agents, "N_EPISODES", 10)
+    monkeypatch.setattr(agents, "SEEDS", range(2))
+    monkeypatch.setattr(agents, "read", lambda path, task: load_teacher(task))
+
+
+def folder_of(tmp_path, *names):
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(name.encode())
+    return tmp_path
+
+
+def test_agents_are_named_by_file_or_by_folder(tmp_path):
+    names = f"ppo-{PENDULUM}.zip", f"trpo/{PENDULUM}_1/{PENDULUM}.zip", f"trpo/{PENDULUM}_2/{PENDULUM}.zip"
+    found = agents.agents_in(folder_of(tmp_path, *names))
+    assert found == {("ppo", PENDULUM): tmp_path / names[0], ("trpo", PENDULUM): tmp_path / names[2]}
+
+
+def test_the_fewest_cells_that_act_like_the_agent_are_kept(small, tmp_path):
+    path = folder_of(tmp_path, "x.zip") / "x.zip"
+    arrays, about = agents.study("td3", MOUNTAINCAR, path)
+    assert (about["cells"], len(arrays["codewords"]), about["numbers"]) == (2, 2, 10) and about["r2"] >= 0.95
+    agent = load_teacher(MOUNTAINCAR)
+    returns = likeness(agent, agent, MOUNTAINCAR, 10).returns["agent"]
+    assert (about["agent"], about["agent_failing"], about["weights"]) == (returns.mean(), 0, 121801)
+    assert np.array_equal(arrays["actions"], agent.predict(agents.plane(MOUNTAINCAR)[2])[0])
+
+
+def test_what_is_refused_or_slow_has_a_reason(small, monkeypatch, tmp_path):
+    path = folder_of(tmp_path, "x.zip") / "x.zip"
+    assert agents.study("ppo", "Nothing-v0", path)[1]["reason"].startswith("unknown task 'Nothing-v0'")
+    monkeypatch.setattr(agents, "SECONDS", 0)
+    assert agents.study("td3", PENDULUM, path) == ({}, {
+        "kind": "Agent", "checksum": agents.atomic.sha256(path), "algorithm": "td3", "task": PENDULUM,
+        "reason": "slower than 0 minutes",
+    })  # fmt: skip
+    with pytest.raises(TimeoutError), agents._at_most(0.05):
+        while True:
+            pass
+
+
+def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypatch, tmp_path):
+    given = folder_of(tmp_path / "given", f"td3-{MOUNTAINCAR}.zip", "sac-Nothing-v0.zip")
+    monkeypatch.setattr(sys, "argv", ["x", str(given), "--out", str(tmp_path), "--jobs", "1"])
+    agents.main()
+    monkeypatch.setattr(agents, "study", None)  # nothing is left to do
+    agents.main()
+    folder = tmp_path / "data" / "beyond"
+    monkeypatch.setattr(agents, "RESULTS", folder)
+    car, unknown = pd.read_csv(folder / "agents.csv").sort_values("task").to_dict("records")
+    assert unknown["reason"].startswith("unknown task") and (car["zoo"], car["cells"]) == (93.483, 2)
+    assert len(agents.policy_of("td3", MOUNTAINCAR)) == 2
+    assert agents.actions_of("td3", MOUNTAINCAR).shape == (agents.POINTS**2, 1)
+    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "none")])
+    with pytest.raises(command.CommandError, match="no .zip below it, expected a folder of agents"):
+        agents.main()
+
+
+def test_the_committed_agents_are_those_of_the_collection_and_within_what_was_published():
+    good = ROWS[ROWS["reason"].isna()]
+    assert len(ROWS) == len(good) == 14 and set(good["task"]) == {MOUNTAINCAR, PENDULUM}
+    sampling = 3 * np.hypot(good["zoo_std"] / np.sqrt(150), good["agent_std"] / np.sqrt(1000))
+    assert (abs(good["agent"] - good["zoo"]) <= sampling).all()
+    for row in good.itertuples():
+        policy, actions = agents.policy_of(row.algorithm, row.task), agents.actions_of(row.algorithm, row.task)
+        assert len(policy) <= row.cells and len(actions) == agents.POINTS**2
+        assert (row.r2 >= agents.ENOUGH) or row.cells == max(agents.SIZES)
+    assert "MIT License" in (RESULTS / "agents" / "LICENSE").read_text()
+
+
+@pytest.mark.skipif("VSP_AGENTS" not in os.environ, reason="VSP_AGENTS names no folder of agents")
+def test_the_committed_rows_are_those_of_the_zips():
+    for (algorithm, task), path in agents.agents_in(Path(os.environ["VSP_AGENTS"])).items():
+        row, agent = ROWS[(ROWS["algorithm"] == algorithm) & (ROWS["task"] == task)].iloc[0], agents.read(path, task)
+        assert (row["checksum"], row["teacher"]) == (agents.atomic.sha256(path), agent.digest[:10])
+        assert np.array_equal(agent.predict(agents.plane(task)[2])[0], agents.actions_of(algorithm, task))
+        alike = likeness(agents.policy_of(algorithm, task), agent, task)
+        assert row["r2_least"] <= alike.r2 + 1e-6 and row["agent"] == pytest.approx(alike.returns["agent"].mean())
+
+
+# The paper's part with another teacher
+
+
+def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp_path):
+    config = tiny(n_epochs=30, n_freeze=5)
+    monkeypatch.setattr(hub_teacher, "N_RUNS", {MOUNTAINCAR: 2})
+    monkeypatch.setattr(hub_teacher, "paper_experiment", lambda task: Experiment(task, config, None, n_episodes=9))
+    monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(task))
+    monkeypatch.setattr(sys, "argv", ["x", "an_agent.zip", "--out", str(tmp_path), "--jobs", "1"])
+    hub_teacher.main()
+    folder = tmp_path / "data" / "results"
+    rows, ledger = (pd.read_csv(folder / f"{name}.csv") for name in ("hub_teacher", "hub_teacher_ledger"))
+    assert rows["teacher"].tolist() == ["an_agent"] * 2 and rows["seed"].tolist() == [0, 1]
+    mean = ledger.set_index("id").loc["mc_spread_ours_mean"]
+    assert mean["here"] == pytest.approx(rows["mean"].mean(), abs=1e-6) and float(mean["paper"]) == 93.534
+
+
+def test_without_an_agent_its_rows_are_kept_and_another_task_is_refused(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(sys, "argv", ["x", "--out", str(tmp_path)])
+    hub_teacher.main()
+    assert capsys.readouterr().out.startswith("hub_teacher.csv is kept, because it needs the zoo's DDPG agent")
+    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
+    monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(PENDULUM, task))
+    with pytest.raises(command.CommandError, match="load it for the task it was trained on"):
+        hub_teacher.main()
+    assert not list(tmp_path.iterdir())
