@@ -39,7 +39,7 @@ from .results import BEYOND, RESULTS, read_results, write_results
 
 SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
 N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw
-SECONDS = 600  # of processor time for one agent
+SECONDS = 600  # for one agent
 POINTS = 61  # of a map, along each axis
 CAR = "MountainCarContinuous-v0"
 N_SEEN, SEEN_SEED = 400, 8  # episodes for maps by least squares, from starts of their own
@@ -165,17 +165,17 @@ def by_the_paper(algorithm: str, path: Path) -> tuple[dict, dict]:
 
 @contextlib.contextmanager
 def _at_most(seconds: int) -> Iterator[None]:
-    """Raise TimeoutError in a block that takes more processor time."""
+    """Raise TimeoutError in a block that takes longer."""
 
     def late(*_) -> None:
         raise TimeoutError
 
-    signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

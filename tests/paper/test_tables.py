@@ -255,7 +255,7 @@ def test_figures_and_tables_are_numbered_apart_in_each_notebook():
 
 def test_a_long_table_is_folded_below_its_caption():
     page = tables.show_table(pd.DataFrame({"a": range(13)}), "hyperparameters").data
-    assert re.match(r"<details><summary><b>Table 4.2.</b> \w.*</summary>\n<table", page) and "13 rows</caption>" in page
+    assert re.match(r"<details><summary><b>Table 4.6.</b> \w.*</summary>\n<table", page) and "13 rows</caption>" in page
     assert "<details>" not in tables.show_table(pd.DataFrame({"a": range(12)}), caption="Mine.").data
 
 

@@ -22,7 +22,6 @@ from vsp.show import state_space, style
 from vsp.show.returns import _VERDICTS, box_plot, boxes, by_group, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
-from vsp_beyond.show import explanation
 
 mpl.use("Agg")
 ALT = 'Two "cells" & their border <drawn> in grey'
@@ -212,7 +211,6 @@ def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
 def test_written_out_colours_are_those_of_seaborn():
     assert list(style.COLOURS) == sns.color_palette("colorblind").as_hex()
     assert list(state_space._PASTEL) == sns.color_palette("pastel").as_hex()
-    assert explanation._TINT == sns.light_palette(style.DISTILLED, 8)[2]
 
 
 def test_importing_does_not_wait_for_what_few_notebooks_use():

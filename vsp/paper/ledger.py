@@ -40,7 +40,7 @@ PARTS = {
 }
 # The notebook and the cell that compute the rerun's number, in the same way
 CELLS = {
-    "^.._(?:caption_)?cells$": "03, best", "^.._(?:caption|text|policies)": "03, runs", "_training_": "01, scores",
+    "^.._(?:caption_)?cells$": "03, best", "^.._(?:caption|text|policies)": "03, runs",
     "_hyper_": "04, hyperparameters", "^sg_spread_": "04, simplegoal-spread", "^mc_spread_": "04, mountaincar-spread",
     "^.._(?:drl|ours)_": "04, text-numbers", "_cell_": "05, replay", "": "05, ledger",
 }  # fmt: skip

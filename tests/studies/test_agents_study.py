@@ -101,9 +101,11 @@ def test_the_committed_rows_are_those_of_the_zips():
     for (algorithm, task), path in agents.agents_in(Path(os.environ["VSP_AGENTS"])).items():
         row, agent = ROWS[(ROWS["algorithm"] == algorithm) & (ROWS["task"] == task)].iloc[0], agents.read(path, task)
         assert (row["checksum"], row["teacher"]) == (agents.atomic.sha256(path), agent.digest[:10])
-        assert np.array_equal(agent.predict(agents.plane(task)[2])[0], agents.actions_of(algorithm, task))
+        assert np.abs(agent.predict(agents.plane(task)[2])[0] - agents.actions_of(algorithm, task)).max() < 1e-5
         alike = likeness(agents.policy_of(algorithm, task), agent, task)
-        assert row["r2_least"] <= alike.r2 + 1e-6 and row["agent"] == pytest.approx(alike.returns["agent"].mean())
+        assert row["r2_least"] <= alike.r2 + 1e-6 and row["agent"] == pytest.approx(
+            alike.returns["agent"].mean(), abs=0.01
+        )
 
 
 # The paper's part with another teacher
