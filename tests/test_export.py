@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
+from studies import agents
 from vsp.export import symbol
 from vsp.paper import published_policy
 from vsp.policy import VoronoiPolicy
@@ -29,9 +30,12 @@ def states_of(policy, n):
     return np.random.default_rng(1).uniform(policy.task.low, policy.task.high, size=(n, len(policy.task.low)))
 
 
+OF_NORMALISED = agents.policy_of("ars", MOUNTAINCAR)  # its agent was trained on normalised observations
+
 each_policy = pytest.mark.parametrize(
     "policy",
     [
+        OF_NORMALISED,
         published_policy(SIMPLEGOAL),
         policy_of(SIMPLEGOAL, "manhattan"), policy_of(MOUNTAINCAR, "euclidean"), policy_of(PENDULUM, "chebyshev"),
         policy_of(MOUNTAINCAR, form="constant"), policy_of(SIMPLEGOAL, form="quadratic"),
@@ -173,6 +177,18 @@ def test_what_is_printed_exactly_reads_back_as_the_same_policy():
     policy = VoronoiPolicy(rng.normal(size=(9, 2)), rng.normal(size=(9, 3, 1)) * 1e-6, task=MOUNTAINCAR)
     numbers = np.array(re.findall(r"-?\d+\.\d+", policy.to_text(None).replace("- ", "-")), dtype=float)
     assert np.array_equal(numbers, np.concatenate([policy.codewords, policy.coefficients[..., 0]], axis=1).ravel())
+
+
+def test_latex_of_a_normalised_agents_policy_is_of_raw_observations():
+    """The numbers of its lines, acted out by hand, are the actions of the policy and nearly those of the agent."""
+    row = r"\$\[(.*?),\\ (.*?)\]\$ & \$(.*?) x ([+-] .*?) v ([+-] .*?)\$"
+    lines = re.findall(row, OF_NORMALISED.to_latex(None))
+    numbers = np.array([[part.replace(" ", "") for part in line] for line in lines], dtype=float)
+    x, y, states = agents.plane(MOUNTAINCAR)
+    nearest = np.square((states[:, None] - numbers[:, :2]) / OF_NORMALISED.scale).sum(axis=2).argmin(axis=1)
+    forces = np.clip((numbers[nearest, 2:4] * states).sum(axis=1) + numbers[nearest, 4], -1, 1)
+    assert np.abs(forces - OF_NORMALISED.predict(states)[0][:, 0]).max() <= 1e-12
+    assert np.corrcoef(forces, agents.actions_of("ars", MOUNTAINCAR)[:, 0])[0, 1] > 0.9
 
 
 @pytest.mark.parametrize(
