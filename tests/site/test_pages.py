@@ -149,6 +149,7 @@ def test_a_phone_shows_it_without_scrolling_sideways(page):
 def test_what_goes_on_beyond_the_edge_says_so(page):
     page.set_viewport_size(PHONE)
     boxes = "[...document.querySelectorAll('article :is(pre, .pst-scrollable-table-container)')]"
+    page.evaluate("document.querySelectorAll('article details').forEach(folded => { folded.open = true })")
     page.evaluate(f"{boxes}.forEach(box => {{ box.scrollLeft = 0 }})")
     wide = f"{boxes}.filter(box => box.scrollWidth > box.clientWidth + 2)"
     marked = "box => getComputedStyle(box).maskImage != 'none'"
