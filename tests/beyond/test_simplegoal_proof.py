@@ -307,6 +307,7 @@ def seal(path, payload):
     return path
 
 
+@pytest.mark.usefixtures("no_collection")
 @pytest.mark.parametrize("payload", [b"no JSON", b'{"task": []}', b"[" * 10**6])
 def test_a_sealed_file_that_is_no_certificate_is_refused(tmp_path, payload):
     with pytest.raises(check.Refused):

@@ -52,6 +52,7 @@ def safetensors(about: str) -> bytes:
     return save({"a": np.zeros(1)}, metadata={"about": about})
 
 
+@pytest.mark.usefixtures("no_collection")
 @pytest.mark.parametrize(
     "payload",
     [b"", b"\x80\x04N.", (2).to_bytes(8, "little") + b"[]", safetensors("null"), safetensors("[" * 100_000)],

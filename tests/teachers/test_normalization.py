@@ -98,6 +98,7 @@ NO_SIGNS = [f"n_envs: 4\nnormalize: {value}" for value in (
 NO_SIGNS += ["&a [*a, *a]", "normalise: true", "a: [", ": : :", "[" * 9999]
 
 
+@pytest.mark.usefixtures("no_collection")
 @pytest.mark.parametrize("name", SIGNS)
 def test_a_file_nearby_tells_of_a_normalisation(name, small, tmp_path):
     path = shutil.copy(small, tmp_path / "x_5_steps.zip")
