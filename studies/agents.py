@@ -21,7 +21,7 @@ import pandas as pd
 
 from vsp.algorithms import VERSION, distill
 from vsp.config import paper_preset
-from vsp.evaluation import likeness, start_states
+from vsp.evaluation import Likeness, likeness, start_states
 from vsp.paper.baselines import refit
 from vsp.paper.results import load_made, make_missing, provenance
 from vsp.policy import VoronoiPolicy
@@ -44,8 +44,10 @@ POINTS = 61  # of a map, along each axis
 CAR = "MountainCarContinuous-v0"
 N_SEEN, SEEN_SEED = 400, 8  # episodes for maps by least squares, from starts of their own
 ALGORITHMS = ("a2c", "ars", "crossq", "ddpg", "ppo", "sac", "td3", "tqc", "trpo")
-OF_AGENT = ["algorithm", "task", "weights", "zoo", "zoo_std", "agent", "agent_std", "agent_failing"]
-OF_POLICIES = ["cells", "numbers", "r2", "r2_least", "mean", "least", "most", "failing", "reason"]
+COLUMNS = (
+    "algorithm task weights zoo zoo_std agent agent_std agent_failing cells numbers r2 r2_least mean least most "
+    "failing reason checksum settings teacher version"
+).split()
 
 
 def agents_in(folder: Path) -> dict[tuple[str, str], Path]:
@@ -71,9 +73,9 @@ def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
         with _at_most(SECONDS), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the row says how good the policies are
             agent = read(path, name)
-            size, policies = _fewest(agent)
-            row |= _numbers(agent, size, policies)
-            arrays = {part: getattr(policies[0], part) for part in ("codewords", "coefficients", "scale")}
+            size, policy, alike = _fewest(agent)
+            row |= _numbers(agent, size, policy, alike)
+            arrays = {part: getattr(policy, part) for part in ("codewords", "coefficients", "scale")}
             arrays["actions"] = agent.predict(plane(agent.task)[2])[0] if name in PLANES else np.zeros((0, 1))
     except TimeoutError:
         row["reason"] = f"slower than {SECONDS // 60} minutes"
@@ -82,29 +84,29 @@ def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
     return arrays, {"kind": "Agent", "checksum": atomic.sha256(path), **row}
 
 
-def _fewest(agent: Teacher) -> tuple[int, list[VoronoiPolicy]]:
-    """Return the fewest of `SIZES` cells whose policies act like the agent, else the most, and these policies."""
+def _fewest(agent: Teacher) -> tuple[int, VoronoiPolicy, list[Likeness]]:
+    """Return the fewest of `SIZES` cells whose policies act like the agent, else the most; the first of these policies,
+    and how alike all are."""
     least, _ = expected_seconds(agent.task, faithful_preset(agent.task, n_cells=1))
     if least * len(SEEDS) > SECONDS:
         raise TimeoutError
     for size in SIZES:
         config = faithful_preset(agent.task, n_cells=size)
         policies = [distill_faithfully(agent, agent.task, config, seed=seed)[0] for seed in SEEDS]
-        alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED).r2 for policy in policies]
-        if np.mean(alike) >= ENOUGH:
+        alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED) for policy in policies]
+        if np.mean([one.r2 for one in alike]) >= ENOUGH:
             break
-    return size, policies
+    return size, policies[0], alike
 
 
-def _numbers(agent: Teacher, size: int, policies: list[VoronoiPolicy]) -> dict:
-    """Return the numbers of a row: of the agent, and of the policies of all seeds."""
-    alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED) for policy in policies]
+def _numbers(agent: Teacher, size: int, policy: VoronoiPolicy, alike: list[Likeness]) -> dict:
+    """Return the numbers of a row: of the agent, of one policy, and of how alike those of all seeds are."""
     returns, n = alike[0].returns["agent"], len(alike[0].returns["agent"])
     means = [float(one.returns["policy"].mean()) for one in alike]
     numbers = {
         "weights": sum(part.size for layer in agent.layers for part in layer),
         "agent": float(returns.mean()), "agent_std": float(returns.std(ddof=1)),
-        "cells": size, "numbers": policies[0].coefficients.size + policies[0].codewords.size * (len(policies[0]) > 1),
+        "cells": size, "numbers": policy.coefficients.size + policy.codewords.size * (len(policy) > 1),
         "r2": float(np.mean([one.r2 for one in alike])), "r2_least": min(one.r2 for one in alike),
         "mean": float(np.mean(means)), "least": min(means), "most": max(means),
     }  # fmt: skip
@@ -186,7 +188,7 @@ def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 PLANES = {
-    "MountainCarContinuous-v0": ((-1.2, -0.07), (0.6, 0.07), lambda x, v: np.stack([x, v], axis=1)),
+    CAR: ((-1.2, -0.07), (0.6, 0.07), lambda x, v: np.stack([x, v], axis=1)),
     "Pendulum-v1": ((-np.pi, -8.0), (np.pi, 8.0), lambda a, speed: np.stack([np.cos(a), np.sin(a), speed], axis=1)),
 }
 
@@ -211,8 +213,7 @@ def write(made: list[tuple[dict, dict]], papers: list[tuple[dict, dict]], out: P
             VoronoiPolicy(**arrays, task=about["task"], metric="euclidean").save(folder / f"{name}.policy")
     sealed.save_arrays(folder / "actions.arrays", maps, {"kind": "Agents"})
     frame = pd.DataFrame([about for _, about in made]).merge(read_results("zoo"), "left")
-    columns = [*OF_AGENT, *OF_POLICIES, "checksum", "settings", "teacher", "version"]
-    frame = frame.reindex(columns=columns).sort_values(["task", "algorithm"])
+    frame = frame.reindex(columns=COLUMNS).sort_values(["task", "algorithm"])
     whole = dict.fromkeys(("version", "cells", "numbers", "weights"), "Int64")  # also where a row lacks them
     write_results(frame.astype(whole), "agents", out=out)
     write_results(pd.DataFrame([row for _, about in papers for row in about["rows"]]), "agents_paper", out=out)

@@ -18,17 +18,15 @@ from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher
 from vsp.paper.studies.teachers import rows_of
 from vsp.run import command
 
-from .agents import read
-
-TASK = "MountainCarContinuous-v0"
+from .agents import CAR, read
 
 
 def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Distil the agent as often as the paper does; return a row per run, and the ledger of the task's results."""
-    experiment = replace(paper_experiment(TASK), teacher=read(agent, TASK))
-    made = make_runs(experiment, range(N_RUNS[TASK]), runs=runs, jobs=jobs)
+    experiment = replace(paper_experiment(CAR), teacher=read(agent, CAR))
+    made = make_runs(experiment, range(N_RUNS[CAR]), runs=runs, jobs=jobs)
     results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
-    return rows_of(experiment, agent.stem, made), distinct_results(ledger_table({TASK: results})).query("task == @TASK")
+    return rows_of(experiment, agent.stem, made), distinct_results(ledger_table({CAR: results})).query("task == @CAR")
 
 
 def main() -> None:
