@@ -48,7 +48,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
-.PHONY: help list quick paper-figures beyond-figures all lab runs study hub-teacher agents proofs proofs-teacher course site test \
+.PHONY: help list quick paper-figures beyond-figures all lab runs study hub-teacher agents proofs proofs-teacher course article site test \
   test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
@@ -106,8 +106,10 @@ proofs-teacher: begin venv ##- proofs for a network: an HOUR at most
 	$(PY) -m studies.make_proofs --teacher --out="$$OUT"
 
 ## Study
-course: begin venv ## three lessons: hand-out, solutions, slides, the lecturer's guide, into build/course/: 3 to 10 s
+course: begin venv ## three lessons: hand-out, solutions, slides, the lecturer's guide, into build/course/: 10 to 20 s
 	@$(PY) -m vsp_course.build --out="$$OUT"
+article: begin venv ## the article of ten minutes: docs/article.html, one file that opens from disk: under 1 minute
+	@$(PY) docs/article/build.py "$$OUT"
 
 # Pages are laid out as the repository is, so that links work on both. The old site stays until the new one is whole.
 site test-site: export SITE := $(OUT)/build/site
@@ -124,7 +126,6 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 	printf 'made: run %s -m http.server -d %s and open http://localhost:8000\n' "$(PY)" "$$SITE"
 
 ## Develop
-# Tests have a temporary folder of their own, which is removed
 PYTEST = tmp=$$(mktemp -d) && trap 'rm -rf "$$tmp"' EXIT && TMPDIR="$$tmp" MPLBACKEND=Agg $(PY) -m pytest -q -rs
 
 test: venv-test-train-dask ## runs the tests, several at a time, and names the ten slowest: 2 to 5 minutes
@@ -173,7 +174,6 @@ short-teachers: venv-train ##- trains the teachers that `make study` compares: 1
 teachers: venv-train-mujoco ##- trains the TD3 teachers from scratch: 9 to 11 HOURS; resumes from $VSP_CACHE (~/.cache/vsp)
 	$(PY) -m studies.make_teachers --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"
 
-# What others build on
 $(ENVIRONMENTS):
 	@sh environment.sh $(sort draw $(if $(DASK),dask) $(filter-out venv,$(subst -, ,$@)))
 

@@ -13,7 +13,7 @@ setup(
     package_data={
         "vsp.data.paper": ["*.csv", "MANIFEST.sha256"],
         "vsp.data.teachers": ["*.json", "*.safetensors", "MANIFEST.sha256", "short/*"],
-        "vsp.show.explorer": ["*.js"],
+        "vsp.show.explorer": ["*.js", "*.css"],
         "vsp_beyond.proofs": ["*.c"],
     },
 )

@@ -27,12 +27,12 @@ def rng():
 
 
 def fingerprint(policy, history):
-    events = [(e.iteration, e.kind, tuple(e.codeword)) for e in history.events]
+    events = [(e.iteration, e.kind, tuple(e.codeword), e.cause) for e in history.events]
     return events, history.cells, history.losses, policy.codewords.tolist(), policy.coefficients.tolist()
 
 
 def split(partition, episode):
-    return [tuple(c) for c in split_regions(partition, episode, partition.config, rng())]
+    return [tuple(c) for c, _ in split_regions(partition, episode, partition.config, rng())]
 
 
 # Algorithm 2 by hand
@@ -51,7 +51,8 @@ def test_a_split_by_hand():
     config = tiny(max_pol_loss=1 / 64, min_pol_distance=0.25, initial="zeros")
     partition = partition_of([[0, 0.5], [1, 0.5]], config=config)
     states = [[0.125, 0.5], [0.375, 0.5], [0.625, 0.5], [0.75, 0.5], [0.6875, 0.5]]
-    assert split(partition, walk(states, [0, 0.25, 0.5, 0.5, 0.5])) == [(0.375, 0.5), (0.6875, 0.5)]
+    changes = split_regions(partition, walk(states, [0, 0.25, 0.5, 0.5, 0.5]), config, rng())
+    assert [(tuple(codeword), mean) for codeword, mean in changes] == [((0.375, 0.5), 1 / 32), ((0.6875, 0.5), 1 / 4)]
     assert partition.codewords.tolist() == [[0, 0.5], [1, 0.5], [0.375, 0.5], [0.6875, 0.5]]
     assert partition.buffers.counts.tolist() == [0, 0, 0, 0]
     assert partition.models.coefficients.shape == (4, 3, 2)
@@ -126,7 +127,7 @@ def test_a_merge_by_hand():
     A: neighbour B differs by 1/8: B goes, A and B are reset. B: gone. C: its neighbour is now A, 3/8 away: stays.
     """
     partition = partition_of(ROW, [0, 1 / 8, 3 / 8], config=tiny(min_param_distance=0.25))
-    assert [tuple(c) for c in merge_regions(partition, partition.config)] == [(0.5, 0.5)]
+    assert [(tuple(c), apart) for c, apart in merge_regions(partition, partition.config)] == [((0.5, 0.5), 1 / 8)]
     assert partition.codewords.tolist() == [ROW[0], ROW[2]]
     assert partition.models.coefficients[:, -1, 0].tolist() == [0, 3 / 8]
     assert partition.buffers.counts.tolist() == [0, 1]

@@ -29,6 +29,8 @@ def test_the_frame_counts_what_the_events_say(run):
     assert frame["merges"].sum() == sum(e.kind == "merge" for e in history.events) > 0
     assert (1 + (frame["splits"] - frame["merges"]).cumsum() == frame["cells"]).all()
     assert all(e.codeword.base is None or len(e.codeword.base) < 100 for e in history.events), "keeps its episodes"
+    splits, merges = ([e.cause for e in history.events if e.kind == kind] for kind in ("split", "merge"))
+    assert min(splits) > TINY.max_pol_loss and 0 <= min(merges) <= max(merges) < TINY.min_param_distance
     assert observed(3).to_frame()[["splits", "merges"]].to_numpy().tolist() == [[0, 0]] * 3
 
 
@@ -46,10 +48,11 @@ def test_policy_at_is_right_where_one_cell_comes_and_another_goes():
     history, old = History(), partition_of([[0.1, 0.1], [0.9, 0.9]])
     history.observe(0, 1.0, old)
     new = partition_of([[0.1, 0.1], [0.5, 0.9]])
-    history.add_events(1, "split", [np.array([0.5, 0.9])])
-    history.add_events(1, "merge", [np.array([0.9, 0.9])])
+    history.add_events(1, "split", [(np.array([0.5, 0.9]), 1.5)])
+    history.add_events(1, "merge", [(np.array([0.9, 0.9]), 0.1)])
     history.observe(1, 1.0, new)
     assert history.policy_at(1).codewords.tolist() == new.codewords.tolist()
+    assert [event.cause for event in history.events] == [1.5, 0.1]
 
 
 @pytest.mark.parametrize("n", [35, 5500])

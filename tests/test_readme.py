@@ -146,7 +146,6 @@ def test_who_leads_is_that_of_the_table():
 
 TABLES = {  # a task stands for the summary of its rows
     ("README.md", "## Results"): "simplegoal_spread what_cells_buy faithful",
-    ("docs/explore.md", "### Three cells against thirteen"): "proofs_simplegoal",
     ("docs/results.md", "## Did it reproduce?"):
         "simplegoal_spread what_cells_buy",
     ("docs/results.md", "## A few equations that act like the teacher"):

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from .checks import check_count
 from .config import Config
-from .history import History
+from .history import Change, History
 from .partition import Partition
 from .policy import VoronoiPolicy
 from .rollouts import Episode, Policy, collect_episodes
@@ -26,8 +26,8 @@ from .tasks import Task
 EPISODES_AHEAD = 500
 VERSION = 1  # increase it when a change makes the same arguments give another policy
 
-SplitPass = Callable[[Partition, Episode, Config, np.random.Generator], list[np.ndarray]]
-MergePass = Callable[[Partition, Config], list[np.ndarray]]
+SplitPass = Callable[[Partition, Episode, Config, np.random.Generator], list[Change]]
+MergePass = Callable[[Partition, Config], list[Change]]
 
 
 @threadpool_limits.wrap(limits=1)  # the same sums in the same order on any machine
@@ -51,55 +51,59 @@ def distill(
         loss = partition.train(batches)  # l. 13-15
         if may_alter(n, config):  # l. 16
             if due(n, config.n_split, config):  # l. 17-19
-                splits = split(partition, episode, config, init)
-                history.add_events(n, "split", splits)
+                history.add_events(n, "split", split(partition, episode, config, init))
             if due(n, config.n_merge, config):  # l. 20-22
-                merges = merge(partition, config)
-                history.add_events(n, "merge", merges)
+                history.add_events(n, "merge", merge(partition, config))
         if due(n, config.n_reset, config) and config.periodic_reset == "buffers":  # R5
             partition.clear()
         history.observe(n, loss, partition)
     return partition.policy(), history
 
 
-def split_regions(partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[np.ndarray]:
+def split_regions(partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[Change]:
     """Algorithm 2: walk along the episode and split each cell where the running mean loss is too high.
 
-    Returns the new codewords, each (d,).
+    Returns the new codewords, each (d,), with the running mean loss that caused it.
     """
     previous: int | None = None
     losses: list[float] = []
-    added: list[np.ndarray] = []
+    added: list[Change] = []
     for state, action in zip(episode.states, episode.actions):
         i = partition.locate(state)  # l. 4
         if i != previous:  # l. 5-8
             previous, losses = i, []
         losses.append(partition.loss(i, state, action))  # l. 9
-        if np.mean(losses) > config.max_pol_loss and partition.far(i, state):  # l. 10
+        loss = float(np.mean(losses))
+        if loss > config.max_pol_loss and partition.far(i, state):  # l. 10
             affected = np.append(partition.neighbours()[i], False)  # the old region's neighbours (R13)
             affected[i] = True
             partition.add(state, rng)  # l. 11-12
             partition.reset(affected)  # l. 13-14
-            added.append(state.copy())  # a view would keep the whole batch of episodes in memory
+            added.append((state.copy(), loss))  # a view would keep the whole batch of episodes in memory
             losses = []  # R14
             if config.one_split:  # R4
                 break
     return added
 
 
-def merge_regions(partition: Partition, config: Config) -> list[np.ndarray]:
-    """Algorithm 3: for each cell, remove neighbours with similar coefficients. Returns the removed codewords."""
+def merge_regions(partition: Partition, config: Config) -> list[Change]:
+    """Algorithm 3: for each cell, remove neighbours with similar coefficients.
+
+    Returns the removed codewords, each (d,), with the L-infinity distance of its map from that of the cell.
+    """
     before, i = partition.codewords, 0
+    causes: dict[tuple, float] = {}
     while i < len(partition.codewords):  # l. 1
         coefficients, near = partition.comparable_coefficients(), partition.neighbours()[i]  # l. 2
         distances = np.abs(coefficients - coefficients[i]).max(axis=1)  # L-infinity
         similar = near & (distances < config.min_param_distance)  # l. 3-4
         if similar.any():
+            causes |= zip(map(tuple, partition.codewords[similar]), distances[similar].tolist())
             near[i] = True  # R6
             partition.reset(near)  # l. 7
             partition.keep(~similar)  # l. 5-6
         i += 1 - similar[:i].sum()  # removed cells before this one moved it up
-    return [codeword for codeword in before if not (partition.codewords == codeword).all(axis=1).any()]
+    return [(codeword, causes[tuple(codeword)]) for codeword in before if tuple(codeword) in causes]
 
 
 def may_alter(n: int, config: Config) -> bool:
@@ -118,7 +122,5 @@ def due(n: int, every: int, config: Config) -> bool:
 def teacher_episodes(teacher: Policy, task: Task, n: int, rng: np.random.Generator) -> Iterator[Episode]:
     """Yield n episodes of the teacher from random starts, rolled out `EPISODES_AHEAD` at a time."""
     check_count("n", n, least=0)
-    while n > 0:
-        batch = collect_episodes(teacher, task, task.start(rng, EPISODES_AHEAD)[:n])
-        yield from batch
-        n -= len(batch)
+    for done in range(0, n, EPISODES_AHEAD):
+        yield from collect_episodes(teacher, task, task.start(rng, EPISODES_AHEAD)[: n - done])

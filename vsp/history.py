@@ -18,12 +18,21 @@ SNAPSHOT_EVERY = 10  # iterations between two stored copies of the coefficients
 SNAPSHOTS = 500  # approximate maximum; in long runs snapshots are further apart, which bounds memory
 
 
+Change = tuple[np.ndarray, float]  # codeword (d,) that a pass added or removed, and its cause as in `Event`
+
+
 class Event(NamedTuple):
-    """A codeword that a split added or a merge removed."""
+    """A codeword that a split added or a merge removed, and why.
+
+    The cause of a split is the running mean loss, which exceeded `Config.max_pol_loss`. That of a merge is the
+    L-infinity distance between the maps of the removed and the remaining cell, which was below
+    `Config.min_param_distance`.
+    """
 
     iteration: int
     kind: str  # "split" or "merge"
     codeword: np.ndarray  # (d,)
+    cause: float
 
 
 class History:
@@ -43,9 +52,9 @@ class History:
     def __repr__(self) -> str:
         return f"<History of {len(self.cells)} iterations, {len(self.events)} splits and merges; to_frame() shows it>"
 
-    def add_events(self, n: int, kind: str, codewords: list[np.ndarray]) -> None:
-        """Record the codewords that a pass of iteration n added or removed."""
-        self.events += [Event(n, kind, codeword) for codeword in codewords]
+    def add_events(self, n: int, kind: str, changes: list[Change]) -> None:
+        """Record what a pass of iteration n added or removed."""
+        self.events += [Event(n, kind, *change) for change in changes]
 
     def observe(self, n: int, loss: float, partition: Partition) -> None:
         """Record the partition after iteration n."""

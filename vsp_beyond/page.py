@@ -16,7 +16,7 @@ from vsp.evaluation import Likeness, likeness
 from vsp.paper.statistics import interval, share_interval
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
-from vsp.show.explorer import explore, standalone
+from vsp.show.explorer import PLANES, explore, standalone
 from vsp.subpolicies.base import number
 from vsp.tasks import Task, get_task
 
@@ -48,8 +48,7 @@ def report(policy: VoronoiPolicy, agent: Policy, task: str | Task, *, name: str 
     parts = [
         f"<p>{html.escape(name)} on {html.escape(task.name)}, imitated by linear maps in {cells}.</p>",
         "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in [*remarks.splitlines(), *warning]),
-        _numbers(alike), _cards(policy, alike), explore(policy, teacher=agent).element(), _worst(policy, agent, alike),
-        _kept(policy),
+        _numbers(alike), _cards(policy, alike), _explorer(policy, agent), _worst(policy, agent, alike), _kept(policy),
     ]  # fmt: skip
     return standalone(f"{task.name}: {name} in {cells}", "\n".join(parts), _STYLE)
 
@@ -84,10 +83,17 @@ def _cards(policy: VoronoiPolicy, alike: Likeness) -> str:
                 for j, (output, rows) in enumerate(zip(policy.task.outputs, largest))
             )
         text = "<br>".join(html.escape(line) for line in lines)
-        cards += f"<div><b>Cell {cell + 1}</b>, {np.mean(inside == cell):.0%} of the states<br>"
+        cards += f"<div><b>Cell {cell}</b>, {np.mean(inside == cell):.0%} of the states<br>"
         cards += f"nearest to {html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
     distance = html.escape(policy.to_text().splitlines()[1]) if len(policy) > 1 else ""
     return f'<h2>The policy</h2><p>{distance}</p><div class="cards">{cards}</div>'
+
+
+def _explorer(policy: VoronoiPolicy, agent: Policy) -> str:
+    """Return the explorer, or why there is none."""
+    if policy.task.name in PLANES:
+        return explore(policy, teacher=agent).element()
+    return f"<p>This page has no explorer, because a browser cannot play {html.escape(policy.task.name)}.</p>"
 
 
 def _worst(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:

@@ -3,7 +3,8 @@
     python -m vsp_course.build --out .
 
 A source is a notebook with nbgrader's metadata: solution cells, whose answers stand between `### BEGIN SOLUTION` and
-`### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone, those tagged `slide` to the slides.
+`### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone; those tagged `slide` to the slides,
+and what is said to them to the guide.
 In a student version, nbgrader's stub replaces each answer, as `nbgrader generate_assignment` does with the solution.
 """
 
@@ -25,7 +26,7 @@ from vsp.run.notebook import NotebookNode, nbformat
 from vsp.run.sealed import read_sealed, write_sealed
 
 from .handout import write_handout
-from .slides import is_slide, slides
+from .slides import is_slide, slides, spoken
 
 SOURCES = ROOT / "notebooks" / "course"
 HERE = Path(__file__).parent
@@ -132,7 +133,7 @@ def guide(lessons: dict[str, NotebookNode]) -> str:
     parts = [GUIDE.read_text(encoding="utf-8"), "# What students see\n"]
     parts += [_overview(name, lesson) for name, lesson in lessons.items()]
     parts += ["# For lecturers only\n"]
-    parts += [_notes(lesson) for lesson in lessons.values()]
+    parts += [f"{_notes(lesson)}\n### The slides, one by one\n\n{spoken(lesson)}" for lesson in lessons.values()]
     return "\n".join(parts)
 
 

@@ -18,7 +18,7 @@ from vsp.rollouts import Policy
 def picture(fig: Figure, alt: str) -> show.Picture:
     """Close the figure and return it as a picture. `alt` describes it for readers who cannot see it."""
     png = io.BytesIO()
-    fig.savefig(png, dpi=150, metadata={"Software": None})
+    fig.savefig(png, dpi="figure", metadata={"Software": None})
     plt.close(fig)
     return show.Picture(png.getvalue(), show.Caption("", "", alt))
 

@@ -14,9 +14,9 @@ from vsp.run.atomic import ROOT, atomic_path
 
 FOLDER = "vsp-course"
 UNUSED = ("papermill",)  # dependencies of the package that the course does not need
-CODE = ("vsp/**/*.py", "vsp/show/**/*.js", "vsp_beyond/**/*.py")
+CODE = ("vsp/**/*.py", "vsp/show/**/*.js", "vsp/show/**/*.css", "vsp_beyond/**/*.py")
 CHECKS = tuple(f"vsp_course/{name}.py" for name in ("__init__", "drawing", "feedback", "lesson_*"))
-FILES = ("LICENSE", "data/paper/*", "data/teachers/*.*", *CODE, *CHECKS)
+FILES = ("LICENSE", "docs/article.html", "data/paper/*", "data/teachers/*.*", *CODE, *CHECKS)
 
 
 def write_handout(path: Path, copies: dict[str, str]) -> None:

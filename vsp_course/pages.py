@@ -35,11 +35,9 @@ def page(lesson: NotebookNode) -> NotebookNode:
     from nbclient import NotebookClient
 
     lesson.metadata.kernelspec = {"name": KERNEL, "display_name": "Python 3", "language": "python"}
-    place = {"metadata": {"path": str(SOURCES)}}
+    options = {"kernel_name": KERNEL, "allow_errors": True, "resources": {"metadata": {"path": str(SOURCES)}}}
     quiet = ["--log-level=CRITICAL"]  # no messages of the kernel itself
-    NotebookClient(
-        lesson, timeout=TIMEOUT, kernel_name=KERNEL, allow_errors=True, extra_arguments=quiet, resources=place
-    ).execute()
+    NotebookClient(lesson, timeout=TIMEOUT, extra_arguments=quiet, **options).execute()
     code = [cell for cell in lesson.cells if cell.cell_type == "code"]
     for number, cell in enumerate(code, 1):
         cell.metadata.pop("execution", None)  # times

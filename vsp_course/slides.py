@@ -1,51 +1,88 @@
-"""Slides of the lessons: the cells tagged `slide`, as one HTML file that opens from disk.
+"""Slides of the lessons, as one HTML file that opens from disk.
 
-reveal.js 5.2.1 (MIT license) shows them; `reveal/` holds it as published by its authors, and the
-page around it.
+Cells tagged `slide` make them. A Markdown cell begins a slide: a title, at most ten words, and under the line `Note:`
+what the lecturer says. A code cell draws its picture or shows an explorer; it needs the cell `imports` of the lesson,
+and the slides before. reveal.js 5.2.1 (MIT license) turns the slides; `reveal/` holds it as published by its authors,
+and the page around it.
 """
 
 from __future__ import annotations
 
-import base64
+import ast
 import html
-import io
-import re
 from pathlib import Path
 
-from PIL import Image
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from vsp.run.atomic import ROOT
+from vsp import show
 from vsp.run.notebook import NotebookNode
+from vsp.show.explorer import Explorer, standalone
+
+from . import drawing
 
 REVEAL = Path(__file__).with_name("reveal")
-WIDE = 1280  # pixels of a figure, and of a slide
-_FIGURE = re.compile(r'<img src="([\w./]+)" alt="([^"]*)"')
+WIDE = 1280  # pixels of a slide
+PROJECTED = 1920  # pixels of a picture as wide as a slide, for a projector
+NOTE = "\n\nNote:\n\n"
+
+
+def room(n: int = 1, *, height: float = 1.9, **subplots) -> tuple[Figure, np.ndarray]:
+    """Make a figure with n panels for a room: 4.5 inches wide, `height` inches high, and drawn as wide as a slide.
+
+    So its type of 8 points is 32 pixels high. Returns the figure and its axes (n,).
+    """
+    return show.panels(n, width=4.5, height=height, dpi=PROJECTED / 4.5, **subplots)
+
+
+def bare_square(ax: Axes, title: str = "") -> Axes:
+    """Draw the unit square of SimpleGoal with its walls, without axes, under a title."""
+    drawing.walls(ax).set(xticks=[], yticks=[], xlabel="", ylabel="", title=title)
+    return ax
 
 
 def is_slide(cell: NotebookNode) -> bool:
-    """Whether this cell is a slide, and nothing else."""
+    """Whether this cell is a slide or its picture, and nothing else."""
     return "slide" in cell.metadata.get("tags", [])
 
 
 def slides(lesson: NotebookNode) -> str:
-    """Return a lesson's slides as one HTML page with figures, style and script. Raises ValueError if it has none."""
+    """Return a lesson's slides as one HTML page with pictures, style and script. Raises ValueError if it has none."""
     import mistune  # nbconvert's own
 
-    sources = [cell.source for cell in lesson.cells if is_slide(cell)]
-    if not sources:
-        raise ValueError("the lesson has no cell tagged 'slide', expected one for each slide")
-    markdown = mistune.create_markdown(plugins=["table"])
-    pages = "\n".join(f"<section>\n{_FIGURE.sub(_inline, markdown(source))}</section>" for source in sources)
-    title = re.sub(r"^#+ ", "", sources[0].splitlines()[0])
+    cells, pages, names = [cell for cell in lesson.cells if is_slide(cell)], [], {}
+    if not cells:
+        raise ValueError("the lesson has no cell tagged 'slide', expected some")
+    exec(next(cell.source for cell in lesson.cells if cell.id == "imports"), names)
+    for cell in cells:
+        if cell.cell_type == "markdown":
+            pages.append(str(mistune.html(cell.source.partition(NOTE)[0])))
+        else:
+            pages[-1] += _shown(cell, names)
     page, css, script = ((REVEAL / name).read_text("utf-8") for name in ("page.html", "reveal.css", "reveal.js"))
-    return page.format(title=html.escape(title), css=css, script=script, slides=pages, wide=WIDE)
+    body = "\n".join(f"<section>\n{slide}</section>" for slide in pages)
+    return page.format(title=html.escape(_title(cells[0])), css=css, script=script, slides=body, wide=WIDE)
 
 
-def _inline(image: re.Match) -> str:
-    """Embed a figure of this repository in the page, no wider than a slide."""
-    file = io.BytesIO()
-    with Image.open(ROOT / image[1]) as picture:
-        small = picture.convert("RGB")
-        small.thumbnail((WIDE, WIDE))
-        small.save(file, "webp", lossless=True)
-    return f'<img src="data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}" alt="{image[2]}"'
+def spoken(lesson: NotebookNode) -> str:
+    """Return what the lecturer says to each slide, as a list in Markdown with the slides' titles."""
+    cells = [cell for cell in lesson.cells if is_slide(cell) and cell.cell_type == "markdown"]
+    return "".join(f"1. **{_title(cell)}**  \n{cell.source.partition(NOTE)[2]}\n" for cell in cells)
+
+
+def _title(slide: NotebookNode) -> str:
+    return slide.source.partition("\n")[0].lstrip("# ")
+
+
+def _shown(cell: NotebookNode, names: dict[str, object]) -> str:
+    """Run a code cell among `names` and return the picture or the explorer of its last line as HTML."""
+    *before, last = ast.parse(cell.source).body
+    exec(compile(ast.Module(before, []), cell.id, "exec"), names)
+    made = eval(compile(ast.Expression(last.value), cell.id, "eval"), names)
+    if not isinstance(made, Explorer):
+        return made._repr_html_()
+    # A page of its own, as light as the slides: their keys and style stay outside
+    style = ":root { color-scheme: light } h1 { display: none } body { margin-top: 0 }"
+    page = standalone("", made.element(), style).replace("<html", '<html data-theme="light"', 1)
+    return f'<div><iframe title="An explorer" loading="lazy" srcdoc="{html.escape(page)}"></iframe></div>'

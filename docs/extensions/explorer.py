@@ -1,11 +1,10 @@
-"""The directive `explorer`: the companion's policies for one task, to be replayed, asked and changed."""
+"""The directive `explorer`: the companion's policies for some tasks, to be replayed, asked and changed."""
 
 import functools
-import shutil
+import re
 
 import numpy as np
 from docutils import nodes
-from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
 import vsp
@@ -14,14 +13,16 @@ from studies import comparison
 from vsp.paper.baselines import linear_map
 from vsp.paper.printed import TASKS, published_policy
 from vsp.paper.results import read_results
-from vsp.show.explorer import SCRIPT, Explorer
+from vsp.show.explorer import Explorer
 from vsp.show.explorer.scene import to_json
 from vsp.teachers.teacher import Teacher
 
+AGENTS = comparison.RESULTS / "agents"
+
 
 @functools.cache  # a run and a tuning each take seconds
-def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
-    """The paper's policy, its method's best rerun with the run, ours, and one linear map: those that the task has."""
+def of_task(task: str) -> Explorer:
+    """The paper's method's best rerun with the run, the paper's policy, ours, one linear map, and agents of the zoo."""
     teacher, policies, history = vsp.load_teacher(task), {}, None
     if task in TASKS:
         best = int(read_results(task).set_index("seed")["validation_mean"].idxmax())
@@ -32,7 +33,15 @@ def of_task(task: str, axes: tuple[str, ...] | None = None) -> Explorer:
     states = np.concatenate([episode.states for episode in episodes])
     actions = np.concatenate([episode.actions for episode in episodes])
     policies["one linear map"] = linear_map(states, actions, task)
-    return vsp.explore(policies, teacher=teacher, history=history, axes=axes)
+    agents = {
+        f"{path.name.split('-')[0].upper()} agent of the zoo, distilled": vsp.VoronoiPolicy.load(path)
+        for path in sorted(AGENTS.glob(f"*-{task}.policy"))
+    }
+    explorer = vsp.explore(policies | agents, teacher=teacher, history=history)
+    for about in explorer.scene["policies"]:
+        if about["name"] in agents:
+            about["teacher"] = None  # these imitate others
+    return explorer
 
 
 def _ours(task: str, teacher: Teacher):
@@ -44,41 +53,27 @@ def _ours(task: str, teacher: Teacher):
             yield name, vsp_beyond.tuned(teacher, task, seed=0)
 
 
-def challenge(task: str, guess: str) -> Explorer:
-    """The paper's policy, about which `guess` asks, and three cells for the reader, which all go to the origin."""
-    maps = np.zeros((3, 3, 2))
-    maps[:, 2] = -1.0
-    three_cells = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.4], [0.4, 0.75]], maps, task=task)
-    policies = {"the paper's, as published": published_policy(task), "three cells, for you to change": three_cells}
-    return vsp.explore(policies, teacher=vsp.load_teacher(task), guess=guess)
-
-
 class Shown(SphinxDirective):
-    """Shows the explorer of the task that its argument names; its data is a file, which loads when it is in view.
+    """Shows an explorer with a choice of the tasks that its argument names.
 
-    Option `axes`: two inputs, for a task with stored episodes. Option `guess`: a question about the paper's policy for
-    SimpleGoal, which the reader answers first and then has three cells to do better. The content is for readers of the
-    source, on GitHub.
+    The scene of each is a file, which loads when the task is chosen. The content is for readers of the source.
     """
 
     has_content = True
     required_arguments = 1
-    option_spec = {"guess": directives.unchanged_required, "axes": directives.unchanged_required}
+    final_argument_whitespace = True
 
     def run(self):
-        (task,), guess, axes = self.arguments, self.options.get("guess"), self.options.get("axes")
-        explorer = challenge(task, guess) if guess else of_task(task, tuple(axes.split()) if axes else None)
-        top, name = "../" * self.env.docname.count("/"), f"explorer_{task}{'_guess' * bool(guess)}.json"
-        self.env.app.explorers[name] = to_json(explorer.scene)
-        return [nodes.raw("", explorer.element(source=f"{top}_static/{name}"), format="html")]
+        top, explorers = "../" * self.env.docname.count("/"), {t: of_task(t) for t in self.arguments[0].split()}
+        self.env.app.explorers |= explorers
+        sources = {re.sub(r"(Continuous)?-v\d+$", "", task): f"{top}_static/{task}.json" for task in explorers}
+        return [nodes.raw("", next(iter(explorers.values())).element(sources=sources), format="html")]
 
 
 def _write(app, error):
-    """The script, which notebooks need too, and the scenes, beside the pages."""
-    if error is None:
-        shutil.copy(SCRIPT, app.outdir / "_static")
-        for name, scene in app.explorers.items():
-            (app.outdir / "_static" / name).write_text(scene, "utf-8")
+    """The scenes, beside the pages."""
+    for task, explorer in app.explorers.items() if error is None else ():
+        (app.outdir / "_static" / f"{task}.json").write_text(to_json(explorer.scene), "utf-8")
 
 
 def setup(app):

@@ -4,33 +4,45 @@ addEventListener("beforeprint", () => {
   shown = document.documentElement.dataset.theme
   document.documentElement.dataset.theme = "light"
 })
-addEventListener("afterprint", () => { document.documentElement.dataset.theme = shown })
+addEventListener("afterprint", () => {
+  document.documentElement.dataset.theme = shown
+})
 
 // Explorers begin to answer where the page has one.
 const folder = document.currentScript.src
 addEventListener("DOMContentLoaded", async () => {
-  if (document.querySelector(".vsp-explorer")) (await import(new URL("explorer.js", folder))).mountAll()
+  if (document.querySelector(".vsp-explorer"))
+    (await import(new URL("explorer.js", folder))).mountAll()
 })
 
 // Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
-const mark = box => box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
+const mark = box =>
+  box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
 addEventListener("load", () => {
   const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
-  for (const box of document.querySelectorAll("article :is(pre, .pst-scrollable-table-container, div.math)")) {
+  for (const box of document.querySelectorAll(
+    "article :is(pre, .pst-scrollable-table-container, div.math)",
+  )) {
     sizes.observe(box)
-    box.addEventListener("scroll", () => mark(box), {passive: true})
+    box.addEventListener("scroll", () => mark(box), { passive: true })
   }
 })
 
-// A letter by itself would find every name that has it somewhere; ∞ is no letter. (Sphinx's search takes this for its own.)
+// A letter by itself would find every name that has it somewhere; ∞ is no letter.
+// (Sphinx's search takes this for its own.)
 var splitQuery = query =>
-  query.replaceAll("∞", " infinity ").split(/[^\p{Letter}\p{Number}_]+/u).filter(term => term.length > 1)
+  query
+    .replaceAll("∞", " infinity ")
+    .split(/[^\p{Letter}\p{Number}_]+/u)
+    .filter(term => term.length > 1)
 
 // A hit leads to the words, not to the top of a long page.
 addEventListener("DOMContentLoaded", () => {
-  const found = document.querySelector("#search-results"), [word] = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
+  const found = document.querySelector("#search-results"),
+    [word] = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
   if (found && word)
     new MutationObserver(() => {
-      for (const link of found.querySelectorAll("a:not([href*='#'])")) link.hash = `:~:text=${encodeURIComponent(word)}`
-    }).observe(found, {childList: true, subtree: true})
+      for (const link of found.querySelectorAll("a:not([href*='#'])"))
+        link.hash = `:~:text=${encodeURIComponent(word)}`
+    }).observe(found, { childList: true, subtree: true })
 })

@@ -69,13 +69,14 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
     return float(np.sqrt(np.square(gaps).mean()))
 
 
-def fidelity(policy: Policy, teacher: Policy, task: Task) -> dict[str, float]:
-    """Measure how closely the policy's actions match the teacher's on `common_states`.
+def fidelity(policy: Policy, teacher: Policy, task: Task, states: np.ndarray | None = None) -> dict[str, float]:
+    """Measure how closely the policy's actions match the teacher's on `states` (n, d), by default `common_states`.
 
     Keys: r2 (R² of the actions, all coordinates pooled), r2_worst (R² of the worst coordinate), off (share of the
     states where an action is off by more than a tenth of its range).
     """
-    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
+    states = common_states(teacher, task) if states is None else states
+    half = 0.5 * (task.action_high - task.action_low)
     wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
     errors = np.square(policy.predict(states)[0] / half - wanted)
     spread = np.square(wanted - wanted.mean(axis=0))

@@ -186,6 +186,7 @@ class Table:
     agents: tuple[int, ...] = (0,)  # teachers: 0 is the shipped one, the others are those of `further_teachers`
     tail: bool = False  # measure the worst returns too
     keeps: str = ""  # the method whose policy of the preset's size and of the first seed is kept
+    keeps_also: tuple[int, ...] = ()  # further sizes whose policy of the first seed is kept
 
 
 OBLIQUE, ONE_MAP = "oblique tree, linear leaves, DAgger, tuned", "one linear map, tuned"  # the closest rivals
@@ -200,7 +201,9 @@ _SMALL = {
     "limit": Table(fewer=range(3), keeps="at the limit"),
 }
 TABLES = {
-    TASKS[0]: _SMALL,
+    TASKS[0]: _SMALL | {
+        "faithful": replace(_SMALL["faithful"], keeps_also=(4, 3)), "limit": replace(_SMALL["limit"], keeps_also=(1,))
+    },
     TASKS[1]: _SMALL | {
         "limit": Table(range(5), range(3), sizes=(3, 4), keeps="at the limit"), "starts": Table(range(3))
     },

@@ -163,10 +163,17 @@ def by_seed(jobs: list[Job]) -> dict[Job, list[Job]]:
 # Policies and tables beside the rows
 
 
-def kept_job(task: str, table: str) -> Job:
-    """Return the row of a table whose policy is kept: the one with the preset's size and the first seed."""
-    name = TABLES[task][table].keeps
-    return Job(task, name, PRESETS[METHODS[name].preset](task).n_cells, 0, tail=TABLES[task][table].tail)
+def kept_jobs(task: str, table: str) -> dict[str, Job]:
+    """Return the rows of a table whose policies are kept, by file: the preset's size first, all of the first seed."""
+    about = TABLES[task][table]
+    if not about.keeps:
+        return {}
+    preset = PRESETS[METHODS[about.keeps].preset](task).n_cells
+    sizes = {"": preset, **{f"_size_{size}": size for size in about.keeps_also}}
+    return {
+        f"{table}_{task}{suffix}.policy": Job(task, about.keeps, size, 0, tail=about.tail)
+        for suffix, size in sizes.items()
+    }
 
 
 def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[Path, Path], None]]]:
@@ -174,7 +181,6 @@ def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[P
 
     The function takes the folder of the rows and OUT; the file goes to OUT/data/beyond.
     """
-    kept = f"{table}_{task}.policy"
     if table == "faithful":
         pairs = (
             {**kind.provenance, "seed": a.seed, "other": b.seed}
@@ -182,15 +188,14 @@ def extras(task: str, table: str) -> Iterator[tuple[str, list[dict], Callable[[P
             for a, b in combinations(jobs, 2)
         )
         yield f"same_{task}.csv", list(pairs), partial(_write_sameness, task)
-    if TABLES[task][table].keeps:
-        job = kept_job(task, table)
-        made_with = job.provenance
-        yield kept, [made_with], lambda folder, out: _keep(job.policy(folder), out / BEYOND / kept, made_with)
+    for name, job in kept_jobs(task, table).items():
+        yield name, [job.provenance], partial(_keep_job, name, job)
         if task == CHEETAH:
+            made_with = job.provenance
             walks = provenance({"policy": made_with, "table": "gait", **GAIT}, made_with["teacher"], GAIT_VERSION)
-            yield f"gait_{task}.csv", [walks], lambda folder, out: _write_gait(job.policy(folder), walks, out)
+            yield f"gait_{task}.csv", [walks], partial(_write_gait, job, walks)
     if (table, task) == ("methods", LANDER):
-        about = simplest_provenance(task)
+        kept, about = f"{table}_{task}.policy", simplest_provenance(task)
         yield kept, [about], lambda folder, out: _keep(simplest(task), out / BEYOND / kept, about)
 
 
@@ -205,9 +210,9 @@ def _write_sameness(task: str, folder: Path, out: Path) -> None:
     write_results(pd.concat(tables, ignore_index=True), f"same_{task}", out=out)
 
 
-def _write_gait(policy: VoronoiPolicy, made_with: dict, out: Path) -> None:
-    name = policy.task.name
-    write_results(record_gait(policy, name, **GAIT).assign(**made_with), f"gait_{name}", out=out)
+def _write_gait(job: Job, made_with: dict, folder: Path, out: Path) -> None:
+    gait = record_gait(job.policy(folder), job.task, **GAIT)
+    write_results(gait.assign(**made_with), f"gait_{job.task}", out=out)
 
 
 def simplest(task: str) -> VoronoiPolicy:
@@ -222,6 +227,10 @@ def simplest_provenance(task: str) -> dict[str, str | int]:
     """Return the provenance of the policy of `simplest`: what determines it besides the seed, which is 0."""
     settings = {"task": task, "loss": LOSS, **asdict(PRESETS["tuned"](task))}
     return provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)
+
+
+def _keep_job(name: str, job: Job, folder: Path, out: Path) -> None:
+    _keep(job.policy(folder), out / BEYOND / name, job.provenance)
 
 
 def _keep(policy: VoronoiPolicy, path: Path, made_with: dict) -> None:

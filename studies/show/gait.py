@@ -82,7 +82,7 @@ def _frames(gait: pd.DataFrame, step_seconds: float, quick: bool) -> list[Image.
     body.set(xlim=(-2.5, 2.5), ylim=(min(z.min(), 0) - 0.15, z.max() + 0.1), aspect="equal", xticks=[], yticks=[])
     body.spines[["left", "bottom"]].set_visible(False)
     body.axhline(0.0, color="0.6", zorder=0)
-    marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell + 1}") for cell, color in colors.items()]
+    marks = [Line2D([], [], color=color, linewidth=THICK, label=f"cell {cell}") for cell, color in colors.items()]
     body.legend(handles=marks, ncol=len(marks), frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     footfall(below, gait, step_seconds=step_seconds)
     if quick:

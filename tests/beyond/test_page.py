@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher, PumpingTeacher
 
 import vsp
 import vsp_beyond
@@ -23,6 +23,13 @@ def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):
     (code,) = re.findall(r'download="policy.vsp" href="data:[^,]*,([^"]*)"', made)
     (tmp_path / "x.vsp").write_bytes(base64.b64decode(code))
     assert vsp.VoronoiPolicy.load(tmp_path / "x.vsp").to_json() == TWO.to_json()
+
+
+def test_of_a_task_that_a_browser_cannot_play_it_says_so():
+    policy = vsp.VoronoiPolicy([np.zeros(8), np.ones(8)], np.zeros((2, 9, 2)), task=LUNARLANDER)
+    made = vsp_beyond.report(policy, Constant(0.0, 0.0), LUNARLANDER)
+    assert f"no explorer, because a browser cannot play {LUNARLANDER}." in made and "application/json" not in made
+    assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "<h2>Where do they differ", "Cell 0<"))
 
 
 def test_a_proof_that_takes_long_is_given_up(monkeypatch, tmp_path):

@@ -160,8 +160,8 @@ def test_marks_come_in_pairs(source):
 
 def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
     before = {path: path.read_bytes() for path in build.SOURCES.glob("*")}
-    twice = [{path.name: path.read_bytes() for path in build.build(tmp_path / name)} for name in ("a", "a", "b")]
-    assert twice[0] == twice[1] == twice[2] and not list(tmp_path.rglob("*.kept-*"))
+    twice = [{path.name: path.read_bytes() for path in build.build(tmp_path / name)} for name in ("a", "b")]
+    assert twice[0] == twice[1] and not list(tmp_path.rglob("*.kept-*"))
     assert before == {path: path.read_bytes() for path in before}
     folder = tmp_path / "b" / "build" / "course"
     copies = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if path.name != build.MADE)

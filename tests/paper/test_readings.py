@@ -16,7 +16,7 @@ ROW = [[0.125, 0.5], [0.5, 0.5], [0.875, 0.5]]  # three cells in a row: each tou
 
 
 def split(readings, partition, episode):
-    return [tuple(c) for c in readings.split(partition, episode, partition.config, np.random.default_rng(5))]
+    return [tuple(c) for c, _ in readings.split(partition, episode, partition.config, np.random.default_rng(5))]
 
 
 @pytest.mark.parametrize(
@@ -74,9 +74,9 @@ def test_by_default_they_are_the_passes_of_the_algorithms(seed):
     partition.models.coefficients[:] = rng.normal(scale=0.6, size=partition.models.coefficients.shape)
     states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
     episode, other = Episode(states, rng.uniform(-1, 1, (60, 2))), copy.deepcopy(partition)
-    added = split_regions(partition, episode, config, np.random.default_rng(1))
-    assert np.array_equal(added, Readings().split(other, episode, config, np.random.default_rng(1)))
-    assert np.array_equal(merge_regions(partition, config), Readings().merge(other, config))
+    splits = split_regions(partition, episode, config, np.random.default_rng(1))
+    assert repr(splits) == repr(Readings().split(other, episode, config, np.random.default_rng(1)))
+    assert repr(merge_regions(partition, config)) == repr(Readings().merge(other, config))
     pairs = [(one.codewords, one.models.coefficients, one.buffers.counts) for one in (partition, other)]
     assert same_arrays(*zip(*pairs))
 

@@ -10,7 +10,6 @@ from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTea
 import vsp
 from vsp import distill
 from vsp.show import Laboratory, page
-from vsp.show.laboratory import SHOWN
 
 VIEW = "application/vnd.jupyter.widget-view+json"
 CONFIG = tiny(min_pol_distance=0.3)
@@ -81,21 +80,6 @@ def test_constants_are_drawn_as_maps_without_weights(lab):
     lab.settings["sub_policy"].value = "linear"
 
 
-def test_the_words_tell_the_distilled_policy_from_the_teacher(lab):
-    teacher = vsp.rollout(CurvedTeacher(), SIMPLEGOAL, lab.scene(0)["starts"])
-    words, result = lab.words(1), lab.trials[1][2]
-    assert words.startswith(f"Trial 2: {len(lab.trials[1][1])} cell") and f"return {result['mean']:.2f}; " in words
-    assert f"The teacher: mean return {teacher.returns.mean():.2f}, {(teacher.outcomes != 1).sum() or 'no'} f" in words
-
-
-def test_the_same_settings_are_not_tried_twice(lab):
-    lab.settings["min_param_distance"].value = 0.9
-    known = len(lab.trials)
-    lab.settings["min_param_distance"].value = 1.2
-    lab.settings["min_param_distance"].value = 0.9 + 1e-12  # as sliders round
-    assert len(lab.trials) == known + 1 and drawn(lab)[0][0] == f"trial {known}"
-
-
 def test_one_button_leads_back_to_the_first_trial(lab, monkeypatch):
     lab.settings["min_pol_distance"].value = 0.45
     lab.settings["min_param_distance"].value = 0.9
@@ -106,21 +90,6 @@ def test_one_button_leads_back_to_the_first_trial(lab, monkeypatch):
     assert len(asked) == 1 and len(lab.trials) == known and drawn(lab)[0][0] == "trial 1"
     lab.settings["min_param_distance"].value = 0.9  # and the controls still answer
     assert len(asked) == 2
-
-
-def test_settings_with_many_digits_are_those_of_the_first_trial():
-    fine = dataclasses.replace(CONFIG, min_pol_distance=0.301234567, n_epochs=40, n_freeze=10)
-    lab = Laboratory(CurvedTeacher(), SIMPLEGOAL, fine)
-    assert lab.trials[0][0] == fine and lab.trial({name: one.value for name, one in lab.settings.items()}) == 0
-
-
-def test_table_and_explorer_hold_the_trial_that_is_shown(lab, monkeypatch):
-    monkeypatch.setattr(lab, "trials", lab.trials[:1] * 20)
-    for place, numbers in ((19, [20, 19, 18, 17, 16, 15, 14, 13]), (2, [20, 19, 18, 17, 16, 15, 14, 3])):
-        lab._put(place)
-        shown = [f"→\N{NO-BREAK SPACE}{number}" if number == place + 1 else str(number) for number in numbers]
-        assert [row[0] for row in rows_of(lab.text.value)[1:]] == shown and len(numbers) == SHOWN
-        assert set(drawn(lab)[0]) == {f"trial {number}" for number in numbers}
 
 
 def test_without_a_kernel_there_is_the_first_trial(lab, monkeypatch):

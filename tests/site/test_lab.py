@@ -159,7 +159,7 @@ def test_the_explorer_replays_and_answers(explorer):
         act()
         pictures.append(_drawn(explorer))
     assert len(set(pictures)) == len(pictures)
-    assert "Mean return from 400 starts" in explorer.inner_text()
+    assert "of 400 starts fail. Mean return" in explorer.inner_text()
 
 
 def test_controls_fit_into_the_notebook(notebook, explorer, laboratory):

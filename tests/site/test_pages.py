@@ -82,7 +82,7 @@ def test_no_code_is_cut_off_and_all_can_be_copied(page):
         cell.querySelectorAll('button.copybtn').length,
         cell.querySelector('pre').scrollWidth - cell.querySelector('pre').clientWidth])""")
     assert all(buttons == 1 and over <= 2 for buttons, over in cells)
-    blocks = "article section > div[class^='highlight-'] pre, article .vsp-explorer fieldset table"
+    blocks = "article section > div[class^='highlight-'] pre"
     assert page.evaluate(f"[...document.querySelectorAll({blocks!r})].every(b => b.scrollWidth <= b.clientWidth + 2)")
 
 
@@ -235,23 +235,6 @@ def test_the_place_of_the_keyboard_is_seen_at_every_stop(browser, address, name,
             unseen.append(visit.page.evaluate("document.activeElement.outerHTML.slice(0, 160)"))
     visit.close()
     assert unseen == [] and stops > 30
-
-
-@pytest.mark.parametrize("name", ["index.html", "explore.html"])
-def test_every_explorer_answers(browser, address, name):
-    visit = Visit(browser, address, name, viewport=DESK)
-    canvases = visit.page.locator(".vsp-explorer[data-scene]")
-    for root in canvases.all():
-        root.scroll_into_view_if_needed()
-        canvas = root.locator("canvas")
-        canvas.wait_for()
-        pictures = [canvas.evaluate("canvas => canvas.toDataURL()")]
-        canvas.click(position={"x": 150, "y": 120})
-        visit.page.wait_for_timeout(500)  # until the map is sharp
-        pictures.append(canvas.evaluate("canvas => canvas.toDataURL()"))
-        assert pictures[0] != pictures[1]
-    assert canvases.count() and visit.troubles == []
-    visit.close()
 
 
 def test_without_a_script_a_page_is_light_on_a_dark_system_too(browser, address):

@@ -11,8 +11,9 @@ from studies import make_rows
 from studies.comparison import measure, rows
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Table
-from studies.comparison.rows import Job, jobs_of, kept_job, make_all, make_row
+from studies.comparison.rows import Job, jobs_of, kept_jobs, make_all, make_row
 from studies.comparison.summary import read_rows
+from studies.results import RESULTS, read_results
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.run import atomic, sealed
@@ -196,10 +197,21 @@ def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
     assert VoronoiPolicy.load(tmp_path / f"data/beyond/robots_{WALKER}.policy").task.name == WALKER
 
 
-def test_the_kept_policy_is_the_first_of_the_presets_size():
-    job = kept_job(WALKER, "robots")
-    assert (job.method, job.size, job.seed) == ("cells, trained further", 8, 0)
-    assert all(kept_job(task, "faithful") in jobs_of(task, "faithful") for task in (*TASKS, LUNARLANDER))
+def test_kept_policies_are_the_first_of_the_presets_size_and_of_some_others():
+    ((name, job),) = kept_jobs(WALKER, "robots").items()
+    assert (name, job.method, job.size, job.seed) == (f"robots_{WALKER}.policy", "cells, trained further", 8, 0)
+    for task in (*TASKS, LUNARLANDER):
+        assert {*kept_jobs(task, "faithful").values()} <= {*jobs_of(task, "faithful")}
+
+
+@pytest.mark.parametrize("table", ["faithful", "limit"])
+def test_a_kept_policy_acts_as_its_row_says(table):
+    """Returns, failures and, of a faithful one, R² on new states of the teacher."""
+    rows, task, teacher = read_results(f"{table}_{SIMPLEGOAL}"), get_task(SIMPLEGOAL), load_teacher(SIMPLEGOAL)
+    for file, job in kept_jobs(SIMPLEGOAL, table).items():
+        policy, row = VoronoiPolicy.load(RESULTS / file), rows[rows["size"] == job.size].iloc[0]  # of seed 0
+        played = measure.measure(policy, teacher, task) | measure.fidelity(policy, teacher, task)
+        assert all(played[name] == pytest.approx(row[name], abs=1e-5) for name in {*played} & {*row.index})
 
 
 # The best policies

@@ -11,6 +11,7 @@ from typing import Literal, get_type_hints
 import numpy as np
 
 from ..config import Config, check_field
+from ..history import Change
 from ..partition import Partition
 from ..rollouts import Episode
 
@@ -66,10 +67,8 @@ class Readings:
         for name, kind in get_type_hints(type(self)).items():
             check_field(name, getattr(self, name), kind)
 
-    def split(
-        self, partition: Partition, episode: Episode, config: Config, rng: np.random.Generator
-    ) -> list[np.ndarray]:
-        """Algorithm 2 with these readings. Returns the new codewords, each (d,)."""
+    def split(self, partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[Change]:
+        """Algorithm 2 with these readings. Returns what `vsp.split_regions` does."""
         cells, losses = partition.cells(episode.states), np.zeros(len(episode.states))
         previous, first, added = None, 0, []  # the running loss averages over the states from `first` on
         for t, (state, action) in enumerate(zip(episode.states, episode.actions)):
@@ -77,13 +76,14 @@ class Readings:
             if i != previous:
                 previous, first = i, t
             losses[t] = partition.loss(i, state, action)
-            if losses[first : t + 1].mean() > config.max_pol_loss and partition.far(i, state):
+            loss = float(losses[first : t + 1].mean())
+            if loss > config.max_pol_loss and partition.far(i, state):
                 before = partition.neighbours()[i]
                 j = partition.add(state, rng)
                 near = np.append(before, False) if self.split_neighbours == "old" else partition.neighbours()[j]
                 near[i] |= self.split_reset == "cell_and_neighbours"
                 partition.reset(near)
-                added.append(state.copy())
+                added.append((state.copy(), loss))
                 if config.one_split:
                     break
                 if self.split_lookup == "refreshed":
@@ -92,15 +92,14 @@ class Readings:
                     first = t + 1
         return added
 
-    def merge(self, partition: Partition, config: Config) -> list[np.ndarray]:
-        """Algorithm 3 with these readings. Returns the removed codewords."""
+    def merge(self, partition: Partition, config: Config) -> list[Change]:
+        """Algorithm 3 with these readings. Returns what `vsp.merge_regions` does."""
         k, coefficients = len(partition.codewords), partition.comparable_coefficients()
-        alive = np.ones(k, dtype=bool)
+        alive, causes = np.ones(k, dtype=bool), np.zeros(k)
         for i in range(k):
             if not alive[i] and not self.merge_visits_removed:
                 continue
-            members = alive.copy()
-            members[i] = True
+            members = alive | (np.arange(k) == i)
             near = np.zeros(k, dtype=bool)
             near[members] = partition.neighbours_of(partition.codewords[members])[members[:i].sum()]
             distances = np.abs(coefficients - coefficients[i]).max(axis=1)
@@ -108,10 +107,10 @@ class Readings:
             if not alive[i]:
                 similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other
             if similar.any():
-                alive = alive & ~similar
+                alive[similar], causes[similar] = False, distances[similar]
                 near[i] |= self.merge_reset == "survivor_and_neighbours"
                 partition.reset(near)
-        removed = list(partition.codewords[~alive])
+        removed = list(zip(partition.codewords[~alive], causes[~alive].tolist()))
         partition.keep(alive)
         return removed
 

@@ -1,9 +1,11 @@
 """The explorer: replay a distillation, query a policy at a state, change the policy and watch its episodes.
 
-`explorer.js` draws on the site, in JupyterLab and in standalone HTML files; `scene` collects the data to draw.
+The scripts draw on the site, in JupyterLab and in standalone HTML files: `model` computes, `picture` draws, `controls`
+and `texts` are around it, `explorer` joins them. `scene` collects the data to draw.
 """
 
-from .explorer import SCRIPT, Explorer, explore, standalone
+from .explorer import Explorer, explore, standalone
 from .scene import PLANES, scene_of
+from .scripts import MODULES, STYLE, bundle
 
-__all__ = ["PLANES", "SCRIPT", "Explorer", "explore", "scene_of", "standalone"]
+__all__ = ["MODULES", "PLANES", "STYLE", "Explorer", "bundle", "explore", "scene_of", "standalone"]

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import html
 import io
+import json
 import os
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
-from .scene import PLANES, scene_of, to_json
+from .scene import scene_of, to_json
+from .scripts import MODULES, STYLE, bundle
 
-SCRIPT = Path(__file__).with_name("explorer.js")
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{title}</title>
 <style>
-body {{ font-family: system-ui, sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem }}
+:root {{ color-scheme: light dark }}
+body {{ max-width: 60rem }}
 h1 {{ overflow-wrap: anywhere }}
 {style}</style>
+<body class="vsp-page">
 <h1>{title}</h1>
 {body}
 <script type="module">
@@ -38,22 +39,20 @@ mountAll()
 
 def standalone(title: str, body: str, style: str = "") -> str:
     """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS."""
-    return _PAGE.format(title=html.escape(title), body=body, style=style, script=SCRIPT.read_text("utf-8"))
+    return _PAGE.format(title=html.escape(title), body=body, style=STYLE + style, script=bundle(MODULES))
 
 
 class Explorer:
     """Policies of one task, to replay, query and change in a browser.
 
-    `policies`: policies with linear maps by name, all of one task. `history`: replays the first of them. The script
-    simulates SimpleGoal, MountainCarContinuous and Pendulum itself; for other tasks it shows stored episodes, over the
-    two inputs `axes`, by default the first two. Raises ValueError for other policies, unknown inputs, and the history
-    of another run.
+    `policies`: policies with linear maps by name, all of one task that the script plays: SimpleGoal,
+    MountainCarContinuous or Pendulum. `history`: replays the first of them. Raises ValueError for other policies and
+    tasks, and for the history of another run.
     """
 
     def __init__(
-        self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None,
-        axes: tuple[str, str] | None = None, guess: str | None = None,
-    ):  # fmt: skip
+        self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
+    ):
         for policy in policies.values():
             if not isinstance(policy, VoronoiPolicy):
                 raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy")
@@ -64,22 +63,21 @@ class Explorer:
         self.policies, (self.task,), first = policies, tasks.values(), next(iter(policies.values()))
         if history and not np.array_equal(history.policy_at(len(history.cells) - 1).codewords, first.codewords):
             raise ValueError("history is of another run than the first policy, expected the one that gave it")
-        if guess is not None and not (isinstance(guess, str) and guess and self.task.name in PLANES):
-            raise ValueError(f"guess is {guess!r}, expected a question about one of {', '.join(PLANES)}, or None")
-        self.scene = scene_of(policies, self.task, teacher, history, axes)
-        if guess is not None:
-            self.scene["guess"] = guess
+        self.scene = scene_of(policies, self.task, teacher, history)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a standalone HTML file, which opens from disk and needs no other file or host."""
         atomic.write_text(path, standalone(f"{self.task.name}: explore the policy", self.element()))
 
-    def element(self, *, source: str | None = None) -> str:
-        """Return HTML with the script's scene (inside, or in the file `source`) and a picture to show without it."""
+    def element(self, *, sources: dict[str, str] | None = None) -> str:
+        """Return HTML with the script's scene inside, and a picture to show without it.
+
+        `sources`: files with scenes to choose from, by name, instead of that scene.
+        """
         caption = f"<figcaption>{html.escape(self._alt())}</figcaption>"
         picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{caption}</figure>"
-        if source is not None:
-            return f'<div class="vsp-explorer" data-scene="{html.escape(source)}">{picture}</div>'
+        if sources is not None:
+            return f'<div class="vsp-explorer" data-scenes="{html.escape(json.dumps(sources))}">{picture}</div>'
         scene = to_json(self.scene).replace("<", "\\u003c")  # no tag ends here
         return f'<div class="vsp-explorer">{picture}<script type="application/json">{scene}</script></div>'
 
@@ -92,51 +90,36 @@ class Explorer:
     def _alt(self) -> str:
         name, policy = next(iter(self.policies.items()))
         plane, cells = " and ".join(self.scene["plane"]["labels"]), f"{len(policy)} cell{'s' * (len(policy) > 1)}"
-        if "stored" in self.scene:
-            return f"States that one policy ({name}, {cells}) visits, over {plane}, in the colours of their cells."
         return f"The map of one policy ({name}, {cells}) over {plane}: cells and actions."
 
     def _still(self) -> bytes:
-        """Draw the first policy as a PNG: its map, or the states of its stored episodes in their cells' colours."""
+        """Draw the first policy over its plane, as a PNG: forces as colours, or cells and arrows."""
         policy, (low, high, labels) = next(iter(self.policies.values())), self.scene["plane"].values()
         fig, (ax,) = style.panels(1, width=3.2, height=3.0)
-        if "stored" in self.scene:
-            states = np.concatenate([episode["states"] for episode in self.scene["policies"][0]["episodes"]])
-            colours = [style.COLOURS[cell % len(style.COLOURS)] for cell in policy.cells(states)]
-            ax.scatter(*states[:, self.scene["stored"]["axes"]].T, s=3, color=colours)
-        else:
-            self._map(ax, policy, np.array(low), np.array(high))
-        ax.set(xlabel=labels[0], ylabel=labels[1], xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        file = io.BytesIO()
-        fig.savefig(file, format="png", dpi=150, metadata={"Software": None})
-        plt.close(fig)
-        return file.getvalue()
-
-    def _map(self, ax: Axes, policy: VoronoiPolicy, low: np.ndarray, high: np.ndarray) -> None:
-        """Draw the policy over its plane: forces as colours, or cells and arrows."""
-        x, y, points = state_space.grid(low, high, 201)
+        x, y, points = state_space.grid(np.array(low), np.array(high), 201)
         single = len(self.task.outputs) == 1
         if single:
             actions = policy.predict(self.task.see(points))[0][:, 0] / self.task.action_high[0]
             state_space.force_map(ax, x, y, actions)
         state_space.cells(ax, x, y, policy.cells(self.task.see(points)), fill=not single)
         if not single:
-            coarse = state_space.grid(low, high, 15)[2]
+            coarse = state_space.grid(np.array(low), np.array(high), 15)[2]
             state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
+        ax.set(xlabel=labels[0], ylabel=labels[1], xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        file = io.BytesIO()
+        fig.savefig(file, format="png", dpi=150, metadata={"Software": None})
+        plt.close(fig)
+        return file.getvalue()
 
 
 def explore(
-    policies: VoronoiPolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None,
-    history: History | None = None, axes: tuple[str, str] | None = None, guess: str | None = None,
-) -> Explorer:  # fmt: skip
+    policies: VoronoiPolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
+) -> Explorer:
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
     `policies`: one policy with linear maps, or several by name. `teacher`: its actions are shown beside theirs.
-    `history`: replays the distillation of the first policy. The browser simulates SimpleGoal, MountainCarContinuous and
-    Pendulum. For other tasks it shows stored episodes over the two inputs `axes`, and policies cannot be changed.
-    `guess`: a question about the first policy, which the reader answers before returns and failures are shown. Raises
-    ValueError for other policies, unknown inputs, a history of another method or task, and a guess for a task that the
-    browser cannot simulate.
+    `history`: replays the distillation of the first policy. The browser plays SimpleGoal, MountainCarContinuous and
+    Pendulum. Raises ValueError for other policies and tasks, and for a history of another method or task.
     """
     policies = policies if isinstance(policies, dict) else {"policy": policies}
-    return Explorer(policies, teacher=teacher, history=history, axes=axes, guess=guess)
+    return Explorer(policies, teacher=teacher, history=history)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import anywidget
 import traitlets
+
+from .scripts import MODULES, STYLE, bundle
 
 
 class View(anywidget.AnyWidget):
     """Draw a scene, given as JSON."""
 
-    _esm = Path(__file__).with_name("explorer.js")
+    _esm, _css = bundle(MODULES), STYLE
     scene = traitlets.Unicode().tag(sync=True)

@@ -1,0 +1,42 @@
+// The state of the article in the address of its page: "#v=1&s=cells&p=run&a=0.7,0.7&k=1x2y3z".
+// Only known keys and numbers are read, and a checksum tells what is cut: links come from anywhere.
+
+const [VERSION, LONGEST, MOST_CELLS, LARGEST] = ["1", 4096, 16, 1e6]
+
+/** A checksum of a text (FNV-1a). */
+function checksum(text) {
+  let sum = 0x811c9dc5
+  for (const sign of text) sum = Math.imul(sum ^ sign.codePointAt(0), 0x01000193)
+  return (sum >>> 0).toString(36)
+}
+
+/** The address of a scene; `numbers` are those of a reader's own policy. */
+export function write({ section, policy, at, moment, zoomed, numbers }) {
+  const { codewords, coefficients } = numbers ?? {}
+  const pairs = { v: VERSION, s: section, p: policy, a: at, n: moment, z: zoomed ? 1 : undefined }
+  Object.assign(pairs, { c: codewords?.flat(), m: coefficients?.flat(2) })
+  const told = Object.entries(pairs).filter(([, value]) => value !== undefined)
+  const text = told.map(([key, value]) => `${key}=${value}`).join("&")
+  return `#${text}&k=${checksum(text)}`
+}
+
+/** The state in an address, or null if it is not whole and known: with one of the policies of a
+ * section, and one of the run's moments. A cell has 2 numbers of its codeword, and 6 of its map. */
+export function read(hash, sections, moments) {
+  const [, text, sum] = hash.slice(0, LONGEST + 1).match(/^#(.*)&k=(\w+)$/) ?? []
+  if (hash.length > LONGEST || text === undefined || checksum(text) !== sum) return null
+  const { v, s: section, p: policy, z, n, ...lists } = Object.fromEntries(new URLSearchParams(text))
+  if (v !== VERSION || !Object.hasOwn(sections, section)) return null
+  if (!sections[section].includes(policy)) return null
+  const moment = n && Number(n)
+  if (n && !(Number.isInteger(moment) && moment >= 0 && moment < moments)) return null
+  const [at, codewords, maps] = ["a", "c", "m"].map(key => lists[key]?.split(",").map(Number))
+  const all = [at, codewords ?? [], maps ?? []].flat()
+  if (at?.length !== 2 || !all.every(value => Math.abs(value) <= LARGEST)) return null
+  const state = { section, policy, at, moment, zoomed: z === "1" }
+  if (!codewords && !maps) return state
+  const cells = codewords?.length / 2
+  if (!(Number.isInteger(cells) && cells <= MOST_CELLS && maps?.length === 6 * cells)) return null
+  const cut = (list, size) => list.flatMap((_, i) => (i % size ? [] : [list.slice(i, i + size)]))
+  return { ...state, numbers: { codewords: cut(codewords, 2), coefficients: cut(cut(maps, 2), 3) } }
+}

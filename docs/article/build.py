@@ -1,0 +1,88 @@
+"""Write docs/article.html, one file that opens from disk, and docs/article.png, its picture for the README.
+
+    make article
+
+The same command gives the same bytes. The site takes the file apart again (docs/extensions/article.py), so both show
+the same article.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+from stills import stills
+
+from data import parts, policies
+from vsp import VoronoiPolicy
+from vsp.run import atomic
+from vsp.show import style
+from vsp.show.explorer import MODULES, STYLE, bundle
+
+FOLDER = Path(__file__).parent
+TITLE = "A network in a few equations"
+SCALE = 12, 17  # of the mean return, in section 7
+SCRIPTS = [*MODULES, FOLDER / "address.js", FOLDER / "article.js"]
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+:root {{ color-scheme: light dark }}
+body {{ max-width: 68rem }}
+{style}</style></head>
+<body class="vsp-page"><main>
+<h1>{title}</h1>
+<div class="vsp-article">
+{text}</div>
+</main>
+{data}
+<script type="module">
+{script}
+begin()
+</script>
+</body></html>
+"""
+
+
+def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
+    """Return the article's HTML with its numbers, each computed, and its pictures."""
+    says, (low, high) = scene["says"], SCALE
+    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best")}
+    still = {
+        name: f'<figure class="still">{style.embedded(png, alt, width=460)}</figure>'
+        for name, (png, alt) in pictures.items()
+    }
+    limits = {name: run[name] for name in ("split", "merge", "distance")}
+    numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
+    written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
+    return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)
+
+
+def card(policy: VoronoiPolicy) -> str:
+    """Return the equations of all cells as HTML."""
+    lines = ""
+    for cell, codeword in enumerate(policy.codewords):
+        near = ", ".join(f"{value:.2f}" for value in codeword)
+        equations = " ".join(f"<code>{one.replace('-', '−')}</code>" for one in policy.equations(cell))
+        lines += f"<p><b>Nearest to ({near})</b> {equations}</p>"
+    return lines
+
+
+def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
+    """Return the whole file."""
+    named = [{"id": name, **policy} for name, policy in data["scene"]["policies"].items()]
+    data = data | {"scene": data["scene"] | {"policies": named}}
+    stored = "\n".join(
+        f'<script type="application/json" id="article-{name}">{json.dumps(part, separators=(",", ":"))}</script>'
+        for name, part in data.items()
+    )
+    look = STYLE + (FOLDER / "article.css").read_text("utf-8")
+    said = text(data["scene"], data["run"], pictures)
+    return PAGE.format(title=TITLE, style=look, text=said, data=stored, script=bundle(SCRIPTS))
+
+
+if __name__ == "__main__":
+    pictures = stills()
+    docs = Path(sys.argv[1]) / "docs"
+    atomic.write_text(docs / "article.html", page(parts(), pictures))
+    atomic.write_bytes(docs / "article.png", pictures["fails"][0])

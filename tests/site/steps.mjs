@@ -1,0 +1,26 @@
+// For test_explorer_modules.py: how often steps and cells differ from Python's, and all episodes.
+
+import { readFileSync } from "fs"
+import { act, dynamics, ready, rollout, tied } from "../../vsp/show/explorer/model.js"
+
+/** `file`: per step state (2), cell, next state (2), reward and outcome, as float64. */
+export function compare(file, scene, policy) {
+  const bytes = readFileSync(file),
+    numbers = new Float64Array(bytes.buffer, bytes.byteOffset, bytes.length / 8),
+    { see, step } = dynamics(scene.task.name),
+    found = { steps: 0, ties: 0, cells: 0, off: 0 }
+  ready(policy)
+  for (let i = 0; i < numbers.length; i += 7) {
+    const [x, y, cell, ...expected] = numbers.subarray(i, i + 7),
+      [near, other] = tied(policy, see([x, y]))
+    found.steps += 1
+    found.ties += near !== other
+    if (near !== other) continue
+    const acted = act(scene, policy, see([x, y])),
+      made = step([x, y], acted.action).flat()
+    found.cells += acted.cell !== cell
+    found.off += made.some((value, k) => Math.abs(value - expected[k]) > 1e-9)
+  }
+  const ends = scene.starts.map(start => rollout(scene, policy, start))
+  return { ...found, totals: ends.map(end => end.total), outcomes: ends.map(end => end.outcome) }
+}

@@ -1,0 +1,242 @@
+"""The article in Chromium, on the site and as a file from disk: every gesture answers, every address leads back."""
+
+import statistics
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bs4 import BeautifulSoup
+from visits import Visit
+
+FILE = Path("docs/article.html").resolve()
+IDS = ["teacher", "one-map", "cells", "fails", "few", "certain", "you"]
+DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+UNREAD = "This link is damaged or from a newer version. So here is the first picture."
+FRAMES = "n => new Promise(done => { const next = () => n-- ? requestAnimationFrame(next) : done(); next() })"
+# Each section's gesture, as a reader makes it
+GESTURES = {
+    "teacher": lambda shown: shown.click(0.3, 0.9),
+    "one-map": lambda shown: shown.section.get_by_label("Δx: bias").fill("-0.9"),
+    "cells": lambda shown: shown.press("next change"),
+    "fails": lambda shown: shown.press("refit this cell"),
+    "few": lambda shown: shown.section.get_by_label("number of cells").fill("2"),
+    "certain": lambda shown: shown.press("enlarge"),
+    "you": lambda shown: shown.drag((0.4, 0.75), (0.2, 0.9)),
+}
+
+
+class Shown:
+    """The article in a window."""
+
+    def __init__(self, browser, where, hash_="", **context):
+        folder, _, name = where.rpartition("/")
+        self.visit = Visit(browser, folder + "/", name + hash_, reduced_motion="reduce", **context)
+        self.page = self.visit.page
+        self.page.locator(".vsp-article.live canvas").wait_for()
+        self.rest()
+
+    def rest(self):
+        self.page.wait_for_timeout(400)  # until the picture is sharp
+
+    def to(self, name):
+        self.page.evaluate("name => document.getElementById(name).scrollIntoView()", name)
+        self.section = self.page.locator(f"#{name}.active")
+        self.section.wait_for()
+        self.page.wait_for_function("n => location.hash.includes(`s=${n}&`) || n == 'teacher'", arg=name)
+        self.rest()
+
+    def place(self, x, y):
+        box = self.page.locator("canvas").bounding_box()
+        return box["x"] + 54 + x * (box["width"] - 62), box["y"] + 8 + (1 - y) * (box["height"] - 44)
+
+    def click(self, x, y):
+        self.page.mouse.click(*self.place(x, y))
+
+    def drag(self, start, end):
+        self.page.mouse.move(*self.place(*start))
+        self.page.mouse.down()
+        self.page.mouse.move(*self.place(*end), steps=4)
+        self.page.mouse.up()
+
+    def press(self, name):
+        self.section.get_by_role("button", name=name).click()
+
+    def looks(self):
+        """Picture, and what the sentences say."""
+        self.rest()
+        said = self.page.locator(".vsp-article section.active, .vsp-result").all_inner_texts()
+        return self.page.locator("canvas").evaluate("canvas => canvas.toDataURL()"), said
+
+
+@pytest.fixture(scope="module", params=["site", "file"])
+def where(request):
+    return request.getfixturevalue("address") + "index.html" if request.param == "site" else FILE.as_uri()
+
+
+@pytest.fixture
+def shown(browser, where):
+    opened = []
+
+    def open_(hash_="", **context):
+        opened.append(Shown(browser, where, hash_, **({"viewport": DESK} | context)))
+        return opened[-1]
+
+    yield open_
+    for one in opened:
+        one.visit.close()
+    assert [one.visit.troubles for one in opened] == [[]] * len(opened)  # no error, no other host
+
+
+@pytest.mark.parametrize(("size", "scheme"), [(DESK, "light"), (DESK, "dark"), (PHONE, "light"), (PHONE, "dark")])
+def test_every_gesture_changes_picture_and_sentence_and_axe_finds_nothing(shown, size, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    article = shown(viewport=size, color_scheme=scheme)
+    for name in IDS:
+        article.to(name)
+        picture, said = article.looks()
+        GESTURES[name](article)
+        after = article.looks()
+        assert after[0] != picture and after[1] != said, name
+        assert article.page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    found = Axe().run(article.page, ".vsp-article", {"preload": False}).response["violations"]
+    assert [(rule["help"], node["html"][:160]) for rule in found for node in rule["nodes"]] == []
+
+
+def test_untouched_sentences_say_what_the_picture_says(shown):
+    written = BeautifulSoup(FILE.read_text("utf-8"), "html.parser").main
+    article = shown()
+    for name in IDS:
+        article.to(name)
+        outputs = [output.text for output in written.select(f"#{name} output")]
+        assert article.section.locator("output").all_inner_texts() == outputs
+
+
+def test_an_address_leads_back_to_its_scene_and_back_undoes(shown):
+    first = shown()
+    for name in IDS:
+        first.to(name)
+        before = first.page.evaluate("location.hash")
+        GESTURES[name](first)
+        looks, here = first.looks(), first.page.evaluate("location.hash")
+        assert len(here) <= 4096
+        again = shown(here)
+        assert again.looks()[0] == looks[0] and again.page.locator("section.active").get_attribute("id") == name
+        outputs = [one.page.locator(f"#{name} output").all_inner_texts() for one in (first, again)]
+        assert outputs[0] == outputs[1]
+        first.page.go_back()
+        first.rest()
+        assert name == "teacher" or first.page.evaluate("location.hash") == before
+
+
+def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown):
+    article, rng = shown(), np.random.default_rng(0)
+    article.to("you")
+    GESTURES["you"](article)
+    article.rest()
+    whole = article.page.evaluate("location.hash")
+    wrong = [
+        whole[:-1], whole + "0", "#v=2" + whole[4:], "#v=1&s=you&p=three&a=NaN,1&k=x", "#v=1" + "&a=1e999" * 600,
+        "#v=1&s=<img src=x onerror=alert(1)>&k=0",
+    ]  # fmt: skip
+    while len(wrong) < 1000:
+        text = list(whole)
+        for at in rng.integers(4, len(text), rng.integers(1, 4)):
+            text[at] = chr(rng.integers(33, 127))
+        wrong.append("".join(text))
+    told = article.page.evaluate(
+        """async hashes => {
+            const told = new Set()
+            for (const hash of hashes) {
+                location.hash = hash
+                await new Promise(done => setTimeout(done, 8))
+                const [status, section] = [".status", "section.active"].map(one => document.querySelector(one))
+                told.add([status.innerHTML, section.id].join())
+            }
+            return [...told]
+        }""",
+        [one for one in dict.fromkeys(wrong) if one != whole],
+    )
+    assert told == [f"{UNREAD},teacher"]
+
+
+def test_keys_alone_lead_through_all_sections(shown):
+    article, seen = shown(), []
+    article.page.locator("canvas").focus()
+    before = article.looks()
+    article.page.keyboard.press("Shift+ArrowLeft")
+    assert article.looks() != before
+    while seen[-1:] != ["you"] and len(seen) < 90:
+        article.page.keyboard.press("Tab")
+        article.page.wait_for_timeout(30)
+        seen += article.page.locator("section.active").evaluate_all("found => found.map(one => one.id)")
+    assert [name for name in dict.fromkeys(seen) if name in IDS] == IDS
+
+
+def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser, where):
+    page = browser.new_context(viewport=DESK).new_page()
+    page.add_init_script("""new MutationObserver((_, watch) => {
+        if (document.querySelector(".vsp-article.live")) {
+            watch.disconnect()
+            requestAnimationFrame(() => requestAnimationFrame(now => { window.there = now }))
+        }
+    }).observe(document, {subtree: true, childList: true, attributes: true})""")
+    page.goto(where)
+    page.wait_for_function("window.there")
+    assert page.evaluate("window.there") < 1000
+    page.evaluate("document.querySelector('#you').scrollIntoView()")
+    page.locator("#you.active").wait_for()
+    page.wait_for_timeout(500)
+    answers = page.evaluate("""async () => {
+        const canvas = document.querySelector("canvas"), {left, top} = canvas.getBoundingClientRect(), times = []
+        canvas.setPointerCapture = () => {}
+        for (let i = 0; i < 40; i++) {
+            const begun = performance.now(), about = {buttons: 1, isPrimary: true}
+            Object.assign(about, {clientX: left + 210 + i, clientY: top + 110 + i})
+            canvas.dispatchEvent(new PointerEvent(i ? "pointermove" : "pointerdown", about))
+            await new Promise(requestAnimationFrame)
+            await new Promise(done => setTimeout(done))
+            times.push(performance.now() - begun)
+        }
+        return times
+    }""")
+    assert statistics.median(answers) < 33
+    page.evaluate("document.querySelector('#cells').scrollIntoView()")
+    page.locator("#cells.active .vsp-said").wait_for()
+    page.locator("#cells").get_by_role("button", name="play").click()
+    pictures = page.evaluate("""async () => {
+        const draw = CanvasRenderingContext2D.prototype.strokeRect
+        let count = 0
+        CanvasRenderingContext2D.prototype.strokeRect = function (...all) { count++; draw.apply(this, all) }
+        await new Promise(done => setTimeout(done, 3000))
+        return count / 3
+    }""")
+    page.context.close()
+    assert pictures >= 15
+
+
+def test_the_file_is_small_whole_and_short():
+    assert FILE.stat().st_size < 1_500_000
+    page = BeautifulSoup(FILE.read_text("utf-8"), "html.parser")
+    assert all(link["href"].startswith("https://arxiv.org/") for link in page.select("[href]"))
+    assert not page.select("link, [src]:not([src^='data:'])")
+    parts = {one.get("id", one.name): one for one in page.select("section, header, footer")}
+    said = {
+        name: one.find_all(string=lambda text: not text.find_parent(["code", "table"])) for name, one in parts.items()
+    }
+    words = {name: len(" ".join(texts).split()) for name, texts in said.items()}
+    assert list(words)[1:-1] == IDS and max(words.values()) <= 150 and sum(words.values()) <= 1100
+
+
+@pytest.mark.parametrize("context", [{"java_script_enabled": False}, {}])
+def test_without_a_script_and_on_paper_each_section_shows_its_picture(browser, where, context):
+    page = browser.new_context(viewport=DESK, **context).new_page()
+    page.goto(where)
+    if not context:
+        page.locator(".live").wait_for()
+        page.emulate_media(media="print")
+    assert [page.locator(f"#{name} .still img").is_visible() for name in IDS] == [True] * 7
+    assert not page.locator(".stage").is_visible()
+    alts = page.locator(".still img").evaluate_all("found => found.map(image => image.alt.length)")
+    assert len(alts) == 7 and min(alts) > 60
+    page.context.close()

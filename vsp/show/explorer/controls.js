@@ -1,0 +1,141 @@
+// Controls of an explorer: elements, numbers, equations to write in, a player for sequences.
+
+const SPEEDS = [0.25, 1, 4]
+
+/** Make an element with attributes, listeners (functions) and children. */
+export function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag)
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === "function") made.addEventListener(name, value)
+    else if (value !== false) made.setAttribute(name, value === true ? "" : value)
+  }
+  made.append(...children)
+  return made
+}
+
+export const button = (label, click) => element("button", { type: "button", click }, label)
+export const row = (...children) => element("div", { class: "vsp-row" }, ...children)
+export const minus = text => String(text).replaceAll("-", "−")
+export const digits = value => (Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3)))
+
+/** Make a table: names of the columns, then rows that begin with their name. */
+export function table(head, rows) {
+  const line = (...cells) => element("tr", {}, ...cells)
+  const heads = head.map(name => (name ? element("th", { scope: "col" }, name) : element("td")))
+  const body = rows.map(([name, ...values]) =>
+    line(element("th", { scope: "row" }, name), ...values.map(value => element("td", {}, value))),
+  )
+  return element("table", {}, line(...heads), ...body)
+}
+
+/** An equation in words: "Δx = 0.20 x − 0.10 y + 0.05". */
+export function equation(name, inputs, rows, k) {
+  const terms = rows.map((weights, i) => {
+    const sign = weights[k] < 0 ? (i ? " − " : "−") : i ? " + " : ""
+    return sign + Math.abs(weights[k]).toFixed(2) + (i < inputs.length ? ` ${inputs[i]}` : "")
+  })
+  return `${name} = ${terms.join("")}`
+}
+
+/** A list to choose from; `take` gets the index of what is chosen. */
+export function choice(label, names, take, at = 0) {
+  const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name))
+  const change = ({ target }) => take(+target.value)
+  return element("label", {}, `${label} `, element("select", { change }, ...options))
+}
+
+/** A field for a number, which calls `put` with every number that is written. */
+export function field(label, number, step, put) {
+  const input = ({ target: { valueAsNumber: given } }) => Number.isFinite(given) && put(given)
+  const value = +(+number.toFixed(3)).toPrecision(4)
+  return element("input", { type: "number", step, value, "aria-label": label, input })
+}
+
+/** Fields for the codeword, where it can be moved, and the equations of the chosen cell of a view.
+ * `changed` is called after each change. */
+export function equations({ scene, policy, cell, cells, angular }, changed) {
+  const { task, plane } = scene,
+    rows = policy.coefficients[cell],
+    codeword = policy.codewords[cell]
+  const range = i => (angular ? 2 : plane.high[i] - plane.low[i])
+  const term = (label, list, i, step, before, after = "") => {
+    const put = value => {
+      list[i] = value
+      changed()
+    }
+    return element("span", { class: "vsp-term" }, before, field(label, list[i], step, put), after)
+  }
+  const line = (name, terms) => element("div", { class: "vsp-equation" }, `${name} `, ...terms)
+  const places = task.inputs.map((name, i) =>
+    term(`codeword: ${name}`, codeword, i, +(range(i) / 50).toPrecision(1), `${name} = `),
+  )
+  const lines = task.outputs.map((output, k) => {
+    const names = [...task.inputs, "bias"]
+    const terms = names.map((name, i) =>
+      term(`${output}: ${name}`, rows[i], k, 0.1, "", name === "bias" ? "" : `${name} +`),
+    )
+    return line(`${output} =`, terms)
+  })
+  return cells > 1 ? [line("codeword", places), ...lines] : lines
+}
+
+/** A row of controls for the run of a view: play, previous and next change, speed, slider. The view
+ * shows and describes moment i in `turn(i)`, and `lasts(i)` says for how many milliseconds. */
+export class Player {
+  constructor(view) {
+    Object.assign(this, { view, speed: 1 })
+    this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches // one picture a second
+    const go = way => (this.stop(), view.jump(way))
+    const input = () => (this.stop(), this.to(+this.slider.value))
+    const settled = { input, change: () => view.settle() }
+    this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled })
+    this.toggle = button("play", () => (this.playing ? this.stop() : this.start()))
+    this.said = element("span", { class: "vsp-said" })
+    const steps = [button("previous change", () => go(-1)), button("next change", () => go(1))]
+    const names = SPEEDS.map(speed => `${speed} ×`)
+    const speeds = choice("speed", names, i => (this.speed = SPEEDS[i]), 1)
+    this.row = row(this.toggle, ...steps, speeds, this.slider, this.said)
+  }
+  get at() {
+    return +this.slider.value
+  }
+  /** Set the number of moments and go to the last one. */
+  restart(count) {
+    this.slider.max = count - 1
+    this.to(count - 1)
+  }
+  to(i) {
+    this.slider.value = i
+    this.text = this.view.turn(this.at)
+  }
+  /** Say where it is: with the picture and all other texts, which are drawn with the next frame. */
+  tell() {
+    if (this.text === undefined || this.said.textContent === this.text) return
+    this.said.textContent = this.text
+    this.slider.setAttribute("aria-valuetext", this.text)
+  }
+  start() {
+    const last = +this.slider.max
+    this.playing = true
+    this.toggle.textContent = "pause"
+    if (this.at === last) this.to(0)
+    let [before, waited] = [performance.now(), 0]
+    const lasts = i => (this.slow ? 1000 : this.view.lasts(i))
+    const frame = now => {
+      if (!this.playing || !this.slider.isConnected) return
+      waited += (now - before) * this.speed
+      before = now
+      let i = this.at
+      for (; i < last && waited >= lasts(i); i++) waited -= lasts(i)
+      if (i > this.at) this.to(i)
+      if (this.at < last) return requestAnimationFrame(frame)
+      this.stop()
+      this.view.settle()
+    }
+    requestAnimationFrame(frame)
+  }
+  stop() {
+    this.playing = false
+    this.toggle.textContent = "play"
+  }
+}

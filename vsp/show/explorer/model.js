@@ -1,0 +1,282 @@
+// Policies, tasks and the teacher, computed as Python does. Nothing here knows a page or picture.
+
+const ON_BORDER = 1e-9 // distances that differ by less are equal, or rounding makes a checkerboard
+export const TINTS = 6 // colours of cells
+
+export const clip = (value, low, high) => Math.min(Math.max(value, low), high)
+
+// ---- Which cell, which action
+
+/** Prepare a policy for fast look-ups: its codewords divided by the scale, in one flat array. */
+export function ready(policy) {
+  const { codewords, scale } = policy
+  policy.scaled = Float64Array.from(
+    codewords.flatMap(word => word.map((value, i) => value / scale[i])),
+  )
+  policy.place = new Float64Array(scale.length)
+  policy.far = new Float64Array(codewords.length)
+  return policy
+}
+
+/** The distances of an observation (Euclidean: squared), valid until the next call. */
+function distances({ scaled, scale, metric, place, far }, seen) {
+  const d = scale.length
+  for (let i = 0; i < d; i++) place[i] = seen[i] / scale[i]
+  for (let j = 0, at = 0; j < far.length; j++) {
+    let sum = 0
+    for (let i = 0; i < d; i++, at++) {
+      const gap = Math.abs(place[i] - scaled[at])
+      if (metric === "euclidean") sum += gap * gap
+      else if (metric === "manhattan") sum += gap
+      else if (gap > sum) sum = gap
+    }
+    far[j] = sum
+  }
+  return far
+}
+
+/** The index of the nearest codeword; among equally near ones, up to `slack`, the first. */
+export function cellOf(policy, seen, slack = 0) {
+  const far = distances(policy, seen)
+  let best = 0
+  for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j
+  return best
+}
+
+/** The nearest codeword, and the last other one that is as near (or the same again). */
+export function tied(policy, seen) {
+  const cell = cellOf(policy, seen, ON_BORDER),
+    { far } = policy
+  let other = far.length - 1
+  while (Math.abs(far[other] - far[cell]) >= ON_BORDER) other--
+  return [cell, other]
+}
+
+/** The output of a linear map for action k: rows are the weights of the inputs, then the bias. */
+export function raw(rows, seen, k) {
+  let sum = rows[seen.length][k]
+  for (let i = 0; i < seen.length; i++) sum += seen[i] * rows[i][k]
+  return sum
+}
+
+/** The cell, the output of its map, and the action within its limits. A network has one cell. */
+export function act({ task }, policy, seen) {
+  const cell = policy.layers ? 0 : cellOf(policy, seen)
+  const given = policy.layers ? output(policy, seen) : []
+  const action = []
+  for (let k = 0; k < task.actionLow.length; k++) {
+    if (!policy.layers) given.push(raw(policy.coefficients[cell], seen, k))
+    action.push(clip(given[k], task.actionLow[k], task.actionHigh[k]))
+  }
+  return { cell, raw: given, action }
+}
+
+// ---- The teacher: a network, or a grid of its actions
+
+/** Numbers stored as base64 of little-endian float32. */
+export const floats = text =>
+  new Float32Array(Uint8Array.from(atob(text), sign => sign.charCodeAt(0)).buffer)
+
+/** A network: relu in the hidden layers, tanh at the end; of each layer weights, then biases. */
+export function network({ sizes, weights }) {
+  const numbers = Float64Array.from(floats(weights))
+  let at = 0
+  const take = count => numbers.subarray(at, (at += count))
+  const layer = (n, i) => ({ weights: take(n * sizes[i]), biases: take(n) })
+  return { layers: sizes.slice(1).map(layer) }
+}
+
+/** The output of a network, for actions from -1 to 1. */
+function output({ layers }, seen) {
+  let values = Float64Array.from(seen, Math.fround) // as the network sees them in Python
+  layers.forEach(({ weights, biases }, layer) => {
+    const next = new Float64Array(biases)
+    for (let j = 0, at = 0; j < next.length; j++) {
+      let sum = 0
+      for (let i = 0; i < values.length; i++, at++) sum += weights[at] * values[i]
+      sum += next[j]
+      next[j] = layer === layers.length - 1 ? Math.tanh(sum) : Math.max(sum, 0)
+    }
+    values = next
+  })
+  return [...values]
+}
+
+/** The teacher's action at a point of the plane, by bilinear interpolation in its grid. */
+export function teacherAt(scene, point) {
+  const { low, high } = scene.plane,
+    { n, actions } = scene.teacher
+  const [u, v] = point.map((value, i) => ((value - low[i]) / (high[i] - low[i])) * (n - 1))
+  const [i, j] = [u, v].map(value => clip(Math.floor(value), 0, n - 2)),
+    [a, b] = [u - i, v - j]
+  const at = (p, q, k) => actions[p * n + q][k]
+  const along = (q, k) => (1 - a) * at(i, q, k) + a * at(i + 1, q, k)
+  return scene.task.outputs.map((_, k) => (1 - b) * along(j, k) + b * along(j + 1, k))
+}
+
+// ---- Tasks: `step` returns next state, reward and outcome (0: running, 1: goal, 2: pit)
+
+const TASKS = {
+  "SimpleGoal-v0": {
+    see: state => state,
+    step([x, y], [dx, dy]) {
+      const next = [clip(x + 0.1 * clip(dx, -1, 1), 0, 1), clip(y + 0.1 * clip(dy, -1, 1), 0, 1)]
+      if (next[0] < 0.1 && next[1] < 0.1) return [next, 10, 1]
+      if (next.every(value => value > 0.4 && value < 0.6)) return [next, -10, 2]
+      return [next, 10 * (Math.hypot(x, y) - Math.hypot(...next)), 0]
+    },
+    places: [
+      { name: "goal", from: [0, 0], to: [0.1, 0.1] },
+      { name: "pit", from: [0.4, 0.4], to: [0.6, 0.6] },
+    ],
+  },
+  "MountainCarContinuous-v0": {
+    see: state => state,
+    step([x, v], [force]) {
+      let speed = clip(v + 0.0015 * clip(force, -1, 1) - 0.0025 * Math.cos(3 * x), -0.07, 0.07)
+      const place = clip(x + speed, -1.2, 0.6)
+      if (place === -1.2 && speed < 0) speed = 0
+      const there = +(place >= 0.45 && speed >= 0)
+      return [[place, speed].map(Math.fround), 100 * there - 0.1 * force ** 2, there]
+    },
+    places: [{ name: "flag", from: [0.45, 0], to: [0.6, 0.07] }],
+  },
+  "Pendulum-v1": {
+    see: ([angle, speed]) => [Math.cos(angle), Math.sin(angle), speed],
+    step([angle, speed], [torque]) {
+      const turn = 2 * Math.PI,
+        upright = ((((angle + Math.PI) % turn) + turn) % turn) - Math.PI
+      const cost = upright ** 2 + 0.1 * speed ** 2 + 0.001 * torque ** 2
+      const next = clip(speed + (15 * Math.sin(angle) + 3 * clip(torque, -2, 2)) * 0.05, -8, 8)
+      return [[angle + next * 0.05, next], -cost, 0]
+    },
+    places: [],
+  },
+}
+
+/** The dynamics of a task: the observation of a state, a step, and places to draw. */
+export const dynamics = name => TASKS[name]
+
+/** Run an episode: its return, its outcome, and with `keep` its states. */
+export function rollout(scene, policy, start, keep = false) {
+  const { see, step } = dynamics(scene.task.name),
+    states = [start]
+  let state = start,
+    total = 0,
+    outcome = 0
+  for (let t = 0; t < scene.task.maxSteps && !outcome; t++) {
+    const { action } = act(scene, policy, see(state))
+    let reward
+    ;[state, reward, outcome] = step(state, action)
+    total += reward
+    if (keep) states.push(state)
+  }
+  return { total, outcome, states }
+}
+
+// ---- Fitting maps to what the teacher did
+
+/** The states of stored episodes, integrated from their starts and actions. */
+export function visits(scene, { starts, lengths, actions }) {
+  const { step } = dynamics(scene.task.name),
+    m = scene.task.outputs.length,
+    numbers = floats(actions),
+    found = { states: [], actions: [] }
+  let at = 0
+  starts.forEach((start, episode) => {
+    for (let state = start, t = 0; t < lengths[episode]; t++, at += m) {
+      const action = [...numbers.subarray(at, at + m)]
+      found.states.push(state.map(Math.fround)) // as they are recorded in Python
+      found.actions.push(action)
+      ;[state] = step(state, action)
+    }
+  })
+  return found
+}
+
+/** The least squares solution x (d, m) of a x = b, a (n, d), b (n, m); of several the shortest, as
+ * NumPy's. Jacobi rotations turn the columns of `a` until they are orthogonal (Hestenes 1958). */
+export function leastSquares(a, b) {
+  const d = a[0].length
+  const columns = Array.from({ length: d }, (_, i) => Float64Array.from(a, row => row[i]))
+  const turns = columns.map((_, i) => Float64Array.from(columns, (_, j) => +(i === j)))
+  const dot = (u, v) => u.reduce((sum, value, i) => sum + value * v[i], 0)
+  for (let sweep = 0, turned = true; turned && sweep < 60; sweep++) {
+    turned = false
+    for (let i = 0; i < d; i++)
+      for (let j = i + 1; j < d; j++) {
+        const [p, q] = [columns[i], columns[j]].map(column => dot(column, column)),
+          both = dot(columns[i], columns[j])
+        if (Math.abs(both) <= 1e-16 * Math.sqrt(p * q)) continue
+        turned = true
+        const angle = 0.5 * Math.atan2(2 * both, p - q)
+        for (const set of [columns, turns]) rotate(set[i], set[j], Math.cos(angle), Math.sin(angle))
+      }
+  }
+  const sizes = columns.map(column => Math.sqrt(dot(column, column)))
+  const least = Math.max(...sizes) * Number.EPSILON * Math.max(a.length, d)
+  const solution = Array.from({ length: d }, () => b[0].map(() => 0))
+  sizes.forEach((size, i) => {
+    if (size <= least) return
+    b[0].forEach((_, k) => {
+      const share = b.reduce((sum, values, row) => sum + columns[i][row] * values[k], 0) / size ** 2
+      solution.forEach((weights, row) => (weights[k] += turns[i][row] * share))
+    })
+  })
+  return solution
+}
+
+function rotate(u, v, cosine, sine) {
+  for (let i = 0; i < u.length; i++) {
+    const [x, y] = [u[i], v[i]]
+    u[i] = cosine * x + sine * y
+    v[i] = cosine * y - sine * x
+  }
+}
+
+/** A policy's maps, in `cells` (by default all) fitted by least squares to visited states. */
+export function refit(policy, { states, actions }, cells = policy.codewords.keys()) {
+  const own = states.map(state => cellOf(policy, state)),
+    maps = structuredClone(policy.coefficients)
+  for (const cell of cells) {
+    const [a, b] = [[], []]
+    own.forEach((at, i) => at === cell && (a.push([...states[i], 1]), b.push(actions[i])))
+    if (a.length) maps[cell] = leastSquares(a, b)
+  }
+  return maps
+}
+
+/** The share of the variance of the teacher's actions, taken together, that a policy reproduces. */
+export function rSquared(scene, policy, { states, actions }) {
+  let [off, spread] = [0, 0]
+  const mean = k => actions.reduce((sum, action) => sum + action[k], 0) / actions.length,
+    means = actions[0].map((_, k) => mean(k))
+  states.forEach((state, i) =>
+    act(scene, policy, state).action.forEach((value, k) => {
+      off += (value - actions[i][k]) ** 2
+      spread += (means[k] - actions[i][k]) ** 2
+    }),
+  )
+  return 1 - off / spread
+}
+
+// ---- Cells in a picture
+
+/** A colour for each of k cells, other than its neighbours' in the pixels `cells` (n, n), and if
+ * possible as wanted. */
+export function colouring(cells, n, k, wanted = []) {
+  const near = Array.from({ length: k }, () => new Set()),
+    colours = []
+  const meet = (i, j) => i !== j && (near[i].add(j), near[j].add(i))
+  for (let at = 0; at < n * n; at++) {
+    if (at % n) meet(cells[at], cells[at - 1])
+    if (at >= n) meet(cells[at], cells[at - n])
+  }
+  const order = [...near.keys()].sort((i, j) => near[j].size - near[i].size)
+  for (const i of order) {
+    const taken = new Set([...near[i]].map(j => colours[j])),
+      all = [wanted[i] ?? i % TINTS, ...Array(TINTS).keys()]
+    colours[i] = all.find(colour => !taken.has(colour)) ?? all[0]
+  }
+  return colours
+}

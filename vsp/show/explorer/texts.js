@@ -1,0 +1,71 @@
+// What an explorer says: how its policy does, why it acts as it does, what its marks mean.
+
+import { digits, element, minus, table } from "./controls.js"
+import { act, teacherAt } from "./model.js"
+
+/** How a policy does from all starts, and how it did before the last gesture ("8 → 31 of 400 starts
+ * fail"). Of a part of the starts, the number of failures is an estimate. */
+export function resultOf({ scene, results, base, teacher }) {
+  const { played, failures, mean } = results,
+    about = played < scene.starts.length ? "about " : ""
+  const both = (before, now) =>
+    base && before !== now ? `${before} → ${about}${now}` : about + now
+  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} starts fail. `
+  const returned = `Mean return ${both(base?.mean.toFixed(2), mean.toFixed(2))}`
+  const aim = teacher ? ` (teacher: ${teacher.mean.toFixed(2)})` : ""
+  return minus(`${scene.lost.length ? fails : ""}${returned}${aim}.`)
+}
+
+/** What caused a split or a merge; `limits` are the thresholds, where they are known. */
+export function causeOf({ kind, codeword, cause }, limits = {}) {
+  const at = `${kind} at (${codeword.map(value => minus(value.toFixed(2))).join(", ")})`,
+    found = cause.toPrecision(3)
+  if (kind === "merge")
+    return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`
+  return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`
+}
+
+/** Why the policy acts so in the chosen state: its cell, the action, what each input adds. */
+export function answerOf({ scene, policy, cell, cells, asked, see, teacher }) {
+  const { inputs, outputs } = scene.task,
+    seen = [...see(asked), 1],
+    rows = policy.coefficients[cell],
+    { raw, action } = act(scene, policy, see(asked))
+  const adds = [...inputs, "bias"].map((name, i) => {
+    const said = name === "bias" ? "the bias adds" : `${name} = ${digits(seen[i])} adds`
+    return [said, ...rows[i].map(weight => weight * seen[i])]
+  })
+  const found = [...adds, ["sum", ...raw], ["action, within the limits", ...action]]
+  if (teacher?.actions) found.push(["the teacher's action", ...teacherAt(scene, asked)])
+  const told = found.map(([name, ...values]) => [name, ...values.map(digits)])
+  const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map"
+  return [element("p", {}, element("b", {}, title)), table(["", ...outputs], told)]
+}
+
+/** What one can do, and how exact the teacher's actions are. */
+export function noteOf({ angular, cells, teacher }) {
+  const drag = angular || cells === 1 ? "" : "Drag a codeword to move its cell. "
+  const grid = teacher?.actions
+    ? " The teacher's action is interpolated. The error is at most " +
+      `${teacher.usual.toFixed(3)} in 90 % of states, and up to ${teacher.error.toFixed(2)}.`
+    : ""
+  return `${drag}Click to choose a state, or move it with the arrow keys.${grid}`
+}
+
+/** What colours and marks mean: only those that are in the picture. */
+export function legendOf({ scene, policy, starts, regions, cells, picture }) {
+  const [output, second] = scene.task.outputs
+  const mark = (kind, words) =>
+    element("li", {}, element("i", { class: `vsp-mark vsp-${kind}` }), words)
+  const marks = [
+    starts && mark("start", "start"),
+    starts && scene.lost.length && mark("failing", "start that fails"),
+    regions && mark("region", "falls into the pit"),
+    second && mark(policy.layers ? "taught" : "step", policy.layers ? "teacher's step" : "step"),
+    !second && mark("below", `${output} below 0`),
+    !second && mark("above", "above 0"),
+    cells > 1 && mark("codeword", "codeword; filled: of the chosen cell"),
+    picture.ties && mark("tied", "two codewords equally near: the first acts"),
+  ]
+  return [...marks.filter(Boolean), mark("chosen", "chosen state, and its episode")]
+}
