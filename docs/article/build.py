@@ -13,7 +13,7 @@ from pathlib import Path
 
 from stills import stills
 
-from data import parts, policies
+from data import longer, parts, policies
 from vsp import VoronoiPolicy
 from vsp.run import atomic
 from vsp.show import style
@@ -54,6 +54,7 @@ def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
     }
     limits = {name: run[name] for name in ("split", "merge", "distance")}
     numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
+    numbers["longer_failures"] = longer()
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
     return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)
 

@@ -7,6 +7,7 @@ All for SimpleGoal. Numbers of arrays are little-endian float32 in base64, those
 from __future__ import annotations
 
 import base64
+import dataclasses
 import functools
 import itertools
 from fractions import Fraction
@@ -110,6 +111,18 @@ def drawn_in(policy: VoronoiPolicy) -> VoronoiPolicy:
     room = np.where(ways > 0, 1 - MARGIN - middle, middle - MARGIN)  # to the nearest edge in each direction
     codewords = middle + ways * (room / np.abs(ways)).min()
     return VoronoiPolicy(codewords, policy.coefficients, task=TASK, metric=policy.metric, scale=policy.scale)
+
+
+def longer(times: int = 10) -> int:
+    """Return from how many starts the run fails if the phase in which only maps are trained is longer: the whole run is
+    `times` as long, with the same cells. Raises ValueError if they are not the same."""
+    config = vsp.preset(TASK.name)
+    more = (times - 1) * config.n_epochs
+    config = dataclasses.replace(config, n_epochs=config.n_epochs + more, n_freeze=config.n_freeze + more)
+    policy, _ = vsp.distill(teacher(), TASK.name, config, seed=SEED, progress=False)
+    if not np.array_equal(policy.codewords, distilled()[0].codewords):
+        raise ValueError(f"a run {times} times as long has other cells, expected the same")
+    return played(policy)["failures"]
 
 
 def first_starts() -> np.ndarray:
@@ -235,7 +248,6 @@ def about_run() -> dict[str, float | str]:
         "run_worst_cell": worst,
         "run_worst_cell_failures": int(failing_cells()[worst]),
         "fails_at": ",".join(map(str, starts_of(TASK)[cured][0])),
-        "largest_gap": float(np.abs(repaired()["run_refitted"].coefficients - policy.coefficients)[worst].max()),
         "refit_episodes": N_REFIT,
         "refit_states": len(joined(learnt_from())[0]),
     }

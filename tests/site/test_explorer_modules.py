@@ -156,13 +156,13 @@ def test_what_is_said():
     code = """const told = { scene: { starts: [0, 1, 2], lost: [2] }, teacher: { mean: 2 } }
       const results = { played: 3, failures: 2, mean: -1.5 }, base = { failures: 1, mean: -1.5 }
       const split = { kind: "split", codeword: [0.5, -0.25], cause: 0.0123 }, merge = { ...split, kind: "merge" }
-      return [controls.equation("a", ["x", "y"], [[-1], [0.5], [-2]], 0), controls.digits(-1e-5), controls.digits(-1.5),
+      return [controls.digits(-1e-5), controls.digits(-1.5),
         texts.resultOf({ ...told, results }), texts.resultOf({ ...told, results, base }),
         texts.resultOf({ scene: { ...told.scene, lost: [] }, results: { ...results, played: 1 } }),
         texts.causeOf(split), texts.causeOf(split, { split: 0.01 }), texts.causeOf(merge, { merge: 0.02 })]"""
     at = "at (0.50, −0.25): "
     assert run(code, {}, *MODULES[1::2]) == [
-        "a = −1.00 x + 0.50 y − 2.00", "0.000", "−1.500",
+        "0.000", "−1.500",
         "2 of 3 starts fail. Mean return −1.50 (teacher: 2.00).",
         "1 → 2 of 3 starts fail. Mean return −1.50 (teacher: 2.00).",
         "Mean return about −1.50.",

@@ -28,15 +28,6 @@ export function table(head, rows) {
   return element("table", {}, line(...heads), ...body)
 }
 
-/** An equation in words: "Δx = 0.20 x − 0.10 y + 0.05". */
-export function equation(name, inputs, rows, k) {
-  const terms = rows.map((weights, i) => {
-    const sign = weights[k] < 0 ? (i ? " − " : "−") : i ? " + " : ""
-    return sign + Math.abs(weights[k]).toFixed(2) + (i < inputs.length ? ` ${inputs[i]}` : "")
-  })
-  return `${name} = ${terms.join("")}`
-}
-
 /** A list to choose from; `take` gets the index of what is chosen. */
 export function choice(label, names, take, at = 0) {
   const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name))

@@ -16,7 +16,7 @@ const mixed = (colour, ground, share) =>
 /** The canvas. `plane` is the part of the plane that it shows; `tones` are the page's colours. */
 export class Picture {
   constructor(canvas, plane) {
-    Object.assign(this, { canvas, plane, ctx: canvas.getContext("2d"), colours: [] })
+    Object.assign(this, { canvas, plane, ctx: canvas.getContext("2d"), colours: [], known: {} })
     this.map = new OffscreenCanvas(1, 1)
   }
   /** Take size and colours from the page, and clear. */
@@ -27,7 +27,7 @@ export class Picture {
       style = getComputedStyle(this.canvas)
     if (this.canvas.width !== size) this.canvas.width = this.canvas.height = size
     const small = side < 330
-    this.edge = { left: small ? 38 : 54, right: small ? 4 : 8, top: 8, bottom: small ? 32 : 36 }
+    this.edge = { left: small ? 46 : 54, right: small ? 4 : 8, top: 8, bottom: small ? 32 : 36 }
     this.ctx.setTransform(ratio, 0, 0, ratio, 0, 0)
     this.side = side
     this.wide = side - this.edge.left - this.edge.right
@@ -82,11 +82,13 @@ export class Picture {
     this.ctx.fillStyle = (name === "pit" ? this.tones.pit : this.tones.goal) + "77"
     this.ctx.fillRect(left, top, right - left, bottom - top)
   }
-  /** Write the name of a place, inside the frame. */
+  /** Name a place that does not fill the frame. */
   name({ name, from, to }) {
     const [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)),
       half = this.ctx.measureText(name).width / 2 + 3
-    this.text(name, Math.max(x, this.edge.left + half), y + 4)
+    if (this.at(to)[0] - x < this.wide)
+     
+      this.text(name, Math.max(x, this.edge.left + half), y + 4)
   }
   line(points, colour, width = 2) {
     const { ctx } = this
@@ -168,7 +170,11 @@ export function drawMap(view, n) {
   picture.ties = cells.some(
     (cell, at) => cell !== others[at] && cell === cells[at - 1] && cells[at - 1] !== others[at - 1],
   )
-  picture.colours = colouring(cells, n, view.cells, picture.colours)
+  // A cell keeps its colour by its codeword, because numbers move up when a cell goes
+  const keys = (policy.codewords ?? [0]).map(String),
+    wanted = keys.map((key, i) => picture.known[key] ?? picture.colours[i])
+  picture.colours = colouring(cells, n, view.cells, wanted)
+  picture.known = Object.fromEntries(keys.map((key, i) => [key, picture.colours[i]]))
   picture.map.width = picture.map.height = n
   picture.map.getContext("2d").putImageData(painted(view, cells, others, n), 0, 0)
 }
