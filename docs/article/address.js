@@ -30,7 +30,9 @@ export function read(hash, sections, moments) {
   if (!sections[section].includes(policy)) return null
   const moment = n && Number(n)
   if (n && !(Number.isInteger(moment) && moment >= 0 && moment < moments)) return null
-  const [at, codewords, maps] = ["a", "c", "m"].map(key => lists[key]?.split(",").map(Number))
+  const [at, codewords, maps] = ["a", "c", "m"].map(key =>
+    lists[key]?.split(",").map(one => (one ? +one : NaN)),
+  )
   const all = [at, codewords ?? [], maps ?? []].flat()
   if (at?.length !== 2 || !all.every(value => Math.abs(value) <= LARGEST)) return null
   const state = { section, policy, at, moment, zoomed: z === "1" }

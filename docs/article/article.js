@@ -6,6 +6,7 @@ import { floats, network, rSquared, refit, visits } from "../../vsp/show/explore
 import { minus } from "../../vsp/show/explorer/controls.js"
 import { read, write } from "./address.js"
 
+const UNLOADED = "A part of the page could not be loaded. Try again."
 const UNREAD = "This link is damaged or from a newer version. So here is the first picture."
 
 /** A part of the data, in the page or beside it. */
@@ -29,8 +30,14 @@ function replayOf({ n, cells, codewords, coefficients, events }) {
   })
 }
 
-/** The policies that a section can show; at first the first one. */
+/** The policies that a section can show. */
 const policiesOf = section => section.dataset.policies.split(" ")
+
+/** The scene of a section as it is at first. */
+function firstOf({ dataset }) {
+  const { policies, at, moment } = dataset
+  return { policy: policies.split(" ")[0], at: at.split(",").map(Number), moment }
+}
 
 /** Text and explorer of one article. */
 class Article {
@@ -39,7 +46,11 @@ class Article {
     this.policies = Object.fromEntries(scene.policies.map(policy => [policy.id, policy]))
     this.sections = [...root.querySelectorAll("section[data-policies]")]
     this.status = root.querySelector(".status")
-    const hooks = { settled: () => this.keep(), told: () => this.say() }
+    const settled = () => {
+      this.keep()
+      this.gestured = true
+    }
+    const hooks = { settled, told: () => this.say() }
     this.view = new Explorer(root.querySelector(".view"), this.scene, { bare: true, ...hooks })
     root.classList.add("live")
     const online = location.protocol.startsWith("http")
@@ -65,18 +76,26 @@ class Article {
     for (const kind of ["pointerdown", "keydown"])
       this.view.canvas.addEventListener(kind, () => this.wake())
     addEventListener("popstate", () => this.follow())
+    addEventListener("beforeprint", () => {
+      for (const output of this.root.querySelectorAll("output")) output.value = output.defaultValue
+    })
   }
-  /** A part of the data, loaded once. */
+  /** A part of the data, loaded once; nothing if that fails. */
   part(name) {
-    this.parts[name] ??= data(name)
+    this.parts[name] ??= data(name).catch(() => {
+      delete this.parts[name]
+      this.status.textContent = UNLOADED
+    })
     return this.parts[name]
   }
   /** Load the network when a reader asks it. Before that, its arrows and one episode are known. */
   async wake() {
-    const { teacher } = this.policies
-    if (this.section?.id !== "teacher" || !teacher.episode) return
-    const { layers } = network(await this.part("teacher"))
-    Object.assign(teacher, { layers, episode: null })
+    const { teacher } = this.policies,
+      known = teacher.episode
+    if (this.section?.id !== "teacher" || !known?.states.length) return
+    teacher.episode = { states: [] } // of another start nothing is known yet
+    const stored = await this.part("teacher")
+    Object.assign(teacher, stored ? { ...network(stored), episode: null } : { episode: known })
     this.view.changed()
   }
 
@@ -84,41 +103,51 @@ class Article {
   /** Show a section's scene: as `state` says, as the reader left it, or as it is at first. */
   enter(section, state, put) {
     if (this.section === section && !state) return this.entering
-    this.section = section
+    this.remember()
+    Object.assign(this, { section, staging: true })
+    this.status.textContent = ""
     for (const one of this.sections) one.classList.toggle("active", one === section)
-    const at = section.dataset.at.split(",").map(Number)
-    const first = { policy: policiesOf(section)[0], at, moment: section.dataset.moment }
-    this.entering = this.stage(section, state ?? this.left[section.id] ?? first, put)
+    this.entering = this.stage(section, state ?? this.left[section.id] ?? firstOf(section), put)
     return this.entering
   }
   async stage(section, { policy, at, moment, zoomed = false, numbers }, put) {
-    const { view } = this
-    this.visited ??= section.dataset.needs && visits(this.scene, await this.part("visited"))
-    const proof = section.dataset.proved && (await this.part("proofs"))[policy]
-    if (policy === "run") await this.run()
+    const { view } = this,
+      names = section.dataset.needs?.split(" ") ?? [],
+      loaded = await Promise.all(names.map(name => this.part(name)))
     if (policy === "teacher" && String(at) !== section.dataset.at) await this.wake()
-    if (this.section !== section) return // the reader has gone on
-    this.zoomed = zoomed
+    if (this.section !== section || loaded.includes(undefined)) return // gone on, or not there
+    const { run, visited, proofs } = Object.fromEntries(names.map((name, i) => [name, loaded[i]]))
+    if (visited) this.visited ??= visits(this.scene, visited)
+    if (run) this.takeRun(run)
+    const proof = proofs?.[policy]
+    Object.assign(this, { zoomed, proved: proof?.polygons ?? null })
     const [low, high] = zoomed && proof ? proof.box : [this.scene.plane.low, this.scene.plane.high]
     view.picture.plane = { ...this.scene.plane, low, high }
-    const starts = !proof && !section.dataset.starts
-    Object.assign(view, { regions: proof?.polygons, starts, asked: at })
+    const { fixed, starts } = section.dataset
+    Object.assign(view, { fixed: Boolean(fixed), starts: !proof && !starts, asked: at })
     view.show(this.policies[policy], numbers)
     if (view.run && moment !== undefined) view.replay.to(+moment)
-    const slots = { replay: [view.replay.row], form: [view.form, view.backs] }
+    view.regions = this.same ? this.proved : null
+    this.arrange(section, policy)
+    this.staging = false
+    this.keep(put ?? (this.gestured ? history.pushState : history.replaceState))
+    this.gestured = false
+  }
+  /** Put the controls into a section, and set its own. */
+  arrange(section, policy) {
+    const { replay, form, backs } = this.view,
+      slots = { replay: [replay.row], form: [form, backs] }
     for (const slot of section.querySelectorAll("[data-slot]"))
       slot.append(...slots[slot.dataset.slot])
     for (const one of section.querySelectorAll("[data-stops]"))
       one.value = one.dataset.stops.split(" ").indexOf(policy)
     for (const one of section.querySelectorAll("[data-act^=zoom]"))
-      one.textContent = zoomed ? "show the whole square" : "enlarge the sliver"
-    this.keep(put ?? history.replaceState)
+      one.textContent = this.zoomed ? "show the whole square" : "enlarge the sliver"
   }
-  async run() {
+  takeRun(stored) {
     const { run } = this.policies,
-      stored = await this.part("run")
+      { codewords, coefficients } = run // exact, unlike those of the moments
     if (run.replay) return
-    const { codewords, coefficients } = run // exact, unlike those of the moments
     run.replay = replayOf(stored)
     Object.assign(run.replay.at(-1), { codewords, coefficients })
     run.limits = { split: stored.split, merge: stored.merge }
@@ -135,24 +164,27 @@ class Article {
     if (replayed) return { ...shown, moment: view.replay.at }
     return { ...shown, numbers: this.same ? undefined : view.numbers() }
   }
+  remember() {
+    if (this.section && !this.staging) this.left[this.section.id] = this.state
+  }
   /** Remember the scene, and write it into the address: after a gesture, to come back from. */
   keep(put = history.pushState) {
-    if (!this.section) return
-    this.left[this.section.id] = this.state
+    if (!this.section || this.staging) return
+    this.remember()
     const address = write(this.state)
     if (address !== location.hash && this.begun) put.call(history, null, "", address)
     this.begun = true // the first scene keeps the page's own address
   }
-  /** Show what the address says: a state, a section, or nothing of ours. */
+  /** Show what the address says: a state, a section, or the first scene. */
   async follow() {
     const { hash } = location
     const sections = Object.fromEntries(this.sections.map(one => [one.id, policiesOf(one)]))
     const state = read(hash, sections, this.scene.moments)
-    this.status.textContent = hash.startsWith("#v=") && !state ? UNREAD : ""
     const named = state?.section ?? hash.slice(1)
     const section = this.sections.find(({ id }) => id === named) ?? this.sections[0]
-    if (named === section.id) section.scrollIntoView()
-    await this.enter(section, state ?? undefined)
+    if (hash || this.section) section.scrollIntoView()
+    await this.enter(section, state ?? firstOf(section))
+    if (hash.startsWith("#v=") && !state) this.status.textContent = UNREAD
   }
 
   // -- What buttons do
@@ -173,19 +205,25 @@ class Article {
     } else await this.copy(pressed, what)
   }
   async copy(pressed, what) {
-    const { href } = location
-    const text =
-      what === "link" ? href : `<iframe src="${href}" width="100%" height="800"></iframe>`
-    await navigator.clipboard.writeText(text)
-    pressed.textContent = `${what} copied`
+    const { href } = location,
+      frame = `<iframe src="${href}" allow="clipboard-write" width="100%" height="800"></iframe>`,
+      text = what === "link" ? href : frame
+    const written = navigator.clipboard?.writeText(text) ?? Promise.reject(text)
+    const done = await written.then(
+      () => true,
+      () => false,
+    )
+    if (done) pressed.textContent = `${what} copied`
+    else this.status.textContent = text
   }
 
   // -- What the text says of the picture
   say() {
     const { view, section } = this
-    if (!section) return
+    if (!section || this.staging || !view.played.states.length) return
+    if (this.proved && !this.same) view.regions = null // they are not proved for another policy
     const { results, policy, cell, played } = view,
-      [x, y] = view.asked.map(value => value.toFixed(section.dataset.proved ? 4 : 2))
+      [x, y] = view.asked.map(value => value.toFixed(this.proved ? 4 : 2))
     const ends = ["does not end", "reaches the goal", "falls into the pit"][played.outcome]
     const n = played.states.length - 1,
       steps = `${n} step${n === 1 ? "" : "s"}`
@@ -197,8 +235,8 @@ class Article {
     }
     known.r2 = this.r2?.toFixed(2)
     for (const output of section.querySelectorAll("output")) {
-      const now = minus(known[output.dataset.say] ?? output.textContent)
-      if (output.textContent !== now) output.textContent = now
+      const now = minus(known[output.dataset.say] ?? output.value)
+      if (output.value !== now) output.value = now
     }
     const { low, high } = this.root.querySelector(".scale").dataset
     this.root.style.setProperty("--score", (results.mean - low) / (high - low))

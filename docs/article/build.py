@@ -21,6 +21,7 @@ from vsp.show.explorer import MODULES, STYLE, bundle
 
 FOLDER = Path(__file__).parent
 TITLE = "A network in a few equations"
+LONGER = 45_000  # more iterations in section 4: with them ten times as many
 SCALE = 12, 17  # of the mean return, in section 7
 SCRIPTS = [*MODULES, FOLDER / "address.js", FOLDER / "article.js"]
 PAGE = """<!doctype html>
@@ -54,7 +55,7 @@ def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
     }
     limits = {name: run[name] for name in ("split", "merge", "distance")}
     numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
-    numbers["longer_failures"] = longer()
+    numbers |= {"longer": LONGER, "longer_failures": longer(LONGER)}
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
     return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)
 
@@ -71,14 +72,15 @@ def card(policy: VoronoiPolicy) -> str:
 
 def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
     """Return the whole file."""
+    said = text(data["scene"], data["run"], pictures)
     named = [{"id": name, **policy} for name, policy in data["scene"]["policies"].items()]
-    data = data | {"scene": data["scene"] | {"policies": named}}
+    scene = {name: part for name, part in data["scene"].items() if name != "says"} | {"policies": named}
+    data = data | {"scene": scene}
     stored = "\n".join(
         f'<script type="application/json" id="article-{name}">{json.dumps(part, separators=(",", ":"))}</script>'
         for name, part in data.items()
     )
     look = STYLE + (FOLDER / "article.css").read_text("utf-8")
-    said = text(data["scene"], data["run"], pictures)
     return PAGE.format(title=TITLE, style=look, text=said, data=stored, script=bundle(SCRIPTS))
 
 

@@ -50,14 +50,6 @@ def test_starts_cover_those_of_the_task(task):
     assert (np.abs(starts.mean(axis=0) - drawn.mean(axis=0)) <= 0.02 * np.ptp(drawn, axis=0) + 1e-9).all()
 
 
-def test_the_teachers_grid_holds_its_actions(run):
-    found = scene_of({}, TWO.task, run[0])["teacher"]
-    nearest = np.random.default_rng(5).integers(n := found["n"], size=(5000, 2))
-    on_the_grid = np.array(found["actions"])[nearest[:, 0] * n + nearest[:, 1]]
-    assert np.allclose(on_the_grid, run[0].predict(nearest / (n - 1))[0], atol=1e-3)
-    assert 0 < found["usual"] < found["error"] < 2.0
-
-
 def test_the_file_is_whole_by_itself(tmp_path):
     vsp.explore(TWO).save(tmp_path / "two.html")
     page = (tmp_path / "two.html").read_text("utf-8")

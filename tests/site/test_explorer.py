@@ -57,7 +57,9 @@ class Shown:
     def at(self, x, y):
         """Where a point of the unit square is on the page."""
         box = self.canvas.bounding_box()
-        return box["x"] + 46 + x * (box["width"] - 54), box["y"] + 8 + (1 - y) * (box["height"] - 44)
+        left, right, bottom = (46, 4, 32) if box["width"] < 330 else (54, 8, 36)
+        across, down = box["width"] - left - right, box["height"] - 8 - bottom
+        return box["x"] + left + x * across, box["y"] + 8 + (1 - y) * down
 
     def drag(self, start, end):
         self.page.mouse.move(*self.at(*start))
@@ -117,7 +119,7 @@ def test_the_run_plays_stops_and_says_what_caused_each_change(desk):
     assert "iteration 0: 1 cell" in desk.after(lambda: slider.press("Home"))[1]
     changed, text = desk.after(lambda: desk.press("next change"))
     assert changed and "about" not in text  # all starts are played, at last
-    assert re.search(r"iteration \d+: \d+ cells\. split at \(0\.\d\d, 0\.\d\d\): loss [\d.]+", text)
+    assert re.search(r"iteration \d+: \d+ cells\nsplit at \(0\.\d\d, 0\.\d\d\): loss [\d.]+", text)
     played = []
     for speed in ("0", "2"):  # a quarter of the speed, and four times
         slider.press("Home")

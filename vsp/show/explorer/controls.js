@@ -37,7 +37,7 @@ export function choice(label, names, take, at = 0) {
 
 /** A field for a number, which calls `put` with every number that is written. */
 export function field(label, number, step, put) {
-  const input = ({ target: { valueAsNumber: given } }) => Number.isFinite(given) && put(given)
+  const input = ({ target: { valueAsNumber: given } }) => Math.abs(given) <= 1e6 && put(given)
   const value = +(+number.toFixed(3)).toPrecision(4)
   return element("input", { type: "number", step, value, "aria-label": label, input })
 }
@@ -111,7 +111,8 @@ export class Player {
     this.toggle.textContent = "pause"
     if (this.at === last) this.to(0)
     let [before, waited] = [performance.now(), 0]
-    const lasts = i => (this.slow ? 1000 : this.view.lasts(i))
+    const lasts = i =>
+      this.slow ? 1000 * Boolean(this.view.run[i].events.length) : this.view.lasts(i)
     const frame = now => {
       if (!this.playing || !this.slider.isConnected) return
       waited += (now - before) * this.speed

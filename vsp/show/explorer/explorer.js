@@ -20,6 +20,7 @@ export class Explorer {
   flashes = [] // changes that have just happened
   regions = null // polygons to fill
   starts = true // whether they are drawn
+  fixed = false // whether codewords cannot be moved
   dragged = null // the codeword, or -1 for the state
 
   constructor(root, scene, { bare, above = [], settled = () => {}, told = () => {} } = {}) {
@@ -275,7 +276,7 @@ export class Explorer {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
     const pixel = [event.offsetX, event.offsetY],
-      fixed = this.angular || this.cells === 1
+      fixed = this.fixed || this.angular || this.cells === 1
     const far = word => Math.hypot(...this.picture.at(word).map((value, i) => value - pixel[i]))
     const gaps = fixed ? [] : this.policy.codewords.map(far),
       least = Math.min(...gaps)
@@ -329,15 +330,21 @@ async function reveal([{ isIntersecting, target: root }], watch) {
   watch.disconnect()
   const { scene, scenes } = root.dataset
   const files = scenes ? JSON.parse(scenes) : { "": scene }
-  const open = async i =>
-    new Explorer(root, await (await fetch(Object.values(files)[i])).json(), { above })
+  let wanted
+  const open = async i => {
+    wanted = i
+    const found = await (await fetch(Object.values(files)[i])).json()
+    if (wanted === i) new Explorer(root, found, { above })
+  }
   const above = scenes ? [choice("task", Object.keys(files), open)] : []
   await open(0)
 }
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
 export function mountAll() {
-  for (const root of document.querySelectorAll(".vsp-explorer:not([data-mounted])")) {
+  for (const root of document.querySelectorAll(
+    ".vsp-explorer:is([data-scene], [data-scenes], :has(> script)):not([data-mounted])",
+  )) {
     root.dataset.mounted = true
     const inner = root.querySelector("script")
     if (inner) new Explorer(root, JSON.parse(inner.textContent))

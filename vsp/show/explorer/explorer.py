@@ -117,7 +117,7 @@ def explore(
 ) -> Explorer:
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
-    `policies`: one policy with linear maps, or several by name. `teacher`: its actions are shown beside theirs.
+    `policies`: one policy with linear maps, or several by name. `teacher`: its mean return is shown beside theirs.
     `history`: replays the distillation of the first policy. The browser plays SimpleGoal, MountainCarContinuous and
     Pendulum. Raises ValueError for other policies and tasks, and for a history of another method or task.
     """

@@ -71,7 +71,7 @@ export function act({ task }, policy, seen) {
   return { cell, raw: given, action }
 }
 
-// ---- The teacher: a network, or a grid of its actions
+// ---- The teacher
 
 /** Numbers stored as base64 of little-endian float32. */
 export const floats = text =>
@@ -100,18 +100,6 @@ function output({ layers }, seen) {
     values = next
   })
   return [...values]
-}
-
-/** The teacher's action at a point of the plane, by bilinear interpolation in its grid. */
-export function teacherAt(scene, point) {
-  const { low, high } = scene.plane,
-    { n, actions } = scene.teacher
-  const [u, v] = point.map((value, i) => ((value - low[i]) / (high[i] - low[i])) * (n - 1))
-  const [i, j] = [u, v].map(value => clip(Math.floor(value), 0, n - 2)),
-    [a, b] = [u - i, v - j]
-  const at = (p, q, k) => actions[p * n + q][k]
-  const along = (q, k) => (1 - a) * at(i, q, k) + a * at(i + 1, q, k)
-  return scene.task.outputs.map((_, k) => (1 - b) * along(j, k) + b * along(j + 1, k))
 }
 
 // ---- Tasks: `step` returns next state, reward and outcome (0: running, 1: goal, 2: pit)

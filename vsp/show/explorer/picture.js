@@ -86,9 +86,7 @@ export class Picture {
   name({ name, from, to }) {
     const [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)),
       half = this.ctx.measureText(name).width / 2 + 3
-    if (this.at(to)[0] - x < this.wide)
-     
-      this.text(name, Math.max(x, this.edge.left + half), y + 4)
+    if (this.at(to)[0] - x < this.wide) this.text(name, Math.max(x, this.edge.left + half), y + 4)
   }
   line(points, colour, width = 2) {
     const { ctx } = this

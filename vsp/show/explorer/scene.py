@@ -20,7 +20,6 @@ PLANES: dict[str, tuple[list, list, list[str]]] = {
     "Pendulum-v1": ([-np.pi, -8.0], [np.pi, 8.0], ["angle (rad)", "angular velocity (rad/s)"]),
 }
 N_STARTS = 400
-TEACHER_POINTS, N_ERRORS = 61, 20_000  # of the teacher's grid, per axis; states to measure the grid's error at
 N_MOMENTS = 80  # of a replay, beside those with a split or merge
 
 
@@ -30,8 +29,7 @@ def scene_of(
     """Return the scene of some policies; `history` replays the first.
 
     Keys: task (names and limits), plane (low, high, labels), starts (n, 2), lost (which outcomes are failures),
-    policies, and teacher: its actions on a grid, the largest error of interpolating them, and its mean return. Raises
-    ValueError for a task that the script does not play.
+    policies, and teacher: its mean return. Raises ValueError for a task that the script does not play.
     """
     if task.name not in PLANES:
         raise ValueError(f"the browser plays {', '.join(PLANES)}, so {task.name} cannot be explored")
@@ -48,8 +46,7 @@ def scene_of(
         first["replay"] = _replay(history)
         first["replay"][-1] |= {name: first[name] for name in ("codewords", "coefficients")}  # snapshots may be older
     if teacher is not None:
-        mean = float(rollout(teacher, task, starts).returns.mean())
-        scene["teacher"] = _teacher(teacher, task, np.array(low), np.array(high)) | {"mean": mean}
+        scene["teacher"] = {"mean": float(rollout(teacher, task, starts).returns.mean())}
     return scene
 
 
@@ -75,24 +72,6 @@ def starts_of(task: Task) -> np.ndarray:
 def _numbers(policy: VoronoiPolicy, name: str) -> dict:
     about = {"name": name, "metric": policy.metric, "scale": policy.scale.tolist()}
     return about | {"codewords": policy.codewords.tolist(), "coefficients": policy.coefficients.tolist()}
-
-
-def _teacher(teacher: Policy, task: Task, low: np.ndarray, high: np.ndarray) -> dict:
-    """Return the teacher's actions on a grid, the first axis slowest, and how wrong interpolation is between them.
-
-    Of `N_ERRORS` random states, "error" is the largest error in any action, and "usual" that of 90 % of them.
-    """
-    from scipy.interpolate import RegularGridInterpolator  # here: it takes long to import
-
-    n = TEACHER_POINTS
-    axes = [np.linspace(a, b, n) for a, b in zip(low, high)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    actions = np.round(teacher.predict(task.see(points))[0], 3)
-    states = np.random.default_rng(0).uniform(low, high, size=(N_ERRORS, 2))
-    between = RegularGridInterpolator(axes, actions.reshape(n, n, -1))(states)
-    error = np.abs(between - teacher.predict(task.see(states))[0])
-    usual = float(np.quantile(error.max(axis=1), 0.9))
-    return {"n": n, "actions": actions.tolist(), "error": float(error.max()), "usual": usual}
 
 
 def _replay(history: History) -> list[dict]:

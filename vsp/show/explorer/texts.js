@@ -1,7 +1,7 @@
 // What an explorer says: how its policy does, why it acts as it does, what its marks mean.
 
 import { digits, element, minus, table } from "./controls.js"
-import { act, teacherAt } from "./model.js"
+import { act } from "./model.js"
 
 /** How a policy does from all starts, and how it did before the last gesture ("8 → 31 of 400 starts
  * fail"). Of a part of the starts, the number of failures is an estimate. */
@@ -26,7 +26,7 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds. */
-export function answerOf({ scene, policy, cell, cells, asked, see, teacher }) {
+export function answerOf({ scene, policy, cell, cells, asked, see }) {
   const { inputs, outputs } = scene.task,
     seen = [...see(asked), 1],
     rows = policy.coefficients[cell],
@@ -36,21 +36,15 @@ export function answerOf({ scene, policy, cell, cells, asked, see, teacher }) {
     return [said, ...rows[i].map(weight => weight * seen[i])]
   })
   const found = [...adds, ["sum", ...raw], ["action, within the limits", ...action]]
-  if (teacher?.actions) found.push(["the teacher's action", ...teacherAt(scene, asked)])
   const told = found.map(([name, ...values]) => [name, ...values.map(digits)])
   const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map"
   return [element("p", {}, element("b", {}, title)), table(["", ...outputs], told)]
 }
 
-/** What one can do, and how exact the teacher's actions are. */
-export function noteOf({ angular, cells, teacher }) {
-  const drag = angular || cells === 1 ? "" : "Drag a codeword to move its cell. "
-  const grid = teacher?.actions
-    ? " The teacher's action is interpolated. The error is at most " +
-      `${teacher.usual.toFixed(3)} in 90 % of states, and up to ${teacher.error.toFixed(2)}.`
-    : ""
-  return `${drag}Click to choose a state, or move it with the arrow keys.${grid}`
-}
+/** What one can do. */
+export const noteOf = ({ angular, cells }) =>
+  (angular || cells === 1 ? "" : "Drag a codeword to move its cell. ") +
+  "Click to choose a state, or move it with the arrow keys."
 
 /** What colours and marks mean: only those that are in the picture. */
 export function legendOf({ scene, policy, starts, regions, cells, picture }) {
