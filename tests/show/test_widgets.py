@@ -80,18 +80,6 @@ def test_constants_are_drawn_as_maps_without_weights(lab):
     lab.settings["sub_policy"].value = "linear"
 
 
-def test_one_button_leads_back_to_the_first_trial(lab, monkeypatch):
-    lab.settings["min_pol_distance"].value = 0.45
-    lab.settings["min_param_distance"].value = 0.9
-    known, asked = len(lab.trials), []
-    trial = lab.trial
-    monkeypatch.setattr(lab, "trial", lambda changes: asked.append(changes) or trial(changes))
-    lab.back.click()
-    assert len(asked) == 1 and len(lab.trials) == known and drawn(lab)[0][0] == "trial 1"
-    lab.settings["min_param_distance"].value = 0.9  # and the controls still answer
-    assert len(asked) == 2
-
-
 def test_without_a_kernel_there_is_the_first_trial(lab, monkeypatch):
     controls, still = displayed(lab, monkeypatch)
     assert controls[VIEW]["model_id"] == lab.view.model_id and still["text/plain"].startswith("Laboratory")

@@ -138,6 +138,22 @@ def test_an_address_leads_back_to_its_scene_and_back_undoes(shown):
         assert first.looks()[0] == picture
 
 
+def test_a_link_of_version_1_stays_readable_and_marked_words_set_scenes(shown):
+    numbers = "c=0.25,0.25,0.75,0.4,0.4,0.75&m=0,0,0,0,-1,-1,0,0,0,0,-0.3,-1,0,0,0,0,-1,-0.3"
+    article = shown(f"#v=1&s=you&p=three&a=0.2,0.7&{numbers}&k=13bf0d2")
+    assert article.page.locator("#you.active output").all_inner_texts() == ["15.48", "9"]
+    for name, *steps in (
+        ("one-map", ("tuned for the return", "0"), ("This one", "52")),
+        ("fails", ("refit every cell", "3"), ("as trained", "19")),
+        ("certain", ("Three cells", "reaches the goal"), ("enlarge the sliver", "falls"), ("whole square", "reaches")),
+    ):
+        article.to(name)
+        for button, said in steps:
+            article.press(button)
+            article.rest()
+            assert any(text.startswith(said) for text in article.section.locator("output").all_inner_texts())
+
+
 def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown):
     article, rng = shown(), np.random.default_rng(0)
     article.to("you")
