@@ -183,8 +183,9 @@ class Article {
     const named = state?.section ?? hash.slice(1)
     const section = this.sections.find(({ id }) => id === named) ?? this.sections[0]
     if (hash || this.section) section.scrollIntoView()
-    await this.enter(section, state ?? firstOf(section))
+    const shown = this.enter(section, state ?? firstOf(section))
     if (hash.startsWith("#v=") && !state) this.status.textContent = UNREAD
+    await shown
   }
 
   // -- What buttons do
