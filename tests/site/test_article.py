@@ -175,7 +175,7 @@ def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown)
             const told = new Set()
             for (const hash of hashes) {
                 location.hash = hash
-                await new Promise(done => setTimeout(done, 8))
+                await new Promise(done => setTimeout(done, 40))  // until a scroll has been noticed
                 const [status, section] = [".status", "section.active"].map(one => document.querySelector(one))
                 told.add([status.innerHTML, section.id].join())
             }
