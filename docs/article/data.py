@@ -145,16 +145,11 @@ def joined(episodes: list[Episode]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scene() -> dict:
-    """Return task, plane, starts and policies as the explorer has them, the best possible, and what the text says."""
+    """Return task, plane, starts and policies as the explorer has them, and what the text says."""
     made = scene_of({NAMES[name]: policy for name, policy in policies().items()}, TASK)
-    numbers = zip(policies().items(), made["policies"])
-    made["policies"] = {name: about | {"cells": len(policy)} for (name, policy), about in numbers}
-    made["teacher"] = played(teacher())
-    made["moments"] = len(run()["n"])
-    made["policies"] = {"teacher": taught()} | made["policies"]
-    for name, about in made["policies"].items():
-        about["r2"] = says()[f"{name}_r2"]
-    return made | {"says": says()}
+    shown = {"teacher": taught()} | dict(zip(NAMES, made["policies"]))
+    made["policies"] = {name: about | {"r2": says()[f"{name}_r2"]} for name, about in shown.items()}
+    return made | {"teacher": played(teacher()), "moments": len(run()["n"]), "says": says()}
 
 
 def taught() -> dict:
@@ -233,7 +228,7 @@ def repaired() -> dict[str, VoronoiPolicy]:
 
 
 def about_run() -> dict[str, float | str]:
-    """Return what the text says of the run: its changes, its worst cell, a start there, and what it is refitted on."""
+    """Return what the text says of the run: its size, its worst cell, a start there, and what it is refitted on."""
     (policy, history), worst = distilled(), int(failing_cells().argmax())
     cured = failing(policy) & ~failing(repaired()["run_worst_refitted"]) & (policy.cells(starts_of(TASK)) == worst)
     return {
@@ -276,10 +271,7 @@ def network() -> dict:
     actor = teacher().actor
     sizes = [actor.layers[0][0].shape[0], *(len(bias) for _, bias in actor.layers)]
     layers = [part for weight, bias in actor.layers for part in (weight.T, bias)]
-    return {
-        "sizes": sizes,
-        "weights": encoded(layers),
-    }
+    return {"sizes": sizes, "weights": encoded(layers)}
 
 
 def run() -> dict:
