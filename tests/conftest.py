@@ -1,4 +1,6 @@
 import gc
+import resource
+import sys
 from pathlib import Path
 
 import hypothesis
@@ -65,3 +67,16 @@ def no_collection():
     gc.disable()
     yield
     gc.enable()
+
+
+@pytest.fixture
+def limit_files(monkeypatch):
+    """`limit_files(size)`: no file grows beyond `size` bytes until the test ends.
+
+    Nor does Python compile any module meanwhile: it would leave a cut one in the environment, for every later import.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

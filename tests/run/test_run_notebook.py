@@ -1,6 +1,5 @@
 """vsp.run.run_notebook: a notebook succeeds as a whole or changes nothing, and says which cell was at fault."""
 
-import resource
 from pathlib import Path
 
 import pytest
@@ -135,17 +134,14 @@ def test_damage_is_told_in_one_line(tmp_path):
 @pytest.mark.parametrize(
     "cell", ["open(out + '/large', 'w').write('x' * 100_000)", "print('x' * 100_000)"], ids=["cell", "copy"]
 )
-def test_limit_on_the_size_of_files(tmp_path, cell):
+def test_limit_on_the_size_of_files(tmp_path, limit_files, cell):
     """In a cell and where the runner writes: one line, and the earlier files stay."""
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures" / "a.txt").write_text("from an earlier run")
     notebook = write(tmp_path, cell)
-    before, (soft, hard) = tree(tmp_path), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, hard))
-    try:
-        error = refused(notebook, "--out", tmp_path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    before = tree(tmp_path)
+    limit_files(50_000)
+    error = refused(notebook, "--out", tmp_path)
     assert error.startswith("error: story.ipynb") and "File too large" in error and "\n" not in error
     assert tree(tmp_path) == before
 

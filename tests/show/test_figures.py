@@ -1,7 +1,6 @@
 import base64
 import io
 import re
-import resource
 import zlib
 
 import matplotlib as mpl
@@ -125,15 +124,12 @@ def test_a_quick_figure_is_marked(saved, tmp_path):
     assert full.shape == quick.shape and (full[middle] != quick[middle]).any()
 
 
-def test_a_failed_save_says_why_and_leaves_the_previous_figure(saved):
+def test_a_failed_save_says_why_and_leaves_the_previous_figure(saved, limit_files):
     """With too little room, matplotlib's own writer of PDF files dies of zlib's "buffer error" instead."""
-    before, (soft, hard) = saved[1].read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
-    try:
-        with pytest.raises(OSError, match="File too large"):
-            save_figure(drawn(seed=1), "cells_example", alt=ALT, out=saved[1].parents[1])
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    before = saved[1].read_bytes()
+    limit_files(4096)
+    with pytest.raises(OSError, match="File too large"):
+        save_figure(drawn(seed=1), "cells_example", alt=ALT, out=saved[1].parents[1])
     plt.close("all")
     assert saved[1].read_bytes() == before and len(list(saved[1].parent.iterdir())) == 2
 
