@@ -49,3 +49,13 @@ def browser():
         browser = playwright.chromium.launch(executable_path=path, args=arguments)
         yield browser
         browser.close()
+
+
+@pytest.fixture(autouse=True)
+def _windows_close(browser):
+    """Those that a test has opened."""
+    before = browser.contexts
+    yield
+    for window in browser.contexts:
+        if window not in before:
+            window.close()

@@ -6,16 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bs4 import BeautifulSoup
-from visits import Visit
+from visits import Gestures, Visit
 
 FILE = Path("docs/article.html").resolve()
 IDS = ["teacher", "one-map", "cells", "fails", "few", "certain", "you"]
-DESK, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+DESK = {"viewport": {"width": 1280, "height": 900}}
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 UNREAD = "This link is damaged or from a newer version. So here is the first picture."
 FRAMES = "n => new Promise(done => { const next = () => n-- ? requestAnimationFrame(next) : done(); next() })"
 # Each section's gesture, as a reader makes it
 GESTURES = {
-    "teacher": lambda shown: shown.click(0.3, 0.9),
+    "teacher": lambda shown: shown.click((0.3, 0.9)),
     "one-map": lambda shown: shown.section.get_by_label("Δx: bias").fill("-0.9"),
     "cells": lambda shown: shown.press("next change"),
     "fails": lambda shown: shown.press("refit this cell"),
@@ -33,7 +34,7 @@ def signed(text):
     return f"#{text}&k={np.base_repr(total, 36).lower()}"
 
 
-class Shown:
+class Shown(Gestures):
     """The article in a window."""
 
     def __init__(self, browser, where, hash_="", **context):
@@ -53,21 +54,9 @@ class Shown:
         self.page.wait_for_function("n => location.hash.includes(`s=${n}&`) || n == 'teacher'", arg=name)
         self.rest()
 
-    def place(self, x, y):
-        box = self.page.locator("canvas").bounding_box()
-        return box["x"] + 54 + x * (box["width"] - 62), box["y"] + 8 + (1 - y) * (box["height"] - 44)
-
-    def click(self, x, y):
-        self.page.mouse.click(*self.place(x, y))
-
-    def drag(self, start, end):
-        self.page.mouse.move(*self.place(*start))
-        self.page.mouse.down()
-        self.page.mouse.move(*self.place(*end), steps=4)
-        self.page.mouse.up()
-
     def press(self, name):
-        self.section.get_by_role("button", name=name).click()
+        button = self.section.get_by_role("button", name=name)
+        button.tap() if self.finger else button.click()
 
     def looks(self):
         """Picture, and what the sentences say."""
@@ -86,27 +75,26 @@ def shown(browser, where):
     opened = []
 
     def open_(hash_="", **context):
-        opened.append(Shown(browser, where, hash_, **({"viewport": DESK} | context)))
+        opened.append(Shown(browser, where, hash_, **(context or DESK)))
         return opened[-1]
 
     yield open_
-    for one in opened:
-        one.visit.close()
     assert [one.visit.troubles for one in opened] == [[]] * len(opened)  # no error, no other host
 
 
-@pytest.mark.parametrize(("size", "scheme"), [(DESK, "light"), (DESK, "dark"), (PHONE, "light"), (PHONE, "dark")])
-def test_every_gesture_changes_picture_and_sentence_and_axe_finds_nothing(shown, size, scheme):
+@pytest.mark.parametrize("window", [DESK, PHONE], ids=["desk", "phone"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_gesture_changes_picture_and_sentence_and_axe_finds_nothing(shown, window, scheme):
     from axe_playwright_python.sync_playwright import Axe
 
-    article = shown(viewport=size, color_scheme=scheme)
+    article = shown(**window, color_scheme=scheme)
     for name in IDS:
         article.to(name)
         picture, said = article.looks()
         GESTURES[name](article)
         after = article.looks()
         assert after[0] != picture and after[1] != said, name
-        assert article.page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        assert article.page.evaluate("document.documentElement.scrollWidth") <= window["viewport"]["width"]
     found = Axe().run(article.page, ".vsp-article", {"preload": False}).response["violations"]
     assert [(rule["help"], node["html"][:160]) for rule in found for node in rule["nodes"]] == []
 
@@ -200,7 +188,7 @@ def test_keys_alone_lead_through_all_sections(shown):
 
 
 def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser, where):
-    page = browser.new_context(viewport=DESK).new_page()
+    page = browser.new_context(**DESK).new_page()
     page.add_init_script("""new MutationObserver((_, watch) => {
         if (document.querySelector(".vsp-article.live")) {
             watch.disconnect()
@@ -213,7 +201,7 @@ def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser,
     page.evaluate("document.querySelector('#you').scrollIntoView()")
     page.locator("#you.active").wait_for()
     page.wait_for_timeout(500)
-    answers = page.evaluate("""async () => {
+    answers = """async () => {
         const canvas = document.querySelector("canvas"), {left, top} = canvas.getBoundingClientRect(), times = []
         canvas.setPointerCapture = () => {}
         for (let i = 0; i < 40; i++) {
@@ -225,8 +213,9 @@ def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser,
             times.push(performance.now() - begun)
         }
         return times
-    }""")
-    assert statistics.median(answers) < 66  # on an idle machine 24: a slower one may be busy
+    }"""
+    medians = (statistics.median(page.evaluate(answers)) for _ in range(5))
+    assert any(median < 33 for median in medians)  # a machine that is busy all the time is none to measure on
     page.evaluate("document.querySelector('#cells').scrollIntoView()")
     page.locator("#cells.active .vsp-said").wait_for()
     page.locator("#cells").get_by_role("button", name="play").click()
@@ -237,8 +226,18 @@ def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser,
         await new Promise(done => setTimeout(done, 3000))
         return count / 3
     }""")
-    page.context.close()
     assert pictures >= 15
+
+
+def test_what_cannot_be_loaded_is_told_and_asked_for_again(browser, address):
+    page = browser.new_context(**DESK).new_page()
+    page.route("**/article-proofs.json", lambda route: route.abort())
+    page.goto(f"{address}index.html#certain")
+    page.get_by_text("could not be loaded").wait_for()
+    page.unroute_all()
+    page.get_by_role("button", name="Three cells").click()
+    page.locator(".vsp-legend").get_by_text("falls into the pit").wait_for()
+    assert page.locator(".status").inner_text() == ""
 
 
 def test_the_file_is_small_whole_and_short():
@@ -256,7 +255,7 @@ def test_the_file_is_small_whole_and_short():
 
 @pytest.mark.parametrize("context", [{"java_script_enabled": False}, {}])
 def test_without_a_script_and_on_paper_each_section_shows_its_picture(browser, where, context):
-    page = browser.new_context(viewport=DESK, **context).new_page()
+    page = browser.new_context(**DESK, **context).new_page()
     page.goto(where)
     if not context:
         page.locator(".live").wait_for()
@@ -265,4 +264,3 @@ def test_without_a_script_and_on_paper_each_section_shows_its_picture(browser, w
     assert not page.locator(".stage").is_visible()
     alts = page.locator(".still img").evaluate_all("found => found.map(image => image.alt.length)")
     assert len(alts) == 7 and min(alts) > 60
-    page.context.close()

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from PIL import Image
-from visits import Visit
+from visits import Gestures, Visit
 
 import vsp
 from vsp.paper.printed import published_policy
@@ -32,7 +32,7 @@ def opened(browser, tmp_path_factory):
     assert [visit.troubles for visit in visits] == [[]] * len(visits)
 
 
-class Shown:
+class Shown(Gestures):
     """What a reader sees of an explorer."""
 
     def __init__(self, visit):
@@ -54,19 +54,6 @@ class Shown:
         self.page.wait_for_timeout(400)  # until the map is sharp
         return before != self.canvas.screenshot(), self.root.inner_text()
 
-    def at(self, x, y):
-        """Where a point of the unit square is on the page."""
-        box = self.canvas.bounding_box()
-        left, right, bottom = (46, 4, 32) if box["width"] < 330 else (54, 8, 36)
-        across, down = box["width"] - left - right, box["height"] - 8 - bottom
-        return box["x"] + left + x * across, box["y"] + 8 + (1 - y) * down
-
-    def drag(self, start, end):
-        self.page.mouse.move(*self.at(*start))
-        self.page.mouse.down()
-        self.page.mouse.move(*self.at(*end), steps=5)
-        self.page.mouse.up()
-
 
 @pytest.fixture(scope="module")
 def desk(opened):
@@ -82,7 +69,7 @@ def shown(desk):
 
 
 def test_a_click_a_drag_and_keys_choose_a_state(shown):
-    changed, text = shown.after(lambda: shown.page.mouse.click(*shown.at(0.3, 0.6)))
+    changed, text = shown.after(lambda: shown.click((0.3, 0.6)))
     assert changed and "x = 0.300" in text
     changed, text = shown.after(lambda: shown.drag((0.3, 0.6), (0.86, 0.5)))
     assert changed and "x = 0.860" in text and "y = 0.500" in text
@@ -154,5 +141,4 @@ def test_on_its_page_a_task_can_be_chosen(browser, address):
         labels[task] = shown.list("policy").locator("option").all_inner_texts()
         assert shown.page.evaluate("document.activeElement.selectedOptions[0].text") == task
     assert [sum("zoo" in name for name in names) for names in labels.values()] == [7, 7, 0]
-    assert "x = 0.30" in shown.after(lambda: shown.page.mouse.click(*shown.at(0.3, 0.6)))[1] and visit.troubles == []
-    visit.close()
+    assert "x = 0.30" in shown.after(lambda: shown.click((0.3, 0.6)))[1] and visit.troubles == []

@@ -24,20 +24,20 @@ SIMPLEGOAL, TASKS = "SimpleGoal-v0", ("SimpleGoal-v0", "MountainCarContinuous-v0
 RANDOM = np.random.default_rng(0)
 
 
+def node(*arguments, given=None):
+    """What a script prints as JSON; `given` is its input."""
+    command = [NODE, *arguments]
+    done = subprocess.run(command, input=json.dumps(given), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 def run(code, given, *modules):
     """What `code` returns after these modules are imported; it has `given`."""
     imports = "".join(f"import * as {path.stem} from {json.dumps(path.as_uri())}; " for path in modules)
     read = "import { readFileSync } from 'fs'; const given = JSON.parse(readFileSync(0, 'utf8')); "
     script = f"{imports}{read}console.log(JSON.stringify((() => {{ {code} }})()))"
-    done = subprocess.run(
-        [NODE, "--input-type=module", "-e", script],
-        input=json.dumps(given),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return node("--input-type=module", "-e", script, given=given)
 
 
 def model(code, **given):
@@ -174,8 +174,6 @@ def test_all_scripts_are_short_with_short_lines():
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
 def test_no_function_is_longer_than_forty_lines(path):
     """As V8 finds them: top-level functions and methods. Those inside of them are shorter."""
-    command = [NODE, HERE / "functions.mjs", path.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    text, found = path.read_text("utf-8"), json.loads(done.stdout)
+    text, found = path.read_text("utf-8"), node(HERE / "functions.mjs", path.as_uri())
     parts = [text[low:high] for low, high in found if (low, high) != (0, len(text))]
     assert parts and [part for part in parts if part.count("\n") >= 40] == []

@@ -84,7 +84,6 @@ def test_the_first_notebook_opens_clean_and_saving_changes_no_byte(home, lab, br
         page.keyboard.press("Control+s")
         page.wait_for_timeout(3000)
         assert path.read_bytes() == before
-    page.context.close()
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ def opened(request, browser, address):
     visit = Visit(browser, address, request.param, viewport=DESK, color_scheme="light", reduced_motion="reduce")
     visit.name = request.param
     yield visit
-    visit.close()
+    visit.page.context.close()
 
 
 @pytest.fixture
@@ -35,9 +35,7 @@ def page(opened):
 @pytest.fixture
 def start(browser, address):
     """The first page, in a window that may go elsewhere."""
-    visit = Visit(browser, address, viewport=DESK)
-    yield visit.page
-    visit.close()
+    return Visit(browser, address, viewport=DESK).page
 
 
 def test_the_pages_that_are_promised_are_there():
@@ -190,7 +188,6 @@ def test_a_dark_page_is_light_while_it_is_printed(browser, address):
         dispatchEvent(new Event(name))
         return document.documentElement.dataset.theme
     })""")
-    visit.close()
     assert themes == ["light", "dark"]
 
 
@@ -211,7 +208,6 @@ def test_little_comes_along_with_a_page(browser, address, name):
     page, sizes = browser.new_context(viewport=DESK).new_page(), []
     page.on("response", lambda response: sizes.append(int(response.headers.get("content-length", 0))))
     page.goto(address + name, wait_until="networkidle")
-    page.context.close()
     assert sum(sizes) < 1_000_000
 
 
@@ -233,7 +229,6 @@ def test_the_place_of_the_keyboard_is_seen_at_every_stop(browser, address, name,
         }""")
         if with_it == without:
             unseen.append(visit.page.evaluate("document.activeElement.outerHTML.slice(0, 160)"))
-    visit.close()
     assert unseen == [] and stops > 30
 
 
@@ -241,7 +236,6 @@ def test_without_a_script_a_page_is_light_on_a_dark_system_too(browser, address)
     page = browser.new_context(color_scheme="dark", java_script_enabled=False).new_page()
     page.goto(address + "use.html")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    page.context.close()
 
 
 def test_a_search_quotes_the_text_and_leads_to_the_words(start, address):

@@ -1,4 +1,4 @@
-"""A page of the site in a window, and what goes wrong in it."""
+"""A page of the site in a window, what goes wrong in it, and gestures in the picture of an explorer."""
 
 
 class Visit:
@@ -28,5 +28,32 @@ class Visit:
         if message.type == "error":
             self.troubles.append(f"console: {message.text}")
 
-    def close(self):
-        self.page.context.close()
+
+class Gestures:
+    """What a reader does in an explorer's picture in `self.page`: with a finger on a phone, else with the mouse."""
+
+    @property
+    def finger(self):
+        return self.page.evaluate("navigator.maxTouchPoints > 0")
+
+    def at(self, x, y):
+        """Where a point of the unit square is on the page."""
+        box = self.page.locator(".vsp-explorer canvas").bounding_box()
+        left, right, bottom = (46, 4, 32) if box["width"] < 330 else (54, 8, 36)
+        across, down = box["width"] - left - right, box["height"] - 8 - bottom
+        return box["x"] + left + x * across, box["y"] + 8 + (1 - y) * down
+
+    def drag(self, *places):
+        start, end = self.at(*places[0]), self.at(*places[-1])
+        if self.finger:
+            send = self.page.context.new_cdp_session(self.page).send
+            for kind, *points in (("touchStart", start), ("touchMove", end), ("touchEnd",)):
+                touched = [dict(zip("xy", point, strict=True)) for point in points]
+                send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touched})
+            return
+        self.page.mouse.move(*start)
+        self.page.mouse.down()
+        self.page.mouse.move(*end, steps=5)
+        self.page.mouse.up()
+
+    click = drag
