@@ -35,17 +35,9 @@ WALKER, CHEETAH = "BipedalWalker-v3", "HalfCheetah-v5"
 TASKS = (SIMPLEGOAL, MOUNTAINCAR)  # of the paper
 
 TINY = Config(
-    n_epochs=120,
-    n_split=4,
-    n_merge=10,
-    n_freeze=30,
-    n_reset=25,
-    min_param_distance=0.6,
-    min_pol_distance=0.2,
-    max_pol_loss=0.02,
-    batch_size=8,
-    learning_rate=0.01,
-)
+    n_epochs=120, n_split=4, n_merge=10, n_freeze=30, n_reset=25,
+    min_param_distance=0.6, min_pol_distance=0.2, max_pol_loss=0.02, batch_size=8, learning_rate=0.01,
+)  # fmt: skip
 
 
 def softsign(x):

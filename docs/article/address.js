@@ -23,8 +23,8 @@ export function write({ section, policy, at, moment, zoomed, numbers }) {
 /** The state in an address, or null if it is not whole and known: with one of the policies of a
  * section, and one of the run's moments. A cell has 2 numbers of its codeword, and 6 of its map. */
 export function read(hash, sections, moments) {
-  const [, text, sum] = hash.slice(0, LONGEST + 1).match(/^#(.*)&k=(\w+)$/) ?? []
-  if (hash.length > LONGEST || text === undefined || checksum(text) !== sum) return null
+  const [, text, sum] = hash.slice(0, LONGEST + 1).match(/^#(.*)&k=(\w+)$/) ?? ["", "", ""]
+  if (hash.length > LONGEST || checksum(text) !== sum) return null
   const { v, s: section, p: policy, z, n, ...lists } = Object.fromEntries(new URLSearchParams(text))
   if (v !== VERSION || !Object.hasOwn(sections, section)) return null
   if (!sections[section].includes(policy)) return null

@@ -2,8 +2,8 @@
 // (`data-act`), and which number an output repeats (`data-say`).
 
 import { Explorer } from "../../vsp/show/explorer/explorer.js"
-import { floats, network, rSquared, refit, visits } from "../../vsp/show/explorer/model.js"
-import { minus } from "../../vsp/show/explorer/controls.js"
+import { floats, network, rSquared, refit } from "../../vsp/show/explorer/model.js"
+import { button, count, minus } from "../../vsp/show/explorer/controls.js"
 import { read, write } from "./address.js"
 
 const UNLOADED = "A part of the page could not be loaded. Try again."
@@ -16,22 +16,24 @@ async function data(name) {
   return (await fetch(inner.dataset.source)).json()
 }
 
+/** Stored numbers, two by two. */
+function pairs(text) {
+  const numbers = floats(text)
+  return Array.from({ length: numbers.length / 2 }, (_, i) => [numbers[2 * i], numbers[2 * i + 1]])
+}
+
 /** The moments of the stored run. */
 function replayOf({ n, cells, codewords, coefficients, events }) {
-  const numbers = floats(coefficients),
+  const rows = pairs(coefficients),
     places = new Map(codewords)
   let [at, words] = [0, null]
   return n.map((iteration, i) => {
     words = places.get(i) ?? words
-    const row = () => [...numbers.subarray(at, (at += 2))]
-    const maps = Array.from({ length: cells[i] }, () => [row(), row(), row()])
-    const happened = events.filter(event => event.n === iteration)
+    const maps = Array.from({ length: cells[i] }, () => rows.slice(at, (at += 3))),
+      happened = events.filter(event => event.n === iteration)
     return { n: iteration, codewords: words, coefficients: maps, events: happened }
   })
 }
-
-/** The policies that a section can show. */
-const policiesOf = section => section.dataset.policies.split(" ")
 
 /** The scene of a section as it is at first. */
 function firstOf({ dataset }) {
@@ -39,7 +41,7 @@ function firstOf({ dataset }) {
   return { policy: policies.split(" ")[0], at: at.split(",").map(Number), moment }
 }
 
-/** Text and explorer of one article. */
+/** Text and explorer. */
 class Article {
   constructor(root, scene) {
     Object.assign(this, { root, scene, parts: {}, left: {} })
@@ -50,11 +52,10 @@ class Article {
       this.keep()
       this.gestured = true
     }
-    const hooks = { settled, told: () => this.say() }
-    this.view = new Explorer(root.querySelector(".view"), this.scene, { bare: true, ...hooks })
+    const hooks = { bare: true, settled, told: () => this.say() }
+    this.view = new Explorer(root.querySelector(".view"), scene, hooks)
     root.classList.add("live")
-    const online = location.protocol.startsWith("http")
-    for (const one of root.querySelectorAll("[data-http]")) one.hidden = !online
+    root.querySelector("[data-http]").hidden = !location.protocol.startsWith("http")
     this.listen()
     this.follow()
   }
@@ -73,14 +74,24 @@ class Article {
       const { stops } = target.dataset
       if (stops) this.act(target, "policy", stops.split(" ")[target.value])
     })
-    for (const kind of ["pointerdown", "keydown"])
-      this.view.canvas.addEventListener(kind, () => this.wake())
+    const { canvas } = this.view
+    for (const kind of ["pointerdown", "keydown"]) canvas.addEventListener(kind, () => this.wake())
+    canvas.addEventListener("keydown", ({ key }) => key === "Escape" && this.skipped?.focus())
+    for (const task of this.root.querySelectorAll(".do")) {
+      const skip = button("to the picture; Escape leads back", () => {
+        this.skipped = skip
+        canvas.focus()
+      })
+      skip.className = "skip"
+      task.append(skip)
+    }
     addEventListener("popstate", () => this.follow())
     addEventListener("beforeprint", () => {
       for (const output of this.root.querySelectorAll("output")) output.value = output.defaultValue
     })
+    addEventListener("afterprint", () => this.say())
   }
-  /** A part of the data, loaded once; nothing if that fails. */
+  /** A part of the data, loaded once. */
   part(name) {
     this.parts[name] ??= data(name).catch(() => {
       delete this.parts[name]
@@ -112,19 +123,20 @@ class Article {
   }
   async stage(section, { policy, at, moment, zoomed = false, numbers }, put) {
     const { view } = this,
-      names = section.dataset.needs?.split(" ") ?? [],
+      { needs, ...about } = section.dataset,
+      names = needs?.split(" ") ?? [],
       loaded = await Promise.all(names.map(name => this.part(name)))
-    if (policy === "teacher" && String(at) !== section.dataset.at) await this.wake()
+    if (policy === "teacher" && String(at) !== about.at) await this.wake()
     if (this.section !== section || loaded.includes(undefined)) return // gone on, or not there
     const { run, visited, proofs } = Object.fromEntries(names.map((name, i) => [name, loaded[i]]))
-    if (visited) this.visited ??= visits(this.scene, visited)
+    const { states, actions } = visited ?? {}
+    if (states) this.visited ??= { states: pairs(states), actions: pairs(actions) }
     if (run) this.takeRun(run)
     const proof = proofs?.[policy]
     Object.assign(this, { zoomed, proved: proof?.polygons ?? null })
     const [low, high] = zoomed && proof ? proof.box : [this.scene.plane.low, this.scene.plane.high]
     view.picture.plane = { ...this.scene.plane, low, high }
-    const { fixed, starts } = section.dataset
-    Object.assign(view, { fixed: Boolean(fixed), starts: !proof && !starts, asked: at })
+    Object.assign(view, { fixed: "fixed" in about, starts: !proof, asked: at })
     view.show(this.policies[policy], numbers)
     if (view.run && moment !== undefined) view.replay.to(+moment)
     view.regions = this.same ? this.proved : null
@@ -139,23 +151,24 @@ class Article {
       slots = { replay: [replay.row], form: [form, backs] }
     for (const slot of section.querySelectorAll("[data-slot]"))
       slot.append(...slots[slot.dataset.slot])
-    for (const one of section.querySelectorAll("[data-stops]"))
+    for (const one of section.querySelectorAll("[data-stops]")) {
       one.value = one.dataset.stops.split(" ").indexOf(policy)
+      one.setAttribute("aria-valuetext", count(this.view.cells, "cell"))
+    }
     for (const one of section.querySelectorAll("[data-act^=zoom]"))
       one.textContent = this.zoomed ? "show the whole square" : "enlarge the sliver"
   }
   takeRun(stored) {
-    const { run } = this.policies,
-      { codewords, coefficients } = run // exact, unlike those of the moments
+    const { run } = this.policies
     if (run.replay) return
     run.replay = replayOf(stored)
-    Object.assign(run.replay.at(-1), { codewords, coefficients })
+    Object.assign(run.replay.at(-1), this.view.numbers(run)) // exact, unlike those of the moments
     run.limits = { split: stored.split, merge: stored.merge }
   }
   /** Whether the policy is as it was: not one that the reader has changed. */
   get same() {
-    const { codewords, coefficients } = this.view.original
-    return JSON.stringify(this.view.numbers()) === JSON.stringify({ codewords, coefficients })
+    const { view } = this
+    return JSON.stringify(view.numbers()) === JSON.stringify(view.numbers(view.original))
   }
   get state() {
     const { view, section, zoomed } = this,
@@ -177,14 +190,17 @@ class Article {
   }
   /** Show what the address says: a state, a section, or the first scene. */
   async follow() {
-    const { hash } = location
-    const sections = Object.fromEntries(this.sections.map(one => [one.id, policiesOf(one)]))
-    const state = read(hash, sections, this.scene.moments)
-    const named = state?.section ?? hash.slice(1)
-    const section = this.sections.find(({ id }) => id === named) ?? this.sections[0]
+    const hash = location.hash.replaceAll("%2C", ",") // as some programs write it
+    const policies = ({ id, dataset }) => [id, dataset.policies.split(" ")],
+      sections = Object.fromEntries(this.sections.map(policies))
+    const state = read(hash, sections, this.scene.moments),
+      named = state?.section ?? hash.slice(1),
+      known = this.sections.find(({ id }) => id === named)
+    if (this.section && !known && document.getElementById(named)) return // another part of the page
+    const section = known ?? this.sections[0]
     if (hash || this.section) section.scrollIntoView()
     const shown = this.enter(section, state ?? firstOf(section))
-    if (hash.startsWith("#v=") && !state) this.status.textContent = UNREAD
+    if (hash && !known) this.status.textContent = UNREAD
     await shown
   }
 
@@ -195,27 +211,25 @@ class Article {
     const scene = to =>
       this.enter(section, { at: view.asked, policy: what, ...to }, history.pushState)
     if (verb === "policy") await scene({ moment: section.dataset.moment })
-    else if (verb === "zoom" && this.zoomed) await scene({ at: [0.6, 0.7] })
+    else if (verb === "zoom" && this.zoomed) await scene({})
     else if (verb === "zoom")
       await scene({ at: (await this.part("proofs"))[what].at, zoomed: true })
     else if (verb === "reset") view.take(view.original)
     else if (verb === "refit") {
-      const { codewords } = view.policy,
-        cells = what === "cell" ? [view.cell] : undefined
-      view.take({ codewords, coefficients: refit(view.policy, this.visited, cells) })
+      const cells = what === "cell" ? [view.cell] : undefined
+      view.take({ ...view.policy, coefficients: refit(view.policy, this.visited, cells) })
     } else await this.copy(pressed, what)
   }
   async copy(pressed, what) {
     const { href } = location,
       frame = `<iframe src="${href}" allow="clipboard-write" width="100%" height="800"></iframe>`,
       text = what === "link" ? href : frame
-    const written = navigator.clipboard?.writeText(text) ?? Promise.reject(text)
-    const done = await written.then(
-      () => true,
-      () => false,
-    )
-    if (done) pressed.textContent = `${what} copied`
-    else this.status.textContent = text
+    try {
+      await navigator.clipboard.writeText(text)
+      pressed.textContent = `${what} copied`
+    } catch {
+      this.status.textContent = text
+    }
   }
 
   // -- What the text says of the picture
@@ -223,24 +237,22 @@ class Article {
     const { view, section } = this
     if (!section || this.staging || !view.played.states.length) return
     if (this.proved && !this.same) view.regions = null // they are not proved for another policy
-    const { results, policy, cell, played } = view,
-      [x, y] = view.asked.map(value => value.toFixed(this.proved ? 4 : 2))
-    const ends = ["does not end", "reaches the goal", "falls into the pit"][played.outcome]
-    const n = played.states.length - 1,
-      steps = `${n} step${n === 1 ? "" : "s"}`
-    const known = { x, y, cell, ends, steps, cells: view.cells }
-    Object.assign(known, { failures: results.failures, mean: results.mean.toFixed(2) })
+    const { results, policy, cell, cells } = view
     if (this.visited && !policy.layers && this.rated !== view.kept) {
       this.r2 = this.same ? view.original.r2 : rSquared(this.scene, policy, this.visited)
       this.rated = view.kept
     }
-    known.r2 = this.r2?.toFixed(2)
+    const here = [...view.failing.values()].filter(last => last === cell).length,
+      { failures, mean } = results,
+      known = { cell, cells, failures, here, episode: view.from.textContent }
+    Object.assign(known, { mean: mean.toFixed(2), r2: this.r2?.toFixed(2) })
     for (const output of section.querySelectorAll("output")) {
       const now = minus(known[output.dataset.say] ?? output.value)
       if (output.value !== now) output.value = now
     }
-    const { low, high } = this.root.querySelector(".scale").dataset
-    this.root.style.setProperty("--score", (results.mean - low) / (high - low))
+    const scale = this.root.querySelector(".scale"),
+      { low, high } = scale.dataset
+    scale.firstChild.style.setProperty("--score", (mean - low) / (high - low))
   }
 }
 

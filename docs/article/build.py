@@ -11,6 +11,7 @@ import re
 import sys
 from pathlib import Path
 
+import yaml
 from stills import stills
 
 from data import longer, parts, policies
@@ -48,16 +49,22 @@ begin()
 def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
     """Return the article's HTML with its numbers, each computed, and its pictures."""
     says, (low, high) = scene["says"], SCALE
-    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best")}
+    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best", "three")}
     still = {
         name: f'<figure class="still">{style.embedded(png, alt, width=460)}</figure>'
         for name, (png, alt) in pictures.items()
     }
     limits = {name: run[name] for name in ("split", "merge", "distance")}
     numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
-    numbers |= {"longer": LONGER, "longer_failures": longer(LONGER)}
+    numbers |= {"longer": LONGER, "longer_failures": longer(LONGER), "cite": citation()}
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
     return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)
+
+
+def citation() -> str:
+    """Return how to cite this article, as HTML."""
+    about = yaml.safe_load((atomic.ROOT / "CITATION.cff").read_text("utf-8"))
+    return f"{about['authors'][0]['name']}, <cite>{about['title']}</cite>, version {about['version']}"
 
 
 def card(policy: VoronoiPolicy) -> str:

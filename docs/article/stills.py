@@ -94,12 +94,13 @@ def _fails() -> tuple[Figure, str]:
         state_space.cells(ax, x, y, index, width=0.4, color="0.6")
         state_space.cells(ax, x, y, (index == worst).astype(int), width=1.4)
         _arrows(ax, policy, style.DISTILLED, where=inside)
-        counts.append(_failing(ax, policy))
+        counts.append(_failing(ax, policy, worst))
         ax.set_title(f"{name}: {counts[-1]} fail", loc="left")
     _legend(fig, axes[0])
     return fig, (
         f"The {len(trained)} cells of the rerun, twice, with the starts that fail. Left, as trained, {counts[0]} of "
-        "400 fail; one cell, above and right of the pit, is marked, and its arrows point down and left. Right, the map "
+        "400 fail; one cell, above and right of the pit, is marked, and its arrows point down and left. Starts whose "
+        "last step is in another cell are rings. Right, the map "
         f"of this cell is refitted by least squares: beside the pit its arrows turn away, and {counts[1]} starts fail."
     )
 
@@ -193,17 +194,23 @@ def _tiles(ax: Axes, policy: vsp.VoronoiPolicy) -> None:
     state_space.cells(ax, x, y, index.ravel())
 
 
-def _failing(ax: Axes, policy: Policy) -> int:
-    """Draw the starts from which a policy fails; return their number."""
-    starts = starts_of(TASK)[data.failing(policy)]
-    ax.scatter(*starts.T, s=8, color=style.FAILING, lw=0, zorder=6, label="start that fails")
+def _failing(ax: Axes, policy: vsp.VoronoiPolicy, cell: int | None = None) -> int:
+    """Draw the starts from which a policy fails, as rings if not in the cell `cell`; return their number."""
+    starts, cells = starts_of(TASK)[data.failing(policy)], data.last_cells(policy)
+    if cell is None:
+        parts = {"start that fails": (style.FAILING, starts)}
+    else:
+        here, elsewhere = starts[cells == cell], starts[cells != cell]
+        parts = {"fails in the marked cell": (style.FAILING, here), "fails in another": ("white", elsewhere)}
+    for label, (fill, points) in parts.items():
+        ax.scatter(*points.T, s=8, fc=fill, ec=style.FAILING, lw=0.7, zorder=6, label=label)
     return len(starts)
 
 
 def _legend(fig: Figure, ax: Axes) -> None:
     """Say below a figure what its squares and dots are."""
     named = {label: handle for handle, label in zip(*ax.get_legend_handles_labels()) if label != "codeword"}
-    fig.legend([*named.values()], [*named], frameon=False, loc="outside lower center", ncol=3)
+    fig.legend([*named.values()], [*named], frameon=False, loc="outside lower center", ncol=2 + (len(named) == 3))
 
 
 def _png(figure: Figure) -> bytes:

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import html
 import io
+import json
 import re
 from itertools import zip_longest
 from pathlib import Path
@@ -43,7 +44,8 @@ def _improve(text: str, folder: Path = None, top: str = "") -> str:
         if match := _IMAGE.fullmatch(tag.get("src") or tag.get("srcset") or ""):
             _picture(tag, base64.b64decode(match[1]), folder, top)
     for script in soup.select(".vsp-explorer > script[type='application/json']"):  # loads when it comes into view
-        script.parent["data-scene"] = top + _write(folder, script.get_text().encode(), "json")
+        scene = top + _write(folder, script.get_text().encode(), "json")
+        script.parent["data-scenes"] = json.dumps({"": scene})
         script.decompose()
     for table in soup.find_all("table"):
         _table(soup, table)

@@ -56,6 +56,5 @@ def _windows_close(browser):
     """Those that a test has opened."""
     before = browser.contexts
     yield
-    for window in browser.contexts:
-        if window not in before:
-            window.close()
+    for window in {*browser.contexts} - {*before}:
+        window.close()

@@ -48,8 +48,7 @@ class Gestures:
         if self.finger:
             send = self.page.context.new_cdp_session(self.page).send
             for kind, *points in (("touchStart", start), ("touchMove", end), ("touchEnd",)):
-                touched = [dict(zip("xy", point, strict=True)) for point in points]
-                send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touched})
+                send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
             return
         self.page.mouse.move(*start)
         self.page.mouse.down()

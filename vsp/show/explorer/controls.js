@@ -1,4 +1,4 @@
-// Controls of an explorer: elements, numbers, equations to write in, a player for sequences.
+// Controls: elements, numbers, equations to write in, a player.
 
 const SPEEDS = [0.25, 1, 4]
 
@@ -16,6 +16,7 @@ export function element(tag, attributes = {}, ...children) {
 export const button = (label, click) => element("button", { type: "button", click }, label)
 export const row = (...children) => element("div", { class: "vsp-row" }, ...children)
 export const minus = text => String(text).replaceAll("-", "−")
+export const count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`
 export const digits = value => (Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3)))
 
 /** Make a table: names of the columns, then rows that begin with their name. */
@@ -28,18 +29,24 @@ export function table(head, rows) {
   return element("table", {}, line(...heads), ...body)
 }
 
-/** A list to choose from; `take` gets the index of what is chosen. */
+/** A list to choose from; `take` gets the index. */
 export function choice(label, names, take, at = 0) {
   const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name))
   const change = ({ target }) => take(+target.value)
   return element("label", {}, `${label} `, element("select", { change }, ...options))
 }
 
-/** A field for a number, which calls `put` with every number that is written. */
-export function field(label, number, step, put) {
-  const input = ({ target: { valueAsNumber: given } }) => Math.abs(given) <= 1e6 && put(given)
-  const value = +(+number.toFixed(3)).toPrecision(4)
-  return element("input", { type: "number", step, value, "aria-label": label, input })
+/** A field for number i of a list, which takes every number that is written, and tells it. */
+function field(label, list, i, step, changed) {
+  const value = () => +(+list[i].toFixed(3)).toPrecision(4)
+  const input = ({ target: { valueAsNumber: given } }) => {
+    if (!(Math.abs(given) <= 1e6)) return
+    list[i] = given
+    changed()
+  }
+  const change = ({ target }) => (target.value = value()) // the number that counts
+  const about = { type: "number", step, value: value(), "aria-label": label }
+  return element("input", { ...about, input, change })
 }
 
 /** Fields for the codeword, where it can be moved, and the equations of the chosen cell of a view.
@@ -50,11 +57,8 @@ export function equations({ scene, policy, cell, cells, angular }, changed) {
     codeword = policy.codewords[cell]
   const range = i => (angular ? 2 : plane.high[i] - plane.low[i])
   const term = (label, list, i, step, before, after = "") => {
-    const put = value => {
-      list[i] = value
-      changed()
-    }
-    return element("span", { class: "vsp-term" }, before, field(label, list[i], step, put), after)
+    const written = field(label, list, i, step, changed)
+    return element("span", { class: "vsp-term" }, before, written, after)
   }
   const line = (name, terms) => element("div", { class: "vsp-equation" }, `${name} `, ...terms)
   const places = task.inputs.map((name, i) =>
@@ -70,9 +74,10 @@ export function equations({ scene, policy, cell, cells, angular }, changed) {
   return cells > 1 ? [line("codeword", places), ...lines] : lines
 }
 
-/** A row of controls for the run of a view: play, previous and next change, speed, slider. The view
- * shows and describes moment i in `turn(i)`, and `lasts(i)` says for how many milliseconds. */
+/** A row of controls for the run of a view, which shows and describes moment i in `turn(i)`;
+ * `lasts(i)` says for how many milliseconds. */
 export class Player {
+  text = ""
   constructor(view) {
     Object.assign(this, { view, speed: 1 })
     this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches // one picture a second
@@ -80,7 +85,7 @@ export class Player {
     const input = () => (this.stop(), this.to(+this.slider.value))
     const settled = { input, change: () => view.settle() }
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled })
-    this.toggle = button("play", () => (this.playing ? this.stop() : this.start()))
+    this.toggle = button("play", () => (this.playing ? this.pause() : this.start()))
     this.said = element("span", { class: "vsp-said" })
     const steps = [button("previous change", () => go(-1)), button("next change", () => go(1))]
     const names = SPEEDS.map(speed => `${speed} ×`)
@@ -101,7 +106,6 @@ export class Player {
   }
   /** Say where it is: with the picture and all other texts, which are drawn with the next frame. */
   tell() {
-    if (this.text === undefined || this.said.textContent === this.text) return
     this.said.textContent = this.text
     this.slider.setAttribute("aria-valuetext", this.text)
   }
@@ -111,20 +115,21 @@ export class Player {
     this.toggle.textContent = "pause"
     if (this.at === last) this.to(0)
     let [before, waited] = [performance.now(), 0]
-    const lasts = i =>
-      this.slow ? 1000 * Boolean(this.view.run[i].events.length) : this.view.lasts(i)
     const frame = now => {
       if (!this.playing || !this.slider.isConnected) return
       waited += (now - before) * this.speed
       before = now
       let i = this.at
-      for (; i < last && waited >= lasts(i); i++) waited -= lasts(i)
+      for (; i < last && waited >= this.view.lasts(i); i++) waited -= this.view.lasts(i)
       if (i > this.at) this.to(i)
       if (this.at < last) return requestAnimationFrame(frame)
-      this.stop()
-      this.view.settle()
+      this.pause()
     }
     requestAnimationFrame(frame)
+  }
+  pause() {
+    this.stop()
+    this.view.settle()
   }
   stop() {
     this.playing = false

@@ -1,21 +1,21 @@
 // The explorer: replay a distillation, query a policy at a state, change the policy and watch its
 // episodes. It draws a scene, which scene.py describes. "Cell 3" here is cell 3 in Python.
 
-import { Player, button, choice, element, equations, row } from "./controls.js"
+import { Player, button, choice, count, element, equations, row } from "./controls.js"
 import { act, clip, dynamics, ready, rollout } from "./model.js"
 import { Picture, drawAll, drawMap } from "./picture.js"
-import { answerOf, causeOf, legendOf, noteOf, resultOf } from "./texts.js"
+import { answerOf, causeOf, episodeOf, legendOf, noteOf, resultOf } from "./texts.js"
 
 const [COARSE, FINE] = [120, 320] // points per axis of the map: in motion, and at rest
 const IN_MOTION = 8 // milliseconds for episodes; at rest all are played
-const STRIDE = 149 // a prime: the first starts played are spread over all
+const STRIDE = 149 // a prime, so the first are spread over all
 const [PLAYS, PAUSE] = [20_000, 400] // milliseconds: of a run, and at most of one of its changes
 
 /** A view of a policy, a chosen state, and texts about them. With `bare`, `root` has only picture,
  * results and legend, and the page arranges the controls; `above` stands above the panel.
  * `settled(view)` is called after each gesture, `told(view)` after each update. */
 export class Explorer {
-  ends = [] // whether a start fails, undefined if it was not played
+  failing = new Map() // of the starts that fail, by index: the cell of their last step
   past = [] // numbers to undo to
   flashes = [] // changes that have just happened
   regions = null // polygons to fill
@@ -28,25 +28,32 @@ export class Explorer {
     Object.assign(this, { root, scene, settled, told, task: dynamics(scene.task.name) })
     this.angular = scene.task.name === "Pendulum-v1"
     this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
-    this.canvas = element("canvas", { tabindex: 0, role: "application" }) // for arrow keys
+    this.canvas = this.makeCanvas()
     this.picture = new Picture(this.canvas, scene.plane)
     this.makeControls()
     const held = root.contains(document.activeElement) && document.activeElement
     root.classList.add("vsp-explorer")
-    const stage = element("div", { class: "vsp-stage" }, this.canvas, this.result, this.legend)
-    if (!bare) stage.append(this.answer)
+    const under = bare ? this.legend : this.answer,
+      stage = element("div", { class: "vsp-stage" }, this.canvas, this.said, under)
     root.replaceChildren(stage, ...(bare ? [] : [this.panel(above)]))
     if (held) (held.isConnected ? held : this.canvas).focus()
     this.listen()
     this.show(scene.policies[0])
   }
+  makeCanvas() {
+    const { pointerdown, pointermove, pointerup, keydown } = this,
+      answers = { pointerdown, pointermove, pointerup, pointercancel: pointerup, keydown },
+      label = "Map of the policy. Arrow keys move the chosen state."
+    return element("canvas", { tabindex: 0, role: "application", "aria-label": label, ...answers })
+  }
   makeControls() {
     this.result = element("p", { class: "vsp-result" })
+    this.from = element("p", { class: "vsp-from" })
+    this.said = element("div", {}, this.result, this.from)
     this.answer = element("div")
     this.note = element("p", { class: "vsp-note" })
     this.legend = element("ul", { class: "vsp-legend", "aria-label": "legend" })
-    const focusout = ({ relatedTarget: to }) =>
-      this.stale && !this.form.contains(to) && this.changed()
+    const focusout = ({ relatedTarget: to }) => this.form.contains(to) || this.changed()
     const focusin = () => (this.armed = true)
     // Kept while a reader writes
     this.form = element("div", { focusout, focusin, input: () => this.soon() })
@@ -59,8 +66,8 @@ export class Explorer {
   panel(above) {
     const names = this.scene.policies.map(({ name }) => name)
     const policy = choice("policy", names, i => this.show(this.scene.policies[i]))
-    const parts = [row(...above, policy), this.replay.row, this.form, this.backs, this.note]
-    return element("div", { class: "vsp-panel" }, ...parts)
+    const parts = [this.replay.row, this.form, this.backs, this.note]
+    return element("div", { class: "vsp-panel" }, this.legend, row(...above, policy), ...parts)
   }
 
   // -- What is shown, and where it lies in the picture
@@ -70,7 +77,6 @@ export class Explorer {
     return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed]
   }
   placeSeen = seen => (this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen)
-  see = point => this.task.see(point)
   get teacher() {
     return "teacher" in this.policy ? this.policy.teacher : this.scene.teacher
   }
@@ -82,36 +88,43 @@ export class Explorer {
     this.replay.stop()
     const { replay, ...own } = policy
     const copy = policy.layers ? policy : structuredClone(own)
+    Object.assign(this.picture, { colours: [], known: {} })
     Object.assign(this, { original: policy, run: replay, policy: copy, moment: -1 })
     this.replay.row.hidden = !this.run
     this.backs.hidden = Boolean(policy.layers)
     if (this.run) this.replay.restart(this.run.length)
-    if (numbers) Object.assign(this.policy, structuredClone(numbers))
-    Object.assign(this, { base: null, past: [], armed: false, kept: this.numbers() })
-    this.changed({ policy: true })
+    if (numbers) this.put(numbers)
+    this.afresh()
   }
 
   // -- Changing the policy
   /** A copy of what a reader can change. */
-  numbers() {
-    const { codewords, coefficients } = this.policy
+  numbers({ codewords, coefficients } = this.policy) {
     return structuredClone({ codewords, coefficients })
   }
+  put(numbers) {
+    Object.assign(this.policy, this.numbers(numbers))
+  }
+  /** Forget all gestures. */
+  afresh() {
+    Object.assign(this, { base: null, past: [], armed: false, kept: this.numbers() })
+    this.changed(true)
+  }
   /** After every change of a number. Before the first of a gesture, keep what it was. */
-  edited({ whole = false } = {}) {
+  edited() {
     if (this.armed) {
       this.past.push(this.kept)
       Object.assign(this, { armed: false, base: this.results })
     }
     this.kept = this.numbers()
-    this.changed({ policy: true, whole })
+    this.changed(true)
   }
   /** Take other numbers, as one gesture. */
-  take({ codewords, coefficients }) {
+  take(numbers) {
     this.replay.stop()
-    Object.assign(this.policy, structuredClone({ codewords, coefficients }))
+    this.put(numbers)
     this.armed = true
-    this.edited({ whole: true })
+    this.edited()
     this.settle()
   }
   undo() {
@@ -132,10 +145,9 @@ export class Explorer {
   }
 
   // -- Everything that depends on policy and state
-  /** Schedule an update. `policy`: it changed; `whole`: with the form, where a reader may write. */
-  changed({ policy = false, whole = true } = {}) {
+  /** Schedule an update: of everything if the `policy` changed. */
+  changed(policy = false) {
     this.renewed ||= policy
-    this.whole ||= whole
     this.waiting ||= requestAnimationFrame(() => {
       const { renewed } = this
       Object.assign(this, { waiting: 0, renewed: false })
@@ -143,17 +155,13 @@ export class Explorer {
     })
   }
   redo(renewed = true) {
-    const before = this.cell
     if (renewed && !this.policy.layers) ready(this.policy)
     if (renewed) this.judge(IN_MOTION)
     if (renewed) this.mapped = null
-    this.cell = act(this.scene, this.policy, this.see(this.asked)).cell
+    this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell
     // Of a network that is not loaded yet, one episode is known
     this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked, true)
-    const writing = this.form.contains(document.activeElement)
-    if (this.whole || (this.cell !== before && !writing)) this.fill()
-    else this.stale ||= this.cell !== before
-    this.whole = false
+    if (!this.form.contains(document.activeElement)) this.fill() // else a reader writes
     this.draw()
     this.speak()
   }
@@ -162,31 +170,29 @@ export class Explorer {
     const { scene, policy } = this,
       n = scene.starts.length,
       begun = performance.now()
-    this.ends = []
+    this.failing.clear()
     if (policy.layers) return (this.results = { played: n, ...policy.results })
     let [played, sum] = [0, 0]
     for (; played < n && (!played || performance.now() - begun < budget); played++) {
       const i = (played * STRIDE) % n,
-        { total, outcome } = rollout(scene, policy, scene.starts[i])
-      this.ends[i] = scene.lost.includes(outcome)
+        { total, outcome, last } = rollout(scene, policy, scene.starts[i])
+      if (scene.lost.includes(outcome)) this.failing.set(i, last)
       sum += total
     }
-    const failures = Math.round((this.ends.filter(Boolean).length / played) * n)
+    const failures = Math.round((this.failing.size / played) * n)
     this.results = { played, failures, mean: sum / played }
   }
   fill() {
-    this.stale = false
     if (this.policy.layers) return this.form.replaceChildren()
     const lines = equations(this, () => this.edited())
     const title = this.cells > 1 ? `Change cell ${this.cell}` : "Change the map"
     this.form.replaceChildren(element("fieldset", {}, element("legend", {}, title), ...lines))
   }
   speak() {
-    const moving = this.replay.playing || this.dragged !== null // too much to hear
-    this.result.setAttribute("aria-live", moving ? "off" : "polite")
-    const label = `Map of the policy. The chosen state is in cell ${this.cell}. Arrow keys move it.`
-    this.canvas.setAttribute("aria-label", label)
+    const moving = this.replay.playing || this.dragged !== null
+    this.said.setAttribute("aria-live", moving ? "off" : "polite") // else too much to hear
     this.result.textContent = resultOf(this)
+    this.from.textContent = episodeOf(this)
     if (!this.policy.layers && this.answer.isConnected)
       this.answer.replaceChildren(...answerOf(this))
     this.legend.replaceChildren(...legendOf(this))
@@ -221,15 +227,15 @@ export class Explorer {
   // -- The run
   /** Show moment i of the run, and say what changed. */
   turn(i) {
-    const { n, codewords, coefficients, events } = this.run[i]
+    const { n, codewords } = this.run[i]
     if (this.replay.playing) this.flash(Math.min(this.moment + 1, i), i)
     this.moment = i
-    Object.assign(this.policy, structuredClone({ codewords, coefficients }))
-    Object.assign(this, { base: null, past: [], kept: this.numbers() })
-    this.changed({ policy: true })
-    const why = events.map(event => causeOf(event, this.original.limits)).join("\n")
-    const count = `${codewords.length} cell${codewords.length > 1 ? "s" : ""}`
-    return `iteration ${n}: ${count}${why && `\n${why}`}`
+    this.put(this.run[i])
+    this.afresh()
+    const last = this.run.slice(0, i + 1).findLast(({ events }) => events.length),
+      since = last?.n < n ? `, since iteration ${last.n}` : "",
+      why = last?.events.map(event => `\n${causeOf(event, this.original.limits)}`) ?? []
+    return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`
   }
   flash(first, last) {
     const happened = this.run.slice(first, last + 1).flatMap(({ events }) => events)
@@ -241,7 +247,8 @@ export class Explorer {
     const changes = this.run.filter(({ events }) => events.length).length,
       pause = Math.min(PAUSE, PLAYS / 2 / Math.max(changes, 1)),
       rest = (PLAYS - pause * changes) / Math.max(this.run.length - changes, 1)
-    return this.run[i].events.length ? pause : rest
+    const [long, short] = this.replay.slow ? [1000, 0] : [pause, rest]
+    return this.run[i].events.length ? long : short
   }
   /** Go to the next change (1) or the one before (-1). */
   jump(way) {
@@ -254,59 +261,63 @@ export class Explorer {
     this.settle()
   }
 
-  // -- Pointer, keys, and the colours of the page
+  // -- Size and colours of the page, pointer and keys
   listen() {
-    const { canvas } = this
-    canvas.addEventListener("pointerdown", event => this.press(event))
-    canvas.addEventListener("pointermove", event => event.buttons && this.move(event))
-    for (const end of ["pointerup", "pointercancel"])
-      canvas.addEventListener(end, () => {
-        if (this.dragged !== null) this.settle()
-        this.dragged = null
-      })
-    canvas.addEventListener("keydown", event => this.key(event))
-    new ResizeObserver(() => this.waiting || this.draw()).observe(canvas)
-    const recolour = () => this.changed({ policy: true, whole: false })
+    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
+    const recolour = () => this.changed(true)
     const watch = new MutationObserver(recolour) // of the site's theme, and of JupyterLab's
     for (const part of [document.documentElement, document.body])
       watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] })
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour)
   }
-  press(event) {
+  pointerdown = event => {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
-    const pixel = [event.offsetX, event.offsetY],
-      fixed = this.fixed || this.angular || this.cells === 1
-    const far = word => Math.hypot(...this.picture.at(word).map((value, i) => value - pixel[i]))
-    const gaps = fixed ? [] : this.policy.codewords.map(far),
-      least = Math.min(...gaps)
-    this.dragged = least < (event.pointerType === "touch" ? 22 : 12) ? gaps.indexOf(least) : -1
+    const { offsetX: x, offsetY: y } = event,
+      fixed = this.fixed || this.angular || this.cells === 1,
+      words = fixed ? [] : this.policy.codewords,
+      places = words.map(word => this.picture.at(word)),
+      far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
+      least = Math.min(...far)
+    this.dragged = least < (event.pointerType === "touch" ? 22 : 12) ? far.indexOf(least) : -1
+    Object.assign(this, { pressed: { x, y, place: places[this.dragged] ?? [x, y] }, armed: true })
     this.replay.stop()
-    this.armed = true
-    this.move(event)
+    this.choose(words[this.dragged] ?? this.picture.point(x, y))
   }
-  move(event) {
+  pointermove = event => {
     if (this.dragged === null) return
-    this.asked = this.picture.point(event.offsetX, event.offsetY)
-    if (this.dragged < 0) return this.changed({ whole: false })
-    this.policy.codewords[this.dragged] = [...this.asked]
-    this.edited({ whole: true })
+    const { x, y, place } = this.pressed,
+      [dx, dy] = [event.offsetX - x, event.offsetY - y],
+      point = this.picture.point(place[0] + dx, place[1] + dy)
+    if (this.dragged < 0) return this.choose(point)
+    if (this.armed && Math.hypot(dx, dy) < 4) return // a finger that rests
+    this.policy.codewords[this.dragged] = point
+    this.asked = [...point]
+    this.edited()
   }
-  key(event) {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] },
-      way = ways[event.key]
+  choose(point) {
+    this.asked = [...point]
+    this.base = null
+    this.changed()
+  }
+  pointerup = () => {
+    if (this.dragged !== null) this.settle()
+    this.dragged = null
+  }
+  keydown = event => {
+    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }
+    const way = ways[event.key]
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return
     event.preventDefault()
     const { low, high } = this.picture.plane,
       by = event.shiftKey ? 0.1 : 0.01
     const moved = (value, i) => clip(value + way[i] * by * (high[i] - low[i]), low[i], high[i])
-    this.asked = this.asked.map(moved)
-    this.changed({ whole: false })
+    this.choose(this.asked.map(moved))
     this.soon()
   }
 }
 
-/** For anywidget: the scene is JSON text. */
+/** For anywidget. */
 export default {
   render({ model, el }) {
     el.addEventListener("keydown", event => {
@@ -314,10 +325,11 @@ export default {
       if (event.key.startsWith("Arrow") && !event.altKey && !event.ctrlKey) event.stopPropagation()
     })
     el.classList.add("vsp-controls") // hides the still picture for readers without a kernel
-    let view = new Explorer(el, JSON.parse(model.get("scene")))
+    const made = () => new Explorer(el, JSON.parse(model.get("scene")))
+    let view = made()
     model.on("change:scene", () => {
       const { asked } = view // the reader's state stays chosen
-      view = new Explorer(el, JSON.parse(model.get("scene")))
+      view = made()
       view.asked = asked
       view.redo() // at once: the page keeps its height, and so its scroll position
     })
@@ -328,22 +340,22 @@ export default {
 async function reveal([{ isIntersecting, target: root }], watch) {
   if (!isIntersecting) return
   watch.disconnect()
-  const { scene, scenes } = root.dataset
-  const files = scenes ? JSON.parse(scenes) : { "": scene }
+  const files = JSON.parse(root.dataset.scenes),
+    names = Object.keys(files)
   let wanted
   const open = async i => {
     wanted = i
-    const found = await (await fetch(Object.values(files)[i])).json()
+    const found = await (await fetch(files[names[i]])).json()
     if (wanted === i) new Explorer(root, found, { above })
   }
-  const above = scenes ? [choice("task", Object.keys(files), open)] : []
+  const above = names.length > 1 ? [choice("task", names, open)] : []
   await open(0)
 }
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
 export function mountAll() {
   for (const root of document.querySelectorAll(
-    ".vsp-explorer:is([data-scene], [data-scenes], :has(> script)):not([data-mounted])",
+    ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])",
   )) {
     root.dataset.mounted = true
     const inner = root.querySelector("script")

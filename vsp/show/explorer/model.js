@@ -62,12 +62,9 @@ export function raw(rows, seen, k) {
 /** The cell, the output of its map, and the action within its limits. A network has one cell. */
 export function act({ task }, policy, seen) {
   const cell = policy.layers ? 0 : cellOf(policy, seen)
-  const given = policy.layers ? output(policy, seen) : []
-  const action = []
-  for (let k = 0; k < task.actionLow.length; k++) {
-    if (!policy.layers) given.push(raw(policy.coefficients[cell], seen, k))
-    action.push(clip(given[k], task.actionLow[k], task.actionHigh[k]))
-  }
+  const mapped = () => task.outputs.map((_, k) => raw(policy.coefficients[cell], seen, k))
+  const given = policy.layers ? output(policy, seen) : mapped()
+  const action = given.map((value, k) => clip(value, task.actionLow[k], task.actionHigh[k]))
   return { cell, raw: given, action }
 }
 
@@ -106,7 +103,6 @@ function output({ layers }, seen) {
 
 const TASKS = {
   "SimpleGoal-v0": {
-    see: state => state,
     step([x, y], [dx, dy]) {
       const next = [clip(x + 0.1 * clip(dx, -1, 1), 0, 1), clip(y + 0.1 * clip(dy, -1, 1), 0, 1)]
       if (next[0] < 0.1 && next[1] < 0.1) return [next, 10, 1]
@@ -119,7 +115,6 @@ const TASKS = {
     ],
   },
   "MountainCarContinuous-v0": {
-    see: state => state,
     step([x, v], [force]) {
       let speed = clip(v + 0.0015 * clip(force, -1, 1) - 0.0025 * Math.cos(3 * x), -0.07, 0.07)
       const place = clip(x + speed, -1.2, 0.6)
@@ -143,83 +138,61 @@ const TASKS = {
 }
 
 /** The dynamics of a task: the observation of a state, a step, and places to draw. */
-export const dynamics = name => TASKS[name]
+export const dynamics = name => ({ see: state => state, ...TASKS[name] })
 
-/** Run an episode: its return, its outcome, and with `keep` its states. */
+/** Run an episode: return, outcome, the cell of its last step, and with `keep` its states. */
 export function rollout(scene, policy, start, keep = false) {
   const { see, step } = dynamics(scene.task.name),
     states = [start]
-  let state = start,
-    total = 0,
-    outcome = 0
+  let [state, total, outcome, last] = [start, 0, 0, 0]
   for (let t = 0; t < scene.task.maxSteps && !outcome; t++) {
-    const { action } = act(scene, policy, see(state))
+    const { cell, action } = act(scene, policy, see(state))
     let reward
     ;[state, reward, outcome] = step(state, action)
+    last = cell
     total += reward
     if (keep) states.push(state)
   }
-  return { total, outcome, states }
+  return { total, outcome, last, states }
 }
 
 // ---- Fitting maps to what the teacher did
 
-/** The states of stored episodes, integrated from their starts and actions. */
-export function visits(scene, { starts, lengths, actions }) {
-  const { step } = dynamics(scene.task.name),
-    m = scene.task.outputs.length,
-    numbers = floats(actions),
-    found = { states: [], actions: [] }
-  let at = 0
-  starts.forEach((start, episode) => {
-    for (let state = start, t = 0; t < lengths[episode]; t++, at += m) {
-      const action = [...numbers.subarray(at, at + m)]
-      found.states.push(state.map(Math.fround)) // as they are recorded in Python
-      found.actions.push(action)
-      ;[state] = step(state, action)
-    }
-  })
-  return found
-}
-
 /** The least squares solution x (d, m) of a x = b, a (n, d), b (n, m); of several the shortest, as
  * NumPy's. Jacobi rotations turn the columns of `a` until they are orthogonal (Hestenes 1958). */
 export function leastSquares(a, b) {
-  const d = a[0].length
-  const columns = Array.from({ length: d }, (_, i) => Float64Array.from(a, row => row[i]))
-  const turns = columns.map((_, i) => Float64Array.from(columns, (_, j) => +(i === j)))
-  const dot = (u, v) => u.reduce((sum, value, i) => sum + value * v[i], 0)
+  const unit = i => a[0].map((_, j) => +(i === j)) // below column i, for the sum of all turns
+  const columns = a[0].map((_, i) => [...a.map(row => row[i]), ...unit(i)])
+  const dot = (u, v) => a.reduce((sum, _, row) => sum + u[row] * v[row], 0)
   for (let sweep = 0, turned = true; turned && sweep < 60; sweep++) {
     turned = false
-    for (let i = 0; i < d; i++)
-      for (let j = i + 1; j < d; j++) {
-        const [p, q] = [columns[i], columns[j]].map(column => dot(column, column)),
-          both = dot(columns[i], columns[j])
+    for (const [i, u] of columns.entries())
+      for (const v of columns.slice(i + 1)) {
+        const [p, q, both] = [dot(u, u), dot(v, v), dot(u, v)]
         if (Math.abs(both) <= 1e-16 * Math.sqrt(p * q)) continue
         turned = true
-        const angle = 0.5 * Math.atan2(2 * both, p - q)
-        for (const set of [columns, turns]) rotate(set[i], set[j], Math.cos(angle), Math.sin(angle))
+        turn(u, v, 0.5 * Math.atan2(2 * both, p - q))
       }
   }
-  const sizes = columns.map(column => Math.sqrt(dot(column, column)))
-  const least = Math.max(...sizes) * Number.EPSILON * Math.max(a.length, d)
-  const solution = Array.from({ length: d }, () => b[0].map(() => 0))
-  sizes.forEach((size, i) => {
-    if (size <= least) return
+  const sizes = columns.map(u => Math.sqrt(dot(u, u))),
+    least = Math.max(...sizes) * Number.EPSILON * Math.max(a.length, a[0].length),
+    solution = a[0].map(() => b[0].map(() => 0))
+  columns.forEach((u, i) => {
+    if (sizes[i] <= least) return
     b[0].forEach((_, k) => {
-      const share = b.reduce((sum, values, row) => sum + columns[i][row] * values[k], 0) / size ** 2
-      solution.forEach((weights, row) => (weights[k] += turns[i][row] * share))
+      const share = b.reduce((sum, values, row) => sum + u[row] * values[k], 0) / sizes[i] ** 2
+      solution.forEach((weights, j) => (weights[k] += u[a.length + j] * share))
     })
   })
   return solution
 }
 
-function rotate(u, v, cosine, sine) {
-  for (let i = 0; i < u.length; i++) {
-    const [x, y] = [u[i], v[i]]
-    u[i] = cosine * x + sine * y
-    v[i] = cosine * y - sine * x
-  }
+function turn(u, v, angle) {
+  const [cosine, sine] = [Math.cos(angle), Math.sin(angle)]
+  u.forEach((x, i) => {
+    u[i] = cosine * x + sine * v[i]
+    v[i] = cosine * v[i] - sine * x
+  })
 }
 
 /** A policy's maps, in `cells` (by default all) fitted by least squares to visited states. */
@@ -237,8 +210,8 @@ export function refit(policy, { states, actions }, cells = policy.codewords.keys
 /** The share of the variance of the teacher's actions, taken together, that a policy reproduces. */
 export function rSquared(scene, policy, { states, actions }) {
   let [off, spread] = [0, 0]
-  const mean = k => actions.reduce((sum, action) => sum + action[k], 0) / actions.length,
-    means = actions[0].map((_, k) => mean(k))
+  const mean = (_, k) => actions.reduce((sum, action) => sum + action[k], 0) / actions.length,
+    means = actions[0].map(mean)
   states.forEach((state, i) =>
     act(scene, policy, state).action.forEach((value, k) => {
       off += (value - actions[i][k]) ** 2

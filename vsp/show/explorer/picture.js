@@ -1,4 +1,4 @@
-// The picture: a canvas with the coordinates of a plane, and what an explorer draws on it.
+// A canvas with the coordinates of a plane, and what an explorer draws on it.
 
 import { act, clip, colouring, raw, tied } from "./model.js"
 
@@ -52,6 +52,10 @@ export class Picture {
       high[1] - ((py - this.edge.top) / this.high) * (high[1] - low[1]),
     ].map((value, i) => clip(value, low[i], high[i]))
   }
+  shows(point) {
+    const { low, high } = this.plane
+    return point.every((value, i) => value >= low[i] && value <= high[i])
+  }
   /** The middle of one of n by n parts of the plane, counted from the top left. */
   middle(at, n) {
     const { low, high } = this.plane,
@@ -82,11 +86,14 @@ export class Picture {
     this.ctx.fillStyle = (name === "pit" ? this.tones.pit : this.tones.goal) + "77"
     this.ctx.fillRect(left, top, right - left, bottom - top)
   }
-  /** Name a place that does not fill the frame. */
+  /** Name a place: at its middle, or at the top of the frame that it fills. */
   name({ name, from, to }) {
-    const [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)),
+    const { low, high } = this.plane,
+      fills = from.every((value, i) => value <= low[i] && to[i] >= high[i]),
+      [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)),
       half = this.ctx.measureText(name).width / 2 + 3
-    if (this.at(to)[0] - x < this.wide) this.text(name, Math.max(x, this.edge.left + half), y + 4)
+    if (fills) this.text(name, this.edge.left + this.wide / 2, this.edge.top + 16)
+    else this.text(name, Math.max(x, this.edge.left + half), y + 4)
   }
   line(points, colour, width = 2) {
     const { ctx } = this
@@ -139,7 +146,7 @@ export class Picture {
       const [first, second] = low.map((value, i) => tick(value, high[i] - value, share))
       const x = edge.left + share * this.wide,
         y = bottom - share * this.high
-      this.text(first, x, bottom + 15, share === 1 ? "right" : share ? "center" : "left")
+      this.text(first, x, bottom + 15, ["left", "center", "right"][2 * share])
       if (share !== 0.5 || (second.length < 5 && this.side > 330))
         this.text(second, edge.left - 5, y + [0, 4, 10][2 * share], "right")
     }
@@ -164,10 +171,8 @@ export function drawMap(view, n) {
     cells = new Int16Array(n * n),
     others = new Int16Array(n * n)
   for (let at = 0; at < n * n && !policy.layers; at++)
-    [cells[at], others[at]] = tied(policy, view.see(picture.middle(at, n)))
-  picture.ties = cells.some(
-    (cell, at) => cell !== others[at] && cell === cells[at - 1] && cells[at - 1] !== others[at - 1],
-  )
+    [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)))
+  picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1])
   // A cell keeps its colour by its codeword, because numbers move up when a cell goes
   const keys = (policy.codewords ?? [0]).map(String),
     wanted = keys.map((key, i) => picture.known[key] ?? picture.colours[i])
@@ -198,7 +203,7 @@ function painted(view, cells, others, n) {
       cell = Math.floor(((row + column) * STRIPES) / n) % 2 ? others[at] : cells[at]
     let hue = tints[cell]
     if (single) {
-      const push = raw(policy.coefficients[cell], view.see(picture.middle(at, n)), 0)
+      const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0)
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))]
     }
     const edge = (column && cells[at - 1] !== cells[at]) || (row && cells[at - n] !== cells[at])
@@ -228,16 +233,18 @@ export function drawAll(view) {
 }
 
 function drawPlane(view) {
-  const { picture, scene, ends } = view,
+  const { picture, scene } = view,
     { tones, edge } = picture
   picture.ctx.drawImage(picture.map, edge.left, edge.top, picture.wide, picture.high)
   view.task.places.forEach(place => picture.place(place))
   if (view.regions) picture.polygons(view.regions, tones.failing)
   if (scene.task.outputs.length === 2) drawArrows(view)
-  const starts = view.starts ? scene.starts : []
-  starts.forEach((start, i) =>
-    picture.dot(view.place(start), ends[i] ? 3.2 : 1.3, ends[i] ? tones.failing : tones.start),
-  )
+  const starts = view.starts ? scene.starts.map(view.place) : []
+  starts.forEach((start, i) => {
+    const cell = view.failing.get(i)
+    if (cell === undefined) picture.dot(start, 1.3, tones.start)
+    else picture.dot(start, 2.7, cell === view.cell ? tones.failing : tones.paper, tones.failing)
+  })
   view.task.places.forEach(place => picture.name(place))
 }
 

@@ -1,6 +1,6 @@
 // What an explorer says: how its policy does, why it acts as it does, what its marks mean.
 
-import { digits, element, minus, table } from "./controls.js"
+import { count, digits, element, minus, table } from "./controls.js"
 import { act } from "./model.js"
 
 /** How a policy does from all starts, and how it did before the last gesture ("8 → 31 of 400 starts
@@ -16,6 +16,17 @@ export function resultOf({ scene, results, base, teacher }) {
   return minus(`${scene.lost.length ? fails : ""}${returned}${aim}.`)
 }
 
+/** How the episode from the chosen state goes. */
+export function episodeOf({ cell, cells, asked, played, task, picture: { plane } }) {
+  if (!played.states.length) return ""
+  const place = task.places[played.outcome - 1],
+    size = i => Math.floor(Math.log10(plane.high[i] - plane.low[i])),
+    at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "),
+    steps = count(played.states.length - 1, "step")
+  const where = cells > 1 ? `, in cell ${cell}` : ""
+  return `From (${at})${where}: ${steps}${place ? ` to the ${place.name}` : ""}.`
+}
+
 /** What caused a split or a merge; `limits` are the thresholds, where they are known. */
 export function causeOf({ kind, codeword, cause }, limits = {}) {
   const at = `${kind} at (${codeword.map(value => minus(value.toFixed(2))).join(", ")})`,
@@ -26,11 +37,11 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds. */
-export function answerOf({ scene, policy, cell, cells, asked, see }) {
+export function answerOf({ scene, policy, cell, cells, asked, task }) {
   const { inputs, outputs } = scene.task,
-    seen = [...see(asked), 1],
+    seen = [...task.see(asked), 1],
     rows = policy.coefficients[cell],
-    { raw, action } = act(scene, policy, see(asked))
+    { raw, action } = act(scene, policy, task.see(asked))
   const adds = [...inputs, "bias"].map((name, i) => {
     const said = name === "bias" ? "the bias adds" : `${name} = ${digits(seen[i])} adds`
     return [said, ...rows[i].map(weight => weight * seen[i])]
@@ -44,21 +55,25 @@ export function answerOf({ scene, policy, cell, cells, asked, see }) {
 /** What one can do. */
 export const noteOf = ({ angular, cells }) =>
   (angular || cells === 1 ? "" : "Drag a codeword to move its cell. ") +
-  "Click to choose a state, or move it with the arrow keys."
+  "Click to choose a state; arrow keys move it."
 
 /** What colours and marks mean: only those that are in the picture. */
-export function legendOf({ scene, policy, starts, regions, cells, picture }) {
+export function legendOf({ scene, policy, failing, starts, regions, cells, picture, placeSeen }) {
   const [output, second] = scene.task.outputs
   const mark = (kind, words) =>
     element("li", {}, element("i", { class: `vsp-mark vsp-${kind}` }), words)
+  const fails = starts && failing.size > 0,
+    inside = policy.codewords?.some(word => picture.shows(placeSeen(word)))
   const marks = [
     starts && mark("start", "start"),
-    starts && scene.lost.length && mark("failing", "start that fails"),
+    fails &&
+      mark("failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"),
+    fails && cells > 1 && mark("elsewhere", "fails; last step in another"),
     regions && mark("region", "falls into the pit"),
     second && mark(policy.layers ? "taught" : "step", policy.layers ? "teacher's step" : "step"),
     !second && mark("below", `${output} below 0`),
     !second && mark("above", "above 0"),
-    cells > 1 && mark("codeword", "codeword; filled: of the chosen cell"),
+    cells > 1 && inside && mark("codeword", "codeword; filled: of the chosen cell"),
     picture.ties && mark("tied", "two codewords equally near: the first acts"),
   ]
   return [...marks.filter(Boolean), mark("chosen", "chosen state, and its episode")]
