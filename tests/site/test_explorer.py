@@ -71,8 +71,8 @@ def shown(desk):
 def test_a_click_a_drag_and_keys_choose_a_state(shown):
     changed, text = shown.after(lambda: shown.click((0.3, 0.6)))
     assert changed and "x = 0.300" in text
-    x, y = published_policy(SIMPLEGOAL).codewords[0]
-    assert "44 of 400 starts fail" in shown.after(lambda: shown.click((x + 0.01, y)))[1]  # near a codeword: chosen
+    beside_a_codeword = published_policy(SIMPLEGOAL).codewords[0] + 0.01
+    assert "44 of 400 starts fail" in shown.after(lambda: shown.click(beside_a_codeword))[1]
     changed, text = shown.after(lambda: shown.drag((0.3, 0.6), (0.86, 0.5)))
     assert changed and "x = 0.860" in text and "y = 0.500" in text
     shown.canvas.focus()
@@ -83,9 +83,9 @@ def test_a_click_a_drag_and_keys_choose_a_state(shown):
 
 
 def test_it_says_what_a_gesture_did_and_takes_it_back(shown):
-    x, y = published_policy(SIMPLEGOAL).codewords[0]
+    place = published_policy(SIMPLEGOAL).codewords[0]
     (before,) = re.findall(r"^(\d+) of 400 starts fail\. Mean return [\d.]+ \(teacher: 16", shown.result.inner_text())
-    changed, text = shown.after(lambda: shown.drag((x, y), (0.5 * x + 0.25, 0.5 * y + 0.25)))
+    changed, text = shown.after(lambda: shown.drag(place, 0.5 * place + 0.25))
     assert changed and re.search(rf"{before} → \d+ of 400 starts fail", text) and "Cell 0 of 13" in text
     shown.after(lambda: shown.root.get_by_label("Δx: bias").fill("9"))
     for name, said in (("undo", r"→ \d+"), ("undo", rf"→ {before}"), ("reset", f"{before}")):
