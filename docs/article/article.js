@@ -1,4 +1,4 @@
-// Text and explorer act on each other. Attributes say which scene a section has, what a button does
+// Text and explorer act on each other. Attributes say which scene a section has, what buttons do
 // (`data-act`), and which number an output repeats (`data-say`).
 
 import { Explorer } from "../../vsp/show/explorer/explorer.js"
@@ -60,12 +60,17 @@ class Article {
     this.follow()
   }
   listen() {
-    const seen = entries => entries.forEach(one => one.isIntersecting && this.enter(one.target))
-    const watch = new IntersectionObserver(seen, { rootMargin: "-60% 0px -40% 0px" })
-    for (const section of this.sections) {
-      watch.observe(section)
-      section.addEventListener("focusin", () => this.enter(section))
-    }
+    for (const section of this.sections)
+      section.addEventListener("focusin", () => {
+        this.held = performance.now()
+        this.enter(section)
+      })
+    const begun = section => section.getBoundingClientRect().top < 0.55 * innerHeight
+    addEventListener("scroll", () => {
+      if (performance.now() - this.held < 200) return // a focus has scrolled
+      const section = this.sections.findLast(begun)
+      if (section && section !== this.section) this.enter(section)
+    })
     this.root.addEventListener("click", ({ target }) => {
       const pressed = target.closest("[data-act]")
       if (pressed) this.act(pressed, ...pressed.dataset.act.split(" "))
@@ -75,13 +80,12 @@ class Article {
       if (stops) this.act(target, "policy", stops.split(" ")[target.value])
     })
     const { canvas } = this.view
-    for (const kind of ["pointerdown", "keydown"]) canvas.addEventListener(kind, () => this.wake())
-    canvas.addEventListener("keydown", ({ key }) => key === "Escape" && this.skipped?.focus())
+    for (const kind of ["pointerdown", "keydown"])
+      canvas.addEventListener(kind, ({ key }) =>
+        key === "Escape" ? this.section?.querySelector(".skip").focus() : this.wake(),
+      )
     for (const task of this.root.querySelectorAll(".do")) {
-      const skip = button("to the picture; Escape leads back", () => {
-        this.skipped = skip
-        canvas.focus()
-      })
+      const skip = button("to the picture (arrows; Escape: back)", () => canvas.focus())
       skip.className = "skip"
       task.append(skip)
     }
@@ -101,19 +105,18 @@ class Article {
   }
   /** Load the network when a reader asks it. Before that, its arrows and one episode are known. */
   async wake() {
-    const { teacher } = this.policies,
-      known = teacher.episode
-    if (this.section?.id !== "teacher" || !known?.states.length) return
+    const { teacher } = this.policies
+    if (this.section?.id !== "teacher" || !teacher.episode) return
     teacher.episode = { states: [] } // of another start nothing is known yet
     const stored = await this.part("teacher")
-    Object.assign(teacher, stored ? { ...network(stored), episode: null } : { episode: known })
+    if (stored && teacher.episode) Object.assign(teacher, network(stored), { episode: null })
     this.view.changed()
   }
 
   // -- Scenes
   /** Show a section's scene: as `state` says, as the reader left it, or as it is at first. */
   enter(section, state, put) {
-    if (this.section === section && !state) return this.entering
+    if (this.section === section && !state && this.entering) return this.entering
     this.remember()
     Object.assign(this, { section, staging: true })
     this.status.textContent = ""
@@ -127,7 +130,8 @@ class Article {
       names = needs?.split(" ") ?? [],
       loaded = await Promise.all(names.map(name => this.part(name)))
     if (policy === "teacher" && String(at) !== about.at) await this.wake()
-    if (this.section !== section || loaded.includes(undefined)) return // gone on, or not there
+    if (this.section !== section) return // gone on
+    if (loaded.includes(undefined)) return (this.entering = null)
     const { run, visited, proofs } = Object.fromEntries(names.map((name, i) => [name, loaded[i]]))
     const { states, actions } = visited ?? {}
     if (states) this.visited ??= { states: pairs(states), actions: pairs(actions) }
@@ -143,20 +147,19 @@ class Article {
     this.arrange(section, policy)
     this.staging = false
     this.keep(put ?? (this.gestured ? history.pushState : history.replaceState))
-    this.gestured = false
+    this.gestured = put === history.pushState
   }
   /** Put the controls into a section, and set its own. */
   arrange(section, policy) {
     const { replay, form, backs } = this.view,
       slots = { replay: [replay.row], form: [form, backs] }
     for (const slot of section.querySelectorAll("[data-slot]"))
-      slot.append(...slots[slot.dataset.slot])
+      // What stays keeps the focus
+      for (const part of slots[slot.dataset.slot]) if (part.parentNode !== slot) slot.append(part)
     for (const one of section.querySelectorAll("[data-stops]")) {
       one.value = one.dataset.stops.split(" ").indexOf(policy)
       one.setAttribute("aria-valuetext", count(this.view.cells, "cell"))
     }
-    for (const one of section.querySelectorAll("[data-act^=zoom]"))
-      one.textContent = this.zoomed ? "show the whole square" : "enlarge the sliver"
   }
   takeRun(stored) {
     const { run } = this.policies
@@ -189,33 +192,37 @@ class Article {
     this.begun = true // the first scene keeps the page's own address
   }
   /** Show what the address says: a state, a section, or the first scene. */
-  async follow() {
+  follow() {
     const hash = location.hash.replaceAll("%2C", ",") // as some programs write it
     const policies = ({ id, dataset }) => [id, dataset.policies.split(" ")],
       sections = Object.fromEntries(this.sections.map(policies))
     const state = read(hash, sections, this.scene.moments),
       named = state?.section ?? hash.slice(1),
       known = this.sections.find(({ id }) => id === named)
-    if (this.section && !known && document.getElementById(named)) return // another part of the page
+    if (!known && document.getElementById(named))
+      // another part of the page
+      return this.section ?? this.enter(this.sections[0])
     const section = known ?? this.sections[0]
     if (hash || this.section) section.scrollIntoView()
-    const shown = this.enter(section, state ?? firstOf(section))
+    if (this.section) this.held = performance.now()
+    this.enter(section, state ?? firstOf(section), history.replaceState)
     if (hash && !known) this.status.textContent = UNREAD
-    await shown
   }
 
   // -- What buttons do
   async act(pressed, verb, what) {
-    await this.enter(pressed.closest("section") ?? this.section)
+    await this.enter(pressed.closest("section"))
     const { view, section } = this
+    if (this.staging) return
     const scene = to =>
       this.enter(section, { at: view.asked, policy: what, ...to }, history.pushState)
     if (verb === "policy") await scene({ moment: section.dataset.moment })
-    else if (verb === "zoom" && this.zoomed) await scene({})
     else if (verb === "zoom")
       await scene({ at: (await this.part("proofs"))[what].at, zoomed: true })
     else if (verb === "reset") view.take(view.original)
     else if (verb === "refit") {
+      view.redo() // just entered, it waits for a frame
+      view.judge()
       const cells = what === "cell" ? [view.cell] : undefined
       view.take({ ...view.policy, coefficients: refit(view.policy, this.visited, cells) })
     } else await this.copy(pressed, what)
@@ -256,7 +263,5 @@ class Article {
   }
 }
 
-export async function begin() {
-  const root = document.querySelector(".vsp-article")
-  return new Article(root, await data("scene"))
-}
+export const begin = async () =>
+  new Article(document.querySelector(".vsp-article"), await data("scene"))

@@ -54,7 +54,7 @@ def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
         name: f'<figure class="still">{style.embedded(png, alt, width=460)}</figure>'
         for name, (png, alt) in pictures.items()
     }
-    limits = {name: run[name] for name in ("split", "merge", "distance")}
+    limits = {name: run[name] for name in ("split", "merge", "distance", "n_split", "n_merge")}
     numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
     numbers |= {"longer": LONGER, "longer_failures": longer(LONGER), "cite": citation()}
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)

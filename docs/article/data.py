@@ -182,7 +182,8 @@ def says() -> dict[str, float | str]:
         numbers |= {f"{name}_{what}": value for what, value in played(policy).items()}
         numbers[f"{name}_r2"] = measure.fidelity(policy, teacher(), TASK, states)["r2"]
     numbers |= {f"scale_{axis}": value for axis, value in zip("xy", policies()["faithful_3"].scale.tolist())}
-    numbers |= {"turns_at": turns_at(), "one_change": one_change()}
+    numbers |= {"turns_at": turns_at(), "one_change": changed("one_map", 0, 1, 1, 1.0)}  # the number of y in Δy
+    numbers |= {"three_change": changed("three", 1, 2, 0, -0.3)}  # the bias of Δx
     return numbers | about_run() | from_tables()
 
 
@@ -194,11 +195,11 @@ def turns_at(y: float = 0.9) -> float:
     return float(starts[left.index(False), 0])
 
 
-def one_change() -> int:
-    """Return from how many starts the one map fails with 1 as the number of y in Δy."""
-    maps = policies()["one_map"].coefficients.copy()
-    maps[0, 1, 1] = 1.0
-    return played(VoronoiPolicy(policies()["one_map"].codewords, maps, task=TASK))["failures"]
+def changed(name: str, cell: int, term: int, action: int, value: float) -> int:
+    """Return from how many starts a policy fails if one number of its maps is another."""
+    maps = policies()[name].coefficients.copy()
+    maps[cell, term, action] = value
+    return played(VoronoiPolicy(policies()[name].codewords, maps, task=TASK))["failures"]
 
 
 def failing(policy: Policy) -> np.ndarray:
@@ -304,6 +305,8 @@ def run() -> dict:
         "split": config.max_pol_loss,
         "merge": config.min_param_distance,
         "distance": config.min_pol_distance,
+        "n_split": config.n_split,
+        "n_merge": config.n_merge,
     }
 
 

@@ -148,7 +148,7 @@ def test_colours_stay_where_they_can():
 
 def test_what_is_said():
     code = """const told = { scene: { starts: [0, 1, 2], lost: [2] }, teacher: { mean: 2 } }
-      const results = { played: 3, failures: 2, mean: -1.5 }, base = { failures: 1, mean: -1.5 }
+      const results = { played: 3, failures: 2, mean: -1.5 }, base = { failures: 1, mean: -1 }
       const split = { kind: "split", codeword: [0.5, -0.25], cause: 0.0123 }, merge = { ...split, kind: "merge" }
       return [controls.digits(-1e-5), controls.digits(-1.5),
         texts.resultOf({ ...told, results }), texts.resultOf({ ...told, results, base }),
@@ -158,7 +158,7 @@ def test_what_is_said():
     assert run(code, {}, *MODULES[1::2]) == [
         "0.000", "−1.500",
         "2 of 3 starts fail. Mean return −1.50 (teacher: 2.00).",
-        "1 → 2 of 3 starts fail. Mean return −1.50 (teacher: 2.00).",
+        "1 → 2 of 3 starts fail. Mean return −1.00 → −1.50 (teacher: 2.00).",
         "Mean return about −1.50.",
         f"split {at}loss 0.0123", f"split {at}loss 0.0123, above 0.01", f"merge {at}maps differ by 0.0123, below 0.02",
     ]  # fmt: skip

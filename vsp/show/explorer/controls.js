@@ -19,14 +19,14 @@ export const minus = text => String(text).replaceAll("-", "−")
 export const count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`
 export const digits = value => (Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3)))
 
-/** Make a table: names of the columns, then rows that begin with their name. */
+/** Make a table: names of the columns but the first, then rows that begin with their name. */
 export function table(head, rows) {
-  const line = (...cells) => element("tr", {}, ...cells)
-  const heads = head.map(name => (name ? element("th", { scope: "col" }, name) : element("td")))
+  const line = (first, tag, about, values) =>
+    element("tr", {}, first, ...values.map(value => element(tag, about, value)))
   const body = rows.map(([name, ...values]) =>
-    line(element("th", { scope: "row" }, name), ...values.map(value => element("td", {}, value))),
+    line(element("th", { scope: "row" }, name), "td", {}, values),
   )
-  return element("table", {}, line(...heads), ...body)
+  return element("table", {}, line(element("td"), "th", { scope: "col" }, head), ...body)
 }
 
 /** A list to choose from; `take` gets the index. */
@@ -83,7 +83,7 @@ export class Player {
     this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches // one picture a second
     const go = way => (this.stop(), view.jump(way))
     const input = () => (this.stop(), this.to(+this.slider.value))
-    const settled = { input, change: () => view.settle() }
+    const settled = { input, change: () => view.soon() }
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled })
     this.toggle = button("play", () => (this.playing ? this.pause() : this.start()))
     this.said = element("span", { class: "vsp-said" })
@@ -104,7 +104,7 @@ export class Player {
     this.slider.value = i
     this.text = this.view.turn(this.at)
   }
-  /** Say where it is: with the picture and all other texts, which are drawn with the next frame. */
+  /** Say where it is: with the next frame, as all texts. */
   tell() {
     this.said.textContent = this.text
     this.slider.setAttribute("aria-valuetext", this.text)

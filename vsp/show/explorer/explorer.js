@@ -11,9 +11,9 @@ const IN_MOTION = 8 // milliseconds for episodes; at rest all are played
 const STRIDE = 149 // a prime, so the first are spread over all
 const [PLAYS, PAUSE] = [20_000, 400] // milliseconds: of a run, and at most of one of its changes
 
-/** A view of a policy, a chosen state, and texts about them. With `bare`, `root` has only picture,
- * results and legend, and the page arranges the controls; `above` stands above the panel.
- * `settled(view)` is called after each gesture, `told(view)` after each update. */
+/** A view of a policy, a chosen state, and texts about them. With `bare`, the page arranges the
+ * controls; `above` stands above the panel. `settled(view)` is called after each gesture,
+ * `told(view)` after each update. */
 export class Explorer {
   failing = new Map() // of the starts that fail, by index: the cell of their last step
   past = [] // numbers to undo to
@@ -25,7 +25,7 @@ export class Explorer {
 
   constructor(root, scene, { bare, above = [], settled = () => {}, told = () => {} } = {}) {
     const { low, high } = scene.plane
-    Object.assign(this, { root, scene, settled, told, task: dynamics(scene.task.name) })
+    Object.assign(this, { scene, settled, told, task: dynamics(scene.task.name) })
     this.angular = scene.task.name === "Pendulum-v1"
     this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
     this.canvas = this.makeCanvas()
@@ -89,7 +89,7 @@ export class Explorer {
     const { replay, ...own } = policy
     const copy = policy.layers ? policy : structuredClone(own)
     Object.assign(this.picture, { colours: [], known: {} })
-    Object.assign(this, { original: policy, run: replay, policy: copy, moment: -1 })
+    Object.assign(this, { original: policy, run: replay, policy: copy, moment: -1, dragged: null })
     this.replay.row.hidden = !this.run
     this.backs.hidden = Boolean(policy.layers)
     if (this.run) this.replay.restart(this.run.length)
@@ -138,10 +138,13 @@ export class Explorer {
     requestAnimationFrame(() => requestAnimationFrame(() => this.settled(this)))
   }
 
-  /** The same once keys rest. */
+  /** The same once keys rest: the next one begins another gesture. */
   soon() {
     clearTimeout(this.still)
-    this.still = setTimeout(() => this.settle(), 400)
+    this.still = setTimeout(() => {
+      this.armed = true
+      this.settle()
+    }, 400)
   }
 
   // -- Everything that depends on policy and state
@@ -155,7 +158,6 @@ export class Explorer {
     })
   }
   redo(renewed = true) {
-    if (renewed && !this.policy.layers) ready(this.policy)
     if (renewed) this.judge(IN_MOTION)
     if (renewed) this.mapped = null
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell
@@ -172,6 +174,7 @@ export class Explorer {
       begun = performance.now()
     this.failing.clear()
     if (policy.layers) return (this.results = { played: n, ...policy.results })
+    ready(policy)
     let [played, sum] = [0, 0]
     for (; played < n && (!played || performance.now() - begun < budget); played++) {
       const i = (played * STRIDE) % n,
@@ -228,7 +231,11 @@ export class Explorer {
   /** Show moment i of the run, and say what changed. */
   turn(i) {
     const { n, codewords } = this.run[i]
-    if (this.replay.playing) this.flash(Math.min(this.moment + 1, i), i)
+    const moments = this.run.slice(Math.min(this.moment + 1, i), i + 1),
+      happened = moments.flatMap(({ events }) => events),
+      now = performance.now()
+    if (this.moment >= 0 && !this.replay.slow)
+      this.flashes.push(...happened.map(event => ({ ...event, since: now })))
     this.moment = i
     this.put(this.run[i])
     this.afresh()
@@ -236,11 +243,6 @@ export class Explorer {
       since = last?.n < n ? `, since iteration ${last.n}` : "",
       why = last?.events.map(event => `\n${causeOf(event, this.original.limits)}`) ?? []
     return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`
-  }
-  flash(first, last) {
-    const happened = this.run.slice(first, last + 1).flatMap(({ events }) => events)
-    const since = performance.now()
-    if (!this.replay.slow) this.flashes.push(...happened.map(event => ({ ...event, since })))
   }
   /** For how many milliseconds a moment of the run stays: with a change, longer. */
   lasts(i) {
@@ -257,14 +259,13 @@ export class Explorer {
     do i = i === end ? i : i + way
     while (i !== end && !this.run[i].events.length)
     this.replay.to(i)
-    this.flash(i, i)
     this.settle()
   }
 
   // -- Size and colours of the page, pointer and keys
   listen() {
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
-    const recolour = () => this.changed(true)
+    const recolour = () => this.canvas.isConnected && this.changed(true)
     const watch = new MutationObserver(recolour) // of the site's theme, and of JupyterLab's
     for (const part of [document.documentElement, document.body])
       watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] })
@@ -273,9 +274,9 @@ export class Explorer {
   pointerdown = event => {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
+    this.canvas.focus() // a finger does not
     const { offsetX: x, offsetY: y } = event,
-      fixed = this.fixed || this.angular || this.cells === 1,
-      words = fixed ? [] : this.policy.codewords,
+      words = this.fixed || this.angular || this.cells === 1 ? [] : this.policy.codewords,
       places = words.map(word => this.picture.at(word)),
       far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
       least = Math.min(...far)
@@ -306,7 +307,7 @@ export class Explorer {
   }
   keydown = event => {
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }
-    const way = ways[event.key]
+    const way = { ...ways, " ": [0, 0] }[event.key] // a space would scroll
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return
     event.preventDefault()
     const { low, high } = this.picture.plane,

@@ -1,7 +1,7 @@
 // Policies, tasks and the teacher, computed as Python does. Nothing here knows a page or picture.
 
 const ON_BORDER = 1e-9 // distances that differ by less are equal, or rounding makes a checkerboard
-export const TINTS = 6 // colours of cells
+const TINTS = 6 // colours of cells
 
 export const clip = (value, low, high) => Math.min(Math.max(value, low), high)
 
@@ -36,7 +36,7 @@ function distances({ scaled, scale, metric, place, far }, seen) {
 }
 
 /** The index of the nearest codeword; among equally near ones, up to `slack`, the first. */
-export function cellOf(policy, seen, slack = 0) {
+function cellOf(policy, seen, slack = 0) {
   const far = distances(policy, seen)
   let best = 0
   for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j
@@ -207,7 +207,7 @@ export function refit(policy, { states, actions }, cells = policy.codewords.keys
   return maps
 }
 
-/** The share of the variance of the teacher's actions, taken together, that a policy reproduces. */
+/** The share of the variance of the teacher's actions that a policy reproduces. */
 export function rSquared(scene, policy, { states, actions }) {
   let [off, spread] = [0, 0]
   const mean = (_, k) => actions.reduce((sum, action) => sum + action[k], 0) / actions.length,

@@ -16,12 +16,12 @@ const mixed = (colour, ground, share) =>
 /** The canvas. `plane` is the part of the plane that it shows; `tones` are the page's colours. */
 export class Picture {
   constructor(canvas, plane) {
-    Object.assign(this, { canvas, plane, ctx: canvas.getContext("2d"), colours: [], known: {} })
+    Object.assign(this, { canvas, plane, ctx: canvas.getContext("2d") })
     this.map = new OffscreenCanvas(1, 1)
   }
   /** Take size and colours from the page, and clear. */
   begin() {
-    const ratio = devicePixelRatio || 1,
+    const ratio = devicePixelRatio,
       side = this.canvas.clientWidth || 440,
       size = Math.round(side * ratio),
       style = getComputedStyle(this.canvas)
@@ -212,7 +212,7 @@ function painted(view, cells, others, n) {
   return image
 }
 
-/** Draw everything: map, places, arrows, starts, the episode, codewords, the chosen state, axes. */
+/** Draw everything. */
 export function drawAll(view) {
   const { picture } = view
   picture.begin()
@@ -286,7 +286,7 @@ function drawCodewords(view) {
   })
 }
 
-/** Draw what has just happened: a ring grows around a new codeword, or closes in on a lost one. */
+/** A ring grows around a new codeword, or closes in on a lost one. */
 function drawFlashes(view) {
   const now = performance.now(),
     { picture } = view

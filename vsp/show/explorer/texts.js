@@ -8,8 +8,7 @@ import { act } from "./model.js"
 export function resultOf({ scene, results, base, teacher }) {
   const { played, failures, mean } = results,
     about = played < scene.starts.length ? "about " : ""
-  const both = (before, now) =>
-    base && before !== now ? `${before} → ${about}${now}` : about + now
+  const both = (before, now) => (base ? `${before} → ${about}${now}` : about + now)
   const fails = `${both(base?.failures, failures)} of ${scene.starts.length} starts fail. `
   const returned = `Mean return ${both(base?.mean.toFixed(2), mean.toFixed(2))}`
   const aim = teacher ? ` (teacher: ${teacher.mean.toFixed(2)})` : ""
@@ -19,15 +18,17 @@ export function resultOf({ scene, results, base, teacher }) {
 /** How the episode from the chosen state goes. */
 export function episodeOf({ cell, cells, asked, played, task, picture: { plane } }) {
   if (!played.states.length) return ""
-  const place = task.places[played.outcome - 1],
+  const [goal] = task.places,
+    place = task.places[played.outcome - 1],
+    end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "",
     size = i => Math.floor(Math.log10(plane.high[i] - plane.low[i])),
     at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "),
     steps = count(played.states.length - 1, "step")
   const where = cells > 1 ? `, in cell ${cell}` : ""
-  return `From (${at})${where}: ${steps}${place ? ` to the ${place.name}` : ""}.`
+  return `From (${at})${where}: ${steps}${end}.`
 }
 
-/** What caused a split or a merge; `limits` are the thresholds, where they are known. */
+/** What caused a split or a merge; `limits`: the thresholds, where known. */
 export function causeOf({ kind, codeword, cause }, limits = {}) {
   const at = `${kind} at (${codeword.map(value => minus(value.toFixed(2))).join(", ")})`,
     found = cause.toPrecision(3)
@@ -39,17 +40,17 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds. */
 export function answerOf({ scene, policy, cell, cells, asked, task }) {
   const { inputs, outputs } = scene.task,
-    seen = [...task.see(asked), 1],
+    seen = task.see(asked),
     rows = policy.coefficients[cell],
-    { raw, action } = act(scene, policy, task.see(asked))
+    { raw, action } = act(scene, policy, seen)
   const adds = [...inputs, "bias"].map((name, i) => {
     const said = name === "bias" ? "the bias adds" : `${name} = ${digits(seen[i])} adds`
-    return [said, ...rows[i].map(weight => weight * seen[i])]
+    return [said, ...rows[i].map(weight => weight * (seen[i] ?? 1))]
   })
   const found = [...adds, ["sum", ...raw], ["action, within the limits", ...action]]
   const told = found.map(([name, ...values]) => [name, ...values.map(digits)])
   const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map"
-  return [element("p", {}, element("b", {}, title)), table(["", ...outputs], told)]
+  return [element("p", {}, element("b", {}, title)), table(outputs, told)]
 }
 
 /** What one can do. */
