@@ -12,10 +12,9 @@ SUMMARIES := data/results/SimpleGoal-v0.csv data/results/MountainCarContinuous-v
 
 # NOTEBOOK:FILE of every artefact in notebooks/captions.toml. The name "beyond/x" stands for files in figures/beyond.
 ARTEFACTS := $(shell awk -F '[][."]+' ' \
-  /^\[/ { n = split($$4, name, "/"); folder = $$2 ":figures/" (n > 1 ? name[1] "/" : ""); tables = $$3 == "tables"; gif = 0 } \
-  /^animation/ { gif = 1 } \
+  /^\[/ { n = split($$4, name, "/"); folder = $$2 ":figures/" (n > 1 ? name[1] "/" : ""); tables = $$3 == "tables" } \
   /^caption/ { file = folder (tables ? "tables/" : "") name[n] "."; \
-    print file (tables ? "tex" : gif ? "gif" : "pdf"), file (tables ? "csv" : "png") }' notebooks/captions.toml)
+    print file (tables ? "tex" : "pdf"), file (tables ? "csv" : "png") }' notebooks/captions.toml)
 executed = figures/$(if $(filter $(1),$(BEYOND)),beyond/)executed
 outputs = $(call executed,$(1))/$(1).ipynb $(patsubst $(1):%,%,$(filter $(1):%,$(ARTEFACTS))) \
   $(if $(filter 03_evaluation,$(1)),$(SUMMARIES))

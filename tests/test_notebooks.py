@@ -60,7 +60,7 @@ def test_more_words_than_code(notebook):
     assert words > code
 
 
-KINDS = {"save_figure": "figures", "save_gait": "figures", "save_table": "tables"}
+KINDS = {"save_figure": "figures", "save_table": "tables"}
 
 
 def saved(notebook):

@@ -4,7 +4,7 @@ import re
 
 from docutils import nodes
 
-_DRAWS = re.compile(r"\b(save_figure|save_gait)\(")
+_DRAWS = re.compile(r"\bsave_figure\(")
 _LISTS = re.compile(r"\b(save_table|show_table)\(")
 _ARGUES = re.compile(r"\b(distill|simplify|explain|prove|explore|Laboratory|split_regions|merge_regions)\(")
 _READS = re.compile(r"\b(all_rows|read_rows|read_results|paper_results)\(")

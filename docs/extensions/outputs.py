@@ -14,7 +14,7 @@ from docutils import nodes
 from mathematics import mathml
 from PIL import Image
 
-_IMAGE = re.compile(r"data:image/(?:png|gif);base64,([A-Za-z0-9+/=\s]+)")
+_IMAGE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
 _NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?(\sto\s[-−]?[\d.,]+)?|nan|NaN|inf|True|False|[–—]|")
 
@@ -27,7 +27,7 @@ def _outputs(app, doctree, docname):
             text = _improve(node.astext(), app.outdir, top)
             node.replace_self(nodes.raw("", text, format="html", classes=node["classes"]))
     for node in list(doctree.findall(nodes.image)):
-        if Path(node["uri"]).suffix in (".png", ".gif"):
+        if Path(node["uri"]).suffix == ".png":
             soup = BeautifulSoup(f'<img alt="{html.escape(node["alt"])}">', "html.parser")
             _picture(soup.img, (app.srcdir / node["uri"]).read_bytes(), app.outdir, top)
             node.replace_self(nodes.raw("", str(soup), format="html"))
@@ -66,13 +66,10 @@ def _picture(tag, image: bytes, folder: Path, top: str) -> None:
 
 
 def _save(folder: Path, image: bytes) -> str:
-    """Write a picture to a file named by its content, once: one that stands still as WebP, the same pixels in less."""
-    kind = "gif"
-    if not image.startswith(b"GIF"):
-        kind, file = "webp", io.BytesIO()
-        Image.open(io.BytesIO(image)).save(file, "WEBP", lossless=True)
-        image = file.getvalue()
-    return _write(folder, image, kind)
+    """Write a picture to a file named by its content, once, as WebP: the same pixels in less."""
+    file = io.BytesIO()
+    Image.open(io.BytesIO(image)).save(file, "WEBP", lossless=True)
+    return _write(folder, file.getvalue(), "webp")
 
 
 def _write(folder: Path, content: bytes, kind: str) -> str:

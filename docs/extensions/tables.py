@@ -13,7 +13,7 @@ from vsp.show.captions import BOOK, caption_of
 
 ROOT = Path(__file__).resolve().parents[2]
 TRUST = ROOT / "data" / "results" / "trust.csv"
-_SAVES = {"figures": "save_(?:figure|gait)", "tables": "save_table"}
+_SAVES = {"figures": "save_figure", "tables": "save_table"}
 
 
 def measured(frame: pd.DataFrame) -> str:
