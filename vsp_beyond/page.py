@@ -13,8 +13,8 @@ import numpy as np
 
 from vsp import agent as as_agent
 from vsp.evaluation import Likeness, likeness
-from vsp.paper.statistics import interval, share_interval
 from vsp.policy import VoronoiPolicy
+from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
 from vsp.show.explorer import PLANES, explore, standalone
 from vsp.subpolicies.base import number

@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from vsp import VoronoiPolicy, get_task, load_teacher, start_states
-from vsp.paper.results import load_made, make_missing, provenance, provenance_folder
+from vsp.protocol.job import load_made, make_missing, provenance, provenance_folder
 from vsp.rollouts import rollout
 from vsp.run import listed, sealed
 from vsp.run.progress import progress

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from vsp.paper.results import PROVENANCE
+from vsp.protocol.job import PROVENANCE
 from vsp.run import atomic, command, sealed
 
 from .. import agents

@@ -10,15 +10,15 @@ import pandas as pd
 
 from ...algorithms import teacher_episodes
 from ...evaluation import rollout_from_seed
+from ...protocol.intervals import crossed_interval
+from ...protocol.job import settings_id
 from ...rollouts import Outcomes, Policy
 from ...run import workers
 from ...tasks.base import GOAL
 from ...tasks.registry import get_task
 from .. import printed
 from ..baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from ..results import settings_id
 from ..runs import EVALUATION_SEED, N_RUNS, Experiment, Results, Run, paper_results
-from ..statistics import crossed_interval
 
 VERSION = 2  # raise it when the same runs give other results
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
