@@ -314,7 +314,8 @@ def test_neither_hash_seed_nor_threads_of_a_process_have_a_say():
     assert len({support.distilled_elsewhere(SIMPLEGOAL, config="tiny", **one) for one in settings}) == 1
 
 
-def test_threads_have_no_say():
+def test_threads_have_no_say(monkeypatch):
+    monkeypatch.delenv("MAKELEVEL", raising=False)  # under make nothing plays for the closing remark
     player, config, seen = support.network_teacher(SIMPLEGOAL, width=(400, 300)), tiny(n_epochs=40, n_freeze=5), []
 
     class Spy:

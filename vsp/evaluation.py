@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -105,6 +105,8 @@ def remark(policy: Policy, agent: Policy, task: Task, n: int, advice: str) -> No
         print(f"{alike}; closer: {advice}", file=sys.stderr)
 
 
-def fences(q1: float, q3: float) -> tuple[float, float]:
-    """Return the bounds beyond which a box plot marks outliers: 1.5 interquartile ranges from the quartiles."""
+def fences(q1: Any, q3: Any) -> tuple[Any, Any]:
+    """Return the bounds beyond which a box plot marks outliers: 1.5 interquartile ranges from the quartiles.
+
+    Quartiles are numbers or arrays."""
     return q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)

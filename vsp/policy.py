@@ -252,6 +252,7 @@ class VoronoiPolicy(PiecewisePolicy):
     """
 
     kind = "VoronoiPolicy"
+    where: Nearest
 
     def __init__(
         self,
@@ -268,21 +269,16 @@ class VoronoiPolicy(PiecewisePolicy):
         super().__init__(Nearest(codewords, metric, scale), coefficients, task=task, sub_policy=sub_policy)
 
     @property
-    def _nearest(self) -> Nearest:
-        assert isinstance(self.where, Nearest)
-        return self.where
-
-    @property
     def codewords(self) -> np.ndarray:
         """The codewords, in the units of the states. (k, d)"""
-        return self._nearest.codewords
+        return self.where.codewords
 
     @property
     def scale(self) -> np.ndarray:
         """What states are divided by before distances are taken. (d,)"""
-        return self._nearest.scale
+        return self.where.scale
 
     @property
     def metric(self) -> str:
         """The name of the distance."""
-        return self._nearest.metric.name
+        return self.where.metric.name

@@ -112,11 +112,12 @@ class Distillation(job.Job):
     def run(self, folder: str | os.PathLike) -> Run:
         """Read the run. Raises `atomic.DamagedFile`, also for a run of another experiment or seed."""
         (arrays, about), config = self.load(folder), self.experiment.config
-        parameters = {name: arrays.pop(name) for name in ("codewords", "coefficients", "scale")}
-        form = {"task": self.task, "metric": config.metric, "sub_policy": config.sub_policy}
+        codewords, coefficients, scale, cells = map(arrays.pop, ("codewords", "coefficients", "scale", "cells"))
+        policy = VoronoiPolicy(
+            codewords, coefficients, task=self.task, metric=config.metric, scale=scale, sub_policy=config.sub_policy
+        )
         counts = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
-        cells = arrays.pop("cells")
-        return Run(policy=VoronoiPolicy(**parameters, **form), cells=cells, outcomes=Outcomes(**arrays), **counts)
+        return Run(policy=policy, cells=cells, outcomes=Outcomes(**arrays), **counts)
 
 
 def paper_experiment(task: str, *, quick: bool = False) -> Experiment:

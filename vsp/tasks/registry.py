@@ -117,16 +117,18 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     If no such environment is registered, the task has no dynamics: its policy can act, but no episode can run. Raises
     ValueError if the environment of that name has another box.
     """
-    labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
+    inputs, outputs = tuple(inputs), tuple(outputs)
     try:
         known = get_task(name.rpartition(":")[2])  # a file must not make us import a module
     except (ValueError, gymnasium.error.Error):  # the latter if packages that it needs are missing
         absent = partial(_absent, name)
-        return Task(name, **labels, **box, max_steps=1, start=absent, step=absent)
+        low, high, action_low, action_high = (box[limit] for limit in BOX)
+        return Task(name, inputs, outputs, inputs, low, high, action_low, action_high, 1, absent, absent)
     for limit in BOX:
         if not np.array_equal(getattr(known, limit), box[limit]):
             raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, but {box[limit]} in the file")
-    return known if (known.inputs, known.outputs) == (tuple(inputs), tuple(outputs)) else replace(known, **labels)
+    same = (known.inputs, known.outputs) == (inputs, outputs)
+    return known if same else replace(known, inputs=inputs, outputs=outputs, input_labels=inputs)
 
 
 def _absent(name: str, *_) -> NoReturn:

@@ -51,11 +51,11 @@ class Agent:
 
 def agent(
     source: Policy | Callable[[np.ndarray], np.ndarray] | str | os.PathLike, task: str | Task | None = None, *,
-    name: str | None = None, **options,
+    name: str | None = None, normalize: str | os.PathLike | bool | None = None,
 ) -> Policy:  # fmt: skip
     """Turn `source` into a teacher for `vsp.distill` and similar functions.
 
-    `source` is a file or the name of a task, as `load_teacher` takes them with `task` and `options`; an object with
+    `source` is a file or the name of a task, as `load_teacher` takes them with `task` and `normalize`; an object with
     `predict`, such as a Stable-Baselines3 model, with the normalisation of its observations if it has one, or the one
     in the file `normalize`; or a function of a batch of observations (n, d) that returns actions (n, m). Stochastic
     agents (PPO, SAC, ...) give their most probable actions, because sampling noise carries no information. `name`
@@ -63,21 +63,20 @@ def agent(
     stays as it is. Raises ValueError for any other `source`.
     """
     if isinstance(source, str | os.PathLike):
-        return load_teacher(source, task, **options)
+        return load_teacher(source, task, normalize=normalize)
     predict = getattr(source, "predict", source)
     if not callable(predict):
         raise ValueError(f"the agent is {source!r}, expected a file, something with `predict`, or a function")
-    ready = isinstance(source, Agent | Teacher | PiecewisePolicy)
-    if options and (ready or predict is source or {*options} != {"normalize"}):
-        raise ValueError(f"{', '.join(options)} for {type(source).__name__}, expected nothing, or normalize of a model")
-    if ready:
-        return source  # type: ignore[return-value]
+    if normalize is not None and (predict is source or isinstance(source, Agent | Teacher | PiecewisePolicy)):
+        raise ValueError(f"normalize for {type(source).__name__}, expected none: it belongs to a model")
+    if isinstance(source, Agent | Teacher | PiecewisePolicy):
+        return source
     named = name.encode() if name else None
-    if predict is source:
+    if not hasattr(source, "predict"):
         return Agent(predict, lambda: named)
     from . import normalization  # here: most teachers are no models
 
-    statistics = normalization.of_model(source, **options)
+    statistics = normalization.of_model(source, normalize)
     return Agent(_deterministic(source, statistics), lambda: named or _weights(source, statistics))
 
 

@@ -95,7 +95,7 @@ def contributions(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
     """
     policy.check_linear()
     why, task = policy.explain(state), policy.task
-    row, labels = 0.0, {}
+    row, labels = 0.0, dict[float, str]()
     for j, output in enumerate(task.outputs):
         weights, terms = policy.coefficients[why.cell, :, j], why.contributions.loc[output].to_numpy()
         names = [*(f"{weight:.2f} {name}" for weight, name in zip(weights, task.inputs)), "bias", "sum", "limited"]
