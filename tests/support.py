@@ -1,9 +1,11 @@
 """What several test files share: teachers that need no file, a short configuration, small partitions, processes."""
 
+import ctypes
 import dataclasses
 import functools
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -11,6 +13,7 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
+import pytest
 
 from vsp import geometry
 from vsp.config import Config
@@ -209,3 +212,20 @@ class Payload:
 
     def __reduce__(self):
         return open, (str(self.path), "w")
+
+
+def compiled(policy, folder):
+    if shutil.which("cc") is None:
+        pytest.skip("no C compiler: `cc` is not there")
+    (folder / "policy.c").write_text(policy.to_c(), encoding="utf-8")
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+    library = folder / "policy.so"
+    subprocess.run(["cc", *flags, "-o", library, folder / "policy.c", "-lm"], check=True, capture_output=True)
+    return ctypes.CDLL(str(library))
+
+
+def acted(library, state, m):
+    """The cell and the action (m,) that the C code gives for a state."""
+    state, action = (ctypes.c_double * len(state))(*state), (ctypes.c_double * m)(*[np.nan] * m)
+    library.vsp_act(state, action)
+    return library.vsp_cell(state), list(action)

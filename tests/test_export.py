@@ -1,13 +1,10 @@
-import ctypes
 import dataclasses
 import json
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, acted, compiled
 
 from studies import agents
 from vsp.export import symbol
@@ -42,23 +39,6 @@ each_policy = pytest.mark.parametrize(
     ],
     ids=lambda policy: f"{policy.task.name}-{policy.metric}-{policy.policy_class.name}",
 )  # fmt: skip
-
-
-def compiled(policy, folder):
-    if shutil.which("cc") is None:
-        pytest.skip("no C compiler: `cc` is not there")
-    (folder / "policy.c").write_text(policy.to_c(), encoding="utf-8")
-    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
-    library = folder / "policy.so"
-    subprocess.run(["cc", *flags, "-o", library, folder / "policy.c", "-lm"], check=True, capture_output=True)
-    return ctypes.CDLL(str(library))
-
-
-def acted(library, state, m):
-    """The cell and the action (m,) that the C code gives for a state."""
-    state, action = (ctypes.c_double * len(state))(*state), (ctypes.c_double * m)(*[np.nan] * m)
-    library.vsp_act(state, action)
-    return library.vsp_cell(state), list(action)
 
 
 def executed(policy):

@@ -258,7 +258,7 @@ class Halfspaces:
             f"    node = {0 if self._k > 1 else -1}",
             "    while node >= 0:",
             "        place = sum(n * s for n, s in zip(NORMALS[node], state))",
-            "        node = CHILDREN[node][place > THRESHOLDS[node]]",
+            "        node = CHILDREN[node][int(place > THRESHOLDS[node])]",
             "    return -1 - node",
         ]
 

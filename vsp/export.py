@@ -6,6 +6,7 @@ Numbers are written so that they read back as the same float64. The cells write 
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from .tasks.base import Task
 
 # What LaTeX would take as a command
 _SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
-_SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "cos ": r"\cos ", "sin ": r"\sin "}
+_SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau"}
+_FUNCTION = re.compile(r"\b(sin|cos|tan|tanh|exp|log)\b(?=[ (])")  # as in "sin θ" or "sin(3 x)"
 
 
 class Exportable:
@@ -190,12 +192,13 @@ def symbol(name: str) -> str:
         return " ".join(symbol(factor) for factor in name.split("·"))
     if name.endswith("²"):
         return symbol(name[:-1]) + "^2"
-    words = " " in name and name.isascii() and not name.strip("(").startswith(("cos ", "sin "))
+    words = " " in name and name.isascii() and not _FUNCTION.search(name)
     name = "".join(_SPECIAL.get(one, one) for one in name)
     if words:
         return rf"\mathrm{{{name}}}".replace(" ", r"\ ")
     for plain, code in _SYMBOLS.items():
         name = name.replace(plain, code)
+    name = _FUNCTION.sub(r"\\\1", name)
     if name.isascii() and name.isalpha() and len(name) == 2 and name.startswith("v"):
         return f"v_{name[1]}"
     return rf"\mathrm{{{name}}}" if name.isalpha() and len(name) > 1 else name

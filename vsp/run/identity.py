@@ -6,6 +6,7 @@ identified by its qualified name, its settings, and a hash of its source and of 
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import inspect
 import sys
@@ -34,10 +35,13 @@ def identity(thing: Any, above: tuple = ()) -> Any:
         return thing.item() if isinstance(thing, np.generic) else [digest, str(thing.dtype), *thing.shape]
     if isinstance(thing, dict):
         return {str(key): identity(value, above) for key, value in thing.items()}
-    if isinstance(thing, list | tuple | range):
-        return [identity(value, above) for value in thing]
+    if isinstance(thing, list | tuple | range | set | frozenset):
+        values = [identity(value, above) for value in thing]
+        return sorted(values, key=repr) if isinstance(thing, set | frozenset) else values
     if isinstance(thing, types.ModuleType):
         return {"module": thing.__name__, "library": _library(thing.__name__)}
+    if isinstance(thing, np.ufunc) and "vectorized" not in thing.__name__:  # not one of `numpy.frompyfunc`
+        return {"name": thing.__name__, "library": np.__version__}
     if isinstance(thing, types.MethodType):
         return {"method": thing.__name__, "of": identity(thing.__self__, above)}
     kind = thing if isinstance(thing, _CODE) else type(thing)
@@ -52,36 +56,42 @@ def _origin(thing: Any, kind: Any, above: tuple) -> dict:
     if kind.__module__.partition(".")[0] in OWN:
         return {}
     library = _library(kind.__module__)
-    if library and kind.__name__ != "partial":
+    if library and kind.__name__ not in ("partial", "ufunc"):
         return {"library": library}
     if library or kind.__name__ == "<lambda>":
         raise _unknown(thing, "has no source of its own")
-    parts = [cls for cls in kind.__mro__ if not _library(cls.__module__)] if isinstance(kind, type) else [kind]
-    uses: dict[str, Any] = {}
-    for part in parts:
-        uses |= _uses(part)
+    functions, uses = _written(kind)
     try:
-        text = "".join(inspect.getsource(getattr(part, "__code__", part)) for part in parts)
-    except (OSError, TypeError) as error:
+        text = "".join(inspect.getsource(function.__code__) for function in functions)
+    except OSError as error:
         raise _unknown(thing, "has no source") from error
+    for function in functions:
+        uses |= _used(function)
     return {"source": hashlib.sha256(text.encode()).hexdigest()[:10], "uses": identity(uses, above)}
 
 
-def _uses(part: Any) -> dict[str, Any]:
-    """Return what the source of a function or class refers to, by name: defaults, closure and globals."""
-    if isinstance(part, type):
-        inner = [getattr(value, "__func__", getattr(value, "fget", value)) for value in vars(part).values()]
-        uses = {name: value for name, value in vars(part).items() if name[:2] != "__" and isinstance(value, _PLAIN)}
-        for function in (one for one in inner if isinstance(one, types.FunctionType)):
-            uses |= _uses(function)
-        return uses
-    codes = [part.__code__]
-    for code in codes:
+def _written(kind: Any) -> tuple[list[types.FunctionType], dict[str, Any]]:
+    """Return the functions that somebody wrote: one, or those of a class and its bases; and the constants of these."""
+    if isinstance(kind, types.FunctionType):
+        return [kind], {}
+    parts = [cls for cls in kind.__mro__[::-1] if not _library(cls.__module__)]
+    values = {f"{cls.__qualname__}.{name}": value for cls in parts for name, value in vars(cls).items()}
+    inner = [getattr(value, "__func__", getattr(value, "fget", value)) for value in values.values()]
+    functions = [one for one in inner if isinstance(one, types.FunctionType)]
+    made = ("<string>", dataclasses.__file__)  # methods that `dataclass` writes
+    constants = {name: value for name, value in values.items() if isinstance(value, _PLAIN) and "__" not in name}
+    return [one for one in functions if one.__code__.co_filename not in made], constants
+
+
+def _used(function: types.FunctionType) -> dict[str, Any]:
+    """Return what a function refers to, by name: globals, closure and defaults."""
+    codes = [function.__code__]
+    for code in codes:  # which grows
         codes += [constant for constant in code.co_consts if isinstance(constant, types.CodeType)]
-    names = sorted({name for code in codes for name in code.co_names} & part.__globals__.keys())
-    closure = zip(part.__code__.co_freevars, (cell.cell_contents for cell in part.__closure__ or ()))
-    used = {name: part.__globals__[name] for name in names} | dict(closure)
-    return used | {"defaults": [part.__defaults__, part.__kwdefaults__]}
+    names = sorted({name for code in codes for name in code.co_names} & function.__globals__.keys())
+    closure = zip(function.__code__.co_freevars, (cell.cell_contents for cell in function.__closure__ or ()))
+    used = {name: function.__globals__[name] for name in names} | dict(closure)
+    return used | {f"defaults of {function.__qualname__}": [function.__defaults__, function.__kwdefaults__]}
 
 
 def _settings(thing: Any) -> dict:

@@ -1,0 +1,176 @@
+"""What a researcher adds from outside the packages: each is compared, explained, saved, loaded, exported, shown."""
+
+import dataclasses
+import importlib
+import sys
+import types
+
+import next_map
+import next_method
+import next_metric
+import next_split
+import next_task
+import numpy as np
+import pytest
+from support import SIMPLEGOAL, TASKS, acted, compiled, tiny
+
+import vsp
+import vsp_beyond
+from vsp.paper.runs import Experiment
+from vsp.run.identity import identity
+from vsp.tasks.registry import _ADDED
+
+PILOT = vsp.agent(next_task.pilot, name="pilot")
+CONFIG = tiny(n_epochs=200, n_freeze=20)
+DISTILLED = {  # with the objects that a file names
+    "split": ({}, {"split": next_split.at_the_worst_state}, []),
+    "minkowski": ({"metric": next_metric.MINKOWSKI}, {}, [next_metric.MINKOWSKI]),
+    "circle": ({"metric": next_metric.CIRCLE}, {}, [next_metric.CIRCLE]),
+    "sines": ({"sub_policy": next_map.sines}, {}, [next_map.sines]),
+}
+METHODS = {
+    name: vsp.paper_method(dataclasses.replace(CONFIG, **changes), **passes)
+    for name, (changes, passes, _) in DISTILLED.items()
+} | {"SVM": vsp.Method(next_method.SvmSplits(4), n_data=20)}
+
+
+@pytest.fixture(scope="module")
+def comparison(tmp_path_factory):
+    return vsp.compare(METHODS, [SIMPLEGOAL], seeds=range(2), n_episodes=50, runs=tmp_path_factory.mktemp("runs"))
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path):
+    task, agent = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
+    data = vsp.collect_episodes(agent, task, vsp.start_states(task, 20, 3))
+    policy = METHODS[name](agent, task, data, 0)
+    row = comparison.frame.set_index("method").loc[name]
+    assert row["policies"] == 2 and row["low"] <= row["mean"] <= row["high"] and row["cells"] >= 2
+    states = np.random.default_rng(0).uniform(0, 1, size=(500, 2))
+    known = DISTILLED[name][2] if name in DISTILLED else []
+    policy.save(tmp_path / "policy.vsp")
+    if known:
+        with pytest.raises(ValueError, match="lacks or names .*known"):
+            vsp.PiecewisePolicy.load(tmp_path / "policy.vsp")
+    back = vsp.PiecewisePolicy.load(tmp_path / "policy.vsp", known=known)
+    assert np.array_equal(back.predict(states)[0], policy.predict(states)[0]) and back.digest == policy.digest
+    why = back.explain(states[0])
+    assert why.next_cell not in (None, why.cell) and why.margin >= 0 and "\\begin{tabular}" in back.to_latex()
+    library, module = compiled(policy, tmp_path), {}
+    exec(policy.to_python(), module)
+    for state, action in zip(states, policy.predict(states)[0]):
+        assert acted(library, state, 2) == (policy.cells(state), pytest.approx(action, abs=1e-12))
+        assert module["act"](state) == pytest.approx(action, abs=1e-12)
+    made = vsp_beyond.report(back, agent, SIMPLEGOAL)
+    drawn = name in ("split", "minkowski")
+    assert ("application/json" in made) == drawn and ("no explorer: " in made) == (not drawn)
+
+
+def test_a_task_on_arrays_is_registered_and_compared(tmp_path):
+    """Its name is known, and a change of its step is another task."""
+    vsp.register(next_task.CART)
+    try:
+        assert len(vsp.evaluate(PILOT, "Cart-v0", 5, seed=0)) == 5
+        methods = {"SVM": METHODS["SVM"], "theirs": np.ones((3, 10))}
+        frame = vsp.compare(methods, ["Cart-v0"], {"Cart-v0": PILOT}, seeds=[0], n_episodes=10, runs=tmp_path).frame
+        assert frame["policies"].tolist() == [1, 1, 3] and frame["failing"].iloc[0] == 0
+    finally:
+        _ADDED.pop("Cart-v0")
+    with pytest.raises(ValueError, match="one of vsp's own"):
+        vsp.register(dataclasses.replace(next_task.CART, name=SIMPLEGOAL))
+
+
+def test_a_comparison_makes_what_is_missing_alone(comparison, tmp_path, monkeypatch):
+    made = []
+    make = vsp.protocol.comparison.Trial.make
+    monkeypatch.setattr(vsp.protocol.comparison.Trial, "make", lambda t: (made.append((t.method, t.seed)), make(t))[1])
+    few = {"SVM": METHODS["SVM"]}
+    first = vsp.compare(few, [SIMPLEGOAL], seeds=[0], n_episodes=20, runs=tmp_path)
+    again = vsp.compare(few | {"split": METHODS["split"]}, [SIMPLEGOAL], seeds=[0, 1], n_episodes=20, runs=tmp_path)
+    kinds = [(one.name or "SVM", seed) for one, seed in made]
+    assert kinds == [
+        ("the agent itself", 0),
+        ("SVM", 0),
+        ("SVM", 1),
+        *[("the paper's method", seed) for seed in (0, 1)],
+    ]
+    key = SIMPLEGOAL, "SVM"
+    assert np.array_equal(first.returns[key][0], again.returns[key][0]) and len(again.frame) == 3
+    assert "\\toprule" in again.to_latex() and again.plot(SIMPLEGOAL).get_title() == SIMPLEGOAL
+    with pytest.raises(ValueError, match="one array, expected one by name of the task"):
+        vsp.compare({"theirs": np.ones((2, 5))}, TASKS, runs=tmp_path)
+
+
+# What identifies a part
+
+
+class NeverSplit:
+    def split(self, partition, episode, config, rng):
+        return []
+
+    merge = staticmethod(vsp.merge_regions)
+
+
+class LikeThePaper(NeverSplit):
+    split = staticmethod(vsp.split_regions)
+
+
+def test_rules_without_fields_are_told_apart(tmp_path):
+    """Also from the paper's own passes: each loads its own run."""
+    teacher, cells = vsp.load_teacher(SIMPLEGOAL), {}
+    for rule in (NeverSplit(), LikeThePaper(), None):
+        one = Experiment(SIMPLEGOAL, CONFIG, teacher, 5, rule)
+        (run,) = vsp.paper.runs.make_runs(one, [0], runs=tmp_path)
+        cells[type(rule)] = len(run.policy)
+    assert cells[NeverSplit] == 1 < cells[LikeThePaper] == cells[type(None)] and len([*tmp_path.glob("*/*")]) == 3
+
+
+BODY = """
+import numpy as np
+LEAST = 3
+def helper(x): return x + 1
+class Rule:
+    def __init__(self, size=1): self.size = size
+    def __call__(self, agent, task, data, seed): return helper(LEAST)
+"""
+
+
+@pytest.mark.parametrize(("old", "new"), [("return helper", "return -helper"), ("= 3", "= 4"), ("x + 1", "x + 2")])
+def test_an_edited_body_helper_or_constant_is_another_rule(old, new, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    found = []
+    for text in (BODY, BODY, BODY.replace(old, new)):
+        (tmp_path / "edited_rule.py").write_text(text)
+        sys.modules.pop("edited_rule", None)
+        importlib.invalidate_caches()
+        found.append(identity(importlib.import_module("edited_rule").Rule()))
+    assert found[0] == found[1] != found[2]
+    assert identity(sys.modules["edited_rule"].Rule(2)) != found[2]
+
+
+def test_code_without_source_needs_a_version():
+    for rule in (lambda *_: [], np.frompyfunc(abs, 1, 1), __import__("functools").partial(next_map.sines)):
+        with pytest.raises(ValueError, match="or give it a `version`"):
+            identity(rule)
+    rule = types.SimpleNamespace(version=2, settings={"a": 1})
+    assert identity(rule)["version"] == 2 and identity(rule)["settings"] == {"a": 1}
+    with pytest.raises(ValueError, match="has no identity, expected a name"):
+        vsp.compare({"SVM": METHODS["SVM"]}, ["Pendulum-v1"], {"Pendulum-v1": vsp.agent(next_task.pilot)})
+    assert PILOT.digest != vsp.agent(next_task.pilot, name="other").digest
+
+
+def test_the_distance_is_part_of_every_id_and_file(tmp_path):
+    teacher = vsp.load_teacher(SIMPLEGOAL)
+    for metric in (
+        "manhattan",
+        "euclidean",
+        next_metric.MINKOWSKI,
+        dataclasses.replace(next_metric.MINKOWSKI, order=4),
+    ):
+        one = Experiment(SIMPLEGOAL, dataclasses.replace(CONFIG, metric=metric), teacher, 5)
+        (run,) = vsp.paper.runs.make_runs(one, [0], runs=tmp_path)
+        again = vsp.rollout_from_seed(run.policy, SIMPLEGOAL, 5, seed=1)
+        assert run.policy.where.metric == vsp.geometry.metric_of(metric)
+        assert np.array_equal(run.outcomes.returns, again.returns)
+    assert len([*tmp_path.glob("*/*")]) == 4
