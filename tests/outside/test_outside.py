@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib
+import re
 import sys
 import types
 
@@ -17,6 +18,7 @@ from support import SIMPLEGOAL, TASKS, acted, compiled, tiny
 import vsp
 import vsp_beyond
 from vsp.paper.runs import Experiment
+from vsp.run.atomic import ROOT
 from vsp.run.identity import identity
 from vsp.tasks.registry import _ADDED
 
@@ -40,7 +42,8 @@ def comparison(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path):
+def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path, monkeypatch):
+    monkeypatch.setattr("vsp_beyond.page.PROVERS", {})  # a proof takes long
     task, agent = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
     data = vsp.collect_episodes(agent, task, vsp.start_states(task, 20, 3))
     policy = METHODS[name](agent, task, data, 0)
@@ -174,3 +177,8 @@ def test_the_distance_is_part_of_every_id_and_file(tmp_path):
         assert run.policy.where.metric == vsp.geometry.metric_of(metric)
         assert np.array_equal(run.outcomes.returns, again.returns)
     assert len([*tmp_path.glob("*/*")]) == 4
+
+
+def test_the_page_shows_the_code_that_is_tested():
+    code = re.search(r"```python\n(.*?)```", (ROOT / "docs/next_method.md").read_text("utf-8"), flags=re.S)[1]
+    assert (ROOT / "tests/outside/next_method.py").read_text("utf-8").endswith(f"\n{code}") and len(code) > 1000
