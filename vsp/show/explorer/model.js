@@ -188,7 +188,8 @@ export function rollout(scene, policy, start, keep = false) {
  * NumPy's. Jacobi rotations turn the columns of `a` until they are orthogonal (Hestenes 1958).
  * @param {Vector[]} a @param {Vector[]} b */
 export function leastSquares(a, b) {
-  const unit = (/** @type {number} */ i) => a[0].map((_, j) => +(i === j)) // below column i, for the sum of all turns
+  // Below column i, for the sum of all turns
+  const unit = (/** @type {number} */ i) => a[0].map((_, j) => +(i === j))
   const columns = a[0].map((_, i) => [...a.map(row => row[i]), ...unit(i)])
   /** @type {(u: Vector, v: Vector) => number} */
   const dot = (u, v) => a.reduce((sum, _, row) => sum + u[row] * v[row], 0)

@@ -144,7 +144,8 @@ export class Picture {
     ctx.fill()
     ctx.stroke()
   }
-  /** @type {(at: Vector, radius: number, fill?: string, stroke?: string, width?: number) => void} */
+  /** @param {Vector} point @param {number} radius
+   * @param {string | undefined} fill @param {string} [stroke] */
   dot(point, radius, fill, stroke, width = 1.5) {
     const { ctx } = this,
       [x, y] = this.at(point)
