@@ -48,7 +48,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
 .PHONY: help list quick paper-figures beyond-figures all lab runs study hub-teacher agents proofs proofs-teacher course article site test \
-  test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
+  test-js test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
 # $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp was made with this QUICK, no file of INPUTS is newer,
@@ -132,6 +132,10 @@ test: venv-test-train-dask ## runs the tests: 2 to 5 minutes; FILES=tests/test_g
 
 test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 6 minutes
 	@$(PYTEST) tests/long
+
+test-js: ##- tests the scripts of explorer, article and site without a browser, which needs Node.js 20.19: 3 s
+	@command -v node > /dev/null || { echo 'error: no node found: install Node.js 20.19 or newer' >&2; exit 1; }
+	@node --no-warnings --test tests/js/modules.test.mjs
 
 lint: venv-test-train ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy

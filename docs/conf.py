@@ -6,8 +6,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs" / "extensions")]
 
-from vsp.show.explorer import MODULES  # noqa: E402
-
 project = "vsp"
 author = "the vsp authors"
 language = "en"
@@ -48,7 +46,8 @@ maximum_signature_line_length = 80
 html_theme = "sphinx_book_theme"
 html_title = "Voronoi state partitioning"
 html_favicon = html_logo = "static/logo.svg"
-html_static_path = ["static", "article/article.css", *map(str, MODULES), str(MODULES[0].with_name("explorer.css"))]
+EXPLORER = [f"../vsp/show/explorer/explorer.{name}" for name in ("bundle.js", "css")]
+html_static_path = ["static", "article/article.css", *EXPLORER]
 html_css_files = ["site.css", "explorer.css", "article.css"]
 html_js_files = ["site.js"]
 templates_path = ["templates"]

@@ -18,13 +18,12 @@ from data import longer, parts, policies
 from vsp import VoronoiPolicy
 from vsp.run import atomic
 from vsp.show import style
-from vsp.show.explorer import MODULES, STYLE, bundle
+from vsp.show.explorer import STYLE
 
 FOLDER = Path(__file__).parent
 TITLE = "A network in a few equations"
 LONGER = 45_000  # more iterations in section 4: with them ten times as many
 SCALE = 12, 17  # of the mean return, in section 7
-SCRIPTS = [*MODULES, FOLDER / "address.js", FOLDER / "article.js"]
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
@@ -87,8 +86,8 @@ def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
         f'<script type="application/json" id="article-{name}">{json.dumps(part, separators=(",", ":"))}</script>'
         for name, part in data.items()
     )
-    look = STYLE + (FOLDER / "article.css").read_text("utf-8")
-    return PAGE.format(title=TITLE, style=look, text=said, data=stored, script=bundle(SCRIPTS))
+    look, script = ((FOLDER / f"article.{name}").read_text("utf-8") for name in ("css", "bundle.js"))
+    return PAGE.format(title=TITLE, style=STYLE + look, text=said, data=stored, script=script)
 
 
 if __name__ == "__main__":

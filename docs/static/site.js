@@ -1,4 +1,6 @@
+// @ts-check
 // Paper is white: a dark page is printed as the light one.
+/** @type {string | undefined} */
 let shown
 addEventListener("beforeprint", () => {
   shown = document.documentElement.dataset.theme
@@ -9,14 +11,14 @@ addEventListener("afterprint", () => {
 })
 
 // Explorers begin to answer where the page has one.
-const folder = document.currentScript.src
+const folder = /** @type {HTMLScriptElement} */ (document.currentScript).src
 addEventListener("DOMContentLoaded", async () => {
   if (document.querySelector(".vsp-explorer"))
-    (await import(new URL("explorer.js", folder))).mountAll()
+    (await import(new URL("explorer.bundle.js", folder).href)).mountAll()
 })
 
 // Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
-const mark = box =>
+const mark = (/** @type {Element} */ box) =>
   box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
 addEventListener("load", () => {
   const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
@@ -30,7 +32,7 @@ addEventListener("load", () => {
 
 // A letter by itself would find every name that has it somewhere; ∞ is no letter.
 // (Sphinx's search takes this for its own.)
-var splitQuery = query =>
+var splitQuery = (/** @type {string} */ query) =>
   query
     .replaceAll("∞", " infinity ")
     .split(/[^\p{Letter}\p{Number}_]+/u)
@@ -43,6 +45,6 @@ addEventListener("DOMContentLoaded", () => {
   if (found && word)
     new MutationObserver(() => {
       for (const link of found.querySelectorAll("a:not([href*='#'])"))
-        link.hash = `:~:text=${encodeURIComponent(word)}`
+        /** @type {HTMLAnchorElement} */ (link).hash = `:~:text=${encodeURIComponent(word)}`
     }).observe(found, { childList: true, subtree: true })
 })

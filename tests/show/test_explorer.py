@@ -7,7 +7,7 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
-from vsp.show.explorer import MODULES, STYLE, bundle, scene_of
+from vsp.show.explorer import SCRIPT, STYLE, scene_of
 
 TWO = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.75]], -np.ones((2, 3, 2)), task=SIMPLEGOAL)
 
@@ -53,7 +53,7 @@ def test_starts_cover_those_of_the_task(task):
 def test_the_file_is_whole_by_itself(tmp_path):
     vsp.explore(TWO).save(tmp_path / "two.html")
     page = (tmp_path / "two.html").read_text("utf-8")
-    assert bundle(MODULES) in page and STYLE in page and "<img alt=" in page
+    assert SCRIPT in page and STYLE in page and "<img alt=" in page
     assert not re.findall(r"(?:src|href)=[\"'](?!data:)", page) and "http" not in page.replace("http-equiv", "")
     scene = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)[1])
     assert scene == json.loads(json.dumps(vsp.explore(TWO).scene))

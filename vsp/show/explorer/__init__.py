@@ -6,6 +6,6 @@ and `texts` are around it, `explorer` joins them. `scene` collects the data to d
 
 from .explorer import Explorer, explore, standalone
 from .scene import PLANES, scene_of
-from .scripts import MODULES, STYLE, bundle
+from .scripts import SCRIPT, STYLE
 
-__all__ = ["MODULES", "PLANES", "STYLE", "Explorer", "bundle", "explore", "scene_of", "standalone"]
+__all__ = ["PLANES", "SCRIPT", "STYLE", "Explorer", "explore", "scene_of", "standalone"]

@@ -1,26 +1,37 @@
+// @ts-check
 // Controls: elements, numbers, equations to write in, a player.
 
 const SPEEDS = [0.25, 1, 4]
 
-/** Make an element with attributes, listeners (functions) and children. */
+/** Make an element with attributes, listeners (functions) and children.
+ * @template {keyof HTMLElementTagNameMap} T @param {T} tag @param {Attributes} attributes
+ * @param {(Node | string)[]} children */
 export function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag)
   for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function") made.addEventListener(name, value)
-    else if (value !== false) made.setAttribute(name, value === true ? "" : value)
+    if (typeof value === "function")
+      made.addEventListener(name, /** @type {EventListener} */ (value))
+    else if (value !== false) made.setAttribute(name, value === true ? "" : String(value))
   }
   made.append(...children)
   return made
 }
 
+/** @type {(label: string, click: () => void) => HTMLButtonElement} */
 export const button = (label, click) => element("button", { type: "button", click }, label)
+/** @type {(...children: Node[]) => HTMLElement} */
 export const row = (...children) => element("div", { class: "vsp-row" }, ...children)
-export const minus = text => String(text).replaceAll("-", "−")
+/** @type {(text: string) => string} */
+export const minus = text => text.replaceAll("-", "−")
+/** @type {(n: number, thing: string) => string} */
 export const count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`
+/** @type {(value: number) => string} */
 export const digits = value => (Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3)))
 
-/** Make a table: names of the columns but the first, then rows that begin with their name. */
+/** Make a table: names of the columns but the first, then rows that begin with their name.
+ * @param {string[]} head @param {string[][]} rows */
 export function table(head, rows) {
+  /** @type {(first: Node, tag: "td" | "th", about: Attributes, values: string[]) => Node} */
   const line = (first, tag, about, values) =>
     element("tr", {}, first, ...values.map(value => element(tag, about, value)))
   const body = rows.map(([name, ...values]) =>
@@ -29,37 +40,46 @@ export function table(head, rows) {
   return element("table", {}, line(element("td"), "th", { scope: "col" }, head), ...body)
 }
 
-/** A list to choose from; `take` gets the index. */
+/** A list to choose from; `take` gets the index.
+ * @param {string} label @param {string[]} names @param {(i: number) => void} take */
 export function choice(label, names, take, at = 0) {
   const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name))
-  const change = ({ target }) => take(+target.value)
-  return element("label", {}, `${label} `, element("select", { change }, ...options))
+  const change = () => void take(+list.value)
+  const list = element("select", { change }, ...options)
+  return element("label", {}, `${label} `, list)
 }
 
-/** A field for number i of a list, which takes every number that is written, and tells it. */
+/** A field for number i of a list, which takes every number that is written, and tells it.
+ * @param {string} label @param {Vector} list @param {number} i @param {number} step
+ * @param {() => void} changed */
 function field(label, list, i, step, changed) {
   const value = () => +(+list[i].toFixed(3)).toPrecision(4)
-  const input = ({ target: { valueAsNumber: given } }) => {
+  const input = () => {
+    const given = made.valueAsNumber
     if (!(Math.abs(given) <= 1e6)) return
     list[i] = given
     changed()
   }
-  const change = ({ target }) => (target.value = value()) // the number that counts
+  const change = () => (made.value = String(value())) // the number that counts
   const about = { type: "number", step, value: value(), "aria-label": label }
-  return element("input", { ...about, input, change })
+  const made = element("input", { ...about, input, change })
+  return made
 }
 
 /** Fields for the codeword, where it can be moved, and the equations of the chosen cell of a view.
- * `changed` is called after each change. */
+ * `changed` is called after each change. @param {Explorer} view @param {() => void} changed */
 export function equations({ scene, policy, cell, cells, angular }, changed) {
+  if (policy.layers) return []
   const { task, plane } = scene,
     rows = policy.coefficients[cell],
     codeword = policy.codewords[cell]
-  const range = i => (angular ? 2 : plane.high[i] - plane.low[i])
+  const range = (/** @type {number} */ i) => (angular ? 2 : plane.high[i] - plane.low[i])
+  /** @type {(label: string, list: Vector, i: number, step: number, ...around: string[]) => Node} */
   const term = (label, list, i, step, before, after = "") => {
     const written = field(label, list, i, step, changed)
     return element("span", { class: "vsp-term" }, before, written, after)
   }
+  /** @type {(name: string, terms: Node[]) => Node} */
   const line = (name, terms) => element("div", { class: "vsp-equation" }, `${name} `, ...terms)
   const places = task.inputs.map((name, i) =>
     term(`codeword: ${name}`, codeword, i, +(range(i) / 50).toPrecision(1), `${name} = `),
@@ -78,10 +98,13 @@ export function equations({ scene, policy, cell, cells, angular }, changed) {
  * `lasts(i)` says for how many milliseconds. */
 export class Player {
   text = ""
-  constructor(view) {
-    Object.assign(this, { view, speed: 1 })
+  speed = 1
+  playing = false
+  /** @type {HTMLInputElement} */ slider
+  constructor(/** @type {Explorer} */ view) {
+    this.view = view
     this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches // one picture a second
-    const go = way => (this.stop(), view.jump(way))
+    const go = (/** @type {1 | -1} */ way) => (this.stop(), view.jump(way))
     const input = () => (this.stop(), this.to(+this.slider.value))
     const settled = { input, change: () => view.soon() }
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled })
@@ -96,12 +119,12 @@ export class Player {
     return +this.slider.value
   }
   /** Set the number of moments and go to the last one. */
-  restart(count) {
-    this.slider.max = count - 1
+  restart(/** @type {number} */ count) {
+    this.slider.max = String(count - 1)
     this.to(count - 1)
   }
-  to(i) {
-    this.slider.value = i
+  to(/** @type {number} */ i) {
+    this.slider.value = String(i)
     this.text = this.view.turn(this.at)
   }
   /** Say where it is: with the next frame, as all texts. */
@@ -115,7 +138,7 @@ export class Player {
     this.toggle.textContent = "pause"
     if (this.at === last) this.to(0)
     let [before, waited] = [performance.now(), 0]
-    const frame = now => {
+    const frame = (/** @type {number} */ now) => {
       if (!this.playing || !this.slider.isConnected) return
       waited += (now - before) * this.speed
       before = now

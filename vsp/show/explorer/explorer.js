@@ -1,3 +1,4 @@
+// @ts-check
 // The explorer: replay a distillation, query a policy at a state, change the policy and watch its
 // episodes. It draws a scene, which scene.py describes. "Cell 3" here is cell 3 in Python.
 
@@ -15,23 +16,65 @@ const [PLAYS, PAUSE] = [20_000, 400] // milliseconds: of a run, and at most of o
  * controls; `above` stands above the panel. `settled(view)` is called after each gesture,
  * `told(view)` after each update. */
 export class Explorer {
+  /** @type {Map<number, number>} */
   failing = new Map() // of the starts that fail, by index: the cell of their last step
-  past = [] // numbers to undo to
-  flashes = [] // changes that have just happened
-  regions = null // polygons to fill
+  /** @type {Partial<Numbers>[]} */ past = [] // to undo to
+  /** @type {(Change & { since: number })[]} */ flashes = [] // changes that have just happened
+  /** @type {Vector[] | null} */ regions = null // polygons to fill
   starts = true // whether they are drawn
   fixed = false // whether codewords cannot be moved
-  dragged = null // the codeword, or -1 for the state
+  /** @type {number | null} */ dragged = null // the codeword, or -1 for the state
+  pressed = { x: 0, y: 0, place: [0, 0] } // where a gesture began
+  moment = -1 // of the run
+  /** @type {Policy} */ policy // with the numbers of the reader
+  /** @type {Policy} */ original
+  /** @type {Moment[]} */ run
+  /** @type {Played} */ played // from the state that is `asked`
+  /** @type {number} */ cell // that acts there
+  /** @type {Judged} */ results
+  /** @type {Judged | null} */ base // the results before the last gesture
+  /** @type {Partial<Numbers>} */ kept // those before the next gesture
+  armed = false // whether the next change begins a gesture
+  /** @type {number | null} */ mapped // the cell that is marked on the map
+  renewed = false // whether the policy has changed since the last frame
+  waiting = 0 // for a frame
+  fading = 0
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ still
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ later
 
+  result = element("p", { class: "vsp-result" })
+  from = element("p", { class: "vsp-from" })
+  said = element("div", {}, this.result, this.from)
+  answer = element("div")
+  note = element("p", { class: "vsp-note" })
+  legend = element("ul", { class: "vsp-legend", "aria-label": "legend" })
+  // Kept while a reader writes
+  form = element("div", {
+    focusout: ({ relatedTarget: to }) => {
+      if (!this.form.contains(/** @type {Node | null} */ (to))) this.changed()
+    },
+    focusin: () => (this.armed = true),
+    input: () => this.soon(),
+  })
+  backs = row(
+    button("undo", () => this.undo()),
+    button("reset", () => this.take(this.original)),
+  )
+  replay = new Player(this)
+
+  /** @param {HTMLElement} root @param {Scene} scene @param {Hooks} hooks */
   constructor(root, scene, { bare, above = [], settled = () => {}, told = () => {} } = {}) {
     const { low, high } = scene.plane
-    Object.assign(this, { scene, settled, told, task: dynamics(scene.task.name) })
+    this.scene = scene
+    this.settled = settled
+    this.told = told
+    this.task = dynamics(scene.task.name)
     this.angular = scene.task.name === "Pendulum-v1"
     this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
     this.canvas = this.makeCanvas()
     this.picture = new Picture(this.canvas, scene.plane)
-    this.makeControls()
-    const held = root.contains(document.activeElement) && document.activeElement
+    const active = /** @type {HTMLElement | null} */ (document.activeElement),
+      held = root.contains(active) && active
     root.classList.add("vsp-explorer")
     const under = bare ? this.legend : this.answer,
       stage = element("div", { class: "vsp-stage" }, this.canvas, this.said, under)
@@ -46,24 +89,7 @@ export class Explorer {
       label = "Map of the policy. Arrow keys move the chosen state."
     return element("canvas", { tabindex: 0, role: "application", "aria-label": label, ...answers })
   }
-  makeControls() {
-    this.result = element("p", { class: "vsp-result" })
-    this.from = element("p", { class: "vsp-from" })
-    this.said = element("div", {}, this.result, this.from)
-    this.answer = element("div")
-    this.note = element("p", { class: "vsp-note" })
-    this.legend = element("ul", { class: "vsp-legend", "aria-label": "legend" })
-    const focusout = ({ relatedTarget: to }) => this.form.contains(to) || this.changed()
-    const focusin = () => (this.armed = true)
-    // Kept while a reader writes
-    this.form = element("div", { focusout, focusin, input: () => this.soon() })
-    this.backs = row(
-      button("undo", () => this.undo()),
-      button("reset", () => this.take(this.original)),
-    )
-    this.replay = new Player(this)
-  }
-  panel(above) {
+  panel(/** @type {Node[]} */ above) {
     const names = this.scene.policies.map(({ name }) => name)
     const policy = choice("policy", names, i => this.show(this.scene.policies[i]))
     const parts = [this.replay.row, this.form, this.backs, this.note]
@@ -71,11 +97,12 @@ export class Explorer {
   }
 
   // -- What is shown, and where it lies in the picture
-  place = state => {
+  place = (/** @type {Vector} */ state) => {
     if (!this.angular) return state
     const [angle, speed] = state
     return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed]
   }
+  /** @type {(seen: Vector) => Vector} */
   placeSeen = seen => (this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen)
   get teacher() {
     return "teacher" in this.policy ? this.policy.teacher : this.scene.teacher
@@ -83,26 +110,27 @@ export class Explorer {
   get cells() {
     return this.policy.layers ? 1 : this.policy.codewords.length
   }
-  /** Show a policy of the scene with its run, if it has one; `numbers` replace its own. */
+  /** Show a policy of the scene with its run, if it has one; `numbers` replace its own.
+   * @param {Policy} policy @param {Partial<Numbers>} [numbers] */
   show(policy, numbers) {
     this.replay.stop()
-    const { replay, ...own } = policy
+    const { replay: run = [], ...own } = policy
     const copy = policy.layers ? policy : structuredClone(own)
     Object.assign(this.picture, { colours: [], known: {} })
-    Object.assign(this, { original: policy, run: replay, policy: copy, moment: -1, dragged: null })
-    this.replay.row.hidden = !this.run
+    Object.assign(this, { original: policy, run, policy: copy, moment: -1, dragged: null })
+    this.replay.row.hidden = !run.length
     this.backs.hidden = Boolean(policy.layers)
-    if (this.run) this.replay.restart(this.run.length)
+    if (run.length) this.replay.restart(run.length)
     if (numbers) this.put(numbers)
     this.afresh()
   }
 
   // -- Changing the policy
   /** A copy of what a reader can change. */
-  numbers({ codewords, coefficients } = this.policy) {
+  numbers({ codewords, coefficients } = /** @type {Partial<Numbers>} */ (this.policy)) {
     return structuredClone({ codewords, coefficients })
   }
-  put(numbers) {
+  put(/** @type {Partial<Numbers>} */ numbers) {
     Object.assign(this.policy, this.numbers(numbers))
   }
   /** Forget all gestures. */
@@ -120,7 +148,7 @@ export class Explorer {
     this.changed(true)
   }
   /** Take other numbers, as one gesture. */
-  take(numbers) {
+  take(/** @type {Partial<Numbers>} */ numbers) {
     this.replay.stop()
     this.put(numbers)
     this.armed = true
@@ -173,7 +201,10 @@ export class Explorer {
       n = scene.starts.length,
       begun = performance.now()
     this.failing.clear()
-    if (policy.layers) return (this.results = { played: n, ...policy.results })
+    if (policy.layers) {
+      this.results = { played: n, ...policy.results }
+      return
+    }
     ready(policy)
     let [played, sum] = [0, 0]
     for (; played < n && (!played || performance.now() - begun < budget); played++) {
@@ -196,8 +227,7 @@ export class Explorer {
     this.said.setAttribute("aria-live", moving ? "off" : "polite") // else too much to hear
     this.result.textContent = resultOf(this)
     this.from.textContent = episodeOf(this)
-    if (!this.policy.layers && this.answer.isConnected)
-      this.answer.replaceChildren(...answerOf(this))
+    if (this.answer.isConnected) this.answer.replaceChildren(...answerOf(this))
     this.legend.replaceChildren(...legendOf(this))
     this.note.textContent = noteOf(this)
     this.replay.tell()
@@ -229,7 +259,7 @@ export class Explorer {
 
   // -- The run
   /** Show moment i of the run, and say what changed. */
-  turn(i) {
+  turn(/** @type {number} */ i) {
     const { n, codewords } = this.run[i]
     const moments = this.run.slice(Math.min(this.moment + 1, i), i + 1),
       happened = moments.flatMap(({ events }) => events),
@@ -240,12 +270,12 @@ export class Explorer {
     this.put(this.run[i])
     this.afresh()
     const last = this.run.slice(0, i + 1).findLast(({ events }) => events.length),
-      since = last?.n < n ? `, since iteration ${last.n}` : "",
+      since = last && last.n < n ? `, since iteration ${last.n}` : "",
       why = last?.events.map(event => `\n${causeOf(event, this.original.limits)}`) ?? []
     return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`
   }
   /** For how many milliseconds a moment of the run stays: with a change, longer. */
-  lasts(i) {
+  lasts(/** @type {number} */ i) {
     const changes = this.run.filter(({ events }) => events.length).length,
       pause = Math.min(PAUSE, PLAYS / 2 / Math.max(changes, 1)),
       rest = (PLAYS - pause * changes) / Math.max(this.run.length - changes, 1)
@@ -253,7 +283,7 @@ export class Explorer {
     return this.run[i].events.length ? long : short
   }
   /** Go to the next change (1) or the one before (-1). */
-  jump(way) {
+  jump(/** @type {1 | -1} */ way) {
     const end = way > 0 ? this.run.length - 1 : 0
     let i = this.replay.at
     do i = i === end ? i : i + way
@@ -271,12 +301,12 @@ export class Explorer {
       watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] })
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour)
   }
-  pointerdown = event => {
+  pointerdown = (/** @type {PointerEvent} */ event) => {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
     this.canvas.focus() // a finger does not
     const { offsetX: x, offsetY: y } = event,
-      words = this.fixed || this.angular || this.cells === 1 ? [] : this.policy.codewords,
+      words = this.fixed || this.angular || this.cells === 1 ? [] : (this.policy.codewords ?? []),
       places = words.map(word => this.picture.at(word)),
       far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
       least = Math.min(...far)
@@ -285,18 +315,19 @@ export class Explorer {
     this.replay.stop()
     this.choose(words[this.dragged] ?? this.picture.point(x, y))
   }
-  pointermove = event => {
+  pointermove = (/** @type {PointerEvent} */ event) => {
     if (this.dragged === null) return
-    const { x, y, place } = this.pressed,
+    const { codewords } = this.policy,
+      { x, y, place } = this.pressed,
       [dx, dy] = [event.offsetX - x, event.offsetY - y],
       point = this.picture.point(place[0] + dx, place[1] + dy)
-    if (this.dragged < 0) return this.choose(point)
+    if (this.dragged < 0 || !codewords) return this.choose(point)
     if (this.armed && Math.hypot(dx, dy) < 4) return // a finger that rests
-    this.policy.codewords[this.dragged] = point
+    codewords[this.dragged] = point
     this.asked = [...point]
     this.edited()
   }
-  choose(point) {
+  choose(/** @type {Vector} */ point) {
     this.asked = [...point]
     this.base = null
     this.changed()
@@ -305,13 +336,15 @@ export class Explorer {
     if (this.dragged !== null) this.settle()
     this.dragged = null
   }
-  keydown = event => {
+  keydown = (/** @type {KeyboardEvent} */ event) => {
+    /** @type {Record<string, Vector>} */
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }
     const way = { ...ways, " ": [0, 0] }[event.key] // a space would scroll
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return
     event.preventDefault()
     const { low, high } = this.picture.plane,
       by = event.shiftKey ? 0.1 : 0.01
+    /** @type {(value: number, i: number) => number} */
     const moved = (value, i) => clip(value + way[i] * by * (high[i] - low[i]), low[i], high[i])
     this.choose(this.asked.map(moved))
     this.soon()
@@ -320,6 +353,7 @@ export class Explorer {
 
 /** For anywidget. */
 export default {
+  /** @param {Widget} widget */
   render({ model, el }) {
     el.addEventListener("keydown", event => {
       // JupyterLab would take the arrow keys from sliders and lists to select a cell
@@ -337,14 +371,16 @@ export default {
   },
 }
 
-/** Load the scene of an explorer in view; of several the first, with a choice. */
-async function reveal([{ isIntersecting, target: root }], watch) {
+/** Load the scene of an explorer in view; of several the first, with a choice.
+ * @type {IntersectionObserverCallback} */
+async function reveal([{ isIntersecting, target }], watch) {
   if (!isIntersecting) return
   watch.disconnect()
-  const files = JSON.parse(root.dataset.scenes),
+  const root = /** @type {HTMLElement} */ (target),
+    files = JSON.parse(root.dataset.scenes ?? "{}"),
     names = Object.keys(files)
-  let wanted
-  const open = async i => {
+  let wanted = 0
+  const open = async (/** @type {number} */ i) => {
     wanted = i
     const found = await (await fetch(files[names[i]])).json()
     if (wanted === i) new Explorer(root, found, { above })
@@ -355,10 +391,10 @@ async function reveal([{ isIntersecting, target: root }], watch) {
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
 export function mountAll() {
-  for (const root of document.querySelectorAll(
-    ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])",
-  )) {
-    root.dataset.mounted = true
+  const bare = ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])"
+  for (const found of document.querySelectorAll(bare)) {
+    const root = /** @type {HTMLElement} */ (found)
+    root.dataset.mounted = "true"
     const inner = root.querySelector("script")
     if (inner) new Explorer(root, JSON.parse(inner.textContent))
     else new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root)

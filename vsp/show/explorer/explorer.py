@@ -17,7 +17,7 @@ from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
 from .scene import scene_of, to_json
-from .scripts import MODULES, STYLE, bundle
+from .scripts import SCRIPT, STYLE
 
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -40,7 +40,7 @@ mountAll()
 
 def standalone(title: str, body: str, style: str = "") -> str:
     """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS."""
-    return _PAGE.format(title=html.escape(title), body=body, style=STYLE + style, script=bundle(MODULES))
+    return _PAGE.format(title=html.escape(title), body=body, style=STYLE + style, script=SCRIPT)
 
 
 class Explorer:

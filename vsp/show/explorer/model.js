@@ -1,15 +1,27 @@
+// @ts-check
 // Policies, tasks and the teacher, computed as Python does. Nothing here knows a page or picture.
 
 const ON_BORDER = 1e-9 // distances that differ by less are equal, or rounding makes a checkerboard
 const TINTS = 6 // colours of cells
 
+/** @type {(value: number, low: number, high: number) => number} */
 export const clip = (value, low, high) => Math.min(Math.max(value, low), high)
 
 // ---- Which cell, which action
 
-/** Prepare a policy for fast look-ups: its codewords divided by the scale, in one flat array. */
+/** The orders of the Minkowski distances that a scene may name alone. */
+const ORDERS = new Map([
+  ["manhattan", 1],
+  ["euclidean", 2],
+  ["chebyshev", null],
+])
+
+/** Prepare a policy for fast look-ups: its codewords divided by the scale, in one flat array.
+ * @param {Linear} policy */
 export function ready(policy) {
-  const { codewords, scale } = policy
+  const { codewords, scale, metric, order = ORDERS.get(metric) } = policy
+  if (order === undefined) throw new Error(`the metric ${metric} has no known order`)
+  policy.power = order ?? Infinity
   policy.scaled = Float64Array.from(
     codewords.flatMap(word => word.map((value, i) => value / scale[i])),
   )
@@ -18,24 +30,28 @@ export function ready(policy) {
   return policy
 }
 
-/** The distances of an observation (Euclidean: squared), valid until the next call. */
-function distances({ scaled, scale, metric, place, far }, seen) {
-  const d = scale.length
+/** The distances of an observation (Euclidean: squared), valid until the next call.
+ * @param {Linear} policy @param {Vector} seen */
+function distances({ scaled, scale, power, place, far }, seen) {
+  const d = scale.length,
+    plain = power === 1 || power === 2 || power === Infinity
   for (let i = 0; i < d; i++) place[i] = seen[i] / scale[i]
   for (let j = 0, at = 0; j < far.length; j++) {
     let sum = 0
     for (let i = 0; i < d; i++, at++) {
       const gap = Math.abs(place[i] - scaled[at])
-      if (metric === "euclidean") sum += gap * gap
-      else if (metric === "manhattan") sum += gap
+      if (power === 2) sum += gap * gap
+      else if (power === 1) sum += gap
+      else if (power !== Infinity) sum += gap ** power
       else if (gap > sum) sum = gap
     }
-    far[j] = sum
+    far[j] = plain ? sum : sum ** (1 / power)
   }
   return far
 }
 
-/** The index of the nearest codeword; among equally near ones, up to `slack`, the first. */
+/** The index of the nearest codeword; among equally near ones, up to `slack`, the first.
+ * @param {Linear} policy @param {Vector} seen */
 function cellOf(policy, seen, slack = 0) {
   const far = distances(policy, seen)
   let best = 0
@@ -43,7 +59,8 @@ function cellOf(policy, seen, slack = 0) {
   return best
 }
 
-/** The nearest codeword, and the last other one that is as near (or the same again). */
+/** The nearest codeword, and the last other one that is as near (or the same again).
+ * @param {Linear} policy @param {Vector} seen */
 export function tied(policy, seen) {
   const cell = cellOf(policy, seen, ON_BORDER),
     { far } = policy
@@ -52,38 +69,44 @@ export function tied(policy, seen) {
   return [cell, other]
 }
 
-/** The output of a linear map for action k: rows are the weights of the inputs, then the bias. */
+/** The output of a linear map for action k: rows are the weights of the inputs, then the bias.
+ * @param {Rows} rows @param {Vector} seen @param {number} k */
 export function raw(rows, seen, k) {
   let sum = rows[seen.length][k]
   for (let i = 0; i < seen.length; i++) sum += seen[i] * rows[i][k]
   return sum
 }
 
-/** The cell, the output of its map, and the action within its limits. A network has one cell. */
+/** The cell, the output of its map, and the action within its limits. A network has one cell.
+ * @param {Scene} scene @param {Policy} policy @param {Vector} seen */
 export function act({ task }, policy, seen) {
   const cell = policy.layers ? 0 : cellOf(policy, seen)
-  const mapped = () => task.outputs.map((_, k) => raw(policy.coefficients[cell], seen, k))
-  const given = policy.layers ? output(policy, seen) : mapped()
+  const given = policy.layers
+    ? output(policy, seen)
+    : task.outputs.map((_, k) => raw(policy.coefficients[cell], seen, k))
   const action = given.map((value, k) => clip(value, task.actionLow[k], task.actionHigh[k]))
   return { cell, raw: given, action }
 }
 
 // ---- The teacher
 
-/** Numbers stored as base64 of little-endian float32. */
+/** Numbers stored as base64 of little-endian float32. @param {string} text */
 export const floats = text =>
   new Float32Array(Uint8Array.from(atob(text), sign => sign.charCodeAt(0)).buffer)
 
-/** A network: relu in the hidden layers, tanh at the end; of each layer weights, then biases. */
+/** A network: relu in the hidden layers, tanh at the end; of each layer weights, then biases.
+ * @param {StoredNetwork} stored */
 export function network({ sizes, weights }) {
   const numbers = Float64Array.from(floats(weights))
   let at = 0
-  const take = count => numbers.subarray(at, (at += count))
-  const layer = (n, i) => ({ weights: take(n * sizes[i]), biases: take(n) })
-  return { layers: sizes.slice(1).map(layer) }
+  const take = (/** @type {number} */ count) => numbers.subarray(at, (at += count))
+  return {
+    layers: sizes.slice(1).map((n, i) => ({ weights: take(n * sizes[i]), biases: take(n) })),
+  }
 }
 
-/** The output of a network, for actions from -1 to 1. */
+/** The output of a network, for actions from -1 to 1.
+ * @param {Network} policy @param {Vector} seen */
 function output({ layers }, seen) {
   let values = Float64Array.from(seen, Math.fround) // as the network sees them in Python
   layers.forEach(({ weights, biases }, layer) => {
@@ -101,6 +124,7 @@ function output({ layers }, seen) {
 
 // ---- Tasks: `step` returns next state, reward and outcome (0: running, 1: goal, 2: pit)
 
+/** @type {Record<string, Rules>} */
 const TASKS = {
   "SimpleGoal-v0": {
     step([x, y], [dx, dy]) {
@@ -137,10 +161,12 @@ const TASKS = {
   },
 }
 
-/** The dynamics of a task: the observation of a state, a step, and places to draw. */
+/** The dynamics of a task: the observation of a state, a step, and places to draw.
+ * @type {(name: string) => Required<Rules>} */
 export const dynamics = name => ({ see: state => state, ...TASKS[name] })
 
-/** Run an episode: return, outcome, the cell of its last step, and with `keep` its states. */
+/** Run an episode: return, outcome, the cell of its last step, and with `keep` its states.
+ * @param {Scene} scene @param {Policy} policy @param {Vector} start */
 export function rollout(scene, policy, start, keep = false) {
   const { see, step } = dynamics(scene.task.name),
     states = [start]
@@ -159,10 +185,13 @@ export function rollout(scene, policy, start, keep = false) {
 // ---- Fitting maps to what the teacher did
 
 /** The least squares solution x (d, m) of a x = b, a (n, d), b (n, m); of several the shortest, as
- * NumPy's. Jacobi rotations turn the columns of `a` until they are orthogonal (Hestenes 1958). */
+ * NumPy's. Jacobi rotations turn the columns of `a` until they are orthogonal (Hestenes 1958).
+ * @param {Vector[]} a @param {Vector[]} b */
 export function leastSquares(a, b) {
-  const unit = i => a[0].map((_, j) => +(i === j)) // below column i, for the sum of all turns
+  // Below column i, for the sum of all turns
+  const unit = (/** @type {number} */ i) => a[0].map((_, j) => +(i === j))
   const columns = a[0].map((_, i) => [...a.map(row => row[i]), ...unit(i)])
+  /** @type {(u: Vector, v: Vector) => number} */
   const dot = (u, v) => a.reduce((sum, _, row) => sum + u[row] * v[row], 0)
   for (let sweep = 0, turned = true; turned && sweep < 60; sweep++) {
     turned = false
@@ -187,6 +216,7 @@ export function leastSquares(a, b) {
   return solution
 }
 
+/** @param {Vector} u @param {Vector} v @param {number} angle */
 function turn(u, v, angle) {
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)]
   u.forEach((x, i) => {
@@ -195,23 +225,25 @@ function turn(u, v, angle) {
   })
 }
 
-/** A policy's maps, in `cells` (by default all) fitted by least squares to visited states. */
+/** A policy's maps, in `cells` (by default all) fitted by least squares to visited states.
+ * @param {Linear} policy @param {Visited} visited @param {Iterable<number>} cells */
 export function refit(policy, { states, actions }, cells = policy.codewords.keys()) {
   const own = states.map(state => cellOf(policy, state)),
     maps = structuredClone(policy.coefficients)
   for (const cell of cells) {
-    const [a, b] = [[], []]
+    const [a, b] = [/** @type {Vector[]} */ ([]), /** @type {Vector[]} */ ([])]
     own.forEach((at, i) => at === cell && (a.push([...states[i], 1]), b.push(actions[i])))
     if (a.length) maps[cell] = leastSquares(a, b)
   }
   return maps
 }
 
-/** The share of the variance of the teacher's actions that a policy reproduces. */
+/** The share of the variance of the teacher's actions that a policy reproduces.
+ * @param {Scene} scene @param {Policy} policy @param {Visited} visited */
 export function rSquared(scene, policy, { states, actions }) {
   let [off, spread] = [0, 0]
-  const mean = (_, k) => actions.reduce((sum, action) => sum + action[k], 0) / actions.length,
-    means = actions[0].map(mean)
+  const n = actions.length,
+    means = actions[0].map((_, k) => actions.reduce((sum, action) => sum + action[k], 0) / n)
   states.forEach((state, i) =>
     act(scene, policy, state).action.forEach((value, k) => {
       off += (value - actions[i][k]) ** 2
@@ -224,10 +256,12 @@ export function rSquared(scene, policy, { states, actions }) {
 // ---- Cells in a picture
 
 /** A colour for each of k cells, other than its neighbours' in the pixels `cells` (n, n), and if
- * possible as wanted. */
+ * possible as wanted. @param {ArrayLike<number>} cells @param {number} n @param {number} k
+ * @param {(number | undefined)[]} wanted */
 export function colouring(cells, n, k, wanted = []) {
-  const near = Array.from({ length: k }, () => new Set()),
-    colours = []
+  const near = Array.from({ length: k }, () => /** @type {Set<number>} */ (new Set())),
+    colours = /** @type {number[]} */ ([])
+  /** @type {(i: number, j: number) => unknown} */
   const meet = (i, j) => i !== j && (near[i].add(j), near[j].add(i))
   for (let at = 0; at < n * n; at++) {
     if (at % n) meet(cells[at], cells[at - 1])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import anywidget
 import traitlets
 
-from .scripts import MODULES, STYLE, bundle
+from .scripts import SCRIPT, STYLE
 
 
 class View(anywidget.AnyWidget):
     """Draw a scene, given as JSON."""
 
-    _esm, _css = bundle(MODULES), STYLE
+    _esm, _css = SCRIPT, STYLE
     scene = traitlets.Unicode().tag(sync=True)

@@ -1,4 +1,4 @@
-// For test_explorer_modules.py: how often steps and cells differ from Python's, and all episodes.
+// For test_modules.py: how often steps and cells differ from Python's, and all episodes.
 
 import { readFileSync } from "fs"
 import { act, dynamics, ready, rollout, tied } from "../../vsp/show/explorer/model.js"

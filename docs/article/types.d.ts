@@ -1,0 +1,30 @@
+// What the article's scripts pass to each other, for `tsc` alone; data.py writes the parts.
+
+type Parts = {
+  scene: Scene & { moments: number }
+  teacher: StoredNetwork
+  run: StoredRun
+  visited: { states: string; actions: string }
+  proofs: Record<string, Proof>
+}
+type StoredRun = {
+  n: Vector
+  cells: Vector
+  codewords: [moment: number, codewords: Vector[]][] // where they change
+  coefficients: string
+  events: (Change & { n: number })[]
+  split: number
+  merge: number
+}
+type Proof = { polygons: Vector[]; box: [low: Vector, high: Vector]; at: Vector }
+
+// A scene of a section: `moment` of its run, which an attribute may give, and a reader's `numbers`
+type State = {
+  policy: string
+  at: Vector
+  section?: string
+  moment?: number | string
+  zoomed?: boolean
+  numbers?: Partial<Numbers>
+}
+type Put = typeof history.pushState

@@ -1,0 +1,195 @@
+// The scripts by themselves: what needs neither Python nor a browser. `make test-js` runs it.
+
+import assert from "node:assert/strict"
+import { execFileSync } from "node:child_process"
+import { existsSync, mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs"
+import inspector from "node:inspector"
+import { tmpdir } from "node:os"
+import { test } from "node:test"
+import { fileURLToPath } from "node:url"
+
+const ROOT = new URL("../../", import.meta.url)
+const NAMES = ["model", "controls", "picture", "texts", "explorer"] // each uses those before it
+const EXPLORER = NAMES.map(name => `vsp/show/explorer/${name}.js`)
+const ARTICLE = ["address", "article"].map(name => `docs/article/${name}.js`)
+const SCRIPTS = [...EXPLORER, ...ARTICLE, "docs/static/site.js"]
+const BUNDLES = ["vsp/show/explorer/explorer.bundle.js", "docs/article/article.bundle.js"]
+const skip = !existsSync(at("docs/node_modules")) && "it needs `npm --prefix docs ci`"
+
+function at(path) {
+  return new URL(path, ROOT)
+}
+const textOf = path => readFileSync(at(path), "utf8")
+const npm = (...words) =>
+  execFileSync("npm", ["--prefix", fileURLToPath(at("docs")), "run", "-s", ...words])
+
+const [model, controls, , texts, , address] = await Promise.all(
+  [...EXPLORER, ARTICLE[0]].map(path => import(at(path))),
+)
+
+/** Numbers from 0 to 1, the same each time (a linear congruential generator). */
+function random(seed) {
+  return () => (seed = (seed * 1664525 + 1013904223) % 2 ** 32) / 2 ** 32
+}
+function voronoi(draw, k, about) {
+  const codewords = Array.from({ length: k }, () => [draw(), draw(), draw()])
+  return { codewords, scale: [1, 0.5, 2], coefficients: [], ...about }
+}
+/** The cell by the distance as it is defined. */
+function nearest({ codewords, scale }, seen, p) {
+  const gaps = word => word.map((value, i) => Math.abs(seen[i] - value) / scale[i])
+  const far = codewords.map(word =>
+    p === Infinity
+      ? Math.max(...gaps(word))
+      : gaps(word).reduce((sum, gap) => sum + gap ** p, 0) ** (1 / p),
+  )
+  return far.indexOf(Math.min(...far))
+}
+
+// What the model computes
+
+for (const order of [0.5, 1, 1.5, 2, 3, 10, null])
+  test(`the nearest codeword by the Minkowski distance of order ${order}, and no false tie`, () => {
+    const draw = random(1)
+    for (const k of [1, 2, 30]) {
+      const policy = model.ready(voronoi(draw, k, { metric: "minkowski", order }))
+      for (let n = 0; n < 2000; n++) {
+        const seen = [draw(), draw(), draw()],
+          cell = nearest(policy, seen, order ?? Infinity)
+        assert.deepEqual(model.tied(policy, seen), [cell, cell])
+      }
+    }
+  })
+
+test("a metric without an order is one of three, and gives the same distances to the bit", () => {
+  for (const [metric, order] of Object.entries({ manhattan: 1, euclidean: 2, chebyshev: null })) {
+    const [named, ordered] = [{ metric }, { metric, order }].map(about =>
+      model.ready(voronoi(random(2), 9, about)),
+    )
+    for (const policy of [named, ordered]) model.tied(policy, [0.3, 0.4, 0.5])
+    assert.deepEqual(named.far, ordered.far)
+  }
+  assert.throws(() => model.ready(voronoi(random(2), 9, { metric: "cosine" })), /cosine/)
+})
+
+test("colours stay where they can", () => {
+  const [kept, changed] = [
+    [0, 1, 2],
+    [1, 1, 2],
+  ].map(wanted => model.colouring([0, 1, 1, 2], 2, 3, wanted))
+  assert.deepEqual(kept, [0, 1, 2])
+  assert.deepEqual(changed.slice(1), [1, 2])
+  assert.notEqual(changed[0], changed[1])
+})
+
+// What is said
+
+test("what is said of results and changes", () => {
+  const told = { scene: { starts: [0, 1, 2], lost: [2] }, teacher: { mean: 2 } },
+    results = { played: 3, failures: 2, mean: -1.5 },
+    base = { failures: 1, mean: -1 },
+    split = { kind: "split", codeword: [0.5, -0.25], cause: 0.0123 },
+    merge = { ...split, kind: "merge" },
+    where = "at (0.50, −0.25): "
+  assert.deepEqual([-1e-5, -1.5].map(controls.digits), ["0.000", "−1.500"])
+  for (const [said, expected] of [
+    [
+      texts.resultOf({ ...told, results }),
+      "2 of 3 starts fail. Mean return −1.50 (teacher: 2.00).",
+    ],
+    [
+      texts.resultOf({ ...told, results, base }),
+      "1 → 2 of 3 starts fail. Mean return −1.00 → −1.50 (teacher: 2.00).",
+    ],
+    [
+      texts.resultOf({ scene: { ...told.scene, lost: [] }, results: { ...results, played: 1 } }),
+      "Mean return about −1.50.",
+    ],
+    [texts.causeOf(split), `split ${where}loss 0.0123`],
+    [texts.causeOf(split, { split: 0.01 }), `split ${where}loss 0.0123, above 0.01`],
+    [texts.causeOf(merge, { merge: 0.02 }), `merge ${where}maps differ by 0.0123, below 0.02`],
+  ])
+    assert.equal(said, expected)
+})
+
+test("an address is read as it was written, and none that is damaged", () => {
+  const numbers = { codewords: [[0.25, 0.5]], coefficients: [[0, 1, 2].map(n => [n, -n])] }
+  const state = { section: "you", policy: "three", at: [0.2, -1e-7], moment: 3, zoomed: true }
+  for (const scene of [state, { ...state, moment: undefined, zoomed: false, numbers }]) {
+    const written = address.write(scene),
+      read = text => address.read(text, { you: ["three"] }, 4)
+    assert.equal(JSON.stringify(read(written)), JSON.stringify(scene))
+    for (const wrong of [written.slice(0, -1), `${written}0`, written.replace("0.2", "0.3")])
+      assert.equal(read(wrong), null)
+  }
+  assert.equal(address.read(address.write(state), { you: ["three"] }, 3), null) // no such moment
+})
+
+// Bundles, types and limits
+
+test("the committed bundles are made of the scripts as they are", { skip }, () => {
+  const folder = mkdtempSync(`${tmpdir()}/bundles-`)
+  npm("build", "--", `--outdir=${folder}`, "--log-level=error")
+  for (const path of BUNDLES)
+    assert.equal(readFileSync(`${folder}/${path}`, "utf8"), textOf(path), `${path} is stale`)
+  rmSync(folder, { recursive: true })
+})
+
+test("types fit", { skip }, () => {
+  npm("check")
+})
+
+test("a page that contains a bundle finds what it calls", async () => {
+  for (const [path, name] of [
+    [BUNDLES[0], "mountAll"],
+    [BUNDLES[1], "begin"],
+  ]) {
+    const page = `${textOf(path)}\nexport const called = ${name}`,
+      { called } = await import(`data:text/javascript,${encodeURIComponent(page)}`)
+    assert.equal(typeof called, "function")
+  }
+  const { default: widget } = await import(at(BUNDLES[0]))
+  assert.equal(typeof widget.render, "function")
+})
+
+test("modules import only those before them, and scripts are short with short lines", () => {
+  EXPLORER.forEach((path, i) => {
+    for (const [, used] of textOf(path).matchAll(/^import .*"\.\/(.*)\.js"/gm))
+      assert.ok(NAMES.slice(0, i).includes(used), `${path} imports ${used}`)
+  })
+  for (const path of BUNDLES) assert.ok(Buffer.byteLength(textOf(path)) <= 60 * 1024, path)
+  assert.ok(SCRIPTS.map(path => textOf(path).split("\n").length).reduce((a, b) => a + b) <= 1700)
+  for (const path of SCRIPTS) {
+    const [first, ...lines] = textOf(path).split("\n")
+    assert.equal(first, "// @ts-check")
+    for (const line of lines) assert.ok([...line].length <= 100, line)
+  }
+  const there = ["vsp/show/explorer/", "docs/article/", "docs/static/"].flatMap(folder =>
+    readdirSync(at(folder)).map(name => folder + name),
+  )
+  const scripts = there.filter(path => path.endsWith(".js") && !path.endsWith(".bundle.js"))
+  assert.deepEqual(scripts.sort(), [...SCRIPTS].sort())
+})
+
+test("no function is longer than forty lines", async () => {
+  // As V8 finds them: top-level functions and methods. Those inside of them are shorter.
+  globalThis.addEventListener = () => {}
+  globalThis.document = { currentScript: { src: "" } }
+  const session = new inspector.Session()
+  let found = []
+  session.connect()
+  session.post("Profiler.enable")
+  session.post("Profiler.startPreciseCoverage", { callCount: true, detailed: false })
+  for (const path of SCRIPTS) await import(`${at(path)}?again`)
+  session.post("Profiler.takePreciseCoverage", (_, { result }) => (found = result))
+  session.disconnect()
+  for (const path of SCRIPTS) {
+    const { functions } = found.find(({ url }) => url === `${at(path)}?again`),
+      written = functions.filter(({ functionName: name }) => name && !name.startsWith("<"))
+    assert.ok(written.length)
+    for (const { ranges } of written) {
+      const part = textOf(path).slice(ranges[0].startOffset, ranges[0].endOffset)
+      assert.ok(part.split("\n").length <= 40, part)
+    }
+  }
+})
