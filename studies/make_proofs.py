@@ -159,8 +159,7 @@ def _kept(table: str, task: str) -> VoronoiPolicy:
 
 def _one_map(teacher) -> VoronoiPolicy:
     episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
-    states, actions = (np.concatenate([getattr(each, name) for each in episodes]) for name in ("states", "actions"))
-    return linear_map(states, actions, SIMPLEGOAL)
+    return linear_map(episodes.states, episodes.actions, SIMPLEGOAL)
 
 
 def _of_simplegoal(policy: VoronoiPolicy) -> VoronoiPolicy:

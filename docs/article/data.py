@@ -134,7 +134,7 @@ def learnt_from() -> list[Episode]:
 
 def joined(episodes: list[Episode]) -> tuple[np.ndarray, np.ndarray]:
     """Return all states (n, 2) and actions (n, 2) of some episodes."""
-    return tuple(np.concatenate([getattr(each, name) for each in episodes]) for name in ("states", "actions"))
+    return episodes.states, episodes.actions
 
 
 # The scene

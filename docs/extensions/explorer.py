@@ -30,7 +30,7 @@ def of_task(task: str) -> Explorer:
         policies["the paper's, as published"] = published_policy(task)
     policies |= {f"ours, {name}": policy for name, policy in _ours(task, teacher)}
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
-    states = np.concatenate([episode.states for episode in episodes])
+    states = episodes.states
     actions = np.concatenate([episode.actions for episode in episodes])
     policies["one linear map"] = linear_map(states, actions, task)
     agents = {

@@ -6,11 +6,15 @@ and raise ValueError for arrays of a wrong shape, numbers that are not finite, a
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from ..checks import check_array, check_choice, check_count, check_data, check_seed
-from ..policy import VoronoiPolicy
+from ..policy import PiecewisePolicy, VoronoiPolicy
 from ..rollouts import standard
+
+P = TypeVar("P", bound=PiecewisePolicy)
 
 
 def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: str, seed: int) -> VoronoiPolicy:
@@ -34,7 +38,7 @@ def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPol
     return VoronoiPolicy(states.mean(axis=0)[None], coefficients[None], task=task)
 
 
-def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> VoronoiPolicy:
+def refit(policy: P, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> P:
     """Return `policy` with new maps, by least squares on the states (n, d) and actions (n, m) in each cell.
 
     These are the maps that training would converge to. `constant` fits a constant action per cell instead. A cell
@@ -46,7 +50,7 @@ def refit(policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, *, con
     inputs = np.column_stack([np.zeros_like(states) if constant else states, np.ones(len(states))])
     for i in np.unique(cells):
         coefficients[i] = np.linalg.lstsq(inputs[cells == i], actions[cells == i], rcond=None)[0]
-    return VoronoiPolicy(policy.codewords, coefficients, task=policy.task, metric=policy.metric, scale=policy.scale)
+    return policy.with_maps(coefficients)
 
 
 def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:

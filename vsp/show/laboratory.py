@@ -151,8 +151,7 @@ class Laboratory:
 def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
     """Return the policy with linear maps; a constant becomes a map with zero weights."""
     weights = np.zeros((len(policy), len(policy.task.low) + 1 - policy.coefficients.shape[1], len(policy.task.outputs)))
-    maps = np.concatenate([weights, policy.coefficients], axis=1)
-    return VoronoiPolicy(policy.codewords, maps, task=policy.task, metric=policy.metric, scale=policy.scale)
+    return policy.with_maps(np.concatenate([weights, policy.coefficients], axis=1))
 
 
 def _judge(policy: Policy, task: Task) -> dict[str, float]:
