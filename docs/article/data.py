@@ -22,7 +22,7 @@ from vsp.algorithms import EPISODES_AHEAD
 from vsp.paper.baselines import linear_map, refit
 from vsp.paper.printed import published_policy
 from vsp.paper.results import read_results as read_paper_results
-from vsp.rollouts import Episode, Policy, rollout
+from vsp.rollouts import Episodes, Policy, rollout
 from vsp.show.explorer.scene import scene_of, starts_of
 from vsp.tasks.base import GOAL, RUNNING
 from vsp.tasks.simplegoal import PIT_LOW, TASK
@@ -80,7 +80,7 @@ def policies() -> dict[str, VoronoiPolicy]:
     on_both_sides[:, 2] = [[-1.0, -1.0], [-0.8, -1.0], [-1.0, -0.8]]  # cells at the goal, right of the pit, above it
     episodes = vsp.collect_episodes(teacher(), TASK, vsp.start_states(TASK, N_FIT, 0))
     made = {
-        "one_map": linear_map(*joined(episodes), TASK.name),
+        "one_map": linear_map(episodes.states, episodes.actions, TASK.name),
         "run": distilled()[0],
         "paper": published_policy(TASK.name),
         "faithful_8": kept("faithful"),
@@ -126,15 +126,10 @@ def longer(more: int) -> int:
 
 
 @functools.cache
-def learnt_from() -> list[Episode]:
+def learnt_from() -> Episodes:
     """Return the first episodes of the teacher from which the run learnt."""
     starts = TASK.start(np.random.default_rng(np.random.SeedSequence(SEED).spawn(3)[0]), N_REFIT)  # as `distill` draws
     return vsp.collect_episodes(teacher(), TASK, starts)
-
-
-def joined(episodes: list[Episode]) -> tuple[np.ndarray, np.ndarray]:
-    """Return all states (n, 2) and actions (n, 2) of some episodes."""
-    return episodes.states, episodes.actions
 
 
 # The scene
@@ -223,8 +218,8 @@ def last_cells(policy: VoronoiPolicy) -> np.ndarray:
 @functools.cache
 def repaired() -> dict[str, VoronoiPolicy]:
     """Return the run's policy with the map of the worst cell, and with all maps, by least squares on `learnt_from`."""
-    policy, worst = policies()["run"], failing_cells().argmax()
-    refitted, maps = refit(policy, *joined(learnt_from())), policy.coefficients.copy()
+    policy, worst, seen = policies()["run"], failing_cells().argmax(), learnt_from()
+    refitted, maps = refit(policy, seen.states, seen.actions), policy.coefficients.copy()
     maps[worst] = refitted.coefficients[worst]
     return {"run_worst_refitted": VoronoiPolicy(policy.codewords, maps, task=TASK), "run_refitted": refitted}
 
@@ -239,7 +234,7 @@ def about_run() -> dict[str, float | str]:
         "run_worst_cell": worst,
         "run_worst_cell_failures": int(failing_cells()[worst]),
         "fails_at": ",".join(map(str, starts_of(TASK)[cured][0])),
-        "refit_states": len(joined(learnt_from())[0]),
+        "refit_states": len(learnt_from().states),
     }
 
 
@@ -312,8 +307,7 @@ def run() -> dict:
 
 def visited() -> dict:
     """Return states and actions of `learnt_from`."""
-    states, actions = joined(learnt_from())
-    return {"states": encoded([states]), "actions": encoded([actions])}
+    return {name: encoded([getattr(learnt_from(), name)]) for name in ("states", "actions")}
 
 
 # The proofs

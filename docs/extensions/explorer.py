@@ -3,7 +3,6 @@
 import functools
 import re
 
-import numpy as np
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
@@ -30,9 +29,7 @@ def of_task(task: str) -> Explorer:
         policies["the paper's, as published"] = published_policy(task)
     policies |= {f"ours, {name}": policy for name, policy in _ours(task, teacher)}
     episodes = vsp.collect_episodes(teacher, task, vsp.start_states(task, 200, 0))
-    states = episodes.states
-    actions = np.concatenate([episode.actions for episode in episodes])
-    policies["one linear map"] = linear_map(states, actions, task)
+    policies["one linear map"] = linear_map(episodes.states, episodes.actions, task)
     agents = {
         f"{path.name.split('-')[0].upper()} agent of the zoo, distilled": vsp.VoronoiPolicy.load(path)
         for path in sorted(AGENTS.glob(f"*-{task}.policy"))
