@@ -24,7 +24,6 @@ from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
 from ..rivals import tdavq
-from ..rivals.critics import advantage_weighted, critic_driven
 from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
 from ..rivals.trees import LinearTree, ObliqueLinearTree
@@ -90,7 +89,6 @@ FITS: dict[str, Callable[..., Policy]] = {
     "greedy cells": greedy_cells,
     "global tree": global_tree,
 }
-CRITICS = {"critic-driven": critic_driven, "advantage-weighted": advantage_weighted}  # fits that ask the critics
 
 
 def corrected(budget: Budget, size: int, seed: int, *, fit: str, rounds: int, by_chance: bool) -> Policy:
@@ -104,11 +102,10 @@ def corrected(budget: Budget, size: int, seed: int, *, fit: str, rounds: int, by
 
 
 def uncorrected(budget: Budget, size: int, seed: int, *, fit: str) -> Policy:
-    """Call a fit of `FITS` or `CRITICS` on the teacher's own episodes."""
+    """Call a fit of `FITS` on the teacher's own episodes."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    make = partial(CRITICS[fit], teacher=budget.teacher) if fit in CRITICS else FITS[fit]
-    return _fitted(make, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
+    return _fitted(FITS[fit], replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
 
 
 def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:

@@ -118,13 +118,11 @@ METHODS = {
         )
         for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
     },
-    # The fit and the borders exchanged, and newer methods: all imitate the teacher's own episodes
+    # The fit and the borders exchanged: all imitate the teacher's own episodes
     "our cells, our fit": _uncorrected("global cells", (2, 4, 8), table="apart"),
     "our cells, greedy fit": _uncorrected("greedy cells", (2, 4, 8), table="apart", version=2),
     "oblique tree, our fit": _uncorrected("global tree", (2, 4, 8), table="apart"),
     "oblique tree, greedy fit": _uncorrected("oblique tree", (2, 4, 8), table="apart", version=2),
-    "critic-driven splitting": _uncorrected("critic-driven", (2, 4, 8), table="apart"),
-    "advantage-weighted maps": _uncorrected("advantage-weighted", (2, 4, 8), table="apart"),
     # The highest return, from the best policy where it is known; and searches with another start or another length
     "at the limit": Method(
         makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"

@@ -55,13 +55,7 @@ PRESETS = {
 
 
 class CriticalTeacher(CurvedTeacher):
-    """With critics, by which an error costs more on the right."""
-
-    def value(self, obs, actions):
-        return -obs[:, 0] * np.square(np.asarray(actions) - self.predict(obs)[0]).sum(axis=1)
-
-    def criticality(self, obs):
-        return obs[:, 0]
+    """With critics, whose training goes on."""
 
     @property
     def critic(self):
@@ -97,7 +91,7 @@ def actions(policy, task):
 def by_method(name):
     """Actions on every task that the method is for, SimpleGoal if it is for all."""
     method, found = METHODS[name], {"at length": AT_LENGTH.get(name, 0)}
-    teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if method.table in ("apart", "robots") else {})
+    teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if method.table == "robots" else {})
     for task in method.tasks or (SIMPLEGOAL,):
         budget = Budget(teachers.get(task), get_task(task), PRESETS[method.preset])
         found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
