@@ -158,20 +158,6 @@ _UNTUNED = (
 UNTUNED = _NEW | {name: METHODS[name] for name in _UNTUNED}
 METHODS |= {f"{name}, tuned": _tuned(fit) for name, fit in UNTUNED.items()} | _NEW
 
-# Names under which rows were made before; their ids contain these
-FORMER_NAMES = {
-    "our cells, tuned": "refined",
-    "our cells": "refined, not tuned",
-    "our cells, no teacher": "refined, no teacher",
-    "our cells, no annealing": "refined, cold from the start",
-    "our cells, one restart": "refined, one beginning",
-    "our cells, no correction": "refined, not corrected",
-    "our cells, no slope beyond the limits": "refined, no leak",
-    "our cells, no failure penalty": "refined, failures at no price",
-    "our cells, weighted by criticality": "refined, drawn by stakes",
-    "our cells, 800 generations": "refined, 800 generations",
-}
-
 
 @dataclass(frozen=True)
 class Table:

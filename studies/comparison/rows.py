@@ -33,7 +33,7 @@ from ..results import BEYOND, write_results
 from ..robots import record_gait
 from . import measure
 from .makers import Budget
-from .methods import ALIKE, CHEETAH, FORMER_NAMES, FOUND, LANDER, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
+from .methods import ALIKE, CHEETAH, FOUND, LANDER, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
 
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
@@ -75,7 +75,7 @@ class Job:
     def provenance(self) -> dict[str, str | int]:
         """What identifies the row besides its seed: settings (an id), teacher, version."""
         how, config = self.how, PRESETS[self.how.preset](self.task)
-        about: dict = {"task": self.task, "method": FORMER_NAMES.get(self.method, self.method), "size": self.size}
+        about: dict = {"task": self.task, "method": self.method, "size": self.size}
         about["settings"] = {name: getattr(config, name) for name in how.reads} | how.settings
         about["measure"] = measure.settings(tail=self.tail, whole=self.whole, seed=self.start_seed)
         about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
