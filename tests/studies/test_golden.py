@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 
-from studies.comparison import measure, rows
+from studies.comparison import beside, measure
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, OF_PRESET
 from studies.rivals import tdavq
@@ -136,10 +136,10 @@ CASES = {
     for name, method in METHODS.items()
     if method.table != "demanded" and method.sizes != OF_PRESET and name not in UNGUARDED
 } | {
-    "simplest": (by_simplest, rows.SIMPLIFY_VERSION),
+    "simplest": (by_simplest, beside.SIMPLIFY_VERSION),
     "beside": (beside_a_run, simpler.VERSION),
     "measure": (by_measure, measure.VERSION),
-    "best returns": (by_best_policies, rows.OPTIMUM_VERSION),
+    "best returns": (by_best_policies, beside.OPTIMUM_VERSION),
     "at the limit": (by_limit, limit.VERSION),
 }
 

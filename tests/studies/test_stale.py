@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
-from studies.comparison import rows, stale
+from studies.comparison import beside, rows, stale
 from studies.comparison.methods import METHODS, PRESETS, TASKS
 from studies.results import RESULTS
 from vsp.run import listed
@@ -29,7 +29,6 @@ def test_every_committed_row_and_policy_is_checked():
 def results(tmp_path, monkeypatch):
     """A copy of the committed results, to spoil."""
     shutil.copytree(RESULTS, tmp_path / "beyond")
-    monkeypatch.setattr(stale, "RESULTS", tmp_path / "beyond")
     monkeypatch.setattr("studies.results.RESULTS", tmp_path / "beyond")
     return tmp_path / "beyond"
 
@@ -76,10 +75,10 @@ OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
     [
         (raised("CART"), OF_CART),
         (raised("TD-AVQ"), OF_CART[:1]),
-        (lambda patch: patch.setattr(rows, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
-        (lambda patch: patch.setattr(rows, "GAIT_VERSION", 9),
+        (lambda patch: patch.setattr(beside, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
+        (lambda patch: patch.setattr(beside, "GAIT_VERSION", 9),
          [says(f"gait_{CHEETAH}.csv", "version", "beyond-long")]),
-        (lambda patch: patch.setattr(rows, "SIMPLIFY_VERSION", 2),
+        (lambda patch: patch.setattr(beside, "SIMPLIFY_VERSION", 2),
          [says(f"methods_{LUNARLANDER}.policy", "version", "beyond-long")]),
     ],
     ids=["CART", "TD-AVQ", "optimum", "gait", "simplify"],
@@ -98,6 +97,6 @@ def test_results_of_another_preset_are_stale(monkeypatch):
 def test_all_results_of_another_teacher_are_stale(monkeypatch):
     other = SimpleNamespace(digest="f" * 64)
     monkeypatch.setattr(rows, "_teacher", lambda task, agent: other)
-    monkeypatch.setattr(rows, "load_teacher", lambda task: other)
+    monkeypatch.setattr(beside, "load_teacher", lambda task: other)
     named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
     assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents"))]
