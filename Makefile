@@ -164,9 +164,9 @@ bench: venv-test-train-dask ##- measures speed and scale, into data/results/: an
 	@$(call MEASURE,tests/bench)
 faults: venv-test-train-dask ##- runs the fault-injection tests, into data/results/: 3 HOURS or more
 	@$(call MEASURE,tests/faults)
-beyond: begin venv-train ##- compares our own method with others, into data/beyond/: 6 to 7 HOURS, resumable
+beyond: begin venv-train ##- compares our own method with others, into data/beyond/: 6 to 7 HOURS for all rows; resumable
 	$(PY) -m studies.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-beyond-long: begin venv-train-mujoco ##- the same for LunarLander and two robots: 27 HOURS or more, resumable
+beyond-long: begin venv-train-mujoco ##- the same for LunarLander and two robots: 27 HOURS or more for all rows; resumable
 	$(PY) -m studies.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 short-teachers: venv-train ##- trains the teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m studies.make_teachers --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"

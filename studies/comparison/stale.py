@@ -26,8 +26,8 @@ def stale() -> list[str]:
     for name, target, today in committed():
         try:
             if columns := differing(name, today):
-                what = f"data/beyond/{name} was made with other {' and '.join(columns)}"
-                messages.append(f"{what}: `make {target}` makes it anew")
+                what = f"data/beyond/{name} lacks today's {' and '.join(columns)}"
+                messages.append(f"{what}: `make {target}` makes what is missing")
         except FileNotFoundError:
             messages.append(f"data/beyond/{name} is missing: `make {target}` makes it")
         except atomic.DamagedFile as error:

@@ -158,6 +158,7 @@ def test_results_are_those_of_the_version(name, request):
         every[name] = {"version": version, "found": found}
         lines = (f"{json.dumps(name)}: {json.dumps(one)}" for name, one in every.items())
         GOLDEN.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+    assert name in every, f"{name} is new: run with --remake-golden, which keeps what it gives in {GOLDEN}"
     kept = every[name]
     within = (LOOSE, np.median) if name in SENSITIVE else (TOLERANCE, np.max)
     if kernels.fixed() and "trained further" not in name:  # torch has kernels of its own

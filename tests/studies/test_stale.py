@@ -26,15 +26,24 @@ def test_every_committed_row_and_policy_is_checked():
 
 
 @pytest.fixture
-def results(tmp_path, monkeypatch):
+def patch(monkeypatch):
+    """Leaves out methods that have no committed rows yet: the first test asks for these."""
+    made = {name for path in RESULTS.glob("*_seconds*.csv") for name in pd.read_csv(path)["method"]}
+    for name in {*METHODS} - made:
+        monkeypatch.delitem(METHODS, name)
+    return monkeypatch
+
+
+@pytest.fixture
+def results(tmp_path, patch):
     """A copy of the committed results, to spoil."""
     shutil.copytree(RESULTS, tmp_path / "beyond")
-    monkeypatch.setattr("studies.results.RESULTS", tmp_path / "beyond")
+    patch.setattr("studies.results.RESULTS", tmp_path / "beyond")
     return tmp_path / "beyond"
 
 
 def says(name, what, target="beyond"):
-    return f"data/beyond/{name} was made with other {what}: `make {target}` makes it anew"
+    return f"data/beyond/{name} lacks today's {what}: `make {target}` makes what is missing"
 
 
 def test_a_missing_or_damaged_file_is_named(results):
@@ -83,20 +92,20 @@ OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
     ],
     ids=["CART", "TD-AVQ", "optimum", "gait", "simplify"],
 )  # fmt: skip
-def test_results_of_another_version_are_stale(monkeypatch, change, expected):
-    change(monkeypatch)
+def test_results_of_another_version_are_stale(patch, change, expected):
+    change(patch)
     assert stale.stale() == expected
 
 
-def test_results_of_another_preset_are_stale(monkeypatch):
+def test_results_of_another_preset_are_stale(patch):
     before, changed = PRESETS["tuned"], dataclasses.replace(PRESETS["tuned"](SIMPLEGOAL), n_steps=99)
-    monkeypatch.setitem(PRESETS, "tuned", lambda task: changed if task == SIMPLEGOAL else before(task))
+    patch.setitem(PRESETS, "tuned", lambda task: changed if task == SIMPLEGOAL else before(task))
     assert stale.stale() == [says(f"{table}_{SIMPLEGOAL}.csv", "settings") for table in ("methods", "teachers")]
 
 
-def test_all_results_of_another_teacher_are_stale(monkeypatch):
+def test_all_results_of_another_teacher_are_stale(patch):
     other = SimpleNamespace(digest="f" * 64)
-    monkeypatch.setattr(rows, "_teacher", lambda task, agent: other)
-    monkeypatch.setattr(beside, "load_teacher", lambda task: other)
+    patch.setattr(rows, "_teacher", lambda task, agent: other)
+    patch.setattr(beside, "load_teacher", lambda task: other)
     named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
     assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents"))]
