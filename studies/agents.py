@@ -8,10 +8,8 @@ reason. Those of MountainCar are distilled by the paper's method, too.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
+import time
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,11 +37,12 @@ from .results import BEYOND, RESULTS, keys, read_results, write_results
 
 SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
 N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw
-SECONDS = 600  # for one agent
+SECONDS = 600  # for one agent, by what the next size takes at least
 PARTS = ("codewords", "coefficients", "scale")  # of a policy
 POINTS = 61  # of a map, along each axis
 CAR = "MountainCarContinuous-v0"
 N_SEEN, SEEN_SEED = 400, 8  # episodes for maps by least squares, from starts of their own
+TABLES = ("agents", "agents_paper")
 ALGORITHMS = ("a2c", "ars", "crossq", "ddpg", "ppo", "sac", "td3", "tqc", "trpo")
 COLUMNS = (
     "algorithm task weights zoo zoo_std agent agent_std agent_failing cells numbers r2 r2_least mean least most "
@@ -72,7 +71,7 @@ def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
     arrays: dict = {}
     papers: list[dict] = []
     try:
-        with _at_most(SECONDS), warnings.catch_warnings():
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the row says how good the policies are
             agent = read(path, name)
             size, policy, alike = _fewest(agent)
@@ -90,11 +89,11 @@ def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
 def _fewest(agent: Teacher) -> tuple[int, VoronoiPolicy, list[Likeness]]:
     """Return the fewest of `SIZES` cells whose policies act like the agent, else the most; the first of these policies,
     and how alike all are."""
-    least, _ = expected_seconds(agent.task, faithful_preset(agent.task, n_cells=1))
-    if least * len(SEEDS) > SECONDS:
-        raise TimeoutError
+    began = time.monotonic()
     for size in SIZES:
         config = faithful_preset(agent.task, n_cells=size)
+        if time.monotonic() - began + len(SEEDS) * expected_seconds(agent.task, config)[0] > SECONDS:
+            raise TimeoutError
         policies = [distill_faithfully(agent, agent.task, config, seed=seed)[0] for seed in SEEDS]
         alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED) for policy in policies]
         if np.mean([one.r2 for one in alike]) >= ENOUGH:
@@ -140,15 +139,9 @@ def current(name: str) -> tuple[pd.DataFrame, list[dict]]:
     return rows, [{"seed": row.seed, **by_the_paper_with(row.teacher)} for row in rows.itertuples()]
 
 
-def committed() -> Iterator[tuple[str, str, list[dict]]]:
-    """Yield the committed tables as `comparison.stale` does: name, make target, what each row is made with today."""
-    for name in ("agents", "agents_paper"):
-        yield f"{name}.csv", "agents", current(name)[1]
-
-
 def kept(checksum: str) -> tuple[dict, dict] | None:
     """Return what `study` returned of a zip, from committed files; None if today it would return another."""
-    tables = map(current, ("agents", "agents_paper"))
+    tables = map(current, TABLES)
     agents, papers = (rows[[then == now for then, now in zip(keys(rows), keys(today))]] for rows, today in tables)
     for row in agents[agents["checksum"] == checksum].drop(columns=["zoo", "zoo_std"]).to_dict("records"):
         mine = papers[papers["teacher"] == row["teacher"]].to_dict("records")
@@ -185,21 +178,6 @@ def by_the_paper(agent: Teacher) -> list[dict]:
             failing = (alike.failures["policy"] or 0) / N_EPISODES
             rows.append(row | scores | {"failing": failing} | by_the_paper_with(agent.digest))
     return rows
-
-
-@contextlib.contextmanager
-def _at_most(seconds: int) -> Iterator[None]:
-    """Raise TimeoutError in a block that takes longer."""
-
-    def late(*_) -> None:
-        raise TimeoutError
-
-    signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -80,9 +80,13 @@ def beside(task: str, table: str) -> Iterator[Beside]:
             today = [provenance(settings, job.provenance["teacher"], GAIT_VERSION)]
             yield Beside(f"gait_{task}.csv", today, partial(record_gait, task=task, **GAIT), (job,))
     if (task, table) == (LANDER, "methods"):
-        yield Beside(f"{table}_{task}.policy", [simplest_provenance(task)], partial(simplest, task))
+        settings = {"task": task, "loss": LOSS, **asdict(PRESETS["tuned"](task))}
+        today = [provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)]
+        yield Beside(f"{table}_{task}.policy", today, partial(simplest, task))
     if (task, table) == (TASKS[0], "limit"):
-        yield Beside("optimum.csv", [best_provenance(*way) for way in WAYS], best_returns)
+        starts = [measure.REPORT_SEED, measure.N_REPORTED]
+        ways = [{"task": name, "finer": finer, "starts": starts} for name, finer in WAYS]
+        yield Beside("optimum.csv", [provenance(way, "none", OPTIMUM_VERSION) for way in ways], best_returns)
 
 
 def kept_jobs(task: str, table: str) -> dict[str, Job]:
@@ -115,12 +119,6 @@ def simplest(task: str) -> VoronoiPolicy:
     return simplify(teacher, task, config, tolerance=LOSS * abs(of_teacher), seed=0)[0]
 
 
-def simplest_provenance(task: str) -> dict[str, str | int]:
-    """Return the provenance of the policy of `simplest`: what determines it besides the seed, which is 0."""
-    settings = {"task": task, "loss": LOSS, **asdict(PRESETS["tuned"](task))}
-    return provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)
-
-
 def best_returns() -> pd.DataFrame:
     """Return the returns of the best policies, one row per task and way to find them. A task's last row is its best.
 
@@ -142,9 +140,3 @@ def _best(name: str, finer: float) -> dict:
     failing = np.nan if name == "Pendulum-v1" else np.mean(result.outcomes != GOAL)  # nothing can fail there
     row = {"task": name, "found": how, "mean": returns.mean(), "worst": returns.min(), "failing": failing}
     return row | {"longest": result.lengths.max()}
-
-
-def best_provenance(task: str, finer: float) -> dict[str, str | int]:
-    """Return the provenance of a row of `best_returns`. Its teacher is "none"."""
-    starts = [measure.REPORT_SEED, measure.N_REPORTED]
-    return provenance({"task": task, "finer": finer, "starts": starts}, "none", OPTIMUM_VERSION)

@@ -71,19 +71,15 @@ def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -
     return search_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
 
 
-# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves
+# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves, `of` a task and a seed
 
 FITS: dict[str, Callable[..., Policy]] = {
-    "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
+    "tree": lambda x, y, size, **of: Tree(x, y, leaves=size),
     "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
-    "oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(x, y, leaves=size, task=task, seed=seed),
-    "constant oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(
-        x, y, leaves=size, task=task, seed=seed, constant=True
-    ),
-    "small network": lambda x, y, size, task, seed: SmallNetwork(
-        x, y, units=units_for(size, task), task=task, seed=seed
-    ),
-    "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
+    "oblique tree": lambda x, y, size, **of: ObliqueLinearTree(x, y, leaves=size, **of),
+    "constant oblique tree": lambda x, y, size, **of: ObliqueLinearTree(x, y, leaves=size, constant=True, **of),
+    "small network": lambda x, y, size, **of: SmallNetwork(x, y, units=units_for(size, of["task"]), **of),
+    "k-means": lambda x, y, size, **of: kmeans_cells(x, y, cells=size, **of),
     "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
     "global cells": global_cells,
     "greedy cells": greedy_cells,

@@ -111,29 +111,24 @@ METHODS = {
     "our cells, no failure penalty": _without(failure_penalty=0.0),
     "our cells, weighted by criticality": _without(criticality=True),
     # The highest likeness to the teacher; and the highest return of policies whose R² is at least a given value
-    "faithful": Method(makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"),
-    **{
-        f"faithful, R² {r2:g}": Method(
-            makers.faithful, OF_FAITHFUL, (2, 4, 8), "demanded", {"min_r2": r2}, preset="faithful"
-        )
-        for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
-    },
+    "faithful": (_faithful := Method(
+        makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"
+    )),
+    **{f"faithful, R² {r2:g}": replace(_faithful, sizes=(2, 4, 8), table="demanded", settings={"min_r2": r2})
+       for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)},
     # The fit and the borders exchanged: all imitate the teacher's own episodes
     "our cells, our fit": _uncorrected("global cells", (2, 4, 8), table="apart"),
     "our cells, greedy fit": _uncorrected("greedy cells", (2, 4, 8), table="apart", version=2),
     "oblique tree, our fit": _uncorrected("global tree", (2, 4, 8), table="apart"),
     "oblique tree, greedy fit": _uncorrected("oblique tree", (2, 4, 8), table="apart", version=2),
     # The highest return, from the best policy where it is known; and searches with another start or another length
-    "at the limit": Method(
+    "at the limit": (_limit := Method(
         makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"
+    )),
+    "at the limit, from the teacher": replace(
+        _limit, make=partial(makers.limited, by_teacher=True), sizes=(3,), table="starts", tasks=TASKS[1:2]
     ),
-    "at the limit, from the teacher": Method(
-        partial(makers.limited, by_teacher=True), ALL, (3,), "starts", version=limit.VERSION, tasks=TASKS[1:2],
-        preset="limit",
-    ),
-    "our cells, 800 generations": Method(
-        makers.our_cells, ALL, (3,), "starts", {"n_generations": 800}, tasks=TASKS[1:2]
-    ),
+    "our cells, 800 generations": replace(_without(n_generations=800), sizes=(3,), table="starts", tasks=TASKS[1:2]),
     # Robots: imitate the teacher, then continue training as its actor; and one linear map by returns alone
     "cells": (_cells := _robot(makers.robot_cells, OF_IMITATION, (1, 2, 4, 8, 16))),
     "cells, trained further": _further(_cells),

@@ -62,10 +62,15 @@ class Job:
         about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
-    def about(self) -> dict:
-        """Return what the row's file says about the row."""
-        named = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
-        return {**named, **self.provenance}  # provenance has the teacher's checksum; its settings include the tail
+    @property
+    def named(self) -> dict[str, str | int]:
+        """What the row's table says of the job."""
+        named: dict = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
+        return named | ({"agent": self.agent} if self.agent else {})
+
+    def about(self) -> dict[str, str | int]:
+        """Return what the row's file says of the job; the settings include the tail."""
+        return self.named | self.provenance
 
     def path(self, folder: str | os.PathLike) -> Path:
         """Return the path of the row's file in `folder`."""
@@ -88,9 +93,7 @@ class Job:
     def row(self, folder: str | os.PathLike) -> dict:
         """Return the row in the job's file. Raises `atomic.DamagedFile`."""
         _, made = load_made(self.path(folder), "Row", self.about())
-        what = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
-        what |= {"agent": self.agent} if self.agent else {}
-        return {**what, "seconds": made["seconds"], **made["row"], **self.provenance}
+        return {**self.named, "seconds": made["seconds"], **made["row"], **self.provenance}
 
     def policy(self, folder: str | os.PathLike) -> VoronoiPolicy:
         """Return the policy in the job's file, which must hold one."""

@@ -43,7 +43,8 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
             yield f"{table}_{task}.csv", target, [job.about() for job in jobs_of(task, table)]
             for file in beside(task, table):
                 yield file.name, target, file.today
-    yield from agents.committed()
+    for name in agents.TABLES:
+        yield f"{name}.csv", "agents", agents.current(name)[1]
 
 
 def main() -> None:

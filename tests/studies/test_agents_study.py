@@ -64,9 +64,6 @@ def test_what_is_refused_or_slow_has_a_reason(small, monkeypatch, tmp_path):
         "kind": "Agent", "checksum": agents.atomic.sha256(path), "algorithm": "td3", "task": PENDULUM,
         "reason": "slower than 0 minutes", "papers": [],
     })  # fmt: skip
-    with pytest.raises(TimeoutError), agents._at_most(0.05):
-        while True:
-            pass
 
 
 def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypatch, tmp_path):
