@@ -28,9 +28,9 @@ OUT ?= .
 JOBS := $(or $(value JOBS),$(shell getconf _NPROCESSORS_ONLN || echo 1))
 $(if $(strip $(value OUT)),,$(error OUT is empty, expected a folder, as in OUT=scratch))
 override OUT := $(if $(filter /% .%,$(firstword $(value OUT))),,./)$(value OUT)
-$(foreach v,JOBS DASK PYTHON QUICK AGENT AGENTS,$(eval override $(v) := $$(value $(v))))
+$(foreach v,JOBS DASK PYTHON QUICK AGENT AGENTS FILES,$(eval override $(v) := $$(value $(v))))
 STAMPS := $(OUT)/build/stamps
-export OUT JOBS DASK PYTHON QUICK STAMPS AGENT AGENTS
+export OUT JOBS DASK PYTHON QUICK STAMPS AGENT AGENTS FILES
 MAKEOVERRIDES :=
 PY := .venv/bin/python
 
@@ -127,8 +127,8 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 ## Develop
 PYTEST = tmp=$$(mktemp -d) && trap 'rm -rf "$$tmp"' EXIT && TMPDIR="$$tmp" MPLBACKEND=Agg $(PY) -m pytest -q -rs
 
-test: venv-test-train-dask ## runs the tests, several at a time, and names the ten slowest: 2 to 5 minutes
-	@$(PYTEST) -n logical --maxprocesses 4 --dist worksteal --durations=10 tests
+test: venv-test-train-dask ## runs the tests: 2 to 5 minutes; FILES=tests/test_geometry.py: one module, in seconds
+	@$(PYTEST) $${FILES:--n logical --maxprocesses 4 --dist worksteal --durations=10 tests}
 
 test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 6 minutes
 	@$(PYTEST) tests/long

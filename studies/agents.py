@@ -21,8 +21,8 @@ from vsp.algorithms import VERSION, distill
 from vsp.config import paper_preset
 from vsp.evaluation import Likeness, likeness, start_states
 from vsp.paper.baselines import refit
-from vsp.paper.results import load_made, make_missing, provenance
 from vsp.policy import VoronoiPolicy
+from vsp.protocol.job import load_made, make_missing, provenance
 from vsp.rollouts import visited_states
 from vsp.run import atomic, command, sealed
 from vsp.tasks import Task, get_task

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from vsp.paper import results
-from vsp.paper.results import PROVENANCE
+from vsp.protocol.job import PROVENANCE
 from vsp.run import ROOT, listed, sealed
 
 BEYOND = Path("data", "beyond")

@@ -218,7 +218,8 @@ ALTERNATIVES = {
     "min_pol_distance": 0.3, "max_pol_loss": 0.05, "one_split": True, "freeze": "first_n_freeze",
     "split_metric": "euclidean", "periodic_reset": "off", "batch_size": 9, "n_minibatches": 2, "learning_rate": 0.02,
     "initial": "zeros", "adam_on_reset": "restart", "scale": "box", "neighbours": "lookup", "split_loss": "clipped",
-    "merge_parameters": "weights", "inclusive": True, "sub_policy": "quadratic", "fit": "closed_form",
+    "merge_parameters": "weights", "inclusive": True, "metric": "chebyshev", "sub_policy": "quadratic",
+    "fit": "closed_form",
 }  # fmt: skip
 
 
@@ -313,7 +314,8 @@ def test_neither_hash_seed_nor_threads_of_a_process_have_a_say():
     assert len({support.distilled_elsewhere(SIMPLEGOAL, config="tiny", **one) for one in settings}) == 1
 
 
-def test_threads_have_no_say():
+def test_threads_have_no_say(monkeypatch):
+    monkeypatch.delenv("MAKELEVEL", raising=False)  # under make nothing plays for the closing remark
     player, config, seen = support.network_teacher(SIMPLEGOAL, width=(400, 300)), tiny(n_epochs=40, n_freeze=5), []
 
     class Spy:
@@ -332,7 +334,7 @@ def test_threads_have_no_say():
 
 
 def test_the_preset_is_the_default(teacher, monkeypatch):
-    monkeypatch.setattr(vsp, "paper_preset", lambda task: tiny(n_epochs=7, n_freeze=1))
+    monkeypatch.setattr(vsp, "preset", lambda task: tiny(n_epochs=7, n_freeze=1))
     assert len(distill(teacher, SIMPLEGOAL, seed=0)[1].cells) == 7
 
 

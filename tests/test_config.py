@@ -64,7 +64,6 @@ def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
     assert 0 < quick.n_freeze <= quick.n_epochs <= n_epochs
 
 
-@pytest.mark.parametrize("kind", ["faithful", "tuned"])
-def test_another_kind_of_preset_names_the_new_call(kind):
-    with pytest.raises(ValueError, match=rf"call vsp_beyond\.{kind}\("):
-        vsp.preset(TASKS[0], kind, n_cells=2)
+def test_a_preset_takes_no_settings():
+    with pytest.raises(TypeError, match="n_epochs"):
+        vsp.preset(TASKS[0], n_epochs=10)

@@ -14,52 +14,55 @@ from collections.abc import Callable
 from types import ModuleType
 
 from . import algorithms, evaluation, rollouts
-from .algorithms import merge_regions, split_regions, teacher_episodes
+from .algorithms import MergePass, SplitPass, merge_regions, split_regions, teacher_episodes
+from .cells import Halfspaces, Nearest
 from .checks import check_seed
-from .config import Config, paper_preset
+from .config import Config
+from .config import paper_preset as preset
 from .evaluation import Likeness, start_states
 from .export import distances_latex
-from .geometry import nearest
+from .geometry import Metric, nearest
 from .history import History
 from .partition import Partition
-from .policy import VoronoiPolicy
+from .policy import PiecewisePolicy, VoronoiPolicy
 from .rollouts import Policy
 from .run.progress import shown
+from .subpolicies import PolicyClass
 from .tasks import Task, get_task, register, task_names
 from .teachers import agent, load_teacher
 
 __all__ = [
-    "Config", "History", "Partition", "Policy", "Task", "VoronoiPolicy", "agent", "collect_episodes",
-    "distances_latex", "distill", "evaluate", "explore", "get_task", "likeness", "load_teacher", "merge_regions",
-    "nearest", "preset", "register", "rollout", "rollout_from_seed", "split_regions", "start_states", "task_names",
-    "teacher_episodes", "visited_states",
+    "Config", "Halfspaces", "History", "Metric", "Nearest", "Partition", "PiecewisePolicy", "Policy", "PolicyClass",
+    "Task", "VoronoiPolicy", "agent", "collect_episodes", "distances_latex", "distill", "evaluate", "explore",
+    "get_task", "likeness", "load_teacher", "merge_regions", "nearest", "preset", "register", "rollout",
+    "rollout_from_seed", "split_regions", "start_states", "task_names", "teacher_episodes", "visited_states",
 ]  # fmt: skip
 
-_LATER = ("paper", "show")
-_MOVED = {
-    name: f"vsp_beyond.{new}" for name, new in (("prove", "prove"), ("refine", "tuned"), ("simplify", "simplify"))
-}
+# Imported on first use: modules, and what they define
+_LATER = {"paper": "vsp.paper", "show": "vsp.show"}
+_LATER |= dict.fromkeys(("Method", "compare", "paper_method"), "vsp.protocol") | {"explore": "vsp.show.explorer"}
 
 
 def distill(
-    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int, progress: bool = True
-) -> tuple[VoronoiPolicy, History]:
+    teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int, split: SplitPass | None = None,
+    merge: MergePass | None = None, progress: bool = True,
+) -> tuple[VoronoiPolicy, History]:  # fmt: skip
     """Distil `teacher` to a `VoronoiPolicy` by the paper's method; its history can be replayed.
 
-    `teacher` is whatever `agent` takes. `config` defaults to the paper's preset of the task. The same arguments give
-    the same policy. `progress` shows how far it is, and at last how alike teacher and policy are. Raises ValueError if
-    the teacher does not fit the task, if states or actions are not finite, for a task without a preset, or if `seed` is
-    not a non-negative integer.
+    `teacher` is whatever `agent` takes. `config` defaults to the paper's preset of the task. `split` and `merge`
+    replace `split_regions` and `merge_regions`. The same arguments give the same policy. `progress` shows how far it
+    is, and at last how alike teacher and policy are. Raises ValueError if the teacher does not fit the task, if states
+    or actions are not finite, for a task without a preset, or if `seed` is not a non-negative integer.
     """
     check_seed(seed)
     task = get_task(task)
     if config is None:
-        config = paper_preset(task)
+        config = preset(task)
     if not isinstance(config, Config):
         raise ValueError(f"config is {config!r:.40}, expected a Config, such as vsp.preset({task.name!r})")
     teacher = agent(teacher, task)
     with shown(progress):
-        policy, history = algorithms.distill(teacher, task, config, seed=seed)
+        policy, history = algorithms.distill(teacher, task, config, seed=seed, split=split, merge=merge)
         evaluation.remark(policy, teacher, task, config.n_iterations, "vsp_beyond.faithful")
     return policy, history
 
@@ -87,25 +90,12 @@ rollout, collect_episodes = _of_any_agent(rollouts.rollout), _of_any_agent(rollo
 visited_states = _of_any_agent(rollouts.visited_states)
 
 
-def preset(task: str | Task, kind: str = "paper", **_) -> Config:
-    """Return the paper's settings for `task`: table T2, with the default readings of what it leaves open.
-
-    Raises ValueError for an unknown task, for a task that is not in the paper, and for another `kind`, which is now a
-    function of `vsp_beyond`.
-    """
-    if kind != "paper":
-        raise ValueError(f"vsp has the paper's settings only; instead of kind {kind!r}, call vsp_beyond.{kind}(...)")
-    return paper_preset(task)
-
-
 def __getattr__(name: str) -> ModuleType | Callable:
-    """Import `vsp.paper`, `vsp.show` and `vsp.explore` on first use, as in `vsp.paper.published_policy`."""
-    if name == "explore":
-        return importlib.import_module("vsp.show.explorer").explore
-    if name in _LATER:
-        return importlib.import_module(f"vsp.{name}")
-    moved = f": call {_MOVED[name]}" if name in _MOVED else ""
-    raise AttributeError(f"module 'vsp' has no attribute {name!r}{moved}")
+    """Import on first use what `import vsp` leaves out, as in `vsp.paper.published_policy`."""
+    if name not in _LATER:
+        raise AttributeError(f"module 'vsp' has no attribute {name!r}")
+    module = importlib.import_module(_LATER[name])
+    return module if module.__name__ == f"vsp.{name}" else getattr(module, name)
 
 
 def __dir__() -> list[str]:

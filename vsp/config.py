@@ -9,12 +9,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from .geometry import LOOKUP, Metric
+from .subpolicies import PolicyClass
 from .tasks import Task, get_task
 
-EXTENSIONS = {"sub_policy": "linear", "fit": "adam"}  # fields beyond the paper, with the values of the paper's method
+# Fields beyond the paper, with the values of the paper's method
+EXTENSIONS = {"metric": LOOKUP, "sub_policy": "linear", "fit": "adam"}
 
 
 @dataclass(frozen=True)
@@ -82,8 +86,11 @@ class Config:
     merges. True: n = n_epochs is included ("n = 0 to n_epochs"), and n = 0 splits and merges."""
 
     # Beyond the paper
-    sub_policy: Literal["linear", "constant", "quadratic"] = "linear"
-    """Class of the sub-policies, an entry of `subpolicies.POLICY_CLASSES`; the paper's is linear."""
+    metric: Literal["manhattan", "euclidean", "chebyshev"] | Metric = "manhattan"
+    """The distance that finds the cell of a state: a name, or a `vsp.Metric` of your own; the paper's is Manhattan."""
+    sub_policy: Literal["linear", "constant", "quadratic"] | Callable[[Task], PolicyClass] = "linear"
+    """Class of the sub-policies: an entry of `subpolicies.POLICY_CLASSES`, or a function of the task that returns a
+    `PolicyClass`; the paper's is linear."""
     fit: Literal["adam", "closed_form"] = "adam"
     """How each iteration fits a cell: by `n_minibatches` steps of Adam, or by least squares over all states since the
     last reset. Least squares uses running sums and no buffer; the settings of minibatches and Adam have no effect."""
@@ -104,7 +111,9 @@ class Config:
 
     def settings(self) -> dict:
         """Return all fields by name. Extensions appear only if used, so that earlier results keep their id."""
-        own = dataclasses.asdict(self)
+        from .run.identity import identity  # here: a run needs it once, an import of vsp never
+
+        own = {name: identity(value) for name, value in vars(self).items()}
         return {name: value for name, value in own.items() if name not in EXTENSIONS or value != EXTENSIONS[name]}
 
     def quick(self) -> Config:
@@ -114,7 +123,12 @@ class Config:
 
 
 def check_field(name: str, value: object, kind: object) -> None:
-    """Raise ValueError unless `value` is of `kind`: one of a Literal's names, a bool, a positive int or float."""
+    """Raise ValueError unless `value` is of `kind`: one of a Literal's names, a bool, a positive int or float, or in a
+    union with a Literal an object."""
+    if get_origin(kind) is Union:
+        kind, other = get_args(kind)
+        if isinstance(value, get_origin(other) or other):
+            return
     number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0
     if get_origin(kind) is Literal:
         good, expected = isinstance(value, str) and value in get_args(kind), f"one of {list(get_args(kind))}"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from .checks import check_count, check_seed
 from .rollouts import Outcomes, Policy, record, rollout
@@ -77,19 +78,23 @@ def likeness(policy: Policy, agent: Policy, task: str | Task, n: int = 1000, *, 
     task = get_task(task)
     starts = start_states(task, max(10, n // task.slowness), seed)
     played, episodes = record(agent, task, starts)
-    states, actions = (np.concatenate([getattr(one, part) for one in episodes]) for part in ("states", "actions"))
-    half = (task.action_high - task.action_low) / 2
-    theirs, ours = actions / half, np.asarray(policy.predict(states)[0]) / half
+    states, half = episodes.states, (task.action_high - task.action_low) / 2
+    theirs, ours = episodes.actions / half, np.asarray(policy.predict(states)[0]) / half
     both = {"policy": rollout(policy, task, starts), "agent": played}
     failures = {name: int((one.outcomes != GOAL).sum()) for name, one in both.items()}
-    spread = np.square(theirs - theirs.mean(axis=0)).sum()
-    r2 = 1 - np.square(ours - theirs).sum() / spread if spread else float(np.array_equal(ours, theirs))
     nobody = all(count == len(starts) for count in failures.values())  # as in a task that has no goal
     ended: dict[str, int | None] = dict.fromkeys(both) if nobody else {**failures}
     returns = {name: one.returns for name, one in both.items()}
-    return Likeness(float(r2), states, np.linalg.norm(ours - theirs, axis=1), returns, ended)
+    return Likeness(r_squared(ours, theirs), states, np.linalg.norm(ours - theirs, axis=1), returns, ended)
 
 
+def r_squared(ours: np.ndarray, theirs: np.ndarray) -> float:
+    """Return the share of the variance of `theirs` (t, m) that `ours` reproduce."""
+    spread = np.square(theirs - theirs.mean(axis=0)).sum()
+    return float(1 - np.square(ours - theirs).sum() / spread if spread else np.array_equal(ours, theirs))
+
+
+@threadpool_limits.wrap(limits=1)  # the same text on any machine, as the distillation before it
 def remark(policy: Policy, agent: Policy, task: Task, n: int, advice: str) -> None:
     """Print on standard error how alike they are in n / 40 episodes, at most 100, and `advice`, unless all is silent.
 
@@ -100,6 +105,8 @@ def remark(policy: Policy, agent: Policy, task: Task, n: int, advice: str) -> No
         print(f"{alike}; closer: {advice}", file=sys.stderr)
 
 
-def fences(q1: float, q3: float) -> tuple[float, float]:
-    """Return the bounds beyond which a box plot marks outliers: 1.5 interquartile ranges from the quartiles."""
+def fences(q1: Any, q3: Any) -> tuple[Any, Any]:
+    """Return the bounds beyond which a box plot marks outliers: 1.5 interquartile ranges from the quartiles.
+
+    Quartiles are numbers or arrays."""
     return q1 - 1.5 * (q3 - q1), q3 + 1.5 * (q3 - q1)

@@ -1,7 +1,6 @@
 """Export a policy as text that needs no vsp: JSON, Python, C, LaTeX and plain words.
 
-Numbers are written so that they read back as the same float64. In code, as in `VoronoiPolicy`, codewords are already
-divided by the scale of the distance, and states are divided before distances are taken.
+Numbers are written so that they read back as the same float64. The cells write their own part (`cells.Cells`).
 """
 
 from __future__ import annotations
@@ -10,6 +9,7 @@ import json
 
 import numpy as np
 
+from .cells import Cells, Nearest, braces
 from .checks import check_count
 from .subpolicies.base import SHARED, PolicyClass, number
 from .tasks.base import Task
@@ -20,17 +20,15 @@ _SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau", "
 
 
 class Exportable:
-    """The exports of a policy as methods: `VoronoiPolicy` inherits them and sets the fields that they read."""
+    """The exports of a policy as methods: `PiecewisePolicy` inherits them and sets the fields that they read."""
 
     task: Task
     policy_class: PolicyClass
-    metric: str
-    codewords: np.ndarray  # (k, d)
+    where: Cells
     coefficients: np.ndarray  # (k, p, m)
-    scale: np.ndarray  # (d,)
 
     def __len__(self) -> int:
-        return len(self.codewords)
+        return len(self.where)
 
     def equations(self, cell: int, digits: int | None = 3) -> tuple[str, ...]:
         """Return the equations of one cell, one per action, such as "F = 0.500 x - 1.200 v + 0.300".
@@ -54,11 +52,10 @@ class Exportable:
             "sub_policy": self.policy_class.name,
             "rows": list(self.policy_class.rows),
             "outputs": list(task.outputs),
-            "metric": self.metric,
+            **self.where.options,
             "action_low": task.action_low.tolist(),
             "action_high": task.action_high.tolist(),
-            "scale": self.scale.tolist(),
-            "codewords": self.codewords.tolist(),
+            **{name: array.tolist() for name, array in self.where.arrays.items()},
             "coefficients": self.coefficients.tolist(),
         }
         return json.dumps(about, ensure_ascii=False, indent=1) + "\n"
@@ -67,36 +64,23 @@ class Exportable:
         """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
 
         It imports only the standard library. For a state that is not finite the functions return -1 and nan.
-        Raises ValueError for features that are not plain arithmetic.
+        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written.
         """
         task = self.task
-        distance = {
-            "manhattan": "sum(abs(a - b) for a, b in zip(point, codeword))",
-            "euclidean": "sqrt(sum((a - b) ** 2 for a, b in zip(point, codeword)))",
-            "chebyshev": "max(abs(a - b) for a, b in zip(point, codeword))",
-        }[self.metric]
-        numbers = {
-            "SCALE": self.scale,
-            "CODEWORDS": self.codewords / self.scale,
-            "COEFFICIENTS": self.coefficients.transpose(0, 2, 1),
-            "LOW": task.action_low,
-            "HIGH": task.action_high,
-        }
+        numbers = {"LOW": task.action_low, "HIGH": task.action_high}
+        numbers["COEFFICIENTS"] = self.coefficients.transpose(0, 2, 1)
         return "\n".join([
             f'"""{_escaped(_headline(self))}"""',
             "",
             f"from math import {', '.join(SHARED)}, isfinite, nan  # noqa: F401",
             "",
             *(f"{name} = {value.tolist()}" for name, value in numbers.items()),
+            *self.where.python(),
             "",
             "",
             "def cell(state):",
-            '    """Index of the nearest codeword; -1 for a state that is not finite."""',
-            "    if not all(map(isfinite, state)):",
-            "        return -1",
-            "    point = [s / unit for s, unit in zip(state, SCALE)]",
-            f"    distances = [{distance} for codeword in CODEWORDS]",
-            "    return distances.index(min(distances))",
+            '    """Index of the cell; -1 for a state that is not finite."""',
+            "    return locate(state) if all(map(isfinite, state)) else -1",
             "",
             "",
             "def output(row, features):",
@@ -118,42 +102,22 @@ class Exportable:
         """Return C99 code: `int vsp_cell(const double *state)`, `void vsp_act(const double *state, double *action)`.
 
         It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
-        Raises ValueError for features that are not plain arithmetic.
+        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written.
         """
         (k, p, m), d, inputs = self.coefficients.shape, len(self.task.low), len(self.policy_class.code) + 1
-        add = {
-            "manhattan": "distance += fabs(gap);",
-            "euclidean": "distance += gap * gap;",
-            "chebyshev": "if (fabs(gap) > distance) distance = fabs(gap);",
-        }[self.metric]
-        root = "        distance = sqrt(distance);\n" if self.metric == "euclidean" else ""
         return f"""/* {_escaped(_headline(self))}
    state: {_names(self.task.inputs)}; action: {_names(self.task.outputs)}. */
 #include <math.h>
 
-static const double scale[{d}] = {_braces(self.scale)};
-static const double codewords[{k}][{d}] = {_braces(self.codewords / self.scale)};
-static const double coefficients[{k}][{m}][{p}] = {_braces(self.coefficients.transpose(0, 2, 1))};
-static const double low[{m}] = {_braces(self.task.action_low)};
-static const double high[{m}] = {_braces(self.task.action_high)};
+{self.where.c()}
+static const double coefficients[{k}][{m}][{p}] = {braces(self.coefficients.transpose(0, 2, 1))};
+static const double low[{m}] = {braces(self.task.action_low)};
+static const double high[{m}] = {braces(self.task.action_high)};
 
-/* The index of the nearest codeword; -1 for a state that is not finite. */
+/* The index of the cell; -1 for a state that is not finite. */
 int vsp_cell(const double *state) {{
-    int nearest = 0;
-    double least = INFINITY;
     for (int j = 0; j < {d}; j++) if (!isfinite(state[j])) return -1;
-    for (int i = 0; i < {k}; i++) {{
-        double distance = 0.0;
-        for (int j = 0; j < {d}; j++) {{
-            double gap = state[j] / scale[j] - codewords[i][j];
-            {add}
-        }}
-{root}        if (distance < least) {{
-            least = distance;
-            nearest = i;
-        }}
-    }}
-    return nearest;
+    return locate(state);
 }}
 
 static double output(const double *row, const double *features) {{
@@ -173,23 +137,22 @@ void vsp_act(const double *state, double *action) {{
 """
 
     def to_text(self, digits: int | None = 3) -> str:
-        """Return the whole policy in words: the distance, and the equations of every codeword."""
+        """Return the whole policy in words: the distance, if there is one, and place and equations of every cell."""
         lines = [_headline(self)]
         if len(self) > 1:
-            lines.append(f"{self.metric.capitalize()} distances{_of_scaled(self, digits)}.")
-        for i, codeword in enumerate(self.codewords):
-            place = ", ".join(f"{name} {number(c, digits)}" for name, c in zip(self.task.inputs, codeword))
-            lines += [f"nearest to {place}:"] if len(self) > 1 else []
+            lines += [f"{about}." for about in [self.where.about(self.task.inputs, digits)] if about]
+        for i in range(len(self)):
+            lines += [f"{self.where.place(i, self.task.inputs, digits)}:"] if len(self) > 1 else []
             lines += [f"  {equation}" for equation in self.equations(i, digits)]
         lows, highs = ([number(limit, None) for limit in box] for box in (self.task.action_low, self.task.action_high))
         limits = (f"{name} from {low} to {high}" for name, low, high in zip(self.task.outputs, lows, highs))
         return "\n".join([*lines, f"limited to {', '.join(limits)}", ""])
 
     def to_latex(self, digits: int | None = 3) -> str:
-        """Return a table of the codewords and their equations, one row per cell, and the distance; needs booktabs."""
+        """Return a table of the cells and their equations, one row per cell, and the distance; needs booktabs."""
         outputs = [f"${symbol(output)}$" for output in self.task.outputs]
         cells = ([codeword_latex(self, i, digits), *equations_latex(self, i, digits)] for i in range(len(self)))
-        head, *rows = (" & ".join(row) + " \\\\\n" for row in (["codeword", *outputs], *cells))
+        head, *rows = (" & ".join(row) + " \\\\\n" for row in ([self.where.column, *outputs], *cells))
         columns = "l" * (1 + len(outputs))
         note = rf"\multicolumn{{{len(columns)}}}{{l}}{{{distances_latex(self, digits)}}} \\" + "\n"
         return (
@@ -199,33 +162,26 @@ void vsp_act(const double *state, double *action) {{
 
 
 def distances_latex(policy: Exportable, digits: int | None = 3) -> str:
-    """Describe the distance to the codewords, as a caption for their table."""
+    """Describe the distance to the codewords, or other cells, as a caption for their table."""
+    if not isinstance(policy.where, Nearest):
+        return f"Each map is valid {policy.where.valid}"
     if len(policy) == 1:
         return "One cell, wherever its codeword is"
-    if (policy.scale == 1).all():
-        return f"{policy.metric.capitalize()} distances"
-    units = ",\\ ".join(number(unit, digits) for unit in policy.scale)
-    return f"{policy.metric.capitalize()} distances of states divided by $[{units}]$"
+    name, scale = policy.where.metric.name.capitalize(), policy.where.scale
+    units = ",\\ ".join(number(unit, digits) for unit in scale)
+    return f"{name} distances" + ("" if (scale == 1).all() else f" of states divided by $[{units}]$")
 
 
 def codeword_latex(policy: Exportable, cell: int, digits: int | None = 3) -> str:
-    """Return the codeword of a cell between dollar signs."""
+    """Return the codeword of a cell, or its half-spaces, between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
-    return "$[" + ",\\ ".join(number(c, digits) for c in policy.codewords[cell]) + "]$"
+    return policy.where.latex(cell, tuple(map(symbol, policy.task.inputs)), digits)
 
 
 def equations_latex(policy: Exportable, cell: int, digits: int | None = 3) -> list[str]:
     """Return the right-hand sides of the equations of a cell, one per action, between dollar signs."""
     check_count("cell", cell, least=0, most=len(policy) - 1)
     return [f"${policy.policy_class.expression(column, digits, symbol)}$" for column in policy.coefficients[cell].T]
-
-
-def _of_scaled(policy: Exportable, digits: int | None) -> str:
-    """Return the scale of the distance in words; an empty text for raw states."""
-    if (policy.scale == 1).all():
-        return ""
-    units = (f"{name} by {number(unit, digits)}" for name, unit in zip(policy.task.inputs, policy.scale))
-    return f" of states divided, {', '.join(units)}"
 
 
 def symbol(name: str) -> str:
@@ -249,7 +205,7 @@ def _headline(policy: Exportable) -> str:
     if len(policy) == 1:
         return f"{policy.task.name}: one {policy.policy_class.name} policy."
     policies = f"{len(policy)} {policy.policy_class.name} policies"
-    return f"{policy.task.name}: {policies}, each valid where its codeword is the nearest."
+    return f"{policy.task.name}: {policies}, each valid {policy.where.valid}."
 
 
 def _names(symbols: tuple[str, ...]) -> str:
@@ -259,7 +215,3 @@ def _names(symbols: tuple[str, ...]) -> str:
 def _escaped(text: str) -> str:
     """Escape `text` for a docstring and a C comment: a name can neither end them nor start a new line."""
     return json.dumps(text, ensure_ascii=False)[1:-1].replace("*/", "* /").replace("/*", "/ *")
-
-
-def _braces(values: np.ndarray) -> str:
-    return json.dumps(values.tolist()).replace("[", "{").replace("]", "}")

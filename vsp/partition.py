@@ -27,6 +27,7 @@ class Partition:
         self.models = SubPolicies(policy_class(config.sub_policy, task), m, initial=config.initial)
         q = len(self.models.policy_class.terms)
         self.buffers = FITS[config.fit](q, m)
+        self.metric = geometry.metric_of(config.metric)
         self.scale = np.ones(d) if config.scale == "raw" else task.high - task.low  # R8
 
     def observe(self, episode: Episode) -> None:
@@ -77,7 +78,7 @@ class Partition:
 
     def cells(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (T, d). (T,)"""
-        return geometry.look_up(self.scaled(self.codewords), self.scaled(states))
+        return geometry.look_up(self.scaled(self.codewords), self.scaled(states), self.metric)
 
     def scaled(self, states: np.ndarray) -> np.ndarray:
         """States (..., d) in the units of the distance."""
@@ -89,7 +90,8 @@ class Partition:
 
     def far(self, i: int, state: np.ndarray) -> bool:
         """Whether `state` is far enough from codeword i to become one (R3), and is not a codeword already."""
-        gap = geometry.gap(self.scaled(state), self.scaled(self.codewords[i]), self.config.split_metric)
+        metric = geometry.METRICS[self.config.split_metric]
+        gap = metric.distances(self.scaled(state)[None], self.scaled(self.codewords[i])[None])[0, 0]
         # A teacher that pushes against the border stands still: with kept look-ups (R2) a state could be added twice.
         return gap > self.config.min_pol_distance and not (self.codewords == state).all(axis=1).any()
 
@@ -110,7 +112,8 @@ class Partition:
         """Which cells are neighbours if these are all `codewords` (k, d). (k, k) bool"""
         codewords = self.scaled(codewords)
         if self.config.neighbours == "lookup":
-            return geometry.lookup_neighbours(codewords, self.scaled(self.task.low), self.scaled(self.task.high))
+            low, high = self.scaled(self.task.low), self.scaled(self.task.high)
+            return geometry.lookup_neighbours(codewords, low, high, self.metric)
         return geometry.delaunay_neighbours(codewords)
 
     def comparable_coefficients(self) -> np.ndarray:
@@ -122,5 +125,7 @@ class Partition:
 
     def policy(self) -> VoronoiPolicy:
         """Return the partition as a policy that later changes do not affect."""
-        coefficients, name = self.models.coefficients, self.config.sub_policy
-        return VoronoiPolicy(self.codewords, coefficients, task=self.task, scale=self.scale, sub_policy=name)
+        return VoronoiPolicy(
+            self.codewords, self.models.coefficients, task=self.task, metric=self.metric, scale=self.scale,
+            sub_policy=self.config.sub_policy,
+        )  # fmt: skip

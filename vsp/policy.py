@@ -1,19 +1,28 @@
-"""`VoronoiPolicy`: codewords and sub-policies. It acts, explains its actions, and can be saved and loaded."""
+"""`PiecewisePolicy`: cells and their maps. It acts, explains its actions, and can be saved and loaded.
+
+`VoronoiPolicy` is the one whose cells are drawn by codewords, as in the paper.
+"""
 
 from __future__ import annotations
 
+import copy
+import hashlib
+import json
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from . import geometry
-from .checks import check_array, check_choice, check_observations
+from .cells import CELLS, MOST, Cells, Nearest
+from .checks import check_array, check_observations
 from .export import Exportable
+from .geometry import METRICS, Metric
 from .run import sealed
 from .run.atomic import DamagedFile
-from .subpolicies import policy_class
+from .subpolicies import POLICY_CLASSES, PolicyClass, policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
 
@@ -21,23 +30,23 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _STEPS = 200  # points on an axis in one pass of the search for a border
-MOST, LEAST_SCALE = 1e50, 1e-50  # limits of a policy's numbers, which keep squared distances and products below 1e308
 
 
 @dataclass(frozen=True)
 class Explanation:
     """Why a policy acts as it does in one state; `print` shows it as text.
 
-    `cell` is its index. It has a `codeword` (d,) and `equations`, one per action, such as "F = 0.5 x - 1.2 v + 0.3".
-    `contributions` has a row per action and a column per feature and the bias. A row adds up to `raw` (m,),
-    the output of the sub-policy; `action` (m,) is `raw` limited to the action box. `next_cell` is the cell with the
-    second nearest codeword, None if there is one cell. `margin` is the distance to that codeword minus the distance to
-    the nearest, in the look-up metric. `borders` has a row per input: the least change of it alone that reaches another
-    cell, and that cell; NaN and -1 if no value in the box does.
+    `cell` is its index. It has a `codeword` (d,), None if its cells have none, and `equations`, one per action, such as
+    "F = 0.5 x - 1.2 v + 0.3". `contributions` has a row per action and a column per feature and the bias. A row adds up
+    to `raw` (m,), the output of the sub-policy; `action` (m,) is `raw` limited to the action box. `next_cell` is the
+    nearest other cell, that of the second nearest codeword, None if there is one cell. `margin` is the distance to its
+    border; with codewords the distance to the second nearest minus that to the nearest, in the look-up metric.
+    `borders` has a row per input: the least change of it alone that reaches another cell, and that cell; NaN and -1 if
+    no value in the box does.
     """
 
     cell: int
-    codeword: np.ndarray
+    codeword: np.ndarray | None
     equations: tuple[str, ...]
     contributions: pd.DataFrame
     raw: np.ndarray
@@ -56,44 +65,42 @@ class Explanation:
         return "\n".join([*parts, f"action within the limits: {action}", others])
 
 
-class VoronoiPolicy(Exportable):
-    """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
+class PiecewisePolicy(Exportable):
+    """k sub-policies, each valid in one cell of `where`.
 
-    `codewords` are (k, d). `coefficients` are (k, p, m); `policy_class.rows` names the p rows: for linear sub-policies
-    d weights, then the bias. `sub_policy` is one of `subpolicies.POLICY_CLASSES`. Distances are taken between states
-    divided by `scale` (d,); None: raw states. All arrays are float64. Raises ValueError for wrong shapes, equal
-    codewords, and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`.
+    `coefficients` are (k, p, m); `policy_class.rows` names the p rows: for linear sub-policies d weights, then the
+    bias. `sub_policy` is one of `subpolicies.POLICY_CLASSES`, or a function of the task that makes a `PolicyClass`. All
+    arrays are float64. Raises ValueError for wrong shapes and numbers that are not finite or beyond `cells.MOST`.
     """
+
+    kind = "PiecewisePolicy"  # in files
 
     def __init__(
         self,
-        codewords: np.ndarray,
+        where: Cells,
         coefficients: np.ndarray,
         *,
         task: str | Task,
-        metric: str = geometry.LOOKUP,
-        scale: np.ndarray | None = None,
-        sub_policy: str = "linear",
+        sub_policy: str | Callable[[Task], PolicyClass] = "linear",
     ):
-        self.task = get_task(task)
+        self.task, self.where = get_task(task), where
         self.policy_class = policy_class(sub_policy, self.task)
         d, p, m = len(self.task.low), len(self.policy_class.rows), len(self.task.action_low)
-        self.codewords = check_array("codewords", codewords, (-1, d), most=MOST).copy()
-        self.coefficients = check_array("coefficients", coefficients, (len(self.codewords), p, m), most=MOST).copy()
-        self.scale = check_array("scale", np.ones(d) if scale is None else scale, (d,), most=MOST).copy()
-        check_choice("metric", metric, geometry.METRICS)
-        if not len(self.codewords) or not geometry.all_differ(self.codewords):
-            raise ValueError(f"expected at least one codeword and all different, got {self.codewords.tolist()}")
-        if not (self.scale >= LEAST_SCALE).all():
-            raise ValueError(f"scale is {self.scale.tolist()}, expected positive numbers of at least {LEAST_SCALE}")
-        self.metric = metric
-        self._scaled = self.codewords / self.scale
-        for array in (self.codewords, self.scale):  # an edit would not reach the look-up
-            array.setflags(write=False)
+        if where.d != d:
+            raise ValueError(f"the cells are of states of {where.d} numbers, {self.task.name} has {d}")
+        self.coefficients = check_array("coefficients", coefficients, (len(where), p, m), most=MOST).copy()
 
     def __repr__(self) -> str:
         d, m = len(self.task.inputs), len(self.task.outputs)
-        return f"<VoronoiPolicy of {self.task.name}: {len(self)} cells, {d} inputs, {m} actions; to_text() shows it>"
+        return f"<{self.kind} of {self.task.name}: {len(self)} cells, {d} inputs, {m} actions; to_text() shows it>"
+
+    def with_maps(
+        self, coefficients: np.ndarray, *, sub_policy: str | Callable[[Task], PolicyClass] = "linear"
+    ) -> Self:
+        """Return a policy with the same cells and other maps. Raises ValueError as the constructor does."""
+        other = copy.copy(self)
+        PiecewisePolicy.__init__(other, self.where, coefficients, task=self.task, sub_policy=sub_policy)
+        return other
 
     def check_linear(self) -> None:
         """Raise ValueError unless the sub-policies are linear, for callers that support no others."""
@@ -127,18 +134,17 @@ class VoronoiPolicy(Exportable):
         state = self._states(obs)
         if state.ndim != 1:
             raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
-        gaps = geometry.distances((state / self.scale)[None], self._scaled, self.metric)[0]
-        order = gaps.argsort(kind="stable")
-        cell, raw = int(order[0]), self.linear(state)
+        cell, raw = int(self._cells(state)), self.linear(state)
+        next_cell, margin = self.where.border(state, cell)
         return Explanation(
             cell=cell,
-            codeword=self.codewords[cell],
+            codeword=self.where.codewords[cell] if isinstance(self.where, Nearest) else None,
             equations=self.equations(cell),
             contributions=self.policy_class.contributions(state, self.coefficients[cell]).set_axis(self.task.outputs),
             raw=raw,
             action=self.predict(state)[0],
-            next_cell=int(order[1]) if len(self) > 1 else None,
-            margin=float(gaps[order[1]] - gaps[order[0]]) if len(self) > 1 else float("inf"),
+            next_cell=next_cell,
+            margin=margin,
             borders=self._borders(state, cell),
         )
 
@@ -154,7 +160,8 @@ class VoronoiPolicy(Exportable):
         rows = []
         for axis in range(len(state)):
             low, high = min(self.task.low[axis], state[axis]), max(self.task.high[axis], state[axis])
-            far = 2 * np.ptp(np.append(self.codewords[:, axis], state[axis]))
+            places = self.where.codewords[:, axis] if isinstance(self.where, Nearest) else [-1, 1]
+            far = 2 * np.ptp(np.append(places, state[axis]))
             ends = (end if np.isfinite(end) else state[axis] + way * far for way, end in ((-1, low), (1, high)))
             ways = [self._border(state, cell, axis, end) for end in ends]
             rows.append(min(ways, key=lambda way: np.nan_to_num(abs(way[0]), nan=np.inf)))
@@ -173,41 +180,105 @@ class VoronoiPolicy(Exportable):
         return float(outside - state[axis]), found
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row per cell: the codeword's coordinates, then the coefficients, named as in data/paper."""
+        """Return one row per cell: its codeword if it has one, then the coefficients, named as in data/paper."""
         import pandas as pd  # here, because it takes long to import
 
-        columns = {f"codeword_{name}": self.codewords[:, i] for i, name in enumerate(self.task.inputs)}
+        codewords = self.where.codewords.T if isinstance(self.where, Nearest) else ()
+        columns = {f"codeword_{name}": column for name, column in zip(self.task.inputs, codewords)}
         for j, output in enumerate(self.task.outputs):
             for i, name in enumerate(self.policy_class.rows):
                 columns[f"{output.replace('Δ', 'd')}_{name}"] = self.coefficients[:, i, j]
         return pd.DataFrame(columns).rename_axis("cell")
 
+    def _content(self) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """What a file of the policy holds: arrays, and all else."""
+        arrays = {**self.where.arrays, "coefficients": self.coefficients}
+        arrays |= {limit: getattr(self.task, limit) for limit in BOX}
+        about: dict[str, Any] = {"task": self.task.name, **self.where.options, "sub_policy": self.policy_class.name}
+        about |= {"inputs": self.task.inputs, "outputs": self.task.outputs, "kind": self.kind}
+        return arrays, about | ({"cells": type(self.where).__name__} if self.kind == PiecewisePolicy.kind else {})
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of what a file of the policy holds: its identity as an agent."""
+        arrays, about = self._content()
+        numbers = b"".join(array.tobytes() for array in arrays.values())
+        return hashlib.sha256(json.dumps(about, sort_keys=True).encode() + numbers).hexdigest()
+
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""
-        arrays = {"codewords": self.codewords, "coefficients": self.coefficients, "scale": self.scale}
-        arrays |= {limit: getattr(self.task, limit) for limit in BOX}
-        about = {"task": self.task.name, "metric": self.metric, "sub_policy": self.policy_class.name}
-        names = {"inputs": self.task.inputs, "outputs": self.task.outputs}
-        sealed.save_arrays(path, arrays, {"kind": "VoronoiPolicy", **about, **names})
+        sealed.save_arrays(path, *self._content())
 
     @classmethod
-    def load(cls, path: str | os.PathLike) -> VoronoiPolicy:
+    def load(cls, path: str | os.PathLike, *, known: Sequence = ()) -> Self:
         """Read a policy that `save` wrote, with the names and the box of its task.
 
-        It can act even if the task is not registered. Raises FileNotFoundError, and `run.atomic.DamagedFile` if a bit
-        is missing or altered, or if the file holds no policy.
+        It can act even if the task is not registered. `known` are objects from outside vsp that the file names: a class
+        of cells, a `Metric`, a function that makes a `PolicyClass`. Raises FileNotFoundError, and
+        `run.atomic.DamagedFile` if a bit is missing or altered, or if the file holds no such policy.
         """
-        arrays, about = sealed.load_arrays(path, kind="VoronoiPolicy")
+        arrays, about = sealed.load_arrays(path, kind=(cls.kind, VoronoiPolicy.kind))
         try:
             box = {limit: arrays.pop(limit) for limit in BOX}
             task = saved_task(about["task"], about["inputs"], about["outputs"], box)
-            return cls(**arrays, task=task, metric=about["metric"], sub_policy=about["sub_policy"])
-        except (KeyError, TypeError, ValueError) as error:
+            things: dict[str, Any] = {**CELLS, **METRICS, **POLICY_CLASSES}
+            things |= {getattr(one, "name", getattr(one, "__name__", "")): one for one in known}
+            things |= {one(task).name: one for one in known if not isinstance(one, type | Metric)}
+            options = {"metric": things[about["metric"]]} if "metric" in about else {}
+            coefficients, sub_policy = arrays.pop("coefficients"), things[about["sub_policy"]]
+            where = things[about.get("cells", "Nearest")](**arrays, **options)
+            policy: Any = object.__new__(VoronoiPolicy if about["kind"] == VoronoiPolicy.kind else PiecewisePolicy)
+            PiecewisePolicy.__init__(policy, where, coefficients, task=task, sub_policy=sub_policy)
+            return policy
+        except KeyError as error:
+            what = f"the checksum is right, but the file lacks or names {error}, which may be an object for `known`"
+            raise DamagedFile(f"{path}: {what}") from error
+        except (TypeError, ValueError) as error:
             raise DamagedFile(f"{path}: the checksum is right, but the file holds no valid policy: {error}") from error
 
     def _cells(self, states: np.ndarray) -> np.ndarray:
-        found = geometry.look_up(self._scaled, states.reshape(-1, states.shape[-1]) / self.scale, self.metric)
+        found = self.where.locate(states.reshape(-1, states.shape[-1]))
         return found.reshape(states.shape[:-1])[()]  # a scalar for one state: faster to index with
 
     def _states(self, obs: np.ndarray) -> np.ndarray:
         return check_observations(obs, len(self.task.low), self.task.name)
+
+
+class VoronoiPolicy(PiecewisePolicy):
+    """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
+
+    `codewords` are (k, d); `metric` and `scale` as in `cells.Nearest`, the rest as in `PiecewisePolicy`. Raises
+    ValueError as both do.
+    """
+
+    kind = "VoronoiPolicy"
+    where: Nearest
+
+    def __init__(
+        self,
+        codewords: np.ndarray,
+        coefficients: np.ndarray,
+        *,
+        task: str | Task,
+        metric: str | Metric = geometry.LOOKUP,
+        scale: np.ndarray | None = None,
+        sub_policy: str | Callable[[Task], PolicyClass] = "linear",
+    ):
+        task = get_task(task)
+        codewords = check_array("codewords", codewords, (-1, len(task.low)))
+        super().__init__(Nearest(codewords, metric, scale), coefficients, task=task, sub_policy=sub_policy)
+
+    @property
+    def codewords(self) -> np.ndarray:
+        """The codewords, in the units of the states. (k, d)"""
+        return self.where.codewords
+
+    @property
+    def scale(self) -> np.ndarray:
+        """What states are divided by before distances are taken. (d,)"""
+        return self.where.scale
+
+    @property
+    def metric(self) -> str:
+        """The name of the distance."""
+        return self.where.metric.name

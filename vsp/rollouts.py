@@ -37,6 +37,20 @@ class Episode:
                 object.__setattr__(self, name, values)
 
 
+class Episodes(list[Episode]):
+    """Recorded episodes of one agent, and all their steps in two arrays."""
+
+    @property
+    def states(self) -> np.ndarray:
+        """All states, episode by episode. (t, d)"""
+        return np.concatenate([episode.states for episode in self])
+
+    @property
+    def actions(self) -> np.ndarray:
+        """The actions taken there. (t, m)"""
+        return np.concatenate([episode.actions for episode in self])
+
+
 @dataclass(frozen=True)
 class Outcomes:
     """How n episodes ended."""
@@ -55,7 +69,7 @@ def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
     return _play(policy, get_task(task), starts)
 
 
-def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcomes, list[Episode]]:
+def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcomes, Episodes]:
     """Run one episode from each start state (n, s); return how they ended, and every state and action of each.
 
     Raises ValueError as `rollout` does.
@@ -64,15 +78,16 @@ def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcom
     outcomes = _play(policy, get_task(task), starts, steps)
     n = len(outcomes.returns)
     if not n:
-        return outcomes, []
+        return outcomes, Episodes()
     index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
     order = np.argsort(index, kind="stable")  # by episode; steps stay in time order
     states, actions = check_data(states[order], actions[order])
     ends = np.cumsum(np.bincount(index, minlength=n))
-    return outcomes, [Episode(states[i:j], actions[i:j], checked=True) for i, j in pairwise([0, *ends.tolist()])]
+    parts = pairwise([0, *ends.tolist()])
+    return outcomes, Episodes(Episode(states[i:j], actions[i:j], checked=True) for i, j in parts)
 
 
-def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> list[Episode]:
+def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> Episodes:
     """Return the episodes of `record`, in the order of `starts`. Raises ValueError as `rollout` does."""
     return record(policy, task, starts)[1]
 
@@ -85,7 +100,7 @@ def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.n
     episodes = collect_episodes(policy, task, starts)
     if not episodes:
         raise ValueError("there are no start states, expected at least one")
-    return np.concatenate([episode.states for episode in episodes])
+    return episodes.states
 
 
 def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -30,9 +30,8 @@ def main() -> None:
     try:
         if given.out.exists() and not given.force:
             raise FileExistsError(f"{given.out} exists and is kept: name another file, or say --force")
-        options = {"normalize": False if given.normalize == "no" else given.normalize} if given.normalize else {}
         task = vsp.get_task(given.task)
-        agent = vsp.agent(given.agent, task, **options)
+        agent = vsp.agent(given.agent, task, normalize=False if given.normalize == "no" else given.normalize)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", UserWarning)
             policy = faithful(agent, task, n_cells=given.cells, seed=given.seed)

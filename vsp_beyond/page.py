@@ -13,11 +13,10 @@ import numpy as np
 
 from vsp import agent as as_agent
 from vsp.evaluation import Likeness, likeness
-from vsp.paper.statistics import interval, share_interval
-from vsp.policy import VoronoiPolicy
+from vsp.policy import PiecewisePolicy, VoronoiPolicy
+from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
-from vsp.show.explorer import PLANES, explore, standalone
-from vsp.subpolicies.base import number
+from vsp.show.explorer import explore, standalone
 from vsp.tasks import Task, get_task
 
 from .proofs import PROVERS
@@ -34,19 +33,20 @@ td, th { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }
 """
 
 
-def report(policy: VoronoiPolicy, agent: Policy, task: str | Task, *, name: str = "agent", remarks: str = "") -> str:
+def report(policy: PiecewisePolicy, agent: Policy, task: str | Task, *, name: str = "agent", remarks: str = "") -> str:
     """Return a page as HTML: equations, the explorer, how alike they act, where they differ most, what is proved, and
     the policy as files to save. `name` and `remarks` stand on the page as text.
 
-    Raises ValueError unless the policy is linear and both fit the task.
+    Raises ValueError unless the policy is cells and maps and both fit the task.
     """
     task, agent = get_task(task), as_agent(agent)
-    policy.check_linear()
+    if not isinstance(policy, PiecewisePolicy):
+        raise ValueError(f"the policy is {policy!r:.60}, expected cells and maps: a vsp.PiecewisePolicy")
     alike = likeness(policy, agent, task)
     warning = [str(alike)] if alike.poor else []
     cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
     parts = [
-        f"<p>{html.escape(name)} on {html.escape(task.name)}, imitated by linear maps in {cells}.</p>",
+        f"<p>{html.escape(f'{name} on {task.name}, imitated by {policy.policy_class.name} maps in {cells}.')}</p>",
         "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in [*remarks.splitlines(), *warning]),
         _numbers(alike), _cards(policy, alike), _explorer(policy, agent), _worst(policy, agent, alike), _kept(policy),
     ]  # fmt: skip
@@ -68,12 +68,12 @@ def _numbers(alike: Likeness) -> str:
     )
 
 
-def _cards(policy: VoronoiPolicy, alike: Likeness) -> str:
-    """Return a card per cell: its codeword, the share of the agent's states in it, and its equations."""
-    names, inside, cards = policy.task.inputs, policy.cells(alike.states), ""
-    typical = np.abs(alike.states).mean(axis=0)
-    for cell, codeword in enumerate(policy.codewords):
-        where = ", ".join(f"{name} {number(c, 3)}" for name, c in zip(names, codeword))
+def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
+    """Return a card per cell: where it is, the share of the agent's states in it, and its equations."""
+    names, inside, cards = policy.policy_class.terms, policy.cells(alike.states), ""
+    typical = np.abs(policy.policy_class.features(alike.states)).mean(axis=0)
+    for cell in range(len(policy)):
+        where = policy.where.place(cell, policy.task.inputs, 3)
         lines = policy.equations(cell)
         if len(names) > MOST_INPUTS:
             weights = policy.coefficients[cell, :-1]
@@ -84,21 +84,22 @@ def _cards(policy: VoronoiPolicy, alike: Likeness) -> str:
             )
         text = "<br>".join(html.escape(line) for line in lines)
         cards += f"<div><b>Cell {cell}</b>, {np.mean(inside == cell):.0%} of the states<br>"
-        cards += f"nearest to {html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
-    distance = html.escape(policy.to_text().splitlines()[1]) if len(policy) > 1 else ""
-    return f'<h2>The policy</h2><p>{distance}</p><div class="cards">{cards}</div>'
+        cards += f"{html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
+    about = policy.where.about(policy.task.inputs, 3) if len(policy) > 1 else ""
+    return f'<h2>The policy</h2><p>{html.escape(about and f"{about}.")}</p><div class="cards">{cards}</div>'
 
 
-def _explorer(policy: VoronoiPolicy, agent: Policy) -> str:
+def _explorer(policy: PiecewisePolicy, agent: Policy) -> str:
     """Return the explorer, or why there is none."""
-    if policy.task.name in PLANES:
+    try:
         return explore(policy, teacher=agent).element()
-    return f"<p>This page has no explorer, because a browser cannot play {html.escape(policy.task.name)}.</p>"
+    except ValueError as error:
+        return f"<p>This page has no explorer: {html.escape(str(error))}.</p>"
 
 
-def _worst(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
+def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     """Return the states in which the actions differ most, one per cell at most."""
-    cells, rows, seen = policy.cells(alike.states), "", set()
+    cells, rows, seen = policy.cells(alike.states), "", set[int]()
     for i in np.argsort(-alike.errors):
         if cells[i] in seen or len(seen) == 3:
             continue
@@ -113,12 +114,15 @@ def _worst(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
     )
 
 
-def _kept(policy: VoronoiPolicy) -> str:
+def _kept(policy: PiecewisePolicy) -> str:
     """Return what is proved, if the task has a prover and it is done within a minute, and the policy as files."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.vsp"
         policy.save(path)
-        proof, saved = _proof(path) if policy.task.name in PROVERS else "", path.read_bytes()
+        proof, saved = (
+            _proof(path) if isinstance(policy, VoronoiPolicy) and policy.task.name in PROVERS else "",
+            path.read_bytes(),
+        )
     files = {"policy.vsp": saved, "policy.c": policy.to_c().encode(), "policy.py": policy.to_python().encode()}
     data = {name: base64.b64encode(content).decode() for name, content in files.items()}
     links = (

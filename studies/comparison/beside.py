@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from vsp import VoronoiPolicy, get_task, load_teacher, start_states
-from vsp.paper.results import PROVENANCE, provenance
+from vsp.protocol.job import PROVENANCE, provenance
 from vsp.rollouts import rollout
 from vsp.run import listed, sealed
 from vsp.run.progress import progress

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from vsp import VoronoiPolicy, get_task, load_teacher
-from vsp.paper.results import load_made, make_missing, provenance, provenance_folder
+from vsp.protocol.job import load_made, make_missing, provenance, provenance_folder
 from vsp.teachers.teacher import Teacher, further_teachers
 from vsp_beyond.few_cells.units import METRIC
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from vsp.paper.statistics import percentile_interval, share_interval
+from vsp.protocol.intervals import percentile_interval, share_interval
 
 from ..results import read_results
 

@@ -62,7 +62,7 @@ def copied(*names: str) -> Callable[[Path], Path]:
 
 def run(folder: Path) -> Path:
     runs.make_runs(EXPERIMENT, [3], runs=folder)
-    return runs.run_path(EXPERIMENT.folder(folder), 3)
+    return EXPERIMENT.folder(folder) / "0003.run"
 
 
 def row(folder: Path) -> Path:

@@ -15,7 +15,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, distilled_elsewhere, threads
 import vsp
 from vsp import algorithms
 from vsp.paper.results import read_results
-from vsp.paper.runs import N_RUNS, load_runs, make_runs, paper_experiment, run_path
+from vsp.paper.runs import N_RUNS, load_runs, make_runs, paper_experiment
 from vsp.paper.statistics import spread
 from vsp.rollouts import visited_states
 from vsp.run.atomic import ROOT
@@ -53,7 +53,9 @@ def test_the_order_of_jobs(record, tmp_path):
             make_runs(experiment, order, runs=tmp_path / name, jobs=jobs)
         folders = [experiment.folder(tmp_path / name) for name in "abcd"]
         for other in folders[1:]:
-            same += [filecmp.cmp(run_path(folders[0], n), run_path(other, n), shallow=False) for n in seeds]
+            same += [
+                filecmp.cmp(*(folder / f"{n:04d}.run" for folder in (folders[0], other)), shallow=False) for n in seeds
+            ]
     tell(record, "run files in any order of jobs, 1 or 2 at a time", same, "files")
 
 

@@ -38,7 +38,7 @@ def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     for part in ("vsp", "vsp_beyond", "studies", "vsp_course", "data/paper", "data/teachers"):
         copytree(ROOT / part, folder / "source" / part, ignore=ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
         copy(ROOT / name, folder / "source" / name)
     options = ["-q", "--no-deps", "--no-build-isolation", "--wheel-dir", "."]
     done = run(sys.executable, "-m", "pip", "wheel", *options, "./source", cwd=folder)

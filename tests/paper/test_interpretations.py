@@ -15,9 +15,10 @@ from vsp.paper import printed
 from vsp.paper.readings import ALTERNATIVES, Readings, defaults
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, paper_experiment
-from vsp.paper.statistics import interval, resample, spread
+from vsp.paper.statistics import resample, spread
 from vsp.paper.studies import interpretations
 from vsp.paper.studies.interpretations import LABELS, SHOWN, distance, landmarks, ranking, shown_variants, study
+from vsp.protocol import interval
 from vsp.tasks import base, get_task
 
 CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer

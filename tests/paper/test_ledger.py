@@ -15,8 +15,8 @@ from vsp.paper import ledger, tables
 from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps, verdict
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
-from vsp.paper.statistics import interval
 from vsp.policy import VoronoiPolicy
+from vsp.protocol import interval
 from vsp.rollouts import Outcomes
 from vsp.run.notebook import nbformat
 from vsp.tasks import registry, simplegoal

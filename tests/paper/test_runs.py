@@ -18,7 +18,7 @@ from vsp.paper import runs as runs_module
 from vsp.paper import tables
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
-from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Results, load_runs, make_all, make_run, make_runs, paper_results
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, load_runs, make_all, make_runs, paper_results
 from vsp.paper.statistics import spread
 from vsp.run import atomic, listed
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
@@ -70,8 +70,8 @@ def test_a_resumed_experiment_makes_the_missing_runs_alone(made, tmp_path, monke
     shutil.copytree(made[0], tmp_path / "runs")
     (SMALL.folder(tmp_path / "runs") / "0001.run").unlink()
     times = {p: p.stat().st_mtime_ns for p in SMALL.folder(tmp_path / "runs").iterdir()}
-    seeds, original = [], make_run
-    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: (seeds.append(seed), original(e, seed))[1])
+    seeds, original = [], Distillation.make
+    monkeypatch.setattr(Distillation, "make", lambda run: (seeds.append(run.seed), original(run))[1])
     make_runs(SMALL, range(3), runs=tmp_path / "runs")
     assert seeds == [1] and files(tmp_path / "runs") == files(made[0])
     assert all(path.stat().st_mtime_ns == time for path, time in times.items())
@@ -147,7 +147,8 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
 
 
 def test_a_run_of_another_seed_is_refused_and_a_failing_one_keeps_the_others(tmp_path, monkeypatch):
-    monkeypatch.setattr(runs_module, "make_run", lambda e, seed: make_run(e, seed) if seed == 0 else 1 / 0)
+    make = Distillation.make
+    monkeypatch.setattr(Distillation, "make", lambda run: make(run) if run.seed == 0 else 1 / 0)
     with pytest.raises(ZeroDivisionError):
         make_runs(SMALL, [0, 1], runs=tmp_path)
     assert [*files(tmp_path)] == ["0000.run"]

@@ -12,10 +12,10 @@ from vsp.paper import printed
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
-from vsp.paper.statistics import crossed_interval
 from vsp.paper.studies import interpretations, simpler, teachers
 from vsp.paper.studies.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp.partition import Partition
+from vsp.protocol import crossed_interval
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)
 FITTED = [

@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vsp.paper import statistics
-from vsp.paper.statistics import greatest_std, interval, outlier_numbers, resample, rounds_to, spread
+from vsp.paper.statistics import greatest_std, outlier_numbers, resample, rounds_to, spread
+from vsp.protocol import interval, intervals
 
 HAND = np.array([-100.0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 100])  # quartiles 2.5, 5, 7.5: whiskers at -5 and 15
 RETURNS = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e3, 1e3))
@@ -76,8 +77,8 @@ def test_the_crossed_interval_is_that_of_drawing_rows_and_columns():
     """The same by hand: an average over drawn policies of an average over drawn starts."""
     gaps, rng = np.random.default_rng(5).normal(size=(4, 30)), np.random.default_rng(1)
     means = [gaps[rng.integers(4, size=4)][:, rng.integers(30, size=30)].mean() for _ in range(4000)]
-    assert statistics.crossed_interval(gaps) == pytest.approx(np.percentile(means, [2.5, 97.5]), abs=0.04)
-    assert statistics.crossed_interval(gaps) == statistics.crossed_interval(gaps)
+    assert intervals.crossed_interval(gaps) == pytest.approx(np.percentile(means, [2.5, 97.5]), abs=0.04)
+    assert intervals.crossed_interval(gaps) == intervals.crossed_interval(gaps)
 
 
 # Everything resampled at once
@@ -174,6 +175,6 @@ def test_rounds_to():
 
 def test_a_share_has_exact_bounds():
     """Five of five are at least 48 %: 0.025 ** (1 / 5)."""
-    assert statistics.share_interval(5, 5) == (pytest.approx(0.025**0.2), 1.0)
-    low, high = statistics.share_interval(2, 4)
+    assert intervals.share_interval(5, 5) == (pytest.approx(0.025**0.2), 1.0)
+    low, high = intervals.share_interval(2, 4)
     assert low == pytest.approx(1 - high) and low < 0.5

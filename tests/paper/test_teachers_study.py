@@ -85,7 +85,7 @@ def test_the_study_has_a_row_per_run(small, tmp_path, monkeypatch):
     def never(*args):
         raise AssertionError("made again")
 
-    monkeypatch.setattr(runs, "make_run", never)
+    monkeypatch.setattr(runs.Distillation, "make", never)
     assert study(tmp_path, tasks=[SIMPLEGOAL]).equals(frame)
 
 

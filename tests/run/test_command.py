@@ -77,7 +77,7 @@ def test_commands_refuse_such_jobs_before_they_begin(monkeypatch, capsys, comman
 
 
 def test_a_damaged_run_ends_the_command_in_one_line(tmp_path):
-    path = runs.run_path(runs.paper_experiment("SimpleGoal-v0", quick=True).folder(tmp_path / "data" / "runs"), 0)
+    path = runs.paper_experiment("SimpleGoal-v0", quick=True).folder(tmp_path / "data" / "runs") / "0000.run"
     path.parent.mkdir(parents=True)
     os.mkfifo(path)
     command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "1", "--out", tmp_path]

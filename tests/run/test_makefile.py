@@ -32,7 +32,7 @@ def checkout(tmp_path):
 
 
 def start(checkout, *arguments, env=None):
-    of_make = ("MAKE", "MFLAGS", "OUT", "JOBS", "DASK", "QUICK")  # of the make that runs the tests
+    of_make = ("MAKE", "MFLAGS", "OUT", "JOBS", "DASK", "QUICK", "FILES")  # of the make that runs the tests
     environ = {name: value for name, value in os.environ.items() if not name.startswith(of_make)}
     environ |= {"FAKE_REAL": sys.executable} | (env or {})
     command = ["make", f"PYTHON={checkout.parent / 'python'}", *arguments]
@@ -185,6 +185,16 @@ def test_any_path_reaches_the_makes_inside(checkout):
     given = asked(checkout)
     assert "<--out=./$(HOME) `touch hit` 'x\"/build/quick><--jobs=://`touch hit`><--quick>" in given, said
     assert given.count("run_notebook") == 5 and status == 0 and not (checkout / "hit").exists()
+
+
+def test_modules_of_tests_run_by_their_names_and_all_without_one(checkout):
+    (checkout / "tests").mkdir()
+    for name in "abc":
+        (checkout / "tests" / f"test_{name}.py").write_text("def test_it():\n    pass\n")
+    for files, passed in (("tests/test_a.py", 1), ("tests/test_a.py tests/test_b.py", 2), ("", 3)):
+        said, status = make(checkout, "test", f"FILES={files}")
+        assert status == 0 and f"{passed} passed" in said and ("nodes" in said) == (not files), said
+    assert make(checkout, "test", "FILES=$(touch hit) `touch hit`")[1] and not (checkout / "hit").exists()
 
 
 def test_what_cannot_be_is_refused_in_one_line(checkout):

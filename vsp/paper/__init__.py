@@ -1,5 +1,7 @@
 """The reproduction of the paper: its printed values, the rerun and its tables, the ledger, the audit, the studies."""
 
+from ..protocol.intervals import interval
+from ..protocol.job import EVALUATION_SEED, N_EPISODES
 from . import baselines
 from .audit import audit_findings, audit_table, mean_inside
 from .ledger import N_RESAMPLES, ledger_gaps, ledger_table, left_out_by_quartiles, verdict_counts
@@ -13,8 +15,8 @@ from .printed import (
     published_policy,
 )
 from .results import read_results
-from .runs import EVALUATION_SEED, N_EPISODES, paper_results
-from .statistics import interval, quartiles_from_fences, spread
+from .runs import paper_results
+from .statistics import quartiles_from_fences, spread
 from .tables import (
     equation_table,
     hyperparameter_table,

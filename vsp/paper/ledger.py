@@ -23,10 +23,11 @@ import numpy as np
 import pandas as pd
 
 from ..config import paper_preset
+from ..protocol.intervals import interval, share_interval
 from ..tasks import base, mountaincar, registry, simplegoal
 from . import audit, printed
 from .runs import SHARES, Results
-from .statistics import interval, outlier_numbers, resample, share_interval, spread
+from .statistics import outlier_numbers, resample, spread
 
 VERDICTS = REPRODUCED, UNTOLD, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "cannot be told", "differs", "cannot be checked", "contradicts itself"

@@ -80,15 +80,15 @@ class Readings:
             if loss > config.max_pol_loss and partition.far(i, state):
                 before = partition.neighbours()[i]
                 j = partition.add(state, rng)
-                near = np.append(before, False) if self.split_neighbours == "old" else partition.neighbours()[j]
-                near[i] |= self.split_reset == "cell_and_neighbours"
+                near = np.append(before, False) if self.split_neighbours == "old" else partition.neighbours()[j]  # R13
+                near[i] |= self.split_reset == "cell_and_neighbours"  # R13
                 partition.reset(near)
                 added.append((state.copy(), loss))
-                if config.one_split:
+                if config.one_split:  # R4
                     break
-                if self.split_lookup == "refreshed":
+                if self.split_lookup == "refreshed":  # R2
                     cells = partition.cells(episode.states)
-                if self.loss_after_split == "reset":
+                if self.loss_after_split == "reset":  # R14
                     first = t + 1
         return added
 
@@ -97,7 +97,7 @@ class Readings:
         k, coefficients = len(partition.codewords), partition.comparable_coefficients()
         alive, causes = np.ones(k, dtype=bool), np.zeros(k)
         for i in range(k):
-            if not alive[i] and not self.merge_visits_removed:
+            if not alive[i] and not self.merge_visits_removed:  # R6
                 continue
             members = alive | (np.arange(k) == i)
             near = np.zeros(k, dtype=bool)
@@ -108,7 +108,7 @@ class Readings:
                 similar[:i] = False  # earlier cells were visited: two equal cells must not remove each other
             if similar.any():
                 alive[similar], causes[similar] = False, distances[similar]
-                near[i] |= self.merge_reset == "survivor_and_neighbours"
+                near[i] |= self.merge_reset == "survivor_and_neighbours"  # R6
                 partition.reset(near)
         removed = list(zip(partition.codewords[~alive], causes[~alive].tolist()))
         partition.keep(alive)

@@ -1,16 +1,11 @@
-"""Many distillations: seeds, workers, one sealed file per run, resume, progress.
-
-A run lies in a folder named by its provenance (see `results`), and its file states the provenance, too. So a changed
-configuration, teacher or method never loads old runs, nor a run that was copied to another folder.
-"""
+"""The paper's experiment: many distillations of one teacher, each a `Job`, and how they end."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from functools import cache, cached_property
-from importlib.metadata import version
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -20,17 +15,18 @@ from ..algorithms import VERSION, distill
 from ..config import Config, paper_preset
 from ..evaluation import rollout_from_seed
 from ..policy import VoronoiPolicy
+from ..protocol import EVALUATION_SEED, N_EPISODES, job
 from ..rollouts import Outcomes
 from ..run import sealed
+from ..run.identity import identity
 from ..tasks.base import GOAL, PIT, TRUNCATED
 from ..tasks.registry import get_task
-from ..teachers.teacher import Teacher, load_teacher
+from ..teachers import digest_of, load_teacher
+from ..teachers.teacher import Teacher
 from .readings import Readings
-from .results import load_made, make_missing, provenance, provenance_folder
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
-N_EPISODES = 1000
-EVALUATION_SEED, VALIDATION_SEED = 1, 2  # start states for the reported results, and for choosing the best run
+VALIDATION_SEED = 2  # start states for choosing the best run
 QUICK_RUNS, QUICK_EPISODES = 4, 100
 SHARES = {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}  # outcomes of episodes whose shares are in the tables
 
@@ -56,34 +52,72 @@ class Experiment:
     config: Config
     teacher: Teacher
     n_episodes: int = N_EPISODES
-    readings: Readings | None = None  # other passes than those of `algorithms`
+    readings: Readings | None = None  # other passes than those of `algorithms`: `Readings`, or an object like it
 
     @property
     def settings(self) -> dict:
         """Everything that determines the result of a run apart from teacher, version and seed, as JSON-able values."""
+        own = isinstance(self.readings, Readings | None)
+        passes = asdict(self.readings or Readings()) if own else {"passes": identity(self.readings)}
         return {
             "task": self.task,
-            "config": self.config.settings() | asdict(self.readings or Readings()),
+            "config": self.config.settings() | passes,
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
-            "versions": {name: _version(name) for name in ("numpy", "scipy")},
+            "versions": {name: job.library(name) for name in ("numpy", "scipy")},
         }
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
         """The provenance of its runs: settings (an id), teacher, version."""
-        return provenance(self.settings, self.teacher.digest, VERSION)
-
-    def about(self, seed: int) -> dict:
-        """Return what a file of this experiment states; `seed` is that of the run or of the start states."""
-        return {"task": self.task, **self.provenance, "seed": seed}
+        return job.provenance(self.settings, digest_of(self.teacher), VERSION)
 
     def folder(self, runs: str | os.PathLike) -> Path:
         """Return the folder of this experiment's runs, below the folder `runs`."""
-        return provenance_folder(runs, self.task, self.provenance)
+        return Distillation(self, 0).path(runs).parent
 
 
-_version = cache(version)  # it takes milliseconds, and each run needs it
+@dataclass(frozen=True)
+class Distillation(job.Job):
+    """One run of an experiment."""
+
+    experiment: Experiment
+    seed: int
+    kind = "Run"
+
+    @property
+    def task(self) -> str:
+        """The experiment's task."""
+        return self.experiment.task
+
+    @property
+    def provenance(self) -> dict[str, str | int]:
+        """The experiment's provenance."""
+        return self.experiment.provenance
+
+    def make(self) -> tuple[dict[str, np.ndarray], dict]:
+        """Distil and evaluate once."""
+        one, n = self.experiment, self.experiment.n_episodes
+        passes = {"split": one.readings.split, "merge": one.readings.merge} if one.readings else {}
+        policy, history = distill(one.teacher, get_task(one.task), one.config, seed=self.seed, **passes)
+        result = rollout_from_seed(policy, one.task, n, seed=EVALUATION_SEED)
+        validation = rollout_from_seed(policy, one.task, n, seed=VALIDATION_SEED)
+        arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
+        arrays |= {**asdict(result), "cells": np.array(history.cells)}
+        changes = [event.kind for event in history.events]
+        about = {"validation_mean": float(validation.returns.mean())}
+        about |= {f"{kind}s": changes.count(kind) for kind in ("split", "merge")}
+        return arrays, {"settings in full": one.settings, **about}
+
+    def run(self, folder: str | os.PathLike) -> Run:
+        """Read the run. Raises `atomic.DamagedFile`, also for a run of another experiment or seed."""
+        (arrays, about), config = self.load(folder), self.experiment.config
+        codewords, coefficients, scale, cells = map(arrays.pop, ("codewords", "coefficients", "scale", "cells"))
+        policy = VoronoiPolicy(
+            codewords, coefficients, task=self.task, metric=config.metric, scale=scale, sub_policy=config.sub_policy
+        )
+        counts = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
+        return Run(policy=policy, cells=cells, outcomes=Outcomes(**arrays), **counts)
 
 
 def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
@@ -102,38 +136,12 @@ def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: i
 
 def make_all(work: Iterable, *, runs: str | os.PathLike, jobs: int | str = 1, label: str) -> None:
     """Make the runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
-    asked = {run_path(experiment.folder(runs), seed): (experiment, seed) for experiment, seed in work}
-    make_missing(make_run, asked, label, jobs=jobs, unit="runs")
-
-
-def make_run(experiment: Experiment, seed: int) -> tuple[dict[str, np.ndarray], dict]:
-    """Distil and evaluate once; return the arrays and about of the run's sealed file."""
-    task, n = experiment.task, experiment.n_episodes
-    readings = experiment.readings
-    passes = {"split": readings.split, "merge": readings.merge} if readings else {}
-    policy, history = distill(experiment.teacher, get_task(task), experiment.config, seed=seed, **passes)
-    result = rollout_from_seed(policy, task, n, seed=EVALUATION_SEED)
-    validation = rollout_from_seed(policy, task, n, seed=VALIDATION_SEED)
-    arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
-    arrays |= {**asdict(result), "cells": np.array(history.cells)}
-    changes = [event.kind for event in history.events]
-    about = {"validation_mean": float(validation.returns.mean())}
-    about |= {f"{kind}s": changes.count(kind) for kind in ("split", "merge")}
-    return arrays, {"kind": "Run", **experiment.about(seed), "settings in full": experiment.settings, **about}
-
-
-def load_run(path: str | os.PathLike, experiment: Experiment) -> Run:
-    """Read one run. Raises `atomic.DamagedFile`, also for a run of another experiment or of a seed not in its name."""
-    arrays, about = load_made(path, "Run", experiment.about(int(Path(path).stem)))
-    parameters = {name: arrays.pop(name) for name in ("codewords", "coefficients", "scale")}
-    policy = VoronoiPolicy(**parameters, task=experiment.task, sub_policy=experiment.config.sub_policy)
-    counts = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
-    return Run(policy=policy, cells=arrays.pop("cells"), outcomes=Outcomes(**arrays), **counts)
+    job.make_all((Distillation(*one) for one in work), runs, label, jobs=jobs)
 
 
 def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:
-    """Read the runs of these seeds. Raises as `load_run` does."""
-    return [load_run(run_path(experiment.folder(runs), seed), experiment) for seed in seeds]
+    """Read the runs of these seeds. Raises as `Distillation.run` does."""
+    return [Distillation(experiment, seed).run(runs) for seed in seeds]
 
 
 def outcome_shares(outcomes: np.ndarray) -> dict[str, float]:
@@ -181,13 +189,9 @@ def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jo
 @threadpool_limits.wrap(limits=1)  # the same order of sums, also without the thread limit of `make`
 def teacher_outcomes(experiment: Experiment, *, runs: str | os.PathLike) -> Outcomes:
     """Return the teacher's episodes from the shared start states, stored beside the runs."""
-    path, about = experiment.folder(runs) / "teacher.run", experiment.about(EVALUATION_SEED)
+    like = Distillation(experiment, EVALUATION_SEED)
+    path = experiment.folder(runs) / "teacher.run"
     if not path.exists():
         played = rollout_from_seed(experiment.teacher, experiment.task, experiment.n_episodes, seed=EVALUATION_SEED)
-        sealed.save_arrays(path, asdict(played), {"kind": "Teacher", **about})
-    return Outcomes(**load_made(path, "Teacher", about)[0])
-
-
-def run_path(folder: str | os.PathLike, seed: int) -> Path:
-    """Return the path of the run with this seed in the folder of its experiment."""
-    return Path(folder) / f"{seed:04d}.run"
+        sealed.save_arrays(path, asdict(played), {"kind": "Teacher", **like.about()})
+    return Outcomes(**job.load_made(path, "Teacher", like.about())[0])

@@ -18,13 +18,14 @@ from ..checks import check_array, check_count
 from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
+from ..protocol.intervals import interval
 from ..run import atomic
 from ..show.captions import caption_of, file_of, headings
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .readings import defaults
 from .results import write_results
 from .runs import Experiment, Results, Run, outcome_shares
-from .statistics import interval, outlier_numbers, spread
+from .statistics import outlier_numbers, spread
 
 if TYPE_CHECKING:
     from IPython.display import HTML

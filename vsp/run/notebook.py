@@ -7,7 +7,7 @@ JupyterLab. This takes seconds, and the format of notebooks has no such addresse
 import sys
 
 if hidden := {"rfc3987_syntax", "rfc3986_validator"} - sys.modules.keys():
-    sys.modules.update(dict.fromkeys(hidden))
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type] # None hides a module, says Python's reference
 import nbformat
 from nbformat import NotebookNode
 

@@ -35,8 +35,8 @@ def save_arrays(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: d
     write_sealed(path, save(contiguous, metadata={"about": about_text}))
 
 
-def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.ndarray], dict]:
-    """Read a file that `save_arrays` wrote with `about["kind"] == kind`: its arrays and `about`.
+def load_arrays(path: str | os.PathLike, *, kind: str | tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict]:
+    """Read a file that `save_arrays` wrote with this `about["kind"]`, or one of several: its arrays and `about`.
 
     Raises `MissingFile` or `DamagedFile`.
     """
@@ -51,8 +51,8 @@ def load_arrays(path: str | os.PathLike, *, kind: str) -> tuple[dict[str, np.nda
         stated = about.get("kind")
     except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
         raise _damaged(path, f"right checksum, but `save_arrays` did not write it: {error!r:.300}") from error
-    if stated != kind:
-        raise _damaged(path, f"holds a {stated!r}, expected a {kind!r}")
+    if stated not in (kinds := (kind,) if isinstance(kind, str) else kind):
+        raise _damaged(path, f"holds a {stated!r}, expected a {' or '.join(map(repr, kinds))}")
     return arrays, about
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import ipywidgets as widgets
 import numpy as np
@@ -90,7 +91,7 @@ class Laboratory:
         self._put(self.trial({name: control.value for name, control in self.settings.items()}))
         self.status.value = self.ready
 
-    def trial(self, changes: dict[str, object]) -> int:
+    def trial(self, changes: dict[str, Any]) -> int:
         """Change these fields of the configuration, distil and evaluate; return the index in `trials`.
 
         Settings that were tried before give the index of the earlier trial.
@@ -144,7 +145,7 @@ class Laboratory:
 
     def _ipython_display_(self) -> None:
         still = _WITHOUT + Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher).element()
-        page.show(self.view._repr_mimebundle_(), still, type(self).__doc__.split("\n")[0])
+        page.show(self.view._repr_mimebundle_(), still, (type(self).__doc__ or "").split("\n")[0])
 
 
 def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
@@ -160,6 +161,6 @@ def _judge(policy: Policy, task: Task) -> dict[str, float]:
     return {"mean": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
 
 
-def _rounded(value: object) -> object:
+def _rounded(value: Any) -> Any:
     """Round to six significant digits: a slider's value may be 0.30000000000000004."""
     return float(f"{value:.6g}") if isinstance(value, float) else value

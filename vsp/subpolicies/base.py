@@ -6,7 +6,7 @@ Coefficients (p, m) have a column per action; the last row is the bias.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Pullback = Callable[[np.ndarray], np.ndarray]
 
 # Functions that `PolicyClass.code` may use: C and Python's math have them under the same names
-SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs")
+SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs", "pow", "remainder")
 _CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d)|[-+*/(),. \d])+")
 
 
@@ -85,11 +85,18 @@ class PolicyClass:
         `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that
         are zero.
         """
-        names = [*map(symbol, self.terms), ""]
-        terms = [(c, name) for c, name in zip(column, names, strict=True) if c or digits is not None]
-        parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
-        text = " ".join(parts)
-        return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
+        return combination(column, [*map(symbol, self.terms), ""], digits)
+
+
+def combination(column: np.ndarray, names: Sequence[str], digits: int | None) -> str:
+    """Return a sum of `names`, each times its coefficient in `column` (p,), as text; an empty name is a constant.
+
+    `digits` as in `PolicyClass.expression`.
+    """
+    terms = [(c, name) for c, name in zip(column, names, strict=True) if c or digits is not None]
+    parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
+    text = " ".join(parts)
+    return text.removeprefix("+ ") if text.startswith("+") else "-" + text[2:]
 
 
 def linear_outputs(features: np.ndarray, coefficients: np.ndarray) -> np.ndarray:

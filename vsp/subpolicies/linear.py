@@ -1,9 +1,11 @@
 """Classes of sub-policies that are linear in their coefficients, by name. The paper uses `linear`.
 
-To add one, write a function that takes a task and returns a `PolicyClass`, and enter it in `POLICY_CLASSES`.
+To add one, write a function that takes a task and returns a `PolicyClass`, and pass it as `Config.sub_policy`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -38,7 +40,15 @@ def quadratic(task: Task) -> PolicyClass:
 POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic}
 
 
-def policy_class(sub_policy: str, task: Task) -> PolicyClass:
-    """Return the class of sub-policies called `sub_policy`, for `task`. Raises ValueError for an unknown name."""
-    check_choice("sub_policy", sub_policy, POLICY_CLASSES)
-    return POLICY_CLASSES[sub_policy](task)
+def policy_class(sub_policy: str | Callable[[Task], PolicyClass], task: Task) -> PolicyClass:
+    """Return the class of sub-policies for `task`: by its name, or by a function of the task.
+
+    Raises ValueError for an unknown name, and for a function that returns something else.
+    """
+    if not callable(sub_policy):
+        check_choice("sub_policy", sub_policy, POLICY_CLASSES)
+        return POLICY_CLASSES[sub_policy](task)
+    made = sub_policy(task)
+    if not isinstance(made, PolicyClass):
+        raise ValueError(f"sub_policy {sub_policy!r:.60} returns {made!r:.60}, expected a PolicyClass")
+    return made

@@ -37,6 +37,12 @@ def task_names() -> list[str]:
     return [*_TASKS, *_LATER, *_ADDED]
 
 
+def is_own(task: Task) -> bool:
+    """Whether `task` is one of vsp's own as they are."""
+    own = _TASKS.get(task.name) or (_LATER[task.name]() if task.name in _LATER else None)
+    return task is own
+
+
 def get_task(name: str | Task) -> Task:
     """Return the `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry.
 
@@ -45,7 +51,8 @@ def get_task(name: str | Task) -> Task:
     """
     if isinstance(name, Task):
         return name
-    name = _registered(name)
+    if not isinstance(name, str) or name not in _ADDED:
+        name = _registered(name)
     return _TASKS.get(name) or _ADDED.get(name) or _LATER.get(name, partial(gymnasium_task, name))()
 
 
@@ -68,19 +75,24 @@ def _registered(name: str) -> str:
 
 
 def register(
-    name: str, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
+    name: str | Task, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
     outcome: Outcome | None = None,
 ) -> Task:  # fmt: skip
-    """Add an environment of Gymnasium's registry to vsp's tasks, for this process. Returns its `Task`.
+    """Add an environment of Gymnasium's registry, or a `Task`, to vsp's tasks, for this process. Returns its `Task`.
 
     `inputs` and `outputs` name its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
     `outcome(observation, reward, info)` tells whether an episode that ended succeeded; None: failures are undefined.
-    Raises ValueError for one of vsp's own tasks, for names that are too few, too many or not distinct, and as
-    `get_task` does.
+    A `Task` has its own names and outcomes. Raises ValueError for one of vsp's own tasks, for names that are too few,
+    too many or not distinct, and as `get_task` does.
     """
-    name = _registered(name)
+    task, name = (name, name.name) if isinstance(name, Task) else (None, _registered(name))
     if name in (*_TASKS, *_LATER):
-        raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another environment")
+        raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another")
+    if task is not None:
+        if (inputs, outputs, outcome) != (None, None, None):
+            raise ValueError(f"the task {name!r} has names and outcomes, expected no others")
+        _ADDED[name] = task
+        return task
     if outcome is not None and not callable(outcome):
         raise ValueError(f"outcome is {outcome!r}, expected a function of the last observation, reward and info")
     plain = gymnasium_task(name, outcome)
@@ -105,16 +117,18 @@ def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: di
     If no such environment is registered, the task has no dynamics: its policy can act, but no episode can run. Raises
     ValueError if the environment of that name has another box.
     """
-    labels = {"inputs": tuple(inputs), "outputs": tuple(outputs), "input_labels": tuple(inputs)}
+    inputs, outputs = tuple(inputs), tuple(outputs)
     try:
         known = get_task(name.rpartition(":")[2])  # a file must not make us import a module
     except (ValueError, gymnasium.error.Error):  # the latter if packages that it needs are missing
         absent = partial(_absent, name)
-        return Task(name, **labels, **box, max_steps=1, start=absent, step=absent)
+        low, high, action_low, action_high = (box[limit] for limit in BOX)
+        return Task(name, inputs, outputs, inputs, low, high, action_low, action_high, 1, absent, absent)
     for limit in BOX:
         if not np.array_equal(getattr(known, limit), box[limit]):
             raise ValueError(f"{limit} of {name} is {getattr(known, limit)} here, but {box[limit]} in the file")
-    return known if (known.inputs, known.outputs) == (tuple(inputs), tuple(outputs)) else replace(known, **labels)
+    same = (known.inputs, known.outputs) == (inputs, outputs)
+    return known if same else replace(known, inputs=inputs, outputs=outputs, input_labels=inputs)
 
 
 def _absent(name: str, *_) -> NoReturn:

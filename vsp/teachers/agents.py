@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..policy import VoronoiPolicy
+from ..policy import PiecewisePolicy
 from ..rollouts import Policy
 from ..tasks.base import Task
 from .teacher import Teacher, load_teacher
 
+if TYPE_CHECKING:
+    from .normalization import Normalization
+
 
 class Agent:
-    """A teacher made from a function of observations (n, d) that returns actions (n, m)."""
+    """A teacher made from a function of observations (n, d) that returns actions (n, m).
 
-    def __init__(self, act: Callable[[np.ndarray], np.ndarray]):
-        self._act, self._asked = act, False
+    `identify` returns what its `digest` is made of, None if nobody knows.
+    """
+
+    def __init__(self, act: Callable[[np.ndarray], np.ndarray], identify: Callable[[], bytes | None] = lambda: None):
+        self._act, self._identify, self._asked = act, identify, False
+
+    @property
+    def digest(self) -> str | None:
+        """SHA-256 of the weights that act, or of the name that the user gave; None if there is neither."""
+        known = self._identify()
+        return None if known is None else hashlib.sha256(known).hexdigest()
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), or (m,) for one (d,).
@@ -37,37 +50,60 @@ class Agent:
 
 
 def agent(
-    source: Policy | Callable[[np.ndarray], np.ndarray] | str | os.PathLike, task: str | Task | None = None, **options
-) -> Policy:
+    source: Policy | Callable[[np.ndarray], np.ndarray] | str | os.PathLike, task: str | Task | None = None, *,
+    name: str | None = None, normalize: str | os.PathLike | bool | None = None,
+) -> Policy:  # fmt: skip
     """Turn `source` into a teacher for `vsp.distill` and similar functions.
 
-    `source` is a file or the name of a task, as `load_teacher` takes them with `task` and `options`; an object with
+    `source` is a file or the name of a task, as `load_teacher` takes them with `task` and `normalize`; an object with
     `predict`, such as a Stable-Baselines3 model, with the normalisation of its observations if it has one, or the one
     in the file `normalize`; or a function of a batch of observations (n, d) that returns actions (n, m). Stochastic
-    agents (PPO, SAC, ...) give their most probable actions, because sampling noise carries no information. What is a
-    teacher already stays as it is. Raises ValueError for any other `source`.
+    agents (PPO, SAC, ...) give their most probable actions, because sampling noise carries no information. `name`
+    identifies a function where its runs are stored: give another name to another function. What is a teacher already
+    stays as it is. Raises ValueError for any other `source`.
     """
     if isinstance(source, str | os.PathLike):
-        return load_teacher(source, task, **options)
+        return load_teacher(source, task, normalize=normalize)
     predict = getattr(source, "predict", source)
     if not callable(predict):
         raise ValueError(f"the agent is {source!r}, expected a file, something with `predict`, or a function")
-    ready = isinstance(source, Agent | Teacher | VoronoiPolicy)
-    if options and (ready or predict is source or {*options} != {"normalize"}):
-        raise ValueError(f"{', '.join(options)} for {type(source).__name__}, expected nothing, or normalize of a model")
-    if ready:
-        return source  # type: ignore[return-value]
-    return Agent(predict if predict is source else _deterministic(source, **options))
-
-
-def _deterministic(model: Any, normalize: str | os.PathLike | bool | None = None) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function of observations that gives the model's actions without sampling."""
+    if normalize is not None and (predict is source or isinstance(source, Agent | Teacher | PiecewisePolicy)):
+        raise ValueError(f"normalize for {type(source).__name__}, expected none: it belongs to a model")
+    if isinstance(source, Agent | Teacher | PiecewisePolicy):
+        return source
+    named = name.encode() if name else None
+    if not hasattr(source, "predict"):
+        return Agent(predict, lambda: named)
     from . import normalization  # here: most teachers are no models
 
+    statistics = normalization.of_model(source, normalize)
+    return Agent(_deterministic(source, statistics), lambda: named or _weights(source, statistics))
+
+
+def digest_of(agent: Policy) -> str:
+    """Return the identity of an agent. Raises ValueError if it has none, for its runs could be taken for another's."""
+    digest = getattr(agent, "digest", None)
+    if not digest:
+        raise ValueError(f'the agent {agent!r:.60} has no identity, expected a name: vsp.agent(function, name="mine")')
+    return digest
+
+
+def _weights(model: Any, statistics: Normalization | None) -> bytes | None:
+    """Return the weights of a Stable-Baselines3 model and its statistics of observations; None for other objects."""
+    if hasattr(model, "digest"):
+        return str(model.digest).encode()
+    state = getattr(getattr(model, "policy", None), "state_dict", None)
+    if state is None:
+        return None
+    parts = [part for name, tensor in state().items() for part in (name.encode(), tensor.cpu().numpy().tobytes())]
+    return b"".join([*parts, *(np.asarray(part).tobytes() for part in statistics or ())])
+
+
+def _deterministic(model: Any, statistics: Normalization | None) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function of observations that gives the model's actions without sampling."""
     parameters = inspect.signature(model.predict).parameters
     takes_any = any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values())
     options = {"deterministic": True} if takes_any or "deterministic" in parameters else {}
-    statistics = normalization.of_model(model, normalize)
 
     def act(obs: np.ndarray) -> np.ndarray:
         answer = model.predict(statistics(obs).astype(np.float32) if statistics else obs, **options)

@@ -104,14 +104,14 @@ def array(thing: Any) -> np.ndarray:
         case int() | float():
             return np.array(thing, dtype=np.float64)
         case Thing(name, _, (_, (*shape,), kind, fortran, bytes(raw))) if name.endswith("._reconstruct"):
-            order = "F" if fortran else "C"
-        case Thing(name, (kind, bytes(raw))) if name.endswith("multiarray.scalar"):
-            shape, order = [], "C"
-        case Thing(name, (bytes() | bytearray() as raw, kind, (*shape,), str(order))) if name.endswith("._frombuffer"):
             pass
+        case Thing(name, (kind, bytes(raw))) if name.endswith("multiarray.scalar"):
+            shape, fortran = [], False
+        case Thing(name, (bytes() | bytearray() as raw, kind, (*shape,), str(order))) if name.endswith("._frombuffer"):
+            fortran = ("C", "F").index(order)
         case _:
             raise ValueError("expected a NumPy array in the pickle")
-    return np.frombuffer(raw, _dtype(kind)).reshape(shape, order=order).astype(np.float64)
+    return np.frombuffer(raw, _dtype(kind)).reshape(shape, order="F" if fortran else "C").astype(np.float64)
 
 
 def _dtype(thing: Any) -> np.dtype:

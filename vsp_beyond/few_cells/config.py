@@ -181,7 +181,7 @@ def _episodes(task: Task) -> int:
     return min(max(100, steps // task.max_steps), 30_000)
 
 
-_TUNED = {
+TUNED = {
     "SimpleGoal-v0": Tuned(n_cells=4, n_restarts=6, n_generations=150, failure_penalty=100.0),
     # One failure in ten thousand costs ten points of return: else tuning makes the force so gentle that it may fail
     "MountainCarContinuous-v0": Tuned(
@@ -203,7 +203,7 @@ def tuned_preset(task: str | Task) -> Tuned:
     For a task without tested settings, they follow from its size, as those of `faithful_preset` do.
     """
     task = get_task(task)
-    return _TUNED.get(task.name) or _tuned_by_size(task)
+    return TUNED.get(task.name) or _tuned_by_size(task)
 
 
 def _tuned_by_size(task: Task) -> Tuned:

@@ -20,7 +20,7 @@ from vsp.tasks.registry import get_task, task_names
 from vsp.teachers.teacher import load_teacher
 
 from ..optimum.references import TASKS, best_policy
-from .config import Tuned, faithful_preset, tuned_preset
+from .config import TUNED, Tuned, faithful_preset, tuned_preset
 from .faithful import distill_faithfully
 from .tune import score
 from .tuned import distill_tuned
@@ -33,23 +33,23 @@ N_AGAIN, AGAIN = 2, 0.4  # for such tasks: further searches, each from the last 
 PRICE = {"MountainCarContinuous-v0": 3e-3}  # per step: a car that arrives sooner tolerates a less exact imitation
 
 _LIMIT = {
-    "SimpleGoal-v0": {"n_cells": 4, "n_generations": 400, "n_tuning_episodes": 500},
-    "MountainCarContinuous-v0": {"n_cells": 3, "n_generations": 100, "tuning_step": 0.03},
-    "Pendulum-v1": {
-        "n_cells": 8, "n_episodes": 500, "n_correction_episodes": 300, "n_restarts": 6,
-        "n_generations": 400, "n_tuning_episodes": 200, "n_validation": 2000,
-    },
-    "LunarLanderContinuous-v3": {
-        "n_cells": 3, "n_generations": 150, "n_tuning_episodes": 60, "failure_penalty": 100.0, "n_validation": 400,
-    },
+    "SimpleGoal-v0": replace(TUNED["SimpleGoal-v0"], n_cells=4, n_generations=400, n_tuning_episodes=500),
+    "MountainCarContinuous-v0": replace(
+        TUNED["MountainCarContinuous-v0"], n_cells=3, n_generations=100, tuning_step=0.03),
+    "Pendulum-v1": replace(
+        TUNED["Pendulum-v1"], n_cells=8, n_episodes=500, n_correction_episodes=300, n_restarts=6,
+        n_generations=400, n_tuning_episodes=200, n_validation=2000),
+    "LunarLanderContinuous-v3": replace(
+        TUNED["LunarLanderContinuous-v3"], n_cells=3, n_generations=150, n_tuning_episodes=60,
+        failure_penalty=100.0, n_validation=400),
 }  # fmt: skip
 
 
 def limit_preset(task: str | Task) -> Tuned:
     """Return the settings of `at_the_limit` for any task: those of `tuned_preset` with a longer search, and on some
     tasks with other cells, steps and penalties."""
-    config, name = tuned_preset(task), get_task(task).name
-    return replace(config, **_LIMIT.get(name, {"n_generations": 3 * config.n_generations}))
+    config = tuned_preset(task)
+    return _LIMIT.get(get_task(task).name) or replace(config, n_generations=3 * config.n_generations)
 
 
 def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy | None = None) -> VoronoiPolicy:

@@ -16,8 +16,8 @@ def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -
     """Roll out policies of one kind in one batch. Voronoi policies must be Euclidean, of one shape and scale."""
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])
-    batch = PolicyBatch if isinstance(policies[0], VoronoiPolicy) else InTurn
-    result = rollout(batch(policies), numbered(task, len(policies)), all_starts)
+    maps = [policy for policy in policies if isinstance(policy, VoronoiPolicy)]
+    result = rollout(PolicyBatch(maps) if maps else InTurn(policies), numbered(task, len(policies)), all_starts)
     parts = (np.split(part, len(policies)) for part in (result.returns, result.lengths, result.outcomes))
     return [Outcomes(*of_one) for of_one in zip(*parts)]
 

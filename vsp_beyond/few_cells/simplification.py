@@ -119,15 +119,15 @@ def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
 
 def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
     """Return a policy for the same task with the same metric, and these numbers."""
-    about = {"task": policy.task, "metric": policy.metric, "sub_policy": policy.policy_class.name}
-    return VoronoiPolicy(codewords, coefficients, scale=scale, **about)
+    kind = policy.policy_class.name
+    return VoronoiPolicy(codewords, coefficients, task=policy.task, metric=policy.metric, scale=scale, sub_policy=kind)
 
 
 class _Tried:
     """The policies tried so far, with their scores from the same starts."""
 
     def __init__(self, task: Task, starts: np.ndarray, failure_penalty: float):
-        self.rows, self.scores = [], []
+        self.rows, self.scores = list[dict](), list[float]()
         self._task, self._starts, self._failure_penalty = task, starts, failure_penalty
 
     def reaches(self, threshold: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:

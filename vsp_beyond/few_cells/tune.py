@@ -29,8 +29,8 @@ class Objective:
 
     def score(self, result: Outcomes, cells: Cells) -> float:
         """Return the value for `cells` whose episodes ended as `result`."""
-        value = score(result, self.failure_penalty)
-        return value - self.error_penalty * squared_error(self.labelled, cells) if self.error_penalty else value
+        error = squared_error(self.labelled, cells) if self.labelled and self.error_penalty else 0.0
+        return score(result, self.failure_penalty) - self.error_penalty * error
 
 
 class Candidates:
@@ -39,7 +39,7 @@ class Candidates:
     best: Cells  # once there is a candidate
 
     def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
-        self.rows, self.best_restart = [], 0
+        self.rows, self.best_restart = list[dict](), 0
         self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
 
     def add(self, stage: str, restart: int, cells: Cells) -> None:

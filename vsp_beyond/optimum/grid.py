@@ -31,7 +31,8 @@ class Grid:
 
     def finer(self, times: float) -> Grid:
         """Return a grid over the same box, with the spacing of the points divided by `times`."""
-        return replace(self, shape=tuple(_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic)))
+        m, n = (_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic))
+        return replace(self, shape=(m, n))
 
     def points(self) -> np.ndarray:
         """Return all points; the last variable varies fastest. (n, 2)"""

@@ -195,7 +195,7 @@ def _halfway(values: np.ndarray, side: int) -> np.ndarray:
     return (values.astype(np.float64) + _floats(_numbers(values) + side)) / 2
 
 
-def _numbers(values: np.ndarray) -> np.ndarray:
+def _numbers(values: np.ndarray | np.floating) -> np.ndarray:
     """Convert float32 to integers that number them from the lowest to the highest."""
     bits = np.asarray(values, dtype=np.float32).view(np.int32).astype(np.int64)
     return np.where(bits >= 0, bits, -(2**31) - bits)

@@ -7,7 +7,7 @@ the polygon. So its numbers grow only with those of the lines, not with the numb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import gcd, lcm
@@ -74,13 +74,13 @@ def box(x: tuple[Fraction, Fraction], y: tuple[Fraction, Fraction]) -> Polygon:
     return Polygon(tuple(meet(edges[i - 1], edges[i]) for i in range(4)), tuple(edges))
 
 
-def line_of(numbers: Sequence[Fraction]) -> Line:
+def line_of(numbers: Collection[Fraction | int]) -> Line:
     """Return the line with coefficients in the ratio of the three `numbers`, in the smallest integers."""
     common = lcm(*(number.denominator for number in numbers))
     return reduced(tuple(number.numerator * (common // number.denominator) for number in numbers))
 
 
-def reduced(line: Line) -> Line:
+def reduced(line: Sequence[int]) -> Line:
     """Return the same line, in the smallest integers."""
     shared, (a, b, c) = gcd(*line) or 1, line
     return a // shared, b // shared, c // shared

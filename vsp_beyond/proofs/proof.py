@@ -10,8 +10,6 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from vsp.checks import check_choice
 from vsp.policy import VoronoiPolicy
 from vsp.run import atomic, sealed
@@ -68,5 +66,4 @@ class Proof(ABC):
 def load_certificate(name: str) -> tuple[VoronoiPolicy, dict]:
     """Load the certificate data/beyond/proofs/NAME.json: return its policy and its content. Raises `DamagedFile`."""
     content = json.loads(sealed.read_sealed(CERTIFICATES / f"{name}.json"))
-    numbers = {key: np.array(value) for key, value in content["policy"].items() if key != "metric"}
-    return VoronoiPolicy(**numbers, metric=content["policy"]["metric"], task=content["task"]), content
+    return VoronoiPolicy(**content["policy"], task=content["task"]), content

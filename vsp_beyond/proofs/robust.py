@@ -86,7 +86,7 @@ def way_to(boxes: np.ndarray, after_low: np.ndarray, after_high: np.ndarray, n: 
     """Return the way from `boxes` (m,) to states between `after_low` and `after_high` (2, m), before the walls limit
     them."""
     after_low, after_high = (np.clip(states, 0.0, 1.0) for states in (after_low, after_high))
-    in_pit = ((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING)).all(axis=0)
+    in_pit = np.all((after_high > PIT_LOW - ROUNDING) & (after_low < PIT_HIGH + ROUNDING), axis=0)
     return Way(boxes, *around(after_low * n - ROUNDING, after_high * n + ROUNDING, n), ~in_pit)
 
 

@@ -67,8 +67,8 @@ class Step:
     reaches and the wall that the next state reaches (-1 the low one, 1 the high one, 0 neither)."""
 
     cell: int
-    limits: tuple[int, int]
-    walls: tuple[int, int] = (0, 0)
+    limits: tuple[int, ...]
+    walls: tuple[int, ...] = (0, 0)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def follow(policy: VoronoiPolicy, *, starts: Polygon = SQUARE, most: int = MOST)
     Raises ValueError for a policy of another task or class, for the metric "chebyshev", and for more than
     `most` pieces: a policy that wanders cuts the square ever finer.
     """
-    loop, ended, running = Loop(policy), [], [Piece(starts)]
+    loop, ended, running = Loop(policy), list[Piece](), [Piece(starts)]
     for t in range(TASK.max_steps):
         moved = [after for piece in running for after in loop.advance(piece)]
         if len(ended) + len(moved) > most:
@@ -127,18 +127,18 @@ class Loop:
         return [(line_of(form + ONE), line_of(form - ONE)) for form in self.actions[cell]]
 
     @cache  # noqa: B019
-    def walls(self, cell: int, limits: tuple[int, int]) -> list[tuple[Line, Line]]:
+    def walls(self, cell: int, limits: tuple[int, ...]) -> list[tuple[Line, Line]]:
         """Return for each coordinate of the next state the lines on which it reaches its walls."""
         return [(line_of(form), line_of(form - ONE)) for form in self._next(cell, limits)]
 
     @cache  # noqa: B019
-    def move(self, cell: int, limits: tuple[int, int], walls: tuple[int, int]) -> np.ndarray:
+    def move(self, cell: int, limits: tuple[int, ...], walls: tuple[int, ...]) -> np.ndarray:
         """Return the matrix of a step, as in `State`."""
         forms = [max(side, 0) * ONE if side else form for side, form in zip(walls, self._next(cell, limits))]
         matrix = np.array([*forms, ONE])
         return np.vectorize(int, otypes=[object])(lcm(*(number.denominator for number in matrix.flat)) * matrix)
 
-    def _next(self, cell: int, limits: tuple[int, int]) -> list[Form]:
+    def _next(self, cell: int, limits: tuple[int, ...]) -> list[Form]:
         actions = [side * ONE if side else form for side, form in zip(limits, self.actions[cell])]
         return [axis + STRIDE * action for axis, action in zip((X, Y), actions)]
 

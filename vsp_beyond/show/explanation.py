@@ -39,8 +39,8 @@ def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
         _number(ax, x, y, inside & (index == cell), cell)
     values = ", ".join(f"{name} = {value:.3g}" for name, value in zip(task.inputs, state)).replace("-", "−")
     ax.plot(*state, "o", color=OURS, mec="white", mew=0.6, ms=5, zorder=5, ls="", label=f"state: {values}")
-    ax.plot(*np.transpose([state, why.codeword]), color=CODEWORD, lw=0.7, ls=":", zorder=3)
-    codewords(ax, why.codeword[None], label=f"its codeword, of cell {why.cell}")
+    ax.plot(*np.transpose([state, policy.codewords[why.cell]]), color=CODEWORD, lw=0.7, ls=":", zorder=3)
+    codewords(ax, policy.codewords[[why.cell]], label=f"its codeword, of cell {why.cell}")
     if way:
         _arrow(ax, np.asarray(state), way, task.inputs)
     if outside:
@@ -95,7 +95,7 @@ def contributions(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:
     """
     policy.check_linear()
     why, task = policy.explain(state), policy.task
-    row, labels = 0.0, {}
+    row, labels = 0.0, dict[float, str]()
     for j, output in enumerate(task.outputs):
         weights, terms = policy.coefficients[why.cell, :, j], why.contributions.loc[output].to_numpy()
         names = [*(f"{weight:.2f} {name}" for weight, name in zip(weights, task.inputs)), "bias", "sum", "limited"]

@@ -14,12 +14,13 @@ import numpy as np
 import pandas as pd
 
 from ...evaluation import rollout_from_seed
+from ...protocol.intervals import percentile_interval
+from ...protocol.job import settings_id
 from ...rollouts import Outcomes
 from .. import printed
 from ..readings import ALTERNATIVES, Readings
-from ..results import settings_id
 from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
-from ..statistics import percentile_interval, quartiles_from_fences, resample, spread
+from ..statistics import quartiles_from_fences, resample, spread
 
 VERSION = 1  # raise it when the same runs give other rows
 CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first

@@ -10,15 +10,16 @@ import pandas as pd
 
 from ...algorithms import teacher_episodes
 from ...evaluation import rollout_from_seed
-from ...rollouts import Outcomes, Policy
+from ...policy import VoronoiPolicy
+from ...protocol.intervals import crossed_interval
+from ...protocol.job import settings_id
+from ...rollouts import Outcomes
 from ...run import workers
 from ...tasks.base import GOAL
 from ...tasks.registry import get_task
 from .. import printed
 from ..baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from ..results import settings_id
 from ..runs import EVALUATION_SEED, N_RUNS, Experiment, Results, Run, paper_results
-from ..statistics import crossed_interval
 
 VERSION = 2  # raise it when the same runs give other results
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
@@ -53,7 +54,7 @@ def teacher_data(experiment: Experiment, seed: int) -> tuple[np.ndarray, np.ndar
     return np.concatenate([e.states for e in episodes]), np.concatenate([e.actions for e in episodes])
 
 
-def fit(experiment: Experiment, run: Run) -> dict[str, Policy]:
+def fit(experiment: Experiment, run: Run) -> dict[str, VoronoiPolicy | Tree]:
     """Fit the simpler policies that need a teacher to the data that `run` was distilled from; return them by name."""
     states, actions = teacher_data(experiment, run.seed)
     return {
@@ -92,12 +93,10 @@ def _fitted(experiment: Experiment, run: Run) -> dict[str, tuple[int, Outcomes]]
     return _played(experiment, fit(experiment, run))
 
 
-def _played(experiment: Experiment, policies: dict[str, Policy]) -> dict[str, tuple[int, Outcomes]]:
+def _played(experiment: Experiment, policies: dict[str, VoronoiPolicy | Tree]) -> dict[str, tuple[int, Outcomes]]:
     """Return the number of cells and the evaluated episodes of each policy."""
-    n = experiment.n_episodes
-    return {
-        kind: (len(p), rollout_from_seed(p, experiment.task, n, seed=EVALUATION_SEED)) for kind, p in policies.items()
-    }
+    task, n, seed = experiment.task, experiment.n_episodes, EVALUATION_SEED
+    return {kind: (len(p), rollout_from_seed(p, task, n, seed=seed)) for kind, p in policies.items()}
 
 
 def _row(evaluated: list[tuple[float, Outcomes]], teacher: np.ndarray) -> dict[str, float]:

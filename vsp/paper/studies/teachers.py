@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 
 from ...evaluation import rollout_from_seed
+from ...protocol.job import settings_id
 from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
 from ..baselines import linear_map
-from ..results import settings_id
 from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
 from .simpler import teacher_data
 

@@ -6,12 +6,13 @@ import html
 import io
 import json
 import os
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from ...history import History
-from ...policy import VoronoiPolicy
+from ...policy import PiecewisePolicy, VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
@@ -54,8 +55,8 @@ class Explorer:
         self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
     ):
         for policy in policies.values():
-            if not isinstance(policy, VoronoiPolicy):
-                raise ValueError(f"the policy is {policy!r}, expected a VoronoiPolicy")
+            if not isinstance(policy, VoronoiPolicy) or policy.where.metric.order is None:
+                raise ValueError(f"the policy is {policy!r:.60}, expected a VoronoiPolicy with a Minkowski distance")
             policy.check_linear()
         tasks = {policy.task.name: policy.task for policy in policies.values()}
         if len(tasks) != 1:
@@ -113,13 +114,16 @@ class Explorer:
 
 
 def explore(
-    policies: VoronoiPolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
-) -> Explorer:
+    policies: PiecewisePolicy | dict[str, VoronoiPolicy],
+    *,
+    teacher: Policy | None = None,
+    history: History | None = None,
+) -> Explorer:  # fmt: skip
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
     `policies`: one policy with linear maps, or several by name. `teacher`: its mean return is shown beside theirs.
     `history`: replays the distillation of the first policy. The browser plays SimpleGoal, MountainCarContinuous and
     Pendulum. Raises ValueError for other policies and tasks, and for a history of another method or task.
     """
-    policies = policies if isinstance(policies, dict) else {"policy": policies}
-    return Explorer(policies, teacher=teacher, history=history)
+    shown: dict[str, Any] = policies if isinstance(policies, dict) else {"policy": policies}
+    return Explorer(shown, teacher=teacher, history=history)

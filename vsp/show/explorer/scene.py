@@ -70,7 +70,9 @@ def starts_of(task: Task) -> np.ndarray:
 
 
 def _numbers(policy: VoronoiPolicy, name: str) -> dict:
-    about = {"name": name, "metric": policy.metric, "scale": policy.scale.tolist()}
+    order = policy.where.metric.order
+    about = {"name": name, "metric": policy.metric, "order": None if order == np.inf else order}
+    about["scale"] = policy.scale.tolist()
     return about | {"codewords": policy.codewords.tolist(), "coefficients": policy.coefficients.tolist()}
 
 
