@@ -1,8 +1,8 @@
 """How the compared methods make a policy, each as a function of a budget, a size and a seed.
 
 The budget is the teacher and the episodes of a `Tuned`. A fit to the teacher's own episodes alone gets as many
-episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. TD-AVQ has
-no teacher. Methods for robots read a `Walking`.
+episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. Methods for robots read
+a `Walking`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
-from ..rivals import tdavq
 from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
 from ..rivals.trees import LinearTree, ObliqueLinearTree
@@ -122,11 +121,6 @@ def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts
 def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """Return the teacher itself."""
     return budget.teacher
-
-
-def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
-    """Learn from rewards by TD-AVQ, without a teacher."""
-    return tdavq.learn(budget.task, seed=seed, **settings)
 
 
 # Robots

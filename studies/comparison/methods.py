@@ -103,7 +103,6 @@ METHODS = {
     "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
     "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
     "one linear map": _uncorrected("one map", FOUND),
-    "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=TASKS[:1]),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
     "our cells, no correction": _without(n_corrections=0),

@@ -1,1 +1,1 @@
-"""Methods to compare our cells with: trees, small networks, TD-AVQ, DAgger."""
+"""Methods to compare our cells with: trees, small networks, DAgger."""

@@ -5,7 +5,6 @@ A version names results: whoever changes what a method does raises it, and `stal
 
 import dataclasses
 import functools
-import inspect
 import json
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 from studies.comparison import beside, measure
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, OF_PRESET
-from studies.rivals import tdavq
 from studies.robots import Walking
 from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
@@ -64,9 +62,7 @@ class CriticalTeacher(CurvedTeacher):
         return {f"qf{i}.{name}": rng.normal(size=n).astype("f4") for i in range(2) for name, n in shapes.items()}
 
 
-SHORTER = {"TD-AVQ": {"n_steps": 1000}}  # settings of methods that would take long
 AT_LENGTH = {  # numbers that decide on a policy and are made small here
-    "TD-AVQ": inspect.signature(tdavq.learn).parameters["n_steps"].default,
     "at the limit": [limit.N_STARTS, limit.N_SLOW, limit.SCREENING, limit.N_AGAIN, limit.AGAIN, *limit.PRICE.values()],
 }
 
@@ -94,7 +90,7 @@ def by_method(name):
     teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if method.table == "robots" else {})
     for task in method.tasks or (SIMPLEGOAL,):
         budget = Budget(teachers.get(task), get_task(task), PRESETS[method.preset])
-        found[task] = actions(method.make(budget, 3, 0, **method.settings | SHORTER.get(name, {})), task)
+        found[task] = actions(method.make(budget, 3, 0, **method.settings), task)
     return found
 
 

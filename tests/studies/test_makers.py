@@ -56,9 +56,9 @@ def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_correct
     assert len(set(first)) == 1 and first[0] < second < third
 
 
-@pytest.mark.parametrize("name", ["our cells", "faithful", "at the limit", "CART", "TD-AVQ"])
+@pytest.mark.parametrize("name", ["our cells", "faithful", "at the limit", "CART"])
 def test_the_seed_is_passed_on(monkeypatch, name):
-    for where in ("distill_tuned", "distill_faithfully", "search_limit", "dagger", "tdavq.learn"):
+    for where in ("distill_tuned", "distill_faithfully", "search_limit", "dagger"):
         monkeypatch.setattr(f"studies.comparison.makers.{where}", lambda *given, seed, **how: [seed])
     assert np.ravel(make(name, seed=7)).tolist() == [7]
 
