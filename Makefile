@@ -95,7 +95,7 @@ study: begin venv ##- studies of the readings, the teachers and simpler policies
 	$(PY) -m studies.hub_teacher $${AGENT:+"$$AGENT"} --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
 	$(PY) -m studies.hub_teacher "$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
-agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent at most, resumable
+agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable
 	$(PY) -m studies.agents "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
 	@$(PY) -m studies.comparison.stale
@@ -168,9 +168,9 @@ bench: venv-test-train-dask ##- measures speed and scale, into data/results/: an
 	@$(call MEASURE,tests/bench)
 faults: venv-test-train-dask ##- runs the fault-injection tests, into data/results/: 3 HOURS or more
 	@$(call MEASURE,tests/faults)
-beyond: begin venv-train ##- compares our own method with others, into data/beyond/: 6 to 7 HOURS, resumable
+beyond: begin venv-train ##- compares our own method with others, into data/beyond/: 6 to 7 HOURS for all rows; resumable
 	$(PY) -m studies.make_rows --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-beyond-long: begin venv-train-mujoco ##- the same for LunarLander and two robots: 27 HOURS or more, resumable
+beyond-long: begin venv-train-mujoco ##- the same for LunarLander and two robots: 27 HOURS or more for all rows; resumable
 	$(PY) -m studies.make_rows --long --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 short-teachers: venv-train ##- trains the teachers that `make study` compares: 1 to 2 HOURS; resumes from $VSP_CACHE
 	$(PY) -m studies.make_teachers --short --cache="$${VSP_CACHE:-$$HOME/.cache/vsp}" --out="$$OUT/data/teachers"

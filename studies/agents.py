@@ -8,10 +8,8 @@ reason. Those of MountainCar are distilled by the paper's method, too.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
+import time
 import warnings
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,14 +33,16 @@ from vsp_beyond.few_cells.duration import expected_seconds
 from vsp_beyond.few_cells.faithful import distill_faithfully
 
 from .comparison.methods import METHODS
-from .results import BEYOND, RESULTS, read_results, write_results
+from .results import BEYOND, RESULTS, keys, read_results, write_results
 
 SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
 N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw
-SECONDS = 600  # for one agent
+SECONDS = 600  # for one agent, by what the next size takes at least
+PARTS = ("codewords", "coefficients", "scale")  # of a policy
 POINTS = 61  # of a map, along each axis
 CAR = "MountainCarContinuous-v0"
 N_SEEN, SEEN_SEED = 400, 8  # episodes for maps by least squares, from starts of their own
+TABLES = ("agents", "agents_paper")
 ALGORITHMS = ("a2c", "ars", "crossq", "ddpg", "ppo", "sac", "td3", "tqc", "trpo")
 COLUMNS = (
     "algorithm task weights zoo zoo_std agent agent_std agent_failing cells numbers r2 r2_least mean least most "
@@ -66,32 +66,34 @@ def read(path: Path, task: str | Task) -> Teacher:
 
 
 def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
-    """Distil one agent; return the arrays and about of its file: the kept policy, the map of its actions, its row."""
-    row: dict = {"algorithm": algorithm, "task": name}
+    """Distil one agent; return the arrays and about of its file: the kept policy, the map of its actions, its rows."""
+    row: dict = {"algorithm": algorithm, "task": name, "checksum": atomic.sha256(path)}
     arrays: dict = {}
+    papers: list[dict] = []
     try:
-        with _at_most(SECONDS), warnings.catch_warnings():
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the row says how good the policies are
             agent = read(path, name)
             size, policy, alike = _fewest(agent)
             row |= _numbers(agent, size, policy, alike)
-            arrays = {part: getattr(policy, part) for part in ("codewords", "coefficients", "scale")}
-            arrays["actions"] = agent.predict(plane(agent.task)[2])[0] if name in PLANES else np.zeros((0, 1))
+            actions = agent.predict(plane(agent.task)[2])[0] if name in PLANES else np.zeros((0, 1))
+            arrays = {part: getattr(policy, part) for part in PARTS} | {"actions": actions}
+        papers = [{"algorithm": algorithm, **each} for each in by_the_paper(agent)] if name == CAR else []
     except TimeoutError:
         row["reason"] = f"slower than {SECONDS // 60} minutes"
     except (ValueError, OSError, ImportError, gymnasium.error.Error) as error:
         row["reason"] = str(error).splitlines()[0].replace(f"{path}: ", "")
-    return arrays, {"kind": "Agent", "checksum": atomic.sha256(path), **row}
+    return arrays, {"kind": "Agent", **row, "papers": papers}
 
 
 def _fewest(agent: Teacher) -> tuple[int, VoronoiPolicy, list[Likeness]]:
     """Return the fewest of `SIZES` cells whose policies act like the agent, else the most; the first of these policies,
     and how alike all are."""
-    least, _ = expected_seconds(agent.task, faithful_preset(agent.task, n_cells=1))
-    if least * len(SEEDS) > SECONDS:
-        raise TimeoutError
+    began = time.monotonic()
     for size in SIZES:
         config = faithful_preset(agent.task, n_cells=size)
+        if time.monotonic() - began + len(SEEDS) * expected_seconds(agent.task, config)[0] > SECONDS:
+            raise TimeoutError
         policies = [distill_faithfully(agent, agent.task, config, seed=seed)[0] for seed in SEEDS]
         alike = [likeness(policy, agent, agent.task, N_EPISODES, seed=START_SEED) for policy in policies]
         if np.mean([one.r2 for one in alike]) >= ENOUGH:
@@ -129,22 +131,34 @@ def by_the_paper_with(digest: str) -> dict:
     return provenance(settings, digest, VERSION)
 
 
-def committed() -> Iterator[tuple[str, str, list[dict]]]:
-    """Yield the committed tables as `comparison.stale` does: name, make target, provenance today of each row."""
-    rows = read_results("agents").dropna(subset=["settings"])
-    yield "agents.csv", "agents", [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
-    yield "agents_paper.csv", "agents", [by_the_paper_with(name) for name in read_results("agents_paper")["teacher"]]
+def current(name: str) -> tuple[pd.DataFrame, list[dict]]:
+    """Return the rows of a committed table, and what each is made with today. Rows with a reason are left out."""
+    rows = read_results(name).dropna(subset=["settings"])
+    if name == "agents":
+        return rows, [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
+    return rows, [{"seed": row.seed, **by_the_paper_with(row.teacher)} for row in rows.itertuples()]
 
 
-def by_the_paper(algorithm: str, path: Path) -> tuple[dict, dict]:
-    """Distil an agent of MountainCar by the paper's method; return no arrays, and the about of its file.
+def kept(checksum: str) -> tuple[dict, dict] | None:
+    """Return what `study` returned of a zip, from committed files; None if today it would return another."""
+    tables = map(current, TABLES)
+    agents, papers = (rows[[then == now for then, now in zip(keys(rows), keys(today))]] for rows, today in tables)
+    for row in agents[agents["checksum"] == checksum].drop(columns=["zoo", "zoo_std"]).to_dict("records"):
+        mine = papers[papers["teacher"] == row["teacher"]].to_dict("records")
+        if mine or row["task"] != CAR:
+            policy, actions = (find(row["algorithm"], row["task"]) for find in (policy_of, actions_of))
+            return {part: getattr(policy, part) for part in PARTS} | {"actions": actions}, {**row, "papers": mine}
+    return None
 
-    Rows of three ways: the paper's settings; the same cells with maps by least squares; Adam with ten times the step
-    size. `apart` is how many of the agent's states are farther from each other than a codeword must be from a state,
-    `slope` the median coefficient of the velocity, without its sign, over the agent's states.
+
+def by_the_paper(agent: Teacher) -> list[dict]:
+    """Distil an agent of MountainCar by the paper's method; return rows of each seed, in three ways.
+
+    The paper's settings; the same cells with maps by least squares; Adam with ten times the step size. `apart` is how
+    many of the agent's states are farther from each other than a codeword must be from a state, `slope` the median
+    coefficient of the velocity, without its sign, over the agent's states.
     """
-    agent, config, rows = read(path, CAR), paper_preset(CAR), []
-    made_with = by_the_paper_with(agent.digest)
+    config, rows = paper_preset(CAR), []
     states = visited_states(agent, CAR, start_states(CAR, N_SEEN, SEEN_SEED))
     for seed in SEEDS:
         policy, apart = distill(agent, agent.task, config, seed=seed)[0], np.zeros((0, 2))
@@ -158,26 +172,12 @@ def by_the_paper(algorithm: str, path: Path) -> tuple[dict, dict]:
                 apart = np.vstack([apart, state])
         for way, one in ways.items():
             alike = likeness(one, agent, CAR, N_EPISODES, seed=START_SEED)
-            row = {"algorithm": algorithm, "way": way, "seed": seed, "cells": len(one), "apart": len(apart)}
+            row = {"way": way, "seed": seed, "cells": len(one), "apart": len(apart)}
             slope = float(np.median(np.abs(one.coefficients[one.cells(states), 1, 0])))
             scores = {"slope": slope, "r2": alike.r2, "mean": float(alike.returns["policy"].mean())}
-            rows.append(row | scores | {"failing": (alike.failures["policy"] or 0) / N_EPISODES} | made_with)
-    return {}, {"kind": "Paper", "checksum": atomic.sha256(path), "rows": rows}
-
-
-@contextlib.contextmanager
-def _at_most(seconds: int) -> Iterator[None]:
-    """Raise TimeoutError in a block that takes longer."""
-
-    def late(*_) -> None:
-        raise TimeoutError
-
-    signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+            failing = (alike.failures["policy"] or 0) / N_EPISODES
+            rows.append(row | scores | {"failing": failing} | by_the_paper_with(agent.digest))
+    return rows
 
 
 def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -203,8 +203,8 @@ def actions_of(algorithm: str, task: str) -> np.ndarray:
     return sealed.load_arrays(RESULTS / "agents" / "actions.arrays", kind="Agents")[0][f"{algorithm}-{task}"]
 
 
-def write(made: list[tuple[dict, dict]], papers: list[tuple[dict, dict]], out: Path) -> None:
-    """Write tables, policies and maps to OUT/data/beyond, from what `study` and `by_the_paper` returned."""
+def write(made: list[tuple[dict, dict]], out: Path) -> None:
+    """Write tables, policies and maps to OUT/data/beyond, from what `study` returned."""
     folder, maps = out / BEYOND / "agents", {}
     for arrays, about in made:
         if arrays:
@@ -216,30 +216,25 @@ def write(made: list[tuple[dict, dict]], papers: list[tuple[dict, dict]], out: P
     frame = frame.reindex(columns=COLUMNS).sort_values(["task", "algorithm"])
     whole = dict.fromkeys(("version", "cells", "numbers", "weights"), "Int64")  # also where a row lacks them
     write_results(frame.astype(whole), "agents", out=out)
-    write_results(pd.DataFrame([row for _, about in papers for row in about["rows"]]), "agents_paper", out=out)
+    write_results(pd.DataFrame([row for _, about in made for row in about["papers"]]), "agents_paper", out=out)
 
 
 def main() -> None:
-    """Study every agent of the folder that has no file yet; write agents.csv, agents_paper.csv, policies and maps."""
+    """Study the agents of the folder that are not committed; write agents.csv, agents_paper.csv, policies and maps."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("agents", type=Path, help="a folder of zips")
     parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help="worker processes, -1 for one per core")
     given = parser.parse_args()
-    agents = agents_in(given.agents)
+    agents = {(*named, path): atomic.sha256(path) for named, path in agents_in(given.agents).items()}
     if not agents:
         raise command.CommandError(f"{given.agents}: no .zip below it, expected a folder of agents: AGENTS=folder")
-
-    def made(make: Callable, kind: str, work: dict[str, tuple]) -> list[tuple[dict, dict]]:
-        files = {given.out / "build" / "agents" / f"{name}.agent": job for name, job in work.items()}
-        make_missing(make, files, kind, jobs=given.jobs, unit="agents")
-        return [load_made(file, kind, {"checksum": atomic.sha256(job[-1])}) for file, job in files.items()]
-
-    cars = {f"paper-{algorithm}": (algorithm, path) for (algorithm, task), path in agents.items() if task == CAR}
-    write(
-        made(study, "Agent", {f"{name}-{task}": (name, task, path) for (name, task), path in agents.items()}),
-        made(by_the_paper, "Paper", cars), given.out,
-    )  # fmt: skip
+    made = {job: kept(checksum) for job, checksum in agents.items()}
+    folder = given.out / "build" / "agents"
+    files = {folder / "{}-{}.agent".format(*job): job for job, known in made.items() if known is None}
+    make_missing(study, files, "agents", jobs=given.jobs, unit="agents")
+    made |= {job: load_made(file, "Agent", {"checksum": agents[job]}) for file, job in files.items()}
+    write(list(made.values()), given.out)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
-from .comparison.rows import simplest
+from .comparison.beside import simplest
 from .proofs.network import teacher_steps_to_goal
 from .proofs.returns import mean_return
 from .results import BEYOND, RESULTS, read_results, write_results

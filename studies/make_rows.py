@@ -9,15 +9,15 @@ import pandas as pd
 
 from vsp.run import command
 
+from .comparison.beside import beside
 from .comparison.methods import LONG, TABLES
-from .comparison.rows import best_returns, extras, jobs_of, make_all, rows
+from .comparison.rows import committed_rows, make_all
 from .results import write_results
 
 
 def main() -> None:
-    """Make the missing rows, and write them to data/beyond/<table>_<task>.csv, with what is kept beside them: policies,
-    the sameness of faithful ones, gaits. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks
-    that take hours. The returns of the best policies go to optimum.csv.
+    """Make the rows that are not committed, and write all to data/beyond/<table>_<task>.csv, with what stands beside
+    them. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks that take hours.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/beyond, rows to OUT/build/beyond")
@@ -25,24 +25,21 @@ def main() -> None:
     parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
     arguments = parser.parse_args()
     out, folder = arguments.out, arguments.out / "build" / "beyond"
-    wanted = {
-        (table, task): jobs_of(task, table)
-        for task in TABLES
-        for table in TABLES[task]
-        if (task in LONG) == arguments.long
-    }
-    make_all(folder, [job for jobs in wanted.values() for job in jobs], jobs=arguments.jobs)
+    tables = [(task, table) for task in TABLES for table in TABLES[task] if (task in LONG) == arguments.long]
+    rows = {each: committed_rows(*each) for each in tables}
+    files = [file for each in tables for file in beside(*each)]
+    todo = [job for known in rows.values() for job, row in known.items() if row is None]
+    todo += [job for file in files if not file.current for job in file.jobs]
+    make_all(folder, todo, jobs=arguments.jobs)
     seconds: dict[str, list[pd.DataFrame]] = {}
-    for (table, task), jobs in wanted.items():
-        frame, times = rows(folder, jobs)
-        seconds.setdefault(table, []).append(times)
-        write_results(frame, f"{table}_{task}", out=out)
-        for _, _, write in extras(task, table):
-            write(folder, out)
+    for (task, table), known in rows.items():
+        frame = pd.DataFrame([row or job.row(folder) for job, row in known.items()])
+        seconds.setdefault(table, []).append(frame.loc[:, :"seconds"])
+        write_results(frame.drop(columns=["task", "seconds"]), f"{table}_{task}", out=out)
     for table, times in seconds.items():
         write_results(pd.concat(times), f"{table}_seconds{'_long' * arguments.long}", out=out)
-    if not arguments.long:
-        write_results(best_returns(), "optimum", out=out)
+    for file in files:
+        file.write(folder, out)
 
 
 if __name__ == "__main__":

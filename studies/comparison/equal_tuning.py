@@ -114,7 +114,7 @@ def possible(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_and_geometry(task: str) -> pd.DataFrame:
-    """Return the table "apart", which separates fit from geometry and adds newer methods, one row per method.
+    """Return the table "apart", which separates fit from geometry, one row per method.
 
     Columns: method; "r2 2" and so on (the median r2 at that size); "mean 2" and so on (the median mean return).
     """

@@ -1,8 +1,8 @@
 """How the compared methods make a policy, each as a function of a budget, a size and a seed.
 
 The budget is the teacher and the episodes of a `Tuned`. A fit to the teacher's own episodes alone gets as many
-episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. TD-AVQ has
-no teacher. Methods for robots read a `Walking`.
+episodes as the other methods get in all rounds. Methods that find their own size ignore `size`. Methods for robots read
+a `Walking`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
 
-from ..rivals import tdavq
-from ..rivals.critics import advantage_weighted, critic_driven
 from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
 from ..rivals.trees import LinearTree, ObliqueLinearTree
@@ -72,25 +70,20 @@ def limited(budget: Budget, size: int, seed: int, *, by_teacher: bool = False) -
     return search_limit(budget.task, replace(budget.config, n_cells=size), seed=seed, teacher=teacher)
 
 
-# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves
+# Fits to states x (n, d) and actions y (n, m), with `size` cells or leaves, `of` a task and a seed
 
 FITS: dict[str, Callable[..., Policy]] = {
-    "tree": lambda x, y, size, task, seed: Tree(x, y, leaves=size),
+    "tree": lambda x, y, size, **of: Tree(x, y, leaves=size),
     "linear tree": lambda x, y, size, task, seed: LinearTree(x, y, leaves=size, task=task),
-    "oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(x, y, leaves=size, task=task, seed=seed),
-    "constant oblique tree": lambda x, y, size, task, seed: ObliqueLinearTree(
-        x, y, leaves=size, task=task, seed=seed, constant=True
-    ),
-    "small network": lambda x, y, size, task, seed: SmallNetwork(
-        x, y, units=units_for(size, task), task=task, seed=seed
-    ),
-    "k-means": lambda x, y, size, task, seed: kmeans_cells(x, y, cells=size, task=task, seed=seed),
+    "oblique tree": lambda x, y, size, **of: ObliqueLinearTree(x, y, leaves=size, **of),
+    "constant oblique tree": lambda x, y, size, **of: ObliqueLinearTree(x, y, leaves=size, constant=True, **of),
+    "small network": lambda x, y, size, **of: SmallNetwork(x, y, units=units_for(size, of["task"]), **of),
+    "k-means": lambda x, y, size, **of: kmeans_cells(x, y, cells=size, **of),
     "one map": lambda x, y, size, task, seed: linear_map(x, y, task),
     "global cells": global_cells,
     "greedy cells": greedy_cells,
     "global tree": global_tree,
 }
-CRITICS = {"critic-driven": critic_driven, "advantage-weighted": advantage_weighted}  # fits that ask the critics
 
 
 def corrected(budget: Budget, size: int, seed: int, *, fit: str, rounds: int, by_chance: bool) -> Policy:
@@ -104,11 +97,10 @@ def corrected(budget: Budget, size: int, seed: int, *, fit: str, rounds: int, by
 
 
 def uncorrected(budget: Budget, size: int, seed: int, *, fit: str) -> Policy:
-    """Call a fit of `FITS` or `CRITICS` on the teacher's own episodes."""
+    """Call a fit of `FITS` on the teacher's own episodes."""
     config = budget.config
     n = config.n_episodes + config.n_corrections * config.n_correction_episodes
-    make = partial(CRITICS[fit], teacher=budget.teacher) if fit in CRITICS else FITS[fit]
-    return _fitted(make, replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
+    return _fitted(FITS[fit], replace(config, n_corrections=0, n_episodes=n), budget, size, seed, 1)
 
 
 def tuned_fit(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy], **settings) -> Policy:
@@ -129,11 +121,6 @@ def _fitted(fit, config: Tuned, budget: Budget, size: int, seed: int, n_restarts
 def the_teacher(budget: Budget, size: int, seed: int) -> Policy:
     """Return the teacher itself."""
     return budget.teacher
-
-
-def td_avq(budget: Budget, size: int, seed: int, **settings) -> Policy:
-    """Learn from rewards by TD-AVQ, without a teacher."""
-    return tdavq.learn(budget.task, seed=seed, **settings)
 
 
 # Robots

@@ -103,7 +103,6 @@ METHODS = {
     "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
     "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
     "one linear map": _uncorrected("one map", FOUND),
-    "TD-AVQ": Method(makers.td_avq, sizes=FOUND, tasks=TASKS[:1]),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
     "our cells, no correction": _without(n_corrections=0),
@@ -111,31 +110,24 @@ METHODS = {
     "our cells, no failure penalty": _without(failure_penalty=0.0),
     "our cells, weighted by criticality": _without(criticality=True),
     # The highest likeness to the teacher; and the highest return of policies whose R² is at least a given value
-    "faithful": Method(makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"),
-    **{
-        f"faithful, R² {r2:g}": Method(
-            makers.faithful, OF_FAITHFUL, (2, 4, 8), "demanded", {"min_r2": r2}, preset="faithful"
-        )
-        for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)
-    },
-    # The fit and the borders exchanged, and newer methods: all imitate the teacher's own episodes
+    "faithful": (_faithful := Method(
+        makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"
+    )),
+    **{f"faithful, R² {r2:g}": replace(_faithful, sizes=(2, 4, 8), table="demanded", settings={"min_r2": r2})
+       for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)},
+    # The fit and the borders exchanged: all imitate the teacher's own episodes
     "our cells, our fit": _uncorrected("global cells", (2, 4, 8), table="apart"),
     "our cells, greedy fit": _uncorrected("greedy cells", (2, 4, 8), table="apart", version=2),
     "oblique tree, our fit": _uncorrected("global tree", (2, 4, 8), table="apart"),
     "oblique tree, greedy fit": _uncorrected("oblique tree", (2, 4, 8), table="apart", version=2),
-    "critic-driven splitting": _uncorrected("critic-driven", (2, 4, 8), table="apart"),
-    "advantage-weighted maps": _uncorrected("advantage-weighted", (2, 4, 8), table="apart"),
     # The highest return, from the best policy where it is known; and searches with another start or another length
-    "at the limit": Method(
+    "at the limit": (_limit := Method(
         makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"
+    )),
+    "at the limit, from the teacher": replace(
+        _limit, make=partial(makers.limited, by_teacher=True), sizes=(3,), table="starts", tasks=TASKS[1:2]
     ),
-    "at the limit, from the teacher": Method(
-        partial(makers.limited, by_teacher=True), ALL, (3,), "starts", version=limit.VERSION, tasks=TASKS[1:2],
-        preset="limit",
-    ),
-    "our cells, 800 generations": Method(
-        makers.our_cells, ALL, (3,), "starts", {"n_generations": 800}, tasks=TASKS[1:2]
-    ),
+    "our cells, 800 generations": replace(_without(n_generations=800), sizes=(3,), table="starts", tasks=TASKS[1:2]),
     # Robots: imitate the teacher, then continue training as its actor; and one linear map by returns alone
     "cells": (_cells := _robot(makers.robot_cells, OF_IMITATION, (1, 2, 4, 8, 16))),
     "cells, trained further": _further(_cells),
@@ -159,20 +151,6 @@ _UNTUNED = (
 )  # fmt: skip
 UNTUNED = _NEW | {name: METHODS[name] for name in _UNTUNED}
 METHODS |= {f"{name}, tuned": _tuned(fit) for name, fit in UNTUNED.items()} | _NEW
-
-# Names under which rows were made before; their ids contain these
-FORMER_NAMES = {
-    "our cells, tuned": "refined",
-    "our cells": "refined, not tuned",
-    "our cells, no teacher": "refined, no teacher",
-    "our cells, no annealing": "refined, cold from the start",
-    "our cells, one restart": "refined, one beginning",
-    "our cells, no correction": "refined, not corrected",
-    "our cells, no slope beyond the limits": "refined, no leak",
-    "our cells, no failure penalty": "refined, failures at no price",
-    "our cells, weighted by criticality": "refined, drawn by stakes",
-    "our cells, 800 generations": "refined, 800 generations",
-}
 
 
 @dataclass(frozen=True)

@@ -6,18 +6,15 @@ they were made with, follows from the table of methods. Not checked are proofs, 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 
-import pandas as pd
-
-from vsp.protocol.job import PROVENANCE
-from vsp.run import atomic, command, sealed
+from vsp.run import atomic, command
 
 from .. import agents
-from ..results import RESULTS, read_results
+from ..results import differing
+from .beside import beside
 from .methods import LONG, TABLES
-from .rows import WAYS, best_provenance, by_seed, extras, jobs_of
+from .rows import jobs_of
 
 
 def stale() -> list[str]:
@@ -28,41 +25,26 @@ def stale() -> list[str]:
     messages = []
     for name, target, today in committed():
         try:
-            differing = _differing(name, today)
+            if columns := differing(name, today):
+                what = f"data/beyond/{name} lacks today's {' and '.join(columns)}"
+                messages.append(f"{what}: `make {target}` makes what is missing")
         except FileNotFoundError:
             messages.append(f"data/beyond/{name} is missing: `make {target}` makes it")
         except atomic.DamagedFile as error:
             messages.append(str(error))
-        else:
-            if differing:
-                what = f"data/beyond/{name} was made with other {' and '.join(differing)}"
-                messages.append(f"{what}: `make {target}` makes it anew")
     return messages
 
 
 def committed() -> Iterator[tuple[str, str, list[dict]]]:
-    """Yield the committed files: name, make target, and the provenance today, of each row or of the whole file."""
+    """Yield the committed files: name, make target, and what each row, or the whole file, is made with today."""
     for task, tables in TABLES.items():
         target = "beyond-long" if task in LONG else "beyond"
         for table in tables:
-            made_with = ((jobs, kind.provenance) for kind, jobs in by_seed(jobs_of(task, table)).items())
-            yield f"{table}_{task}.csv", target, [{"seed": job.seed, **now} for jobs, now in made_with for job in jobs]
-            for name, today, _ in extras(task, table):
-                yield name, target, today
-    yield "optimum.csv", "beyond", [best_provenance(*way) for way in WAYS]
-    yield from agents.committed()
-
-
-def _differing(name: str, today: list[dict]) -> list[str]:
-    """Return the columns in which the provenance in a file differs from today's; none if it is up to date."""
-    now, path = pd.DataFrame(today), RESULTS / name
-    columns = [column for column in (*PROVENANCE, "seed", "other") if column in now]
-    kept = [sealed.load_arrays(path, kind="VoronoiPolicy")[1]] if path.suffix == ".policy" else read_results(path.stem)
-    now, then = now[columns].astype(str), pd.DataFrame(kept).reindex(columns=columns).astype(str)
-    count = Counter if "seed" in columns else set  # with a seed, each row stands for one job
-    if count(map(tuple, now.to_numpy())) == count(map(tuple, then.to_numpy())):
-        return []
-    return [column for column in columns if set(now[column]) != set(then[column])] or ["rows"]
+            yield f"{table}_{task}.csv", target, [job.about() for job in jobs_of(task, table)]
+            for file in beside(task, table):
+                yield file.name, target, file.today
+    for name in agents.TABLES:
+        yield f"{name}.csv", "agents", agents.current(name)[1]
 
 
 def main() -> None:

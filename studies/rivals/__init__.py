@@ -1,1 +1,1 @@
-"""Methods to compare our cells with: trees, small networks, critics, TD-AVQ, DAgger."""
+"""Methods to compare our cells with: trees, small networks, DAgger."""

@@ -4,6 +4,7 @@ and from the policy's own."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -43,7 +44,7 @@ def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: 
 
     `fit`: by default the closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed.
     """
-    task, fit = get_task(task), cells_fit(config) if fit is None else fit
+    task, fit = get_task(task), fit or partial(cells_fit, config=config)
     starts, pushes, fits, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     own = visited_states(teacher, task, task.start(starts, config.n_episodes))
     pushed = visited_states(Pushed(teacher, task, config.push, pushes), task, task.start(starts, 2 * config.n_episodes))
@@ -58,18 +59,15 @@ def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: 
     return most_rewarding(tried, task, config.n_validation, validation)
 
 
-def cells_fit(config: Walking) -> Fit:
-    """Return the default fit: the cells with the least error, and in later rounds a descent from the cells of the round
-    before."""
-
-    def fit(frame: Scaling, seen: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
-        if isinstance(before, VoronoiPolicy):
-            cells = descend(seen, frame.cells(before), COOL)
-        else:
-            cells = least_error(seen, config.n_cells, config.n_restarts, rng)
-        return frame.policy(by_visits(cells, seen))
-
-    return fit
+def cells_fit(
+    frame: Scaling, seen: LabelledStates, before: Policy | None, rng: np.random.Generator, *, config: Walking
+) -> Policy:
+    """Return the cells with the least error; in later rounds, descend from the cells of the round before."""
+    if isinstance(before, VoronoiPolicy):
+        cells = descend(seen, frame.cells(before), COOL)
+    else:
+        cells = least_error(seen, config.n_cells, config.n_restarts, rng)
+    return frame.policy(by_visits(cells, seen))
 
 
 def most_rewarding(policies: list[Policy], task: Task, n_episodes: int, rng: np.random.Generator) -> Policy:

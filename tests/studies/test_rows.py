@@ -1,19 +1,21 @@
 import dataclasses
+import shutil
 from collections import Counter
 
 import numpy as np
 import pandas as pd
 import pytest
 from small import SMALL
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Constant
 
 from studies import make_rows
-from studies.comparison import measure, rows
+from studies.comparison import beside, measure, rows
+from studies.comparison.beside import kept_jobs
 from studies.comparison.makers import Budget
-from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Table
-from studies.comparison.rows import Job, jobs_of, kept_jobs, make_all, make_row
+from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Method, Table
+from studies.comparison.rows import Job, jobs_of, make_all
 from studies.comparison.summary import read_rows
-from studies.results import RESULTS, read_results
+from studies.results import RESULTS, keys, read_results
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.run import atomic, sealed
@@ -68,7 +70,8 @@ def test_other_arguments_settings_teachers_and_versions_are_other_rows(small):
     changes = ({"method": "teacher"}, {"size": 2}, {"seed": 0}, {"agent": 1}, {"tail": True})
     others = [dataclasses.replace(job, **change) for change in changes]
     assert len({known, *(tuple(other.about().values()) for other in others)}) == 6
-    assert job.path("") != others[3].path("") and job.about() | {"teacher": ""} == others[3].about() | {"teacher": ""}
+    other = others[3].about()
+    assert job.path("") != others[3].path("") and job.about() | {"teacher": "", "agent": 1} == other | {"teacher": ""}
     for change in ({"settings": {"depth": 3}}, {"version": 2}):
         with pytest.MonkeyPatch.context() as patch:
             patch.setitem(METHODS, "CART", dataclasses.replace(METHODS["CART"], **change))
@@ -98,8 +101,8 @@ def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
     small.setattr(measure, "rollout", lambda *given: played.append(len(given[2])) or rollout(*given))
     for name, whole in (("at the limit", True), ("CART", False)):
         job = Job(SIMPLEGOAL, name, 3, 0)
-        assert job.whole == whole
-        measure.measure(policy, policy, slow, whole=job.whole)
+        assert job.measured["whole"] == whole
+        measure.measure(policy, policy, slow, whole=whole)
     assert played == [measure.N_REPORTED, measure.N_REPORTED // 10]
     assert measure.settings(whole=True) == measure.settings() | {"whole": True}
 
@@ -108,41 +111,70 @@ def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
 
 
 def test_a_row_holds_what_is_measured(small):
-    _, about = make_row(CART_3)
+    _, about = CART_3.make()
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
     policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
     assert all(about[name] == value for name, value in CART_3.about().items()) and about["seconds"] > 0
-    tailed = make_row(dataclasses.replace(CART_3, tail=True))[1]["row"]
+    tailed = dataclasses.replace(CART_3, tail=True).make()[1]["row"]
     assert tailed.pop("worst") <= tailed["mean"] and tailed == about["row"]
 
 
 def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
-    jobs = jobs_of(SIMPLEGOAL)
+    jobs, made = jobs_of(SIMPLEGOAL), []
     make_all(tmp_path, jobs)
-    frame, seconds = rows.rows(tmp_path, jobs)
-    assert frame["method"].tolist() == ["CART"] * 4 + ["teacher"] and (seconds["task"] == SIMPLEGOAL).all()
-    assert frame[["settings", "teacher", "version"]].to_dict("records") == [job.provenance for job in jobs]
-    made = []
-    small.setattr(rows, "make_row", lambda job: (made.append(job), make_row(job))[1])
+    found = [job.row(tmp_path) for job in jobs]
+    assert [row["method"] for row in found] == ["CART"] * 4 + ["teacher"] and found[0]["task"] == SIMPLEGOAL
+    assert [{name: row[name] for name in ("settings", "teacher", "version")} for row in found] == [
+        job.provenance for job in jobs
+    ]
+    watch(small, made)
     jobs[2].path(tmp_path).unlink()
     make_all(tmp_path, jobs)
-    assert made == [jobs[2]] and rows.rows(tmp_path, jobs)[0].equals(frame)
+    again = [job.row(tmp_path) | {"seconds": row["seconds"]} for job, row in zip(jobs, found)]
+    assert made == [jobs[2]] and again == found
     jobs[2].path(tmp_path).write_bytes(jobs[3].path(tmp_path).read_bytes())
     with pytest.raises(atomic.DamagedFile, match="made with seed 1, expected 0: delete it"):
-        rows.rows(tmp_path, jobs)
+        jobs[2].row(tmp_path)
+
+
+def watch(patch, made):
+    """Note in `made` which rows are made."""
+    make = Job.make
+    patch.setattr(Job, "make", lambda job: (made.append(job), make(job))[1])
 
 
 # Whole commands
 
 
 def test_the_command_writes_results_and_times_apart(small, tmp_path):
-    small.setattr(make_rows, "best_returns", lambda: pd.DataFrame({"seconds": [0.5]}))
     command(small, "--out", tmp_path)
     results = tmp_path / "data" / "beyond"
     frame = read_rows(SIMPLEGOAL, results)
     assert len(frame) == 5 == len(pd.read_csv(results / "methods_seconds.csv")) and "seconds" not in frame
-    assert (results / "optimum.csv").read_text() == "seconds\n0.500000\n"
+
+
+def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
+    """Rows of other methods are read from the committed tables, and written as they were."""
+    made, results = [], tmp_path / "data" / "beyond"
+    for where in ("studies.results", "studies.comparison.beside"):
+        small.setattr(f"{where}.RESULTS", results)
+    watch(small, made)
+    command(small, "--out", tmp_path)
+    files = [results / "methods_SimpleGoal-v0.csv", results / "methods_seconds.csv"]
+    before = [file.read_text() for file in files]
+    shutil.rmtree(tmp_path / "build")
+    still = Method(lambda budget, size, seed: Constant(0.5, 0.5), sizes=(1, 3))
+    small.setitem(METHODS, "still", still)
+    only(small, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "still", "teacher"), sizes=(0, 1, 3)))
+    command(small, "--out", tmp_path)
+    after = [file.read_text() for file in files]
+    assert [job.method for job in made] == [*"CART CART teacher CART CART".split(), *["still"] * 4]
+    assert ["".join(line for line in text.splitlines(True) if "still" not in line) for text in after] == before
+    assert [text.count("still") for text in after] == [4, 4]
+    small.setattr(Job, "make", None)  # nothing is left to do
+    command(small, "--out", tmp_path / "elsewhere")
+    assert [(tmp_path / "elsewhere" / file.relative_to(tmp_path)).read_text() for file in files] == after
 
 
 def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
@@ -150,7 +182,6 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
         n_cells=2, tolerance=0.1, n_episodes=50, n_restarts=2, n_generations=1, n_tuning_episodes=5, n_validation=20
     )
     small.setitem(PRESETS, "faithful", lambda task: quick)
-    small.setattr(make_rows, "best_returns", lambda: pd.DataFrame())
     only(small, SIMPLEGOAL, "faithful", Table(range(2), sizes=(1, 2), keeps="faithful"))
     command(small, "--out", tmp_path)
     frame, same = (pd.read_csv(tmp_path / f"data/beyond/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
@@ -165,19 +196,20 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
 
 def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
     small.setattr(make_rows, "LONG", (SIMPLEGOAL,))
-    small.setattr(rows, "LANDER", SIMPLEGOAL)
+    small.setattr(beside, "LANDER", SIMPLEGOAL)
     command(small, "--long", "--out", tmp_path)
     results = tmp_path / "data" / "beyond"
     _, about = sealed.load_arrays(results / "methods_SimpleGoal-v0.policy", kind="VoronoiPolicy")
     assert 1 <= len(VoronoiPolicy.load(results / "methods_SimpleGoal-v0.policy")) <= SMALL.n_cells
-    assert about.items() >= rows.simplest_provenance(SIMPLEGOAL).items()
-    assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5 and not (results / "optimum.csv").exists()
+    (file,) = beside.beside(SIMPLEGOAL, "methods")
+    assert about.items() >= file.today[0].items()
+    assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5
 
 
 def test_the_simplified_policy_may_lose_its_share_of_the_teachers_return(small):
     asked, starts = [], start_states(SIMPLEGOAL, SMALL.n_validation, 0)
-    small.setattr(rows, "simplify", lambda *given, **how: asked.append(how) or ("policy", None))
-    assert rows.simplest(SIMPLEGOAL) == "policy"
+    small.setattr(beside, "simplify", lambda *given, **how: asked.append(how) or ("policy", None))
+    assert beside.simplest(SIMPLEGOAL) == "policy"
     of_teacher = rollout(load_teacher(SIMPLEGOAL), SIMPLEGOAL, starts).returns.mean()
     assert asked == [{"tolerance": pytest.approx(0.02 * of_teacher), "seed": 0}]
 
@@ -186,14 +218,14 @@ def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
     walking = Walking(n_cells=2, n_episodes=1, n_corrections=0, n_states=300, n_restarts=1, n_validation=1)
     small.setitem(PRESETS, "walking", lambda task: walking)
     small.setattr(measure, "N_ERROR", 20)  # the walker is slow: a twentieth of them
-    small.setattr(rows, "CHEETAH", WALKER)
+    small.setattr(beside, "CHEETAH", WALKER)
     gait = pd.DataFrame({"step": range(3)})
-    small.setattr(rows, "record_gait", lambda policy, task, **how: gait.assign(cells=len(policy)))
+    small.setattr(beside, "record_gait", lambda policy, task, **how: gait.assign(cells=len(policy)))
     only(small, WALKER, "robots", Table(range(1), methods=("cells", "robot's teacher"), sizes=(0, 2), keeps="cells"))
     command(small, "--long", "--out", tmp_path)
     made = {name: pd.read_csv(tmp_path / f"data/beyond/{name}_{WALKER}.csv") for name in ("robots", "gait")}
     assert made["robots"]["method"].tolist() == ["cells", "robot's teacher"] and made["robots"]["r2"][1] == 1
-    assert made["gait"]["cells"].tolist() == [2] * 3 and made["gait"]["version"].tolist() == [rows.GAIT_VERSION] * 3
+    assert made["gait"]["cells"].tolist() == [2] * 3 and made["gait"]["version"].tolist() == [beside.GAIT_VERSION] * 3
     assert VoronoiPolicy.load(tmp_path / f"data/beyond/robots_{WALKER}.policy").task.name == WALKER
 
 
@@ -217,13 +249,16 @@ def test_a_kept_policy_acts_as_its_row_says(table):
 # The best policies
 
 
-def test_the_best_returns_are_those_of_the_best_policies(monkeypatch):
+def test_the_best_returns_are_those_of_the_best_policies(monkeypatch, tmp_path):
     """SimpleGoal's in closed form, others as played from coarse grids; of a task without a goal nothing fails."""
     monkeypatch.setattr(measure, "N_REPORTED", 40)
-    monkeypatch.setattr(rows, "WAYS", ((SIMPLEGOAL, 1.0), (PENDULUM, 0.2), (PENDULUM, 0.4)))
-    frame = rows.best_returns()
+    monkeypatch.setattr(beside, "WAYS", ((SIMPLEGOAL, 1.0), (PENDULUM, 0.2), (PENDULUM, 0.4)))
+    *_, file = beside.beside(SIMPLEGOAL, "limit")
+    file.write(tmp_path, tmp_path)
+    frame = read_results("optimum", tmp_path / "data" / "beyond")
     assert frame["found"].tolist() == ["closed form", "72 × 73 points", "144 × 145 points"]
+    assert keys(frame) == keys(file.today)
     starts = start_states(get_task(SIMPLEGOAL), 40, measure.REPORT_SEED)
-    assert frame["mean"][0] == pytest.approx(np.maximum(10, 10 * np.hypot(*starts.T) + 9).mean(), abs=1e-12)
+    assert frame["mean"][0] == pytest.approx(np.maximum(10, 10 * np.hypot(*starts.T) + 9).mean(), abs=1e-6)
     assert frame["failing"][0] == 0 and frame["failing"][1:].isna().all()
     assert frame["mean"][1] <= frame["mean"][2] < 0 and (frame["longest"] <= [50, 200, 200]).all()

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
-from studies.comparison import rows, stale
+from studies.comparison import beside, rows, stale
 from studies.comparison.methods import METHODS, PRESETS, TASKS
 from studies.results import RESULTS
 from vsp.run import listed
@@ -26,16 +26,24 @@ def test_every_committed_row_and_policy_is_checked():
 
 
 @pytest.fixture
-def results(tmp_path, monkeypatch):
+def patch(monkeypatch):
+    """Leaves out methods that have no committed rows yet: the first test asks for these."""
+    made = {name for path in RESULTS.glob("*_seconds*.csv") for name in pd.read_csv(path)["method"]}
+    for name in {*METHODS} - made:
+        monkeypatch.delitem(METHODS, name)
+    return monkeypatch
+
+
+@pytest.fixture
+def results(tmp_path, patch):
     """A copy of the committed results, to spoil."""
     shutil.copytree(RESULTS, tmp_path / "beyond")
-    monkeypatch.setattr(stale, "RESULTS", tmp_path / "beyond")
-    monkeypatch.setattr("studies.results.RESULTS", tmp_path / "beyond")
+    patch.setattr("studies.results.RESULTS", tmp_path / "beyond")
     return tmp_path / "beyond"
 
 
 def says(name, what, target="beyond"):
-    return f"data/beyond/{name} was made with other {what}: `make {target}` makes it anew"
+    return f"data/beyond/{name} lacks today's {what}: `make {target}` makes what is missing"
 
 
 def test_a_missing_or_damaged_file_is_named(results):
@@ -75,29 +83,28 @@ OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
     ("change", "expected"),
     [
         (raised("CART"), OF_CART),
-        (raised("TD-AVQ"), OF_CART[:1]),
-        (lambda patch: patch.setattr(rows, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
-        (lambda patch: patch.setattr(rows, "GAIT_VERSION", 9),
+        (lambda patch: patch.setattr(beside, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
+        (lambda patch: patch.setattr(beside, "GAIT_VERSION", 9),
          [says(f"gait_{CHEETAH}.csv", "version", "beyond-long")]),
-        (lambda patch: patch.setattr(rows, "SIMPLIFY_VERSION", 2),
+        (lambda patch: patch.setattr(beside, "SIMPLIFY_VERSION", 2),
          [says(f"methods_{LUNARLANDER}.policy", "version", "beyond-long")]),
     ],
-    ids=["CART", "TD-AVQ", "optimum", "gait", "simplify"],
+    ids=["CART", "optimum", "gait", "simplify"],
 )  # fmt: skip
-def test_results_of_another_version_are_stale(monkeypatch, change, expected):
-    change(monkeypatch)
+def test_results_of_another_version_are_stale(patch, change, expected):
+    change(patch)
     assert stale.stale() == expected
 
 
-def test_results_of_another_preset_are_stale(monkeypatch):
+def test_results_of_another_preset_are_stale(patch):
     before, changed = PRESETS["tuned"], dataclasses.replace(PRESETS["tuned"](SIMPLEGOAL), n_steps=99)
-    monkeypatch.setitem(PRESETS, "tuned", lambda task: changed if task == SIMPLEGOAL else before(task))
+    patch.setitem(PRESETS, "tuned", lambda task: changed if task == SIMPLEGOAL else before(task))
     assert stale.stale() == [says(f"{table}_{SIMPLEGOAL}.csv", "settings") for table in ("methods", "teachers")]
 
 
-def test_all_results_of_another_teacher_are_stale(monkeypatch):
+def test_all_results_of_another_teacher_are_stale(patch):
     other = SimpleNamespace(digest="f" * 64)
-    monkeypatch.setattr(rows, "_teacher", lambda task, agent: other)
-    monkeypatch.setattr(rows, "load_teacher", lambda task: other)
+    patch.setattr(rows, "_teacher", lambda task, agent: other)
+    patch.setattr(beside, "load_teacher", lambda task: other)
     named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
     assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents"))]
