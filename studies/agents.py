@@ -8,9 +8,10 @@ reason. Those of MountainCar are distilled by the paper's method, too.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import time
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import gymnasium
@@ -22,7 +23,8 @@ from vsp.config import paper_preset
 from vsp.evaluation import Likeness, likeness, start_states
 from vsp.paper.baselines import refit
 from vsp.policy import VoronoiPolicy
-from vsp.protocol.job import load_made, make_missing, provenance
+from vsp.protocol import Job, job
+from vsp.protocol.job import provenance
 from vsp.rollouts import visited_states
 from vsp.run import atomic, command, sealed
 from vsp.tasks import Task, get_task
@@ -65,25 +67,43 @@ def read(path: Path, task: str | Task) -> Teacher:
     return load_teacher(path, task, normalize=statistics_beside(path))
 
 
-def study(algorithm: str, name: str, path: Path) -> tuple[dict, dict]:
-    """Distil one agent; return the arrays and about of its file: the kept policy, the map of its actions, its rows."""
-    row: dict = {"algorithm": algorithm, "task": name, "checksum": atomic.sha256(path)}
-    arrays: dict = {}
-    papers: list[dict] = []
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the row says how good the policies are
-            agent = read(path, name)
-            size, policy, alike = _fewest(agent)
-            row |= _numbers(agent, size, policy, alike)
-            actions = agent.predict(plane(agent.task)[2])[0] if name in PLANES else np.zeros((0, 1))
-            arrays = {part: getattr(policy, part) for part in PARTS} | {"actions": actions}
-        papers = [{"algorithm": algorithm, **each} for each in by_the_paper(agent)] if name == CAR else []
-    except TimeoutError:
-        row["reason"] = f"slower than {SECONDS // 60} minutes"
-    except (ValueError, OSError, ImportError, gymnasium.error.Error) as error:
-        row["reason"] = str(error).splitlines()[0].replace(f"{path}: ", "")
-    return arrays, {"kind": "Agent", **row, "papers": papers}
+@dataclass(frozen=True)
+class Study(Job):
+    """One zip: the kept policy of its agent, the map of its actions, and its rows."""
+
+    algorithm: str
+    task: str
+    zip: Path
+    seed: int = 0  # all of `SEEDS`
+    kind = "Agent"
+
+    @property
+    def provenance(self) -> dict[str, str | int]:
+        """The zip, and what the rows are made with, if the task is known."""
+        settings: dict = {"paper": by_the_paper_with("")}
+        with contextlib.suppress(ValueError, ImportError, gymnasium.error.Error):
+            settings |= provenance_of(get_task(self.task), "")
+        return provenance(settings, atomic.sha256(self.zip), VERSION)
+
+    def make(self) -> tuple[dict, dict]:
+        """Distil the agent."""
+        row: dict = {"algorithm": self.algorithm, "task": self.task, "checksum": atomic.sha256(self.zip)}
+        arrays: dict = {}
+        papers: list[dict] = []
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the row says how good the policies are
+                agent = read(self.zip, self.task)
+                size, policy, alike = _fewest(agent)
+                row |= _numbers(agent, size, policy, alike)
+                actions = agent.predict(plane(agent.task)[2])[0] if self.task in PLANES else np.zeros((0, 1))
+                arrays = {part: getattr(policy, part) for part in PARTS} | {"actions": actions}
+            papers = [{"algorithm": self.algorithm, **each} for each in by_the_paper(agent)] if self.task == CAR else []
+        except TimeoutError:
+            row["reason"] = f"slower than {SECONDS // 60} minutes"
+        except (ValueError, OSError, ImportError, gymnasium.error.Error) as error:
+            row["reason"] = str(error).splitlines()[0].replace(f"{self.zip}: ", "")
+        return arrays, {"row": row, "papers": papers}
 
 
 def _fewest(agent: Teacher) -> tuple[int, VoronoiPolicy, list[Likeness]]:
@@ -140,14 +160,14 @@ def current(name: str) -> tuple[pd.DataFrame, list[dict]]:
 
 
 def kept(checksum: str) -> tuple[dict, dict] | None:
-    """Return what `study` returned of a zip, from committed files; None if today it would return another."""
+    """Return what `Study.make` returned of a zip, from committed files; None if today it would return another."""
     tables = map(current, TABLES)
     agents, papers = (rows[[then == now for then, now in zip(keys(rows), keys(today))]] for rows, today in tables)
     for row in agents[agents["checksum"] == checksum].drop(columns=["zoo", "zoo_std"]).to_dict("records"):
         mine = papers[papers["teacher"] == row["teacher"]].to_dict("records")
         if mine or row["task"] != CAR:
             policy, actions = (find(row["algorithm"], row["task"]) for find in (policy_of, actions_of))
-            return {part: getattr(policy, part) for part in PARTS} | {"actions": actions}, {**row, "papers": mine}
+            return {part: getattr(policy, part) for part in PARTS} | {"actions": actions}, {"row": row, "papers": mine}
     return None
 
 
@@ -204,15 +224,16 @@ def actions_of(algorithm: str, task: str) -> np.ndarray:
 
 
 def write(made: list[tuple[dict, dict]], out: Path) -> None:
-    """Write tables, policies and maps to OUT/data/beyond, from what `study` returned."""
+    """Write tables, policies and maps to OUT/data/beyond, from what `Study.make` returned."""
     folder, maps = out / BEYOND / "agents", {}
     for arrays, about in made:
         if arrays:
-            name = f"{about['algorithm']}-{about['task']}"
+            row = about["row"]
+            name = f"{row['algorithm']}-{row['task']}"
             maps[name] = arrays.pop("actions")
-            VoronoiPolicy(**arrays, task=about["task"], metric="euclidean").save(folder / f"{name}.policy")
+            VoronoiPolicy(**arrays, task=row["task"], metric="euclidean").save(folder / f"{name}.policy")
     sealed.save_arrays(folder / "actions.arrays", maps, {"kind": "Agents"})
-    frame = pd.DataFrame([about for _, about in made]).merge(read_results("zoo"), "left")
+    frame = pd.DataFrame([about["row"] for _, about in made]).merge(read_results("zoo"), "left")
     frame = frame.reindex(columns=COLUMNS).sort_values(["task", "algorithm"])
     whole = dict.fromkeys(("version", "cells", "numbers", "weights"), "Int64")  # also where a row lacks them
     write_results(frame.astype(whole), "agents", out=out)
@@ -226,14 +247,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help="worker processes, -1 for one per core")
     given = parser.parse_args()
-    agents = {(*named, path): atomic.sha256(path) for named, path in agents_in(given.agents).items()}
-    if not agents:
+    studies = [Study(*named, path) for named, path in agents_in(given.agents).items()]
+    if not studies:
         raise command.CommandError(f"{given.agents}: no .zip below it, expected a folder of agents: AGENTS=folder")
-    made = {job: kept(checksum) for job, checksum in agents.items()}
+    made = {study: kept(atomic.sha256(study.zip)) for study in studies}
+    missing = [study for study, known in made.items() if known is None]
     folder = given.out / "build" / "agents"
-    files = {folder / "{}-{}.agent".format(*job): job for job, known in made.items() if known is None}
-    make_missing(study, files, "agents", jobs=given.jobs, unit="agents")
-    made |= {job: load_made(file, "Agent", {"checksum": agents[job]}) for file, job in files.items()}
+    job.make_all(missing, folder, "agents", jobs=given.jobs, unit="agents")
+    made |= {study: study.load(folder) for study in missing}
     write(list(made.values()), given.out)
 
 

@@ -18,9 +18,9 @@ def test_a_tree_by_hand():
     assert HAND.locate(states).tolist() == [1, 0, 2, 1] and len(HAND) == 3
     assert HAND.place(2, ("x", "y"), 1) == "where 1.0 x + 0.0 y <= 0.5 and 0.0 x + 2.0 y > 0.6"
     assert HAND.latex(1, ("x", "y"), None) == "$1 x > 0.5$"
-    assert [HAND.border(np.array(state), cell) for state, cell in (([0.4, 0.1], 0), ([0.4, 0.25], 0), ([0.6, 0.2], 1))] == [
-        (1, pytest.approx(0.1)), (2, pytest.approx(0.05)), (0, pytest.approx(0.1)),
-    ]  # fmt: skip
+    near = {0: ([0.4, 0.1], 1, 0.1), 1: ([0.6, 0.2], 0, 0.1), 2: ([0.45, 0.4], 1, 0.05)}
+    for cell, (state, other, far) in near.items():
+        assert HAND.border(np.array(state), cell) == (other, pytest.approx(far))
     assert HAND.border(np.array([0.5, 0.1]), 0) == (1, 0)  # on the hyperplane
 
 

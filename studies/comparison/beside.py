@@ -25,7 +25,7 @@ from ..results import BEYOND, RESULTS, differing, write_results
 from ..robots import record_gait
 from . import measure
 from .methods import CHEETAH, LANDER, METHODS, PRESETS, TABLES, TASKS
-from .rows import Job, jobs_of
+from .rows import Row, jobs_of
 
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
@@ -42,7 +42,7 @@ class Beside:
     name: str
     today: list[dict]  # what each of its rows is made with; one for all of them, or for a policy
     make: Callable[..., VoronoiPolicy | pd.DataFrame]  # of the policies of `jobs`
-    jobs: tuple[Job, ...] = ()
+    jobs: tuple[Row, ...] = ()
 
     @property
     def current(self) -> bool:
@@ -89,7 +89,7 @@ def beside(task: str, table: str) -> Iterator[Beside]:
         yield Beside("optimum.csv", [provenance(way, "none", OPTIMUM_VERSION) for way in ways], best_returns)
 
 
-def kept_jobs(task: str, table: str) -> dict[str, Job]:
+def kept_jobs(task: str, table: str) -> dict[str, Row]:
     """Return the rows of a table whose policies are kept, by file: the preset's size first, all of the first seed."""
     about = TABLES[task][table]
     if not about.keeps:
@@ -97,12 +97,12 @@ def kept_jobs(task: str, table: str) -> dict[str, Job]:
     preset = PRESETS[METHODS[about.keeps].preset](task).n_cells
     sizes = {"": preset, **{f"_size_{size}": size for size in about.keeps_also}}
     return {
-        f"{table}_{task}{suffix}.policy": Job(task, about.keeps, size, 0, tail=about.tail)
+        f"{table}_{task}{suffix}.policy": Row(task, about.keeps, size, 0, tail=about.tail)
         for suffix, size in sizes.items()
     }
 
 
-def _sameness(jobs: tuple[Job, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
+def _sameness(jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
     """Compare policies of different seeds, one row per size and pair."""
     tables, task = {}, jobs[0].task
     for size in dict.fromkeys(job.size for job in jobs):

@@ -11,10 +11,10 @@ import os
 import time
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from vsp import VoronoiPolicy, get_task, load_teacher
-from vsp.protocol.job import load_made, make_missing, provenance, provenance_folder
+from vsp.protocol import Job, job
+from vsp.protocol.job import provenance
 from vsp.teachers.teacher import Teacher, further_teachers
 from vsp_beyond.few_cells.units import METRIC
 
@@ -25,7 +25,7 @@ from .methods import ALIKE, FOUND, LONG, METHODS, PRESETS, TABLES, Method, metho
 
 
 @dataclass(frozen=True)
-class Job:
+class Row(Job):
     """One row to make: a method at a size, with a seed. Size 0: the method finds its own size."""
 
     task: str
@@ -34,6 +34,7 @@ class Job:
     seed: int
     agent: int = 0  # which teacher: 0 is the shipped one, the others are those of `further_teachers`
     tail: bool = False  # whether the worst returns are measured too
+    kind = "Row"
 
     @property
     def how(self) -> Method:
@@ -72,10 +73,6 @@ class Job:
         """Return what the row's file says of the job; the settings include the tail."""
         return self.named | self.provenance
 
-    def path(self, folder: str | os.PathLike) -> Path:
-        """Return the path of the row's file in `folder`."""
-        return provenance_folder(folder, self.task, self.provenance) / f"{self.seed:04d}.row"
-
     def make(self) -> tuple[dict, dict]:
         """Distil and measure a policy; return the arrays (of Voronoi cells only) and about of the row's file."""
         teacher = _teacher(self.task, self.agent)
@@ -88,17 +85,16 @@ class Job:
         arrays = {}
         if isinstance(policy, VoronoiPolicy):
             arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
-        return arrays, {"kind": "Row", **self.about(), "row": row, "seconds": seconds}
+        return arrays, {"row": row, "seconds": seconds}
 
     def row(self, folder: str | os.PathLike) -> dict:
         """Return the row in the job's file. Raises `atomic.DamagedFile`."""
-        _, made = load_made(self.path(folder), "Row", self.about())
+        _, made = self.load(folder)
         return {**self.named, "seconds": made["seconds"], **made["row"], **self.provenance}
 
     def policy(self, folder: str | os.PathLike) -> VoronoiPolicy:
         """Return the policy in the job's file, which must hold one."""
-        arrays, _ = load_made(self.path(folder), "Row", self.about())
-        return VoronoiPolicy(**arrays, task=self.task, metric=METRIC)
+        return VoronoiPolicy(**self.load(folder)[0], task=self.task, metric=METRIC)
 
 
 @cache
@@ -106,11 +102,11 @@ def _teacher(task: str, agent: int) -> Teacher:
     return load_teacher(list(further_teachers(task).values())[agent - 1] if agent else task)
 
 
-def jobs_of(task: str, table: str = "methods") -> list[Job]:
+def jobs_of(task: str, table: str = "methods") -> list[Row]:
     """List all rows of a task in `table`, a key of `TABLES[task]`."""
     about = TABLES[task][table]
     return [
-        Job(task, name, size, seed, agent, about.tail)
+        Row(task, name, size, seed, agent, about.tail)
         for name, method in methods_of(task, table).items()
         for size in sizes_of(task, method, about)
         for agent in about.agents
@@ -125,17 +121,16 @@ def _seeds(task: str, table: str, method: Method, size: int) -> range:
     return seeds if method.chance else seeds[:1]
 
 
-def committed_rows(task: str, table: str) -> dict[Job, dict | None]:
+def committed_rows(task: str, table: str) -> dict[Row, dict | None]:
     """Return the committed row of each job of a table, with its seconds; None for a job that is not committed."""
     jobs, known = jobs_of(task, table), {}
     with contextlib.suppress(FileNotFoundError):
         seconds = read_results(f"{table}_seconds{'_long' * (task in LONG)}")
         rows = seconds[seconds["task"] == task].merge(read_results(f"{table}_{task}"))
         known = dict(zip(keys(rows), rows.to_dict("records")))
-    return {job: known.get(key) for job, key in zip(jobs, keys([job.about() for job in jobs]))}
+    return {row: known.get(key) for row, key in zip(jobs, keys([row.about() for row in jobs]))}
 
 
-def make_all(folder: str | os.PathLike, todo: list[Job], *, jobs: int | str = 1) -> None:
+def make_all(folder: str | os.PathLike, todo: list[Row], *, jobs: int | str = 1) -> None:
     """Make the rows of `todo` that are missing in `folder`, lower seeds first; `jobs` as in `workers`."""
-    todo = sorted(todo, key=lambda job: job.seed)
-    make_missing(Job.make, {job.path(folder): (job,) for job in todo}, "beyond", jobs=jobs, unit="rows")
+    job.make_all(sorted(todo, key=lambda row: row.seed), folder, "beyond", jobs=jobs, unit="rows")

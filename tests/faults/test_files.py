@@ -19,14 +19,14 @@ from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload
 
 import vsp
 from studies import training
-from studies.comparison.rows import Job, make_row
+from studies.comparison.rows import Row, make_all
 from studies.recipes import Recipe
 from vsp.paper import results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
 from vsp.run.listed import MANIFEST, list_folder, read_listed, read_table
 from vsp.run.notebook import nbformat
-from vsp.run.sealed import load_arrays, read_sealed, save_arrays
+from vsp.run.sealed import load_arrays, read_sealed
 from vsp_course import build
 
 FLIPS, TRUNCATIONS = 100, 50
@@ -66,8 +66,8 @@ def run(folder: Path) -> Path:
 
 
 def row(folder: Path) -> Path:
-    job = Job(SIMPLEGOAL, "teacher", 0, 0)
-    save_arrays(job.path(folder), *make_row(job))
+    job = Row(SIMPLEGOAL, "teacher", 0, 0)
+    make_all(folder, [job])
     return job.path(folder)
 
 

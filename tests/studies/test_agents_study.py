@@ -48,7 +48,8 @@ def test_agents_are_named_by_file_or_by_folder(tmp_path):
 
 def test_the_fewest_cells_that_act_like_the_agent_are_kept(small, tmp_path):
     path = folder_of(tmp_path, "x.zip") / "x.zip"
-    arrays, about = agents.study("td3", MOUNTAINCAR, path)
+    arrays, made = agents.Study("td3", MOUNTAINCAR, path).make()
+    about = made["row"]
     assert (about["cells"], len(arrays["codewords"]), about["numbers"]) == (2, 2, 10) and about["r2"] >= 0.95
     agent = load_teacher(MOUNTAINCAR)
     returns = likeness(agent, agent, MOUNTAINCAR, 10).returns["agent"]
@@ -58,12 +59,11 @@ def test_the_fewest_cells_that_act_like_the_agent_are_kept(small, tmp_path):
 
 def test_what_is_refused_or_slow_has_a_reason(small, monkeypatch, tmp_path):
     path = folder_of(tmp_path, "x.zip") / "x.zip"
-    assert agents.study("ppo", "Nothing-v0", path)[1]["reason"].startswith("unknown task 'Nothing-v0'")
+    assert agents.Study("ppo", "Nothing-v0", path).make()[1]["row"]["reason"].startswith("unknown task 'Nothing-v0'")
     monkeypatch.setattr(agents, "SECONDS", 0)
-    assert agents.study("td3", PENDULUM, path) == ({}, {
-        "kind": "Agent", "checksum": agents.atomic.sha256(path), "algorithm": "td3", "task": PENDULUM,
-        "reason": "slower than 0 minutes", "papers": [],
-    })  # fmt: skip
+    row = {"checksum": agents.atomic.sha256(path), "algorithm": "td3", "task": PENDULUM}
+    row["reason"] = "slower than 0 minutes"
+    assert agents.Study("td3", PENDULUM, path).make() == ({}, {"row": row, "papers": []})
 
 
 def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypatch, tmp_path):
@@ -71,16 +71,16 @@ def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypat
     given = folder_of(tmp_path / "given", f"td3-{MOUNTAINCAR}.zip", "sac-Nothing-v0.zip")
     monkeypatch.setattr(sys, "argv", ["x", str(given), "--out", str(tmp_path), "--jobs", "1"])
     agents.main()
-    folder, study, asked = tmp_path / "data" / "beyond", agents.study, []
+    folder, make, asked = tmp_path / "data" / "beyond", agents.Study.make, []
     written = [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
-    monkeypatch.setattr(agents, "study", None)  # nothing is left to do
+    monkeypatch.setattr(agents.Study, "make", None)  # nothing is left to do
     agents.main()
     for where in ("studies.agents", "studies.results"):
         monkeypatch.setattr(f"{where}.RESULTS", folder)
     shutil.copy(RESULTS / "zoo.csv", folder)
     listed.list_folder(folder)
     shutil.rmtree(tmp_path / "build")
-    monkeypatch.setattr(agents, "study", lambda name, task, path: (asked.append(name), study(name, task, path))[1])
+    monkeypatch.setattr(agents.Study, "make", lambda one: (asked.append(one.algorithm), make(one))[1])
     agents.main()
     assert asked == ["sac"]
     assert written == [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]

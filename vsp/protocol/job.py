@@ -14,10 +14,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,15 +34,13 @@ class Job:
     kind: str
     seed: int
 
-    @property
-    def task(self) -> str:
-        """Return the name of the task."""
-        raise NotImplementedError
+    if TYPE_CHECKING:  # a subclass has these as fields or as properties
 
-    @property
-    def provenance(self) -> dict[str, str | int]:
-        """Return what determines the result beside the seed, as `provenance` makes it."""
-        raise NotImplementedError
+        @property
+        def task(self) -> str: ...
+
+        @property
+        def provenance(self) -> dict[str, str | int]: ...
 
     def make(self) -> tuple[dict[str, np.ndarray], dict]:
         """Make the result: arrays, and what else the file says."""
@@ -53,7 +52,8 @@ class Job:
 
     def path(self, folder: str | os.PathLike) -> Path:
         """Return the path of the file below `folder`."""
-        return provenance_folder(folder, self.task, self.provenance) / f"{self.seed:04d}.run"
+        made_with = "{settings}-{teacher}-v{version}".format(**self.provenance)
+        return Path(folder, self.task, made_with, f"{self.seed:04d}.run")
 
     def load(self, folder: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict]:
         """Read the file: its arrays and all that it says. Raises `atomic.DamagedFile`, also for another job's file."""
@@ -92,11 +92,6 @@ def settings_id(settings: dict) -> str:
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:10]
 
 
-def provenance_folder(root: str | os.PathLike, task: str, made_with: dict) -> Path:
-    """Return the folder below `root` for files of one task that differ only in their seed."""
-    return Path(root) / task / "{settings}-{teacher}-v{version}".format(**made_with)
-
-
 def load_made(path: str | os.PathLike, kind: str, expected: dict) -> tuple[dict, dict]:
     """Return the arrays and about of a sealed file.
 
@@ -109,13 +104,3 @@ def load_made(path: str | os.PathLike, kind: str, expected: dict) -> tuple[dict,
                 f"{path}: made with {name} {about.get(name)!r}, expected {value!r}: delete it to make it again"
             )
     return arrays, about
-
-
-def make_missing(
-    make: Callable[..., tuple[dict, dict]], work: dict[Path, tuple], label: str, *, jobs: int | str, unit: str
-) -> None:
-    """Write the missing files of `work`; `make(*work[path])` returns arrays and about; `jobs` as in `workers`."""
-    missing = [path for path in work if not path.exists()]
-    arguments = [work[path] for path in missing]
-    for i, content in workers.results(make, arguments, label, jobs=jobs, total=len(work), unit=unit):
-        sealed.save_arrays(missing[i], *content)
