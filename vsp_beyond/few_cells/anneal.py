@@ -9,7 +9,7 @@ import numpy as np
 from vsp.subpolicies.stacked import BETA1, adam
 
 from .config import Tuned
-from .units import Cells, LabelledStates
+from .units import LabelledStates, ScaledCells
 
 WARM = 10  # initial temperature for cells that are already good, in units of the final temperature
 
@@ -20,31 +20,31 @@ def warm(config: Tuned) -> Tuned:
     return replace(config, initial_temperature=heat, n_steps=max(1, config.n_steps // 2))
 
 
-def squared_errors(labelled: LabelledStates, cells: Cells) -> np.ndarray:
+def squared_errors(labelled: LabelledStates, cells: ScaledCells) -> np.ndarray:
     """Mean squared error of the limited action of every cell in every state. (k, n)"""
     return np.square(np.clip(cells.outputs(labelled.inputs), -1.0, 1.0) - labelled.actions.T).mean(axis=1)
 
 
-def squared_error(labelled: LabelledStates, cells: Cells) -> float:
+def squared_error(labelled: LabelledStates, cells: ScaledCells) -> float:
     """Mean squared error of the limited action of each state's cell, over all states."""
     nearest = cells.nearest(labelled.inputs[:, :-1])
     return float(squared_errors(labelled, cells)[nearest, np.arange(len(nearest))].mean())
 
 
-def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """k codewords near states drawn from `labelled`; every cell gets the least-squares coefficients of all states."""
     states, common = labelled.inputs[:, :-1], np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
     codewords = states[rng.integers(len(states), size=k)] + 0.01 * rng.normal(size=(k, states.shape[1]))
-    return Cells(codewords, np.tile(common, (k, 1, 1)))
+    return ScaledCells(codewords, np.tile(common, (k, 1, 1)))
 
 
-def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """`linear_init` with a little noise in every coefficient."""
     cells = linear_init(labelled, k, rng)
-    return Cells(cells.codewords, cells.coefficients + 0.1 * rng.normal(size=cells.coefficients.shape))
+    return ScaledCells(cells.codewords, cells.coefficients + 0.1 * rng.normal(size=cells.coefficients.shape))
 
 
-def anneal(labelled: LabelledStates, cells: Cells, config: Tuned, rng: np.random.Generator) -> Cells:
+def anneal(labelled: LabelledStates, cells: ScaledCells, config: Tuned, rng: np.random.Generator) -> ScaledCells:
     """Optimise all numbers of `cells` by Adam while the temperature falls from the initial to the final of `config`.
 
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
@@ -74,7 +74,7 @@ def temperature_unit(labelled: LabelledStates, k: int) -> float:
 
 
 def expected_loss(
-    cells: Cells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
+    cells: ScaledCells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
     """Mean squared error of the limited actions, weighted by each cell's share of a state, and its gradient.
 

@@ -25,7 +25,7 @@ from .config import Faithful, check_kind
 from .population import rollout_population
 from .search import least_error, moves, spread, uncorrelated
 from .tune import cma_es, is_snapshot, score
-from .units import Cells, LabelledStates, Scaling, warn_outside
+from .units import LabelledStates, ScaledCells, Scaling, warn_outside
 
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # states on which the error of a candidate is measured
@@ -87,16 +87,16 @@ class _Candidates:
         self.tolerance = config.tolerance or max(SHARE * abs(float(result.returns.mean())), 1e-9)
         self._least_gap = config.margin - 0.5 * self.tolerance
 
-    def add(self, stage: str, cells: Cells) -> None:
+    def add(self, stage: str, cells: ScaledCells) -> None:
         r2 = 1.0 - squared_error(self._labelled, cells) / variance(self._labelled)
         self._rows.append({"stage": stage, "r2": r2, "gap": self._gap(cells)})
         self._cells.append(cells)
 
-    def _gap(self, cells: Cells) -> float:
+    def _gap(self, cells: ScaledCells) -> float:
         result = rollout(self.scaling.policy(cells), self.scaling.task, self._starts)
         return score(result, self.config.failure_penalty) - self._teacher_score
 
-    def returns_enough(self, cells: Cells) -> bool:
+    def returns_enough(self, cells: ScaledCells) -> bool:
         """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
         gap = self._rows[self._kept]["gap"]
         return self._gap(cells) >= (gap if self.config.min_r2 is not None else min(gap, self._least_gap))
@@ -107,7 +107,7 @@ class _Candidates:
         return kept(r2, gap, least_gap=self._least_gap, min_r2=self.config.min_r2)
 
     @property
-    def best(self) -> Cells:
+    def best(self) -> ScaledCells:
         return self._cells[self._kept]
 
     @property
@@ -148,8 +148,8 @@ def variance(labelled: LabelledStates) -> float:
 
 
 def _tune(
-    candidates: _Candidates, teacher: Policy, labelled: LabelledStates, cells: Cells, rng: np.random.Generator
-) -> Iterator[Cells]:
+    candidates: _Candidates, teacher: Policy, labelled: LabelledStates, cells: ScaledCells, rng: np.random.Generator
+) -> Iterator[ScaledCells]:
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
     `SNAPSHOTS` times.
 
@@ -186,7 +186,7 @@ def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: floa
     return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND
 
 
-def _units(labelled: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
+def _units(labelled: LabelledStates, cells: ScaledCells) -> tuple[np.ndarray, np.ndarray]:
     """Return bases of the coefficients and units of the codewords for `moves`, from the curvature of the error."""
     here, vector, units = squared_error(labelled, cells), cells.vector, np.empty(cells.codewords.size)
     for j in range(len(units)):
@@ -198,7 +198,7 @@ def _units(labelled: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarr
     return uncorrelated(labelled, shares.astype(np.float64)), units
 
 
-def needed_only(cells: Cells, labelled: LabelledStates) -> Cells:
+def needed_only(cells: ScaledCells, labelled: LabelledStates) -> ScaledCells:
     """Remove cells that the error does not need: the next codeword serves their states as well, as where two neighbours
     hold the same map."""
     while (k := len(cells.codewords)) > 1:
@@ -209,11 +209,11 @@ def needed_only(cells: Cells, labelled: LabelledStates) -> Cells:
     return cells
 
 
-def _without(cells: Cells, i: int) -> Cells:
-    return Cells(np.delete(cells.codewords, i, axis=0), np.delete(cells.coefficients, i, axis=0))
+def _without(cells: ScaledCells, i: int) -> ScaledCells:
+    return ScaledCells(np.delete(cells.codewords, i, axis=0), np.delete(cells.coefficients, i, axis=0))
 
 
-def among_states(cells: Cells, labelled: LabelledStates) -> Cells:
+def among_states(cells: ScaledCells, labelled: LabelledStates) -> ScaledCells:
     """Draw the same border between two cells by codewords among the states. Of the many pairs that draw it, choose the
     one around the mean state. With more codewords there is no such choice."""
     if len(cells.codewords) != 2:
@@ -222,11 +222,11 @@ def among_states(cells: Cells, labelled: LabelledStates) -> Cells:
     across = (second - first) / np.linalg.norm(second - first)
     beyond = (states - (first + second) / 2) @ across  # signed distances from the border
     on_border = states.mean(axis=0) - beyond.mean() * across
-    return Cells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.coefficients)
+    return ScaledCells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.coefficients)
 
 
-def by_visits(cells: Cells, labelled: LabelledStates) -> Cells:
+def by_visits(cells: ScaledCells, labelled: LabelledStates) -> ScaledCells:
     """Return the same cells, the one with the most states of `labelled` first."""
     visits = np.bincount(cells.nearest(labelled.inputs[:, :-1]), minlength=len(cells.codewords))
     order = np.argsort(-visits, kind="stable")
-    return Cells(cells.codewords[order], cells.coefficients[order])
+    return ScaledCells(cells.codewords[order], cells.coefficients[order])

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from vsp.run.progress import steps
 
 from .anneal import expected_loss, squared_error, temperature_unit
-from .units import Cells, LabelledStates
+from .units import LabelledStates, ScaledCells
 
 N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
@@ -28,7 +28,7 @@ AT_ONCE = 60_000  # size of the largest arrays in a loss: they fit into the cach
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> Cells:
+def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> ScaledCells:
     """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find."""
     some = labelled.rows(spread(labelled.inputs[:, :-1], FEW, rng))
     live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
@@ -39,12 +39,12 @@ def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.r
     return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
 
 
-def distinct(cells: Cells) -> Cells:
+def distinct(cells: ScaledCells) -> ScaledCells:
     """Drop codewords that are equal to an earlier one: of equally near codewords the first counts, so no state is in
     their cells."""
     _, first = np.unique(cells.codewords, axis=0, return_index=True)
     first.sort()
-    return Cells(cells.codewords[first], cells.coefficients[first])
+    return ScaledCells(cells.codewords[first], cells.coefficients[first])
 
 
 def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -57,12 +57,12 @@ def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
     return order[((np.arange(n) + rng.random(n)) * len(points) / n).astype(np.intp)]
 
 
-def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """Place k codewords at states drawn from `labelled`, each with the least-squares map of the states in its cell."""
     d, inputs = labelled.inputs.shape[1] - 1, labelled.inputs
     common = np.linalg.lstsq(inputs, labelled.actions, rcond=None)[0]
     codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
-    cells = Cells(codewords, np.tile(common, (k, 1, 1)))
+    cells = ScaledCells(codewords, np.tile(common, (k, 1, 1)))
     nearest = cells.nearest(inputs[:, :d])
     for i in range(k):  # a weak pull to the map of all states, for cells with few states
         rows = np.vstack([inputs[nearest == i], np.eye(d + 1)])
@@ -71,7 +71,9 @@ def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Ce
     return cells
 
 
-def descend(labelled: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
+def descend(
+    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS
+) -> ScaledCells:
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
     unit = temperature_unit(labelled, len(cells.codewords))
@@ -80,7 +82,9 @@ def descend(labelled: LabelledStates, cells: Cells, stages: range, *, n_iteratio
     return cells
 
 
-def _descend_at(stage: int, labelled: LabelledStates, cells: Cells, unit: float, n_iterations: int) -> Cells:
+def _descend_at(
+    stage: int, labelled: LabelledStates, cells: ScaledCells, unit: float, n_iterations: int
+) -> ScaledCells:
     temperature = unit * TEMPERATURES[stage]
     bases = uncorrelated(labelled, cells.shares(labelled.inputs[:, :-1], temperature))
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
@@ -93,7 +97,7 @@ def _descend_at(stage: int, labelled: LabelledStates, cells: Cells, unit: float,
     return move(minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options).x)
 
 
-def whole_loss(cells: Cells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
+def whole_loss(cells: ScaledCells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
     """Compute `expected_loss` of all states, some at a time."""
     n, value, gradient = len(labelled.inputs), 0.0, np.zeros(cells.vector.size)
     step = max(1, AT_ONCE // (len(cells.coefficients) * labelled.actions.shape[1]))
@@ -115,14 +119,14 @@ def uncorrelated(labelled: LabelledStates, shares: np.ndarray) -> np.ndarray:
     return np.linalg.cholesky(np.linalg.inv(products + RIDGE * np.eye(p)))
 
 
-def moves(cells: Cells, bases: np.ndarray, codeword_units: np.ndarray | float):
+def moves(cells: ScaledCells, bases: np.ndarray, codeword_units: np.ndarray | float):
     """Return two functions: one from a step in these units to the moved cells, and one from a gradient with respect to
-    `Cells.vector` to the gradient with respect to the step."""
+    `ScaledCells.vector` to the gradient with respect to the step."""
     cut, shape = cells.codewords.size, cells.coefficients.shape
 
-    def move(step: np.ndarray) -> Cells:
+    def move(step: np.ndarray) -> ScaledCells:
         codewords = cells.codewords + (codeword_units * step[:cut]).reshape(cells.codewords.shape)
-        return Cells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
+        return ScaledCells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
 
     def pull_back(gradient: np.ndarray) -> np.ndarray:
         by_coefficients = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)

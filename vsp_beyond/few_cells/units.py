@@ -60,7 +60,7 @@ class Scaling:
         weights, biases = coefficients[..., :-1, :], coefficients[..., -1:, :]
         return np.concatenate([weights / self._half, self.outputs(biases)], axis=-2)
 
-    def policy(self, cells: Cells) -> VoronoiPolicy:
+    def policy(self, cells: ScaledCells) -> VoronoiPolicy:
         """Return `cells` as a policy in the units of the task."""
         weights = cells.coefficients[:, :-1] * self._half / self.scale[:, None]
         biases = cells.coefficients[:, -1] * self._half + self._middle - self.centre @ weights
@@ -68,12 +68,12 @@ class Scaling:
         codewords = cells.codewords * self.scale + self.centre
         return VoronoiPolicy(codewords, coefficients, task=self.task, metric=METRIC, scale=self.scale)
 
-    def cells(self, policy: VoronoiPolicy) -> Cells:
+    def cells(self, policy: VoronoiPolicy) -> ScaledCells:
         """Return the codewords and coefficients of `policy` in these units."""
         weights, biases = policy.coefficients[:, :-1], policy.coefficients[:, -1]
         biases = biases + self.centre @ weights
         coefficients = self.coefficients(np.concatenate([weights * self.scale[:, None], biases[:, None]], axis=1))
-        return Cells((policy.codewords - self.centre) / self.scale, coefficients)
+        return ScaledCells((policy.codewords - self.centre) / self.scale, coefficients)
 
     def labelled(self, teacher: Policy, states: np.ndarray, *, criticality: bool = False) -> LabelledStates:
         """Return `states` (n, d) with the teacher's actions and, if asked for, their criticality."""
@@ -94,7 +94,7 @@ def parted(vector: np.ndarray, like: list[np.ndarray]) -> list[np.ndarray]:
 
 
 @dataclass(frozen=True)
-class Cells:
+class ScaledCells:
     """Codewords and coefficients in scaled units."""
 
     codewords: np.ndarray  # (k, d)
@@ -110,9 +110,9 @@ class Cells:
         """Codewords, then coefficients."""
         return [self.codewords, self.coefficients]
 
-    def like(self, vector: np.ndarray) -> Cells:
+    def like(self, vector: np.ndarray) -> ScaledCells:
         """Return cells of the same shape with the numbers of `vector`."""
-        return Cells(*parted(vector, self.parts))
+        return ScaledCells(*parted(vector, self.parts))
 
     def closeness(self, states: np.ndarray) -> np.ndarray:
         """Return how near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
