@@ -24,9 +24,8 @@ SMALL = Tuned(
 )  # fmt: skip
 PLAIN = dataclasses.replace(SMALL, n_restarts=1, failure_penalty=0.0)
 UNSCALED = Scaling(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
-SLOW = ScaledCells(
-    np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]])
-)  # walks to the goal, not at full speed
+# Walks to the goal, not at full speed
+SLOW = ScaledCells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))
 
 
 def some(k=3, d=2, m=2, n=40, criticality=None):
