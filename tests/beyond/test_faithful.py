@@ -7,10 +7,9 @@ from support import SIMPLEGOAL, CurvedTeacher
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.anneal import squared_error
 from vsp_beyond.few_cells.config import Faithful
-from vsp_beyond.few_cells.faithful import among_states, by_visits, distill_faithfully, kept, needed_only
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells
+from vsp_beyond.few_cells.faithful import distill_faithfully, kept
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, needed_only, squared_error
 
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
@@ -130,18 +129,17 @@ def test_two_codewords_come_among_the_states_and_draw_the_same_border():
     rng = np.random.default_rng(0)
     states = rng.normal(size=(500, 3))
     cells = ScaledCells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
-    labelled = LabelledStates(np.column_stack([states, np.ones(500)]), np.zeros((500, 1)))
-    moved = among_states(cells, labelled)
+    moved = cells.among(states)
     assert (moved.nearest(states) == cells.nearest(states)).all() and len(set(cells.nearest(states).tolist())) == 2
     shift, across = moved.codewords.mean(axis=0) - cells.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]
     assert np.abs(moved.codewords).max() < 4 and shift @ across == pytest.approx(0)
     three = ScaledCells(rng.normal(size=(3, 3)), np.zeros((3, 4, 1)))
-    assert among_states(three, labelled) is three
+    assert three.among(states) is three
 
 
 def test_the_most_visited_cell_comes_first():
     cells, labelled = on_a_line([0, 5, 9], [0.1, 0.2, 0.3], [0.0, 9.0, 9.1, 9.2, 5.0, 5.1])
-    assert by_visits(cells, labelled).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
+    assert cells.by_visits(labelled.states).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
 
 
 def test_a_teacher_that_never_varies_is_imitated():

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from vsp_beyond.few_cells import search
-from vsp_beyond.few_cells.anneal import expected_loss, squared_error
-from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, spread, uncorrelated
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells
+from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, uncorrelated
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, expected_loss, spread, squared_error
 
 
 def planted(seed=0, n=1500):

@@ -12,11 +12,11 @@ from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
-from vsp_beyond.few_cells.anneal import anneal, expected_loss, random_init, squared_error
+from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, Objective, score, tune
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss, squared_error
 
 SMALL = Tuned(
     n_cells=3, n_episodes=60, n_restarts=2, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,

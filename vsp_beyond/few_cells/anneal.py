@@ -9,7 +9,7 @@ import numpy as np
 from vsp.subpolicies.stacked import BETA1, adam
 
 from .config import Tuned
-from .units import LabelledStates, ScaledCells
+from .units import LabelledStates, ScaledCells, expected_loss, temperature_unit
 
 WARM = 10  # initial temperature for cells that are already good, in units of the final temperature
 
@@ -20,20 +20,9 @@ def warm(config: Tuned) -> Tuned:
     return replace(config, initial_temperature=heat, n_steps=max(1, config.n_steps // 2))
 
 
-def squared_errors(labelled: LabelledStates, cells: ScaledCells) -> np.ndarray:
-    """Mean squared error of the limited action of every cell in every state. (k, n)"""
-    return np.square(np.clip(cells.outputs(labelled.inputs), -1.0, 1.0) - labelled.actions.T).mean(axis=1)
-
-
-def squared_error(labelled: LabelledStates, cells: ScaledCells) -> float:
-    """Mean squared error of the limited action of each state's cell, over all states."""
-    nearest = cells.nearest(labelled.inputs[:, :-1])
-    return float(squared_errors(labelled, cells)[nearest, np.arange(len(nearest))].mean())
-
-
 def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """k codewords near states drawn from `labelled`; every cell gets the least-squares coefficients of all states."""
-    states, common = labelled.inputs[:, :-1], np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
+    states, common = labelled.states, np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
     codewords = states[rng.integers(len(states), size=k)] + 0.01 * rng.normal(size=(k, states.shape[1]))
     return ScaledCells(codewords, np.tile(common, (k, 1, 1)))
 
@@ -50,7 +39,7 @@ def anneal(labelled: LabelledStates, cells: ScaledCells, config: Tuned, rng: np.
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
     lower the temperature, the faster they fall. The last tenth of the steps stays at the final temperature.
     """
-    unit = temperature_unit(labelled, len(cells.codewords))
+    unit = temperature_unit(labelled, len(cells))
     first, n_steps = config.initial_temperature, config.n_steps
     theta, adam, draw = cells.vector, Adam(), labelled.draw(config.batch_size, rng)
     for i in range(n_steps):
@@ -61,39 +50,6 @@ def anneal(labelled: LabelledStates, cells: ScaledCells, config: Tuned, rng: np.
         _, gradient = expected_loss(*batch, temperature=temperature, clip_slope=config.clip_slope)
         theta = theta - config.learning_rate * (1 - done) * adam.step(gradient)
     return cells.like(theta)
-
-
-def temperature_unit(labelled: LabelledStates, k: int) -> float:
-    """Return the variance of the states inside one of k cells. At much higher temperatures, codewords collapse onto
-    each other and stay there.
-
-    A single state has no variance; its unit is 1.
-    """
-    states = labelled.inputs[:, :-1]
-    return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
-
-
-def expected_loss(
-    cells: ScaledCells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
-) -> tuple[float, np.ndarray]:
-    """Mean squared error of the limited actions, weighted by each cell's share of a state, and its gradient.
-
-    `inputs` (n, d + 1) and `actions` (n, m); the gradient is with respect to `cells.vector`.
-    """
-    n, (k, rows, m), states = len(inputs), cells.coefficients.shape, inputs[:, :-1]
-    raw = cells.outputs(inputs)
-    limited = np.clip(raw, -1.0, 1.0)
-    error = limited + clip_slope * (raw - limited) - actions.T
-    losses = np.square(error).mean(axis=1)
-
-    shares = cells.shares(states, temperature)
-    loss = (shares * losses).sum(axis=0)
-
-    by_raw = (2 / (n * m)) * shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
-    by_coefficients = (by_raw.reshape(k * m, n) @ inputs).reshape(k, m, rows).transpose(0, 2, 1)
-    by_closeness = shares * (losses - loss) * (2 / (n * temperature))
-    by_codewords = by_closeness @ states - by_closeness.sum(axis=1)[:, None] * cells.codewords
-    return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_coefficients.ravel()])
 
 
 class Adam:

@@ -11,10 +11,9 @@ from vsp.rollouts import Outcomes, rollout
 from vsp.run.progress import steps
 from vsp.tasks.base import GOAL
 
-from .anneal import squared_error
 from .config import Tuned
 from .population import rollout_population
-from .units import LabelledStates, ScaledCells, Scaling
+from .units import LabelledStates, ScaledCells, Scaling, squared_error
 
 SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
 
@@ -98,3 +97,8 @@ def score(result: Outcomes, failure_penalty: float) -> float:
     In a task without a goal the penalty is the same for all policies, so it changes no comparison.
     """
     return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))
+
+
+def scores(result: Outcomes, failure_penalty: float) -> np.ndarray:
+    """Return the return of each episode, minus `failure_penalty` if it failed. (n,)"""
+    return result.returns - failure_penalty * (result.outcomes != GOAL)
