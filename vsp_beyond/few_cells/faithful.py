@@ -16,15 +16,15 @@ from threadpoolctl import threadpool_limits
 
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Outcomes, Policy, rollout, visited_states
+from vsp.rollouts import Policy, rollout, visited_states
 from vsp.run.progress import steps
-from vsp.tasks.base import Task
+from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
 from .config import Faithful, check_kind
 from .population import rollout_population
 from .search import even_moves, least_error
-from .tune import cma_es, is_snapshot, score, scores
+from .tune import cma_es, is_snapshot, score
 from .units import LabelledStates, ScaledCells, Scaling, needed_only, spread, squared_error, unexplained, warn_outside
 
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
@@ -56,18 +56,21 @@ def distill_faithfully(
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     compared = task.start(validation, config.n_validation)  # starts from which candidates are compared
     of_teacher = rollout(teacher, task, compared)
+    expected = score(of_teacher, config.failure_penalty)
+    tolerance = config.tolerance or max(SHARE * abs(float(of_teacher.returns.mean())), 1e-9)
     warn_outside(task, states)
     scaling = Scaling.of(task, states)
     states = states[spread(states / scaling.scale, config.n_states, init)]
     labelled = scaling.labelled(states, teacher.predict(states)[0])
 
-    candidates = _Candidates(config, scaling, labelled, compared, of_teacher)
+    candidates = _Candidates(config, scaling, labelled, compared, expected, tolerance)
     closest = least_error(labelled, config.n_cells, config.n_restarts, init)
     candidates.add("fit", closest)
     if config.min_r2 is not None or candidates.shortfall:  # else tuning gains nothing
         some = labelled.thinned(TUNING_STATES, init)
         pool = task.start(search, POOL * config.n_tuning_episodes)
-        goals = scores(rollout(teacher, task, pool), config.failure_penalty)
+        result = rollout(teacher, task, pool)
+        goals = result.returns - config.failure_penalty * (result.outcomes != GOAL)
         for tuned in _tune(candidates, some, closest, pool, goals, search):
             candidates.add("tune", tuned)
     if candidates.shortfall:
@@ -88,7 +91,8 @@ class _Candidates:
     scaling: Scaling
     labelled: LabelledStates
     starts: np.ndarray  # (n, s)
-    teacher: Outcomes  # of its episodes from these starts
+    expected: float  # the teacher's mean return less penalties, from these starts
+    tolerance: float
     rows: list[dict] = field(default_factory=list)
     cells: list[ScaledCells] = field(default_factory=list)
 
@@ -98,13 +102,8 @@ class _Candidates:
         self.cells.append(cells)
 
     def _gap(self, cells: ScaledCells) -> float:
-        penalty = self.config.failure_penalty
         result = rollout(self.scaling.policy(cells), self.scaling.task, self.starts)
-        return score(result, penalty) - score(self.teacher, penalty)
-
-    @property
-    def tolerance(self) -> float:
-        return self.config.tolerance or max(SHARE * abs(float(self.teacher.returns.mean())), 1e-9)
+        return score(result, self.config.failure_penalty) - self.expected
 
     @property
     def least_gap(self) -> float:

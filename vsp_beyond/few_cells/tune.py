@@ -97,8 +97,3 @@ def score(result: Outcomes, failure_penalty: float) -> float:
     In a task without a goal the penalty is the same for all policies, so it changes no comparison.
     """
     return float(result.returns.mean() - failure_penalty * np.mean(result.outcomes != GOAL))
-
-
-def scores(result: Outcomes, failure_penalty: float) -> np.ndarray:
-    """Return the return of each episode, minus `failure_penalty` if it failed. (n,)"""
-    return result.returns - failure_penalty * (result.outcomes != GOAL)

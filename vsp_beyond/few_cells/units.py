@@ -222,15 +222,11 @@ def warn_outside(task: Task, states: np.ndarray) -> None:
         )
 
 
-def squared_errors(labelled: LabelledStates, cells: ScaledCells) -> np.ndarray:
-    """Mean squared error of the limited action of every cell in every state. (k, n)"""
-    return np.square(np.clip(cells.outputs(labelled.inputs), -1.0, 1.0) - labelled.actions.T).mean(axis=1)
-
-
 def squared_error(labelled: LabelledStates, cells: ScaledCells) -> float:
     """Mean squared error of the limited action of each state's cell, over all states."""
-    nearest = cells.nearest(labelled.states)
-    return float(squared_errors(labelled, cells)[nearest, np.arange(len(nearest))].mean())
+    nearest, limited = cells.nearest(labelled.states), np.clip(cells.outputs(labelled.inputs), -1.0, 1.0)
+    errors = np.square(limited - labelled.actions.T).mean(axis=1)  # (k, n)
+    return float(errors[nearest, np.arange(len(nearest))].mean())
 
 
 def unexplained(labelled: LabelledStates, cells: ScaledCells) -> float:
