@@ -93,13 +93,11 @@ class _Candidates:
     starts: np.ndarray  # (n, s)
     expected: float  # the teacher's mean return less penalties, from these starts
     tolerance: float
-    rows: list[dict] = field(default_factory=list)
-    cells: list[ScaledCells] = field(default_factory=list)
+    rows: list[dict] = field(default_factory=list)  # stage, cells, r2, gap
 
     def add(self, stage: str, cells: ScaledCells) -> None:
-        gap = self._gap(cells)
-        self.rows.append({"stage": stage, "r2": 1.0 - unexplained(self.labelled, cells), "gap": gap})
-        self.cells.append(cells)
+        gap, r2 = self._gap(cells), 1.0 - unexplained(self.labelled, cells)
+        self.rows.append({"stage": stage, "cells": cells, "r2": r2, "gap": gap})
 
     def _gap(self, cells: ScaledCells) -> float:
         result = rollout(self.scaling.policy(cells), self.scaling.task, self.starts)
@@ -116,7 +114,7 @@ class _Candidates:
 
     @property
     def best(self) -> ScaledCells:
-        return self.cells[self.kept]
+        return self.rows[self.kept]["cells"]
 
     def returns_enough(self, cells: ScaledCells) -> bool:
         """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
@@ -135,7 +133,8 @@ class _Candidates:
         return None
 
     def history(self) -> pd.DataFrame:
-        return pd.DataFrame(self.rows).assign(kept=np.arange(len(self.rows)) == self.kept)
+        rows = pd.DataFrame(self.rows).drop(columns="cells")
+        return rows.assign(kept=np.arange(len(rows)) == self.kept)
 
 
 def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | None) -> int:

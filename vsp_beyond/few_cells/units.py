@@ -176,14 +176,10 @@ class LabelledStates:
         """The states, without the column of ones. (n, d)"""
         return self.inputs[:, :-1]
 
-    def rows(self, rows: np.ndarray) -> LabelledStates:
-        """Return the states at `rows`."""
-        weights = None if self.criticality is None else self.criticality[rows]
-        return LabelledStates(self.inputs[rows], self.actions[rows], weights)
-
     def thinned(self, n: int, rng: np.random.Generator) -> LabelledStates:
         """Return n of these states, as dense as all of them (`spread`)."""
-        return self.rows(spread(self.states, n, rng))
+        rows = spread(self.states, n, rng)
+        return LabelledStates(*(part if part is None else part[rows] for part in vars(self).values()))
 
     def with_more(self, other: LabelledStates) -> LabelledStates:
         """Return these states, then those of `other`."""
