@@ -15,8 +15,7 @@ from threadpoolctl import threadpool_limits
 from vsp import Policy, Task, VoronoiPolicy
 from vsp.paper.baselines import refit
 from vsp_beyond.few_cells import search
-from vsp_beyond.few_cells.anneal import temperature_unit
-from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling, joined
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, joined, spread, temperature_unit
 
 from ..rivals.trees import ObliqueLinearTree, Split
 from .tuning import TreeNumbers, Tunable, in_units
@@ -49,7 +48,7 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
     thresholds and maps together. If no descent is better, the best greedy tree is returned.
     """
     rng, frame = np.random.default_rng(seed), Scaling.of(task, states)
-    some = search.spread(states / frame.scale, search.FEW, rng)
+    some = spread(states / frame.scale, search.FEW, rng)
 
     def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
         seeds = rng.integers(2**31, size=n).tolist()
@@ -153,10 +152,10 @@ def expected_loss(
 ) -> tuple[float, np.ndarray]:
     """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
 
-    This is `anneal.expected_loss` for trees. The gradient is with respect to `tree.vector`.
+    This is `units.expected_loss` for trees. The gradient is with respect to `tree.vector`.
     """
     (n, m), (k, rows, _), states = labelled.actions.shape, tree.maps.shape, labelled.inputs[:, :-1]
-    raw = Cells(np.zeros((k, 0)), tree.maps).outputs(labelled.inputs)
+    raw = ScaledCells(np.zeros((k, 0)), tree.maps).outputs(labelled.inputs)
     limited = np.clip(raw, -1.0, 1.0)
     error = limited + clip_slope * (raw - limited) - labelled.actions.T
     losses = np.square(error).mean(axis=1)
@@ -191,7 +190,7 @@ def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
     tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # used only to search for splits
 
     def fitted(codewords: np.ndarray) -> VoronoiPolicy:
-        empty = Cells(codewords, np.zeros((len(codewords), d + 1, m)))
+        empty = ScaledCells(codewords, np.zeros((len(codewords), d + 1, m)))
         return refit(frame.policy(empty), states, actions)
 
     codewords = points.mean(axis=0)[None]

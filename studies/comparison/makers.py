@@ -21,7 +21,7 @@ from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling
 
 from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
@@ -154,7 +154,7 @@ def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable
     start, task = imitation(budget, size, seed), budget.task
     states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
     frame = Scaling.of(task, states)
-    numbers: Numbers | Cells
+    numbers: Numbers | ScaledCells
     if isinstance(start, VoronoiPolicy):  # including a single cell
         frame = replace(frame, scale=start.scale)
         numbers = frame.cells(start)

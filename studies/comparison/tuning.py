@@ -12,7 +12,7 @@ from vsp.rollouts import visited_states
 from vsp.subpolicies import linear_outputs
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import Candidates, Objective, tune
-from vsp_beyond.few_cells.units import Cells, Scaling, joined, parted
+from vsp_beyond.few_cells.units import ScaledCells, Scaling, joined, parted
 
 from ..rivals.small_network import SmallNetwork
 from ..rivals.trees import LinearTree, ObliqueLinearTree
@@ -129,7 +129,7 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
     return frame.policy(candidates.best)
 
 
-def in_units(policy: Fitted, frame: Scaling) -> tuple[Scaling, Numbers | Cells]:
+def in_units(policy: Fitted, frame: Scaling) -> tuple[Scaling, Numbers | ScaledCells]:
     """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
 
     The frame has the policy's own scale, or that of `frame` if the policy has none.

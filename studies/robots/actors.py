@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import torch
 
-from vsp_beyond.few_cells.units import Cells, Scaling, parted
+from vsp_beyond.few_cells.units import ScaledCells, Scaling, parted
 
 CLIP_SLOPE = 0.02  # slope beyond the action limits in training: without it, a saturated map stays saturated
 
@@ -13,7 +13,7 @@ CLIP_SLOPE = 0.02  # slope beyond the action limits in training: without it, a s
 class SoftActor(torch.nn.Module):
     """Policies made of linear maps, in the units of a `Scaling`, as the network that TD3 trains.
 
-    `numbers`: `Cells`, or the `TreeNumbers` of an oblique tree. Observations (n, d) to actions (n, m) in [-1, 1].
+    `numbers`: `ScaledCells`, or the `TreeNumbers` of an oblique tree. Observations (n, d) to actions (n, m) in [-1, 1].
     """
 
     def __init__(self, frame: Scaling, numbers, temperature: float):
@@ -22,7 +22,7 @@ class SoftActor(torch.nn.Module):
         self.vector = torch.nn.Parameter(torch.tensor(numbers.vector, dtype=torch.float32))
         for name, value in (("centre", frame.centre), ("scale", frame.scale)):
             self.register_buffer(name, torch.tensor(value, dtype=torch.float32))
-        self._closeness = _to_codewords if isinstance(numbers, Cells) else _to_leaves
+        self._closeness = _to_codewords if isinstance(numbers, ScaledCells) else _to_leaves
 
     @property
     def numbers(self):
@@ -46,8 +46,8 @@ class SoftActor(torch.nn.Module):
         return (shares[:, :, None] * (limited + CLIP_SLOPE * (raw - limited))).sum(dim=1).clamp(-1.0, 1.0)
 
 
-def _to_codewords(states: torch.Tensor, places: list[torch.Tensor], numbers: Cells) -> torch.Tensor:
-    """Return how near each codeword is, as in `Cells.closeness`. (n, k)"""
+def _to_codewords(states: torch.Tensor, places: list[torch.Tensor], numbers: ScaledCells) -> torch.Tensor:
+    """Return how near each codeword is, as in `ScaledCells.closeness`. (n, k)"""
     (codewords,) = places
     return 2 * states @ codewords.T - codewords.square().sum(dim=1)
 

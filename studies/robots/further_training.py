@@ -24,8 +24,8 @@ def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *,
     """Return the most rewarding of the first policy and `N_CHOICES` policies during training. Same arguments, same
     policy.
 
-    `numbers`: `Cells`, or other numbers that a `SoftActor` takes. Raises ValueError for a bad seed and for a teacher
-    without critics.
+    `numbers`: `ScaledCells`, or other numbers that a `SoftActor` takes. Raises ValueError for a bad seed and for a
+    teacher without critics.
     """
     import torch
 

@@ -11,8 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp.rollouts import rollout, visited_states
-from vsp_beyond.few_cells.faithful import by_visits
-from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, spread
+from vsp_beyond.few_cells.search import N_STAGES, descend, least_error
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
 from .settings import Walking
@@ -49,12 +48,13 @@ def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: 
     own = visited_states(teacher, task, task.start(starts, config.n_episodes))
     pushed = visited_states(Pushed(teacher, task, config.push, pushes), task, task.start(starts, 2 * config.n_episodes))
     frame = Scaling.of(task, own)
-    seen, tried = frame.labelled(teacher, np.concatenate([own, pushed])), []
+    both = np.concatenate([own, pushed])
+    seen, tried = frame.labelled(both, teacher.predict(both)[0]), []
     for i in range(1 + config.n_corrections):
         if i:
             visited = visited_states(tried[-1], task, task.start(starts, config.n_correction_episodes))
-            seen = seen.with_more(frame.labelled(teacher, visited))
-        some = seen.rows(spread(seen.inputs[:, :-1], config.n_states, fits))
+            seen = seen.with_more(frame.labelled(visited, teacher.predict(visited)[0]))
+        some = seen.thinned(config.n_states, fits)
         tried.append(fit(frame, some, tried[-1] if tried else None, fits))
     return most_rewarding(tried, task, config.n_validation, validation)
 
@@ -67,7 +67,7 @@ def cells_fit(
         cells = descend(seen, frame.cells(before), COOL)
     else:
         cells = least_error(seen, config.n_cells, config.n_restarts, rng)
-    return frame.policy(by_visits(cells, seen))
+    return frame.policy(cells.by_visits(seen.states))
 
 
 def most_rewarding(policies: list[Policy], task: Task, n_episodes: int, rng: np.random.Generator) -> Policy:

@@ -22,7 +22,7 @@ class Walking:
     n_corrections: int = 12
     # Episodes of the policy per round.
     n_correction_episodes: int = 10
-    # States that a fit uses, as dense as all of them (`search.spread`).
+    # States that a fit uses, as dense as all of them (`units.spread`).
     n_states: int = 30_000
     # Descents from different random initial cells in the first round; the closest imitation is kept.
     n_restarts: int = 8

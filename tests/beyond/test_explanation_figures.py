@@ -9,7 +9,7 @@ from drawn import labels, named
 from vsp.policy import VoronoiPolicy
 from vsp.show import state_space, style
 from vsp.show.style import letter, panels
-from vsp_beyond.show import explanation
+from vsp_beyond.explain import figures
 
 mpl.use("Agg")
 
@@ -26,7 +26,7 @@ def two_cells(codewords=((0.25, 0.5), (0.75, 0.5)), scale=None):
 
 def test_the_whereabouts_of_a_state_by_hand(ax):
     policy, state = two_cells(), np.array([0.375, 0.5])
-    explanation.whereabouts(state_space.square(ax), policy, state)
+    figures.whereabouts(state_space.square(ax), policy, state)
     about = named(ax)
     assert list(about) == [
         "goal", "pit", "state: x = 0.375, y = 0.5", "its codeword, of cell 0", "x + 0.13 leads to cell 1",
@@ -42,14 +42,14 @@ def test_the_whereabouts_of_a_state_by_hand(ax):
 
 def test_the_own_cell_and_the_one_behind_the_border_are_tinted(ax):
     policy = VoronoiPolicy([[0.2, 0.5], [0.5, 0.5], [0.8, 0.5]], np.zeros((3, 3, 2)), task="SimpleGoal-v0")
-    explanation.whereabouts(ax, policy, np.array([0.1, 0.5]))
+    figures.whereabouts(ax, policy, np.array([0.1, 0.5]))
     shades = ax.images[0].get_array()[200]
     left, middle, right = (tuple(shades[i][:3]) for i in (20, 200, 380))
     assert right == (1, 1, 1) and middle[0] == middle[1] == middle[2] < 1 and left == mpl.colors.to_rgb(style.OURS)
 
 
 def test_the_view_holds_a_codeword_outside_the_box(ax):
-    explanation.whereabouts(ax, two_cells([[0.25, -0.5], [0.75, 0.5]]), np.array([0.1, 0.1]))
+    figures.whereabouts(ax, two_cells([[0.25, -0.5], [0.75, 0.5]]), np.array([0.1, 0.1]))
     assert ax.get_ylim()[0] < -0.5 and ax.get_ylim()[1] > 1 and ax.get_xlim()[0] < 0
     frame = named(ax)["box of the states"]
     assert (frame.get_xy(), frame.get_width(), frame.get_height()) == ((0, 0), 1, 1)
@@ -63,25 +63,25 @@ def test_the_nearest_border_is_that_of_the_look_up(ax):
     why = policy.explain(np.array([0.5, 0.25]))
     right, up = why.borders["change"]
     assert right < up
-    assert explanation._way_out(why, np.ones(2)) == (0, right, 1)
-    assert explanation._way_out(why, np.array([0.05, 1.0]))[0] == 1
+    assert figures._way_out(why, np.ones(2)) == (0, right, 1)
+    assert figures._way_out(why, np.array([0.05, 1.0]))[0] == 1
 
 
 def test_where_there_is_one_cell_there_is_no_way_out(ax):
     policy = VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task="SimpleGoal-v0")
-    explanation.whereabouts(ax, policy, np.array([0.3, 0.4]))
+    figures.whereabouts(ax, policy, np.array([0.3, 0.4]))
     assert not ax.texts and not any("leads to" in name for name in named(ax))
 
 
 def test_three_inputs_have_no_map(ax):
     policy = VoronoiPolicy([[0.5, 0.5, 0.0]], np.zeros((1, 4, 1)), task="Pendulum-v1")
     with pytest.raises(ValueError, match="Pendulum-v1 has inputs .* expected two"):
-        explanation.whereabouts(ax, policy, np.array([0.6, 0.8, 0.0]))
+        figures.whereabouts(ax, policy, np.array([0.6, 0.8, 0.0]))
 
 
 def test_contributions_add_up_to_the_sum_and_are_limited(ax):
     policy, state = two_cells(), np.array([0.25, 0.5])
-    explanation.contributions(ax, policy, state)
+    figures.contributions(ax, policy, state)
     bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in ax.patches]
     assert bars[:5] == [(0, -1), (-1, -2), (-2, -1.5), (0, -1.5), (0, -1)]
     assert bars[5:] == [(0, 0.25), (0.25, 0.5), (0.5, 0.25), (0, 0.25), (0, 0.25)]
@@ -99,15 +99,15 @@ def test_contributions_add_up_to_the_sum_and_are_limited(ax):
 
 def test_contributions_have_any_number_of_inputs(ax):
     policy = VoronoiPolicy([[0.0, 0.0, 0.0]], np.array([[[1.0], [2.0], [0.5], [3.0]]]), task="Pendulum-v1")
-    explanation.contributions(ax, policy, np.array([1.0, 0.0, 2.0]))
+    figures.contributions(ax, policy, np.array([1.0, 0.0, 2.0]))
     assert [bar.get_width() for bar in ax.patches] == [1, 0, 1, 3, 5, 2] and labels(ax)[0] == "τ"
 
 
 def test_nothing_of_an_explanation_overlaps():
     """Labels, values and the legend: no two texts in one place."""
     fig, axes = panels(2, height=2.5)
-    explanation.whereabouts(state_space.square(axes[0]), two_cells(), np.array([0.375, 0.5]))
-    explanation.contributions(axes[1], two_cells(), np.array([0.375, 0.5]))
+    figures.whereabouts(state_space.square(axes[0]), two_cells(), np.array([0.375, 0.5]))
+    figures.contributions(axes[1], two_cells(), np.array([0.375, 0.5]))
     letter(axes, ["where the state is", "what its cell adds up"])
     style.legend_below(fig, axes[0])
     fig.canvas.draw()

@@ -7,10 +7,9 @@ from support import SIMPLEGOAL, CurvedTeacher
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.anneal import squared_error
 from vsp_beyond.few_cells.config import Faithful
-from vsp_beyond.few_cells.faithful import among_states, by_visits, distill_faithfully, kept, needed_only
-from vsp_beyond.few_cells.units import Cells, LabelledStates
+from vsp_beyond.few_cells.faithful import distill_faithfully, kept
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, needed_only, squared_error
 
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
@@ -99,7 +98,7 @@ def test_nothing_is_tuned_where_the_closest_cells_return_enough():
 
 def test_a_cell_that_the_return_needs_stays(monkeypatch, distilled):
     """Though the error does not."""
-    still = Cells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))
+    still = ScaledCells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))
     monkeypatch.setattr("vsp_beyond.few_cells.faithful.needed_only", lambda cells, labelled: still)
     assert len(distilled_by(n_generations=1)[0]) > 1 == len(distilled_by(tolerance=1000.0)[0])
 
@@ -107,7 +106,7 @@ def test_a_cell_that_the_return_needs_stays(monkeypatch, distilled):
 def on_a_line(codewords, values, states):
     """Cells of constant values, and the states with the values of their cells."""
     coefficients = np.stack([np.zeros(len(values)), values], axis=1)[..., None]
-    cells, states = Cells(np.array(codewords, dtype=float)[:, None], coefficients), np.asarray(states)[:, None]
+    cells, states = ScaledCells(np.array(codewords, dtype=float)[:, None], coefficients), np.asarray(states)[:, None]
     inputs = np.column_stack([states, np.ones(len(states))])
     return cells, LabelledStates(inputs, coefficients[cells.nearest(states), 1])
 
@@ -129,19 +128,18 @@ def test_of_neighbours_with_one_map_one_is_left(codewords, values, needed):
 def test_two_codewords_come_among_the_states_and_draw_the_same_border():
     rng = np.random.default_rng(0)
     states = rng.normal(size=(500, 3))
-    cells = Cells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
-    labelled = LabelledStates(np.column_stack([states, np.ones(500)]), np.zeros((500, 1)))
-    moved = among_states(cells, labelled)
+    cells = ScaledCells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
+    moved = cells.among(states)
     assert (moved.nearest(states) == cells.nearest(states)).all() and len(set(cells.nearest(states).tolist())) == 2
     shift, across = moved.codewords.mean(axis=0) - cells.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]
     assert np.abs(moved.codewords).max() < 4 and shift @ across == pytest.approx(0)
-    three = Cells(rng.normal(size=(3, 3)), np.zeros((3, 4, 1)))
-    assert among_states(three, labelled) is three
+    three = ScaledCells(rng.normal(size=(3, 3)), np.zeros((3, 4, 1)))
+    assert three.among(states) is three
 
 
 def test_the_most_visited_cell_comes_first():
     cells, labelled = on_a_line([0, 5, 9], [0.1, 0.2, 0.3], [0.0, 9.0, 9.1, 9.2, 5.0, 5.1])
-    assert by_visits(cells, labelled).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
+    assert cells.by_visits(labelled.states).codewords.ravel().tolist() == [9.0, 5.0, 0.0]
 
 
 def test_a_teacher_that_never_varies_is_imitated():

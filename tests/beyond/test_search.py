@@ -2,15 +2,14 @@ import numpy as np
 import pytest
 
 from vsp_beyond.few_cells import search
-from vsp_beyond.few_cells.anneal import expected_loss, squared_error
-from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, spread, uncorrelated
-from vsp_beyond.few_cells.units import Cells, LabelledStates
+from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, uncorrelated
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, expected_loss, spread, squared_error
 
 
 def planted(seed=0, n=1500):
     """Three cells, and states labelled by them."""
     rng = np.random.default_rng(0)
-    cells = Cells(np.array([[-1.0, 0.0], [1.0, 0.5], [0.5, -1.0]]), rng.uniform(-0.8, 0.8, size=(3, 3, 1)))
+    cells = ScaledCells(np.array([[-1.0, 0.0], [1.0, 0.5], [0.5, -1.0]]), rng.uniform(-0.8, 0.8, size=(3, 3, 1)))
     states = np.random.default_rng(seed).uniform(-1.5, 1.5, size=(n, 2))
     inputs, nearest = np.column_stack([states, np.ones(n)]), cells.nearest(states)
     outputs = cells.outputs(inputs)[nearest, :, np.arange(n)]

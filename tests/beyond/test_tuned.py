@@ -12,11 +12,11 @@ from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
-from vsp_beyond.few_cells.anneal import anneal, expected_loss, random_init, squared_error
+from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, Objective, score, tune
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import Cells, LabelledStates, Scaling
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss, squared_error
 
 SMALL = Tuned(
     n_cells=3, n_episodes=60, n_restarts=2, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
@@ -24,14 +24,15 @@ SMALL = Tuned(
 )  # fmt: skip
 PLAIN = dataclasses.replace(SMALL, n_restarts=1, failure_penalty=0.0)
 UNSCALED = Scaling(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
-SLOW = Cells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))  # walks to the goal, not at full speed
+# Walks to the goal, not at full speed
+SLOW = ScaledCells(np.zeros((1, 2)), np.array([[[-0.3, 0], [0, -0.3], [-0.1, -0.1]]]))
 
 
 def some(k=3, d=2, m=2, n=40, criticality=None):
     """Cells, and states with labels of no meaning."""
     rng = np.random.default_rng(0)
     inputs = np.column_stack([rng.normal(size=(n, d)), np.ones(n)])
-    cells = Cells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, m)))
+    cells = ScaledCells(rng.normal(size=(k, d)), rng.normal(size=(k, d + 1, m)))
     return cells, LabelledStates(inputs, rng.uniform(-1, 1, size=(n, m)), criticality)
 
 
@@ -131,8 +132,8 @@ def test_failures_and_differing_from_the_teacher_cost_their_penalties():
 
 def test_the_first_of_the_best_candidates_is_kept():
     candidates = Candidates(UNSCALED, np.array([[0.9, 0.05], [0.05, 0.9]]), Objective(1000.0))
-    still, home = (Cells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
-    for restart, cells in enumerate((still, home, Cells(home.codewords + 1, home.coefficients))):
+    still, home = (ScaledCells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
+    for restart, cells in enumerate((still, home, ScaledCells(home.codewords + 1, home.coefficients))):
         candidates.add("fit", restart, cells)
     rows = candidates.rows
     assert candidates.best is home and candidates.best_restart == 1
@@ -254,7 +255,7 @@ def test_it_works_from_a_policy_that_is_there():
 
 def test_the_start_is_a_candidate_and_never_lost(monkeypatch):
     """Every fit gives a policy that does nothing."""
-    still = Cells(np.arange(6.0).reshape(3, 2), np.zeros((3, 3, 2)))
+    still = ScaledCells(np.arange(6.0).reshape(3, 2), np.zeros((3, 3, 2)))
     monkeypatch.setattr("vsp_beyond.few_cells.tuned.anneal", lambda *_: still)
     coefficients = np.random.default_rng(0).normal(-1, 0.1, size=(3, 3, 2)) * [[0.0], [0.0], [1.0]]
     codewords, states = np.random.default_rng(1).random((3, 2)), np.random.default_rng(2).random((1000, 2))

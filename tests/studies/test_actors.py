@@ -25,7 +25,7 @@ FEW = Walking(n_cells=3, n_validation=5, n_steps=160, n_filling=60, gamma=0.98)
 def pieces(kind):
     """A frame, the numbers of three linear maps, and the policy they make."""
     if kind == "cells":
-        cells = local_init(FRAME.labelled(TEACHER, STATES), 3, np.random.default_rng(1))
+        cells = local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 3, np.random.default_rng(1))
         return FRAME, cells, FRAME.policy(cells)
     tree = ObliqueLinearTree(STATES, TEACHER.predict(STATES)[0].astype(float), leaves=3, task=PENDULUM, seed=0)
     return *in_units(tree, FRAME), tree
@@ -73,7 +73,7 @@ def test_nothing_learns_until_the_replay_buffer_is_filled():
 
 
 def test_a_single_cell_can_be_trained_further():
-    one = FRAME.policy(local_init(FRAME.labelled(TEACHER, STATES), 1, np.random.default_rng(1)))
+    one = FRAME.policy(local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 1, np.random.default_rng(1)))
     waits = replace(FEW, n_filling=FEW.n_steps)
     found = trained_further(Budget(TEACHER, TASK, waits), 1, 0, imitation=lambda budget, size, seed: one)
     assert len(found) == 1 and np.allclose(found.coefficients, one.coefficients, atol=1e-5)

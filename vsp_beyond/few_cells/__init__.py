@@ -1,7 +1,10 @@
 """Our own methods: few cells that act like their teacher, or return much.
 
 `faithful.py` fits a few cells to the teacher's actions and return, `tuned.py` to the return alone, `limit.py` does so
-from the best policy. `simplification.py` reduces cells and numbers. The others hold what these share.
+from the best policy. `simplification.py` reduces cells and numbers.
+
+They share, from the ground up: `units.py`, cells and labelled states as arrays; `anneal.py` and `search.py`, which fit
+the ones to the others; `population.py` and `tune.py`, which play candidates and raise their return.
 """
 
 from .config import Faithful, Tuned, faithful_preset, tuned_preset

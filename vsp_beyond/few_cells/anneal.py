@@ -9,7 +9,7 @@ import numpy as np
 from vsp.subpolicies.stacked import BETA1, adam
 
 from .config import Tuned
-from .units import Cells, LabelledStates
+from .units import LabelledStates, ScaledCells, expected_loss, temperature_unit
 
 WARM = 10  # initial temperature for cells that are already good, in units of the final temperature
 
@@ -20,91 +20,36 @@ def warm(config: Tuned) -> Tuned:
     return replace(config, initial_temperature=heat, n_steps=max(1, config.n_steps // 2))
 
 
-def squared_errors(labelled: LabelledStates, cells: Cells) -> np.ndarray:
-    """Mean squared error of the limited action of every cell in every state. (k, n)"""
-    return np.square(np.clip(cells.outputs(labelled.inputs), -1.0, 1.0) - labelled.actions.T).mean(axis=1)
-
-
-def squared_error(labelled: LabelledStates, cells: Cells) -> float:
-    """Mean squared error of the limited action of each state's cell, over all states."""
-    nearest = cells.nearest(labelled.inputs[:, :-1])
-    return float(squared_errors(labelled, cells)[nearest, np.arange(len(nearest))].mean())
-
-
-def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def linear_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """k codewords near states drawn from `labelled`; every cell gets the least-squares coefficients of all states."""
-    states, common = labelled.inputs[:, :-1], np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
+    states, common = labelled.states, np.linalg.lstsq(labelled.inputs, labelled.actions, rcond=None)[0]
     codewords = states[rng.integers(len(states), size=k)] + 0.01 * rng.normal(size=(k, states.shape[1]))
-    return Cells(codewords, np.tile(common, (k, 1, 1)))
+    return ScaledCells(codewords, np.tile(common, (k, 1, 1)))
 
 
-def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def random_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """`linear_init` with a little noise in every coefficient."""
     cells = linear_init(labelled, k, rng)
-    return Cells(cells.codewords, cells.coefficients + 0.1 * rng.normal(size=cells.coefficients.shape))
+    return ScaledCells(cells.codewords, cells.coefficients + 0.1 * rng.normal(size=cells.coefficients.shape))
 
 
-def anneal(labelled: LabelledStates, cells: Cells, config: Tuned, rng: np.random.Generator) -> Cells:
+def anneal(labelled: LabelledStates, cells: ScaledCells, config: Tuned, rng: np.random.Generator) -> ScaledCells:
     """Optimise all numbers of `cells` by Adam while the temperature falls from the initial to the final of `config`.
 
     Deterministic annealing (Rose 1998): each state belongs to all cells in shares that fall with the distance. The
     lower the temperature, the faster they fall. The last tenth of the steps stays at the final temperature.
     """
-    unit = temperature_unit(labelled, len(cells.codewords))
+    unit = temperature_unit(labelled, len(cells))
     first, n_steps = config.initial_temperature, config.n_steps
-    theta, adam, draw = cells.vector, Adam(), labelled.draw(config.batch_size, rng)
+    theta, draw = cells.vector, labelled.draw(config.batch_size, rng)
+    mean = square = np.zeros_like(theta)
     for i in range(n_steps):
         done = i / n_steps
         temperature = unit * first * (config.final_temperature / first) ** min(1.0, done / 0.9)
         rows = draw()
         batch = cells.like(theta), labelled.inputs[rows], labelled.actions[rows]
         _, gradient = expected_loss(*batch, temperature=temperature, clip_slope=config.clip_slope)
-        theta = theta - config.learning_rate * (1 - done) * adam.step(gradient)
+        mean, square, spread = adam(gradient, mean, square, i + 1)
+        step = mean / (1 - BETA1 ** (i + 1)) / spread
+        theta = theta - config.learning_rate * (1 - done) * step
     return cells.like(theta)
-
-
-def temperature_unit(labelled: LabelledStates, k: int) -> float:
-    """Return the variance of the states inside one of k cells. At much higher temperatures, codewords collapse onto
-    each other and stay there.
-
-    A single state has no variance; its unit is 1.
-    """
-    states = labelled.inputs[:, :-1]
-    return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
-
-
-def expected_loss(
-    cells: Cells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
-) -> tuple[float, np.ndarray]:
-    """Mean squared error of the limited actions, weighted by each cell's share of a state, and its gradient.
-
-    `inputs` (n, d + 1) and `actions` (n, m); the gradient is with respect to `cells.vector`.
-    """
-    n, (k, rows, m), states = len(inputs), cells.coefficients.shape, inputs[:, :-1]
-    raw = cells.outputs(inputs)
-    limited = np.clip(raw, -1.0, 1.0)
-    error = limited + clip_slope * (raw - limited) - actions.T
-    losses = np.square(error).mean(axis=1)
-
-    shares = cells.shares(states, temperature)
-    loss = (shares * losses).sum(axis=0)
-
-    by_raw = (2 / (n * m)) * shares[:, None] * error * np.where(raw == limited, 1.0, clip_slope)
-    by_coefficients = (by_raw.reshape(k * m, n) @ inputs).reshape(k, m, rows).transpose(0, 2, 1)
-    by_closeness = shares * (losses - loss) * (2 / (n * temperature))
-    by_codewords = by_closeness @ states - by_closeness.sum(axis=1)[:, None] * cells.codewords
-    return float(loss.mean()), np.concatenate([by_codewords.ravel(), by_coefficients.ravel()])
-
-
-class Adam:
-    """The steps of Adam for one array, before they are multiplied by the learning rate."""
-
-    def __init__(self):
-        self._mean = self._square = 0.0
-        self._steps = 0
-
-    def step(self, gradient: np.ndarray) -> np.ndarray:
-        """Return the step against which to move, from the next gradient."""
-        self._steps += 1
-        self._mean, self._square, spread = adam(gradient, self._mean, self._square, self._steps)
-        return self._mean / (1 - BETA1**self._steps) / spread

@@ -95,7 +95,7 @@ class Faithful:
     n_episodes: int = 30_000
     """Episodes of the teacher that the fit sees."""
     n_states: int = 60_000
-    """States of these episodes that are kept, as dense as all of them (`search.spread`)."""
+    """States of these episodes that are kept, as dense as all of them (`units.spread`)."""
     n_restarts: int = 32
     """Descents from different random initial cells; the closest imitation is kept."""
     n_generations: int = 250

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -16,23 +17,21 @@ from threadpoolctl import threadpool_limits
 from vsp.checks import check_seed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout, visited_states
-from vsp.run import progress
+from vsp.run.progress import steps
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
-from .anneal import squared_error
 from .config import Faithful, check_kind
 from .population import rollout_population
-from .search import least_error, moves, spread, uncorrelated
+from .search import even_moves, least_error
 from .tune import cma_es, is_snapshot, score
-from .units import Cells, LabelledStates, Scaling, warn_outside
+from .units import LabelledStates, ScaledCells, Scaling, needed_only, spread, squared_error, unexplained, warn_outside
 
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # states on which the error of a candidate is measured
 POOL = 20  # times the episodes of a generation: size of the pool of starts, from each of which the teacher plays once
 MANY = 150  # with more numbers, the tuning learns no covariances: it is too short for them
 FIRST_STEP = 0.02  # relative increase of the error by the first candidates of the tuning, about
-NUDGE = 0.05  # move of a codeword that shows the curvature of the error, in deviations of the states
 SHARE = 0.02  # default tolerance, as a share of the teacher's mean return
 BEYOND = 0.001  # unexplained variance beyond that of `min_r2` that costs as much as one tolerance of return
 NEAR = 2.0  # times the error of the closest cells: limit for what is kept if no candidate returns enough
@@ -53,76 +52,89 @@ def distill_faithfully(
     check_kind(config, Faithful)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
+
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
+    compared = task.start(validation, config.n_validation)  # starts from which candidates are compared
+    of_teacher = rollout(teacher, task, compared)
+    expected = score(of_teacher, config.failure_penalty)
+    tolerance = config.tolerance or max(SHARE * abs(float(of_teacher.returns.mean())), 1e-9)
     warn_outside(task, states)
     scaling = Scaling.of(task, states)
-    labelled = scaling.labelled(teacher, states[spread(states / scaling.scale, config.n_states, init)])
-    candidates = _Candidates(scaling, teacher, labelled, config, task.start(validation, config.n_validation))
+    states = states[spread(states / scaling.scale, config.n_states, init)]
+    labelled = scaling.labelled(states, teacher.predict(states)[0])
 
-    cells = least_error(labelled, config.n_cells, config.n_restarts, init)
-    candidates.add("fit", cells)
+    candidates = _Candidates(config, scaling, labelled, compared, expected, tolerance)
+    closest = least_error(labelled, config.n_cells, config.n_restarts, init)
+    candidates.add("fit", closest)
     if config.min_r2 is not None or candidates.shortfall:  # else tuning gains nothing
-        some = labelled.rows(spread(labelled.inputs[:, :-1], TUNING_STATES, init))
-        for tuned in _tune(candidates, teacher, some, cells, search):
+        some = labelled.thinned(TUNING_STATES, init)
+        pool = task.start(search, POOL * config.n_tuning_episodes)
+        result = rollout(teacher, task, pool)
+        goals = result.returns - config.failure_penalty * (result.outcomes != GOAL)
+        for tuned in _tune(candidates, some, closest, pool, goals, search):
             candidates.add("tune", tuned)
     if candidates.shortfall:
         warnings.warn(candidates.shortfall, stacklevel=4)  # points at the caller of `vsp_beyond.faithful`
-    cells, fewer = candidates.best, needed_only(candidates.best, labelled)
-    if len(fewer.codewords) < len(cells.codewords) and candidates.returns_enough(fewer):
+    cells = candidates.best
+    fewer = needed_only(cells, labelled)
+    if len(fewer) < len(cells) and candidates.returns_enough(fewer):
         cells = fewer
-    return scaling.policy(by_visits(among_states(cells, labelled), labelled)), candidates.history()
+    return scaling.policy(cells.among(labelled.states).by_visits(labelled.states)), candidates.history()
 
 
+@dataclass(frozen=True)
 class _Candidates:
     """Candidates with their R² and their gap: the mean return less penalties, minus the teacher's from the same
     starts."""
 
-    def __init__(
-        self, scaling: Scaling, teacher: Policy, labelled: LabelledStates, config: Faithful, starts: np.ndarray
-    ):
-        self._rows, self._cells = [], []
-        self.scaling, self._labelled, self.config, self._starts = scaling, labelled, config, starts
-        result = rollout(teacher, scaling.task, starts)
-        self._teacher_score = score(result, config.failure_penalty)
-        self.tolerance = config.tolerance or max(SHARE * abs(float(result.returns.mean())), 1e-9)
-        self._least_gap = config.margin - 0.5 * self.tolerance
+    config: Faithful
+    scaling: Scaling
+    labelled: LabelledStates
+    starts: np.ndarray  # (n, s)
+    expected: float  # the teacher's mean return less penalties, from these starts
+    tolerance: float
+    rows: list[dict] = field(default_factory=list)  # stage, cells, r2, gap
 
-    def add(self, stage: str, cells: Cells) -> None:
-        r2 = 1.0 - squared_error(self._labelled, cells) / variance(self._labelled)
-        self._rows.append({"stage": stage, "r2": r2, "gap": self._gap(cells)})
-        self._cells.append(cells)
+    def add(self, stage: str, cells: ScaledCells) -> None:
+        gap, r2 = self._gap(cells), 1.0 - unexplained(self.labelled, cells)
+        self.rows.append({"stage": stage, "cells": cells, "r2": r2, "gap": gap})
 
-    def _gap(self, cells: Cells) -> float:
-        result = rollout(self.scaling.policy(cells), self.scaling.task, self._starts)
-        return score(result, self.config.failure_penalty) - self._teacher_score
+    def _gap(self, cells: ScaledCells) -> float:
+        result = rollout(self.scaling.policy(cells), self.scaling.task, self.starts)
+        return score(result, self.config.failure_penalty) - self.expected
 
-    def returns_enough(self, cells: Cells) -> bool:
+    @property
+    def least_gap(self) -> float:
+        return self.config.margin - 0.5 * self.tolerance
+
+    @property
+    def kept(self) -> int:
+        r2, gap = (np.array([row[name] for row in self.rows]) for name in ("r2", "gap"))
+        return kept(r2, gap, least_gap=self.least_gap, min_r2=self.config.min_r2)
+
+    @property
+    def best(self) -> ScaledCells:
+        return self.rows[self.kept]["cells"]
+
+    def returns_enough(self, cells: ScaledCells) -> bool:
         """Whether `cells` return as much as the best candidate or, without `min_r2`, enough to be accepted."""
-        gap = self._rows[self._kept]["gap"]
-        return self._gap(cells) >= (gap if self.config.min_r2 is not None else min(gap, self._least_gap))
-
-    @property
-    def _kept(self) -> int:
-        r2, gap = (np.array([row[name] for row in self._rows]) for name in ("r2", "gap"))
-        return kept(r2, gap, least_gap=self._least_gap, min_r2=self.config.min_r2)
-
-    @property
-    def best(self) -> Cells:
-        return self._cells[self._kept]
+        gap = self.rows[self.kept]["gap"]
+        return self._gap(cells) >= (gap if self.config.min_r2 is not None else min(gap, self.least_gap))
 
     @property
     def shortfall(self) -> str | None:
         """The requirement that no candidate meets, in words; None if one meets all."""
-        best, k, min_r2 = self._rows[self._kept], self.config.n_cells, self.config.min_r2
+        best, k, min_r2 = self.rows[self.kept], self.config.n_cells, self.config.min_r2
         if min_r2 is not None and best["r2"] < min_r2:
             return f"no policy of {k} cells with R² {min_r2:g} was found: the closest is kept, R² {best['r2']:.3f}"
-        if min_r2 is None and best["gap"] < self._least_gap:
-            what = f"{best['gap']:+.4g} to the teacher's return less penalties, expected {self._least_gap:+.4g} or more"
+        if min_r2 is None and best["gap"] < self.least_gap:
+            what = f"{best['gap']:+.4g} to the teacher's return less penalties, expected {self.least_gap:+.4g} or more"
             return f"no policy of {k} cells that acts like the teacher returns enough: the best has a gap of {what}"
         return None
 
     def history(self) -> pd.DataFrame:
-        return pd.DataFrame(self._rows).assign(kept=np.arange(len(self._rows)) == self._kept)
+        rows = pd.DataFrame(self.rows).drop(columns="cells")
+        return rows.assign(kept=np.arange(len(rows)) == self.kept)
 
 
 def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | None) -> int:
@@ -140,37 +152,27 @@ def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | N
     return int(np.where(accepted, value, -np.inf).argmax() if accepted.any() else instead.argmax())
 
 
-def variance(labelled: LabelledStates) -> float:
-    """Return the mean squared error of the best constant, which R² is measured against; 1 if the teacher is
-    constant."""
-    mean = float(labelled.actions.var(axis=0).mean())
-    return mean if mean > 1e-12 else 1.0
-
-
 def _tune(
-    candidates: _Candidates, teacher: Policy, labelled: LabelledStates, cells: Cells, rng: np.random.Generator
-) -> Iterator[Cells]:
+    candidates: _Candidates, labelled: LabelledStates, cells: ScaledCells, pool: np.ndarray, goals: np.ndarray,
+    rng: np.random.Generator,
+) -> Iterator[ScaledCells]:  # fmt: skip
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
-    `SNAPSHOTS` times.
+    `SNAPSHOTS` times. Each generation is rolled out from some starts of the `pool`, where the teacher scores `goals`.
 
     Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
     """
-    config, policy, task = candidates.config, candidates.scaling.policy, candidates.scaling.task
-    move, _ = moves(cells, *_units(labelled, cells))
-    whole = variance(labelled)
+    config, scaling = candidates.config, candidates.scaling
+    move = even_moves(labelled, cells)
     step = np.sqrt(FIRST_STEP * max(squared_error(labelled, cells), 1e-6) / cells.vector.size)
     search = cma_es(np.zeros(cells.vector.size), step, rng, diagonal=cells.vector.size > MANY)
-    pool = task.start(rng, POOL * config.n_tuning_episodes)
-    result = rollout(teacher, task, pool)
-    scores = result.returns - config.failure_penalty * (result.outcomes != GOAL)
-    for i in progress.steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
-        rows, steps = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
-        starts, target = pool[rows], scores[rows].mean() + config.margin
-        moved = [move(vector) for vector in steps]
-        results = rollout_population([policy(cells) for cells in moved], task, starts)
+    for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
+        rows, vectors = rng.choice(len(pool), size=config.n_tuning_episodes, replace=False), search.ask()
+        moved = [move(vector) for vector in vectors]
+        results = rollout_population([scaling.policy(cells) for cells in moved], scaling.task, pool[rows])
+        target = goals[rows].mean() + config.margin
         missed = np.array([target - score(result, config.failure_penalty) for result in results])
-        errors = np.array([squared_error(labelled, cells) / whole for cells in moved])
-        search.tell(steps, _cost(errors, missed, candidates.tolerance, config.min_r2).tolist())
+        errors = np.array([unexplained(labelled, cells) for cells in moved])
+        search.tell(vectors, _cost(errors, missed, candidates.tolerance, config.min_r2).tolist())
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield move(search.result.xfavorite)
 
@@ -184,49 +186,3 @@ def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: floa
     if min_r2 is None:
         return errors + PRICE / tolerance * np.maximum(0.0, missed)
     return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND
-
-
-def _units(labelled: LabelledStates, cells: Cells) -> tuple[np.ndarray, np.ndarray]:
-    """Return bases of the coefficients and units of the codewords for `moves`, from the curvature of the error."""
-    here, vector, units = squared_error(labelled, cells), cells.vector, np.empty(cells.codewords.size)
-    for j in range(len(units)):
-        nudge = np.zeros_like(vector)
-        nudge[j] = NUDGE
-        more = sum(squared_error(labelled, cells.like(vector + sign * nudge)) - here for sign in (1, -1))
-        units[j] = 1.0 / np.sqrt(max(0.0, 0.5 * more / NUDGE**2) + 1e-3)
-    shares = cells.nearest(labelled.inputs[:, :-1]) == np.arange(len(cells.codewords))[:, None]
-    return uncorrelated(labelled, shares.astype(np.float64)), units
-
-
-def needed_only(cells: Cells, labelled: LabelledStates) -> Cells:
-    """Remove cells that the error does not need: the next codeword serves their states as well, as where two neighbours
-    hold the same map."""
-    while (k := len(cells.codewords)) > 1:
-        errors = [squared_error(labelled, _without(cells, i)) for i in range(k)]
-        if min(errors) > squared_error(labelled, cells):
-            break
-        cells = _without(cells, int(np.argmin(errors)))
-    return cells
-
-
-def _without(cells: Cells, i: int) -> Cells:
-    return Cells(np.delete(cells.codewords, i, axis=0), np.delete(cells.coefficients, i, axis=0))
-
-
-def among_states(cells: Cells, labelled: LabelledStates) -> Cells:
-    """Draw the same border between two cells by codewords among the states. Of the many pairs that draw it, choose the
-    one around the mean state. With more codewords there is no such choice."""
-    if len(cells.codewords) != 2:
-        return cells
-    states, (first, second) = labelled.inputs[:, :-1], cells.codewords
-    across = (second - first) / np.linalg.norm(second - first)
-    beyond = (states - (first + second) / 2) @ across  # signed distances from the border
-    on_border = states.mean(axis=0) - beyond.mean() * across
-    return Cells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), cells.coefficients)
-
-
-def by_visits(cells: Cells, labelled: LabelledStates) -> Cells:
-    """Return the same cells, the one with the most states of `labelled` first."""
-    visits = np.bincount(cells.nearest(labelled.inputs[:, :-1]), minlength=len(cells.codewords))
-    order = np.argsort(-visits, kind="stable")
-    return Cells(cells.codewords[order], cells.coefficients[order])

@@ -7,14 +7,14 @@ Descents that fall behind are stopped early (successive halving, Jamieson & Talw
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import minimize
-from scipy.spatial import KDTree
 
 from vsp.run.progress import steps
 
-from .anneal import expected_loss, squared_error, temperature_unit
-from .units import Cells, LabelledStates
+from .units import LabelledStates, ScaledCells, expected_loss, squared_error, temperature_unit
 
 N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
@@ -25,12 +25,13 @@ FEW = 8000  # states that the rounds use; with too few, the outcome depends on w
 ROUNDS = ((range(0, 6), 8), (range(6, 12), 4), (range(12, N_STAGES), 1))
 LAST = range(12, N_STAGES)  # stages of the last descent, which uses all states
 AT_ONCE = 60_000  # size of the largest arrays in a loss: they fit into the cache
+NUDGE = 0.05  # move of a codeword that shows the curvature of the error, in deviations of the states
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> Cells:
+def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> ScaledCells:
     """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find."""
-    some = labelled.rows(spread(labelled.inputs[:, :-1], FEW, rng))
+    some = labelled.thinned(FEW, rng)
     live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
         tried = steps(live, f"fits with {n_cells} cells", total=len(live), unit="starts")
@@ -39,30 +40,18 @@ def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.r
     return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
 
 
-def distinct(cells: Cells) -> Cells:
+def distinct(cells: ScaledCells) -> ScaledCells:
     """Drop codewords that are equal to an earlier one: of equally near codewords the first counts, so no state is in
     their cells."""
-    _, first = np.unique(cells.codewords, axis=0, return_index=True)
-    first.sort()
-    return Cells(cells.codewords[first], cells.coefficients[first])
+    return cells.at(np.sort(np.unique(cells.codewords, axis=0, return_index=True)[1]))
 
 
-def spread(points: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
-    """Return the rows of n of the `points`, as dense as all of them: a stratified sample. It takes one point of each
-    n-th part in the order of a k-d tree, so it depends less on chance than independent draws. Returns all rows if there
-    are no more than n."""
-    if len(points) <= n:
-        return np.arange(len(points))
-    order = KDTree(points, leafsize=max(1, len(points) // n)).indices
-    return order[((np.arange(n) + rng.random(n)) * len(points) / n).astype(np.intp)]
-
-
-def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Cells:
+def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> ScaledCells:
     """Place k codewords at states drawn from `labelled`, each with the least-squares map of the states in its cell."""
     d, inputs = labelled.inputs.shape[1] - 1, labelled.inputs
     common = np.linalg.lstsq(inputs, labelled.actions, rcond=None)[0]
     codewords = inputs[rng.choice(len(inputs), size=k, replace=len(inputs) < k), :d]
-    cells = Cells(codewords, np.tile(common, (k, 1, 1)))
+    cells = ScaledCells(codewords, np.tile(common, (k, 1, 1)))
     nearest = cells.nearest(inputs[:, :d])
     for i in range(k):  # a weak pull to the map of all states, for cells with few states
         rows = np.vstack([inputs[nearest == i], np.eye(d + 1)])
@@ -71,18 +60,19 @@ def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Ce
     return cells
 
 
-def descend(labelled: LabelledStates, cells: Cells, stages: range, *, n_iterations: int = N_ITERATIONS) -> Cells:
+def descend(
+    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS
+) -> ScaledCells:
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
-    unit = temperature_unit(labelled, len(cells.codewords))
     for stage in stages:
-        cells = _descend_at(stage, labelled, cells, unit, n_iterations)
+        cells = _descend_at(stage, labelled, cells, n_iterations)
     return cells
 
 
-def _descend_at(stage: int, labelled: LabelledStates, cells: Cells, unit: float, n_iterations: int) -> Cells:
-    temperature = unit * TEMPERATURES[stage]
-    bases = uncorrelated(labelled, cells.shares(labelled.inputs[:, :-1], temperature))
+def _descend_at(stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int) -> ScaledCells:
+    temperature = temperature_unit(labelled, len(cells)) * TEMPERATURES[stage]
+    bases = uncorrelated(labelled, cells.shares(labelled.states, temperature))
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
@@ -93,10 +83,10 @@ def _descend_at(stage: int, labelled: LabelledStates, cells: Cells, unit: float,
     return move(minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options).x)
 
 
-def whole_loss(cells: Cells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
+def whole_loss(cells: ScaledCells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
     """Compute `expected_loss` of all states, some at a time."""
     n, value, gradient = len(labelled.inputs), 0.0, np.zeros(cells.vector.size)
-    step = max(1, AT_ONCE // (len(cells.coefficients) * labelled.actions.shape[1]))
+    step = max(1, AT_ONCE // (len(cells) * labelled.actions.shape[1]))
     for i in range(0, n, step):
         inputs, actions = labelled.inputs[i : i + step], labelled.actions[i : i + step]
         part, its_gradient = expected_loss(cells, inputs, actions, **about)
@@ -115,17 +105,30 @@ def uncorrelated(labelled: LabelledStates, shares: np.ndarray) -> np.ndarray:
     return np.linalg.cholesky(np.linalg.inv(products + RIDGE * np.eye(p)))
 
 
-def moves(cells: Cells, bases: np.ndarray, codeword_units: np.ndarray | float):
+def moves(cells: ScaledCells, bases: np.ndarray, codeword_units: np.ndarray | float):
     """Return two functions: one from a step in these units to the moved cells, and one from a gradient with respect to
-    `Cells.vector` to the gradient with respect to the step."""
+    `ScaledCells.vector` to the gradient with respect to the step."""
     cut, shape = cells.codewords.size, cells.coefficients.shape
 
-    def move(step: np.ndarray) -> Cells:
+    def move(step: np.ndarray) -> ScaledCells:
         codewords = cells.codewords + (codeword_units * step[:cut]).reshape(cells.codewords.shape)
-        return Cells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
+        return ScaledCells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
 
     def pull_back(gradient: np.ndarray) -> np.ndarray:
         by_coefficients = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
         return np.concatenate([codeword_units * gradient[:cut], by_coefficients.ravel()])
 
     return move, pull_back
+
+
+def even_moves(labelled: LabelledStates, cells: ScaledCells) -> Callable[[np.ndarray], ScaledCells]:
+    """Return the first function of `moves`, in units in which steps of one length raise the error equally, by its
+    curvature."""
+    here, vector, units = squared_error(labelled, cells), cells.vector, np.empty(cells.codewords.size)
+    for j in range(len(units)):
+        nudge = np.zeros_like(vector)
+        nudge[j] = NUDGE
+        more = sum(squared_error(labelled, cells.like(vector + sign * nudge)) - here for sign in (1, -1))
+        units[j] = 1.0 / np.sqrt(max(0.0, 0.5 * more / NUDGE**2) + 1e-3)
+    inside = cells.nearest(labelled.states) == np.arange(len(cells))[:, None]
+    return moves(cells, uncorrelated(labelled, inside.astype(np.float64)), units)[0]

@@ -11,10 +11,9 @@ from vsp.rollouts import Outcomes, rollout
 from vsp.run.progress import steps
 from vsp.tasks.base import GOAL
 
-from .anneal import squared_error
 from .config import Tuned
 from .population import rollout_population
-from .units import Cells, LabelledStates, Scaling
+from .units import LabelledStates, ScaledCells, Scaling, squared_error
 
 SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
 
@@ -27,7 +26,7 @@ class Objective:
     error_penalty: float = 0.0
     labelled: LabelledStates | None = None  # the states of the teacher, for the error penalty
 
-    def score(self, result: Outcomes, cells: Cells) -> float:
+    def score(self, result: Outcomes, cells: ScaledCells) -> float:
         """Return the value for `cells` whose episodes ended as `result`."""
         error = squared_error(self.labelled, cells) if self.labelled and self.error_penalty else 0.0
         return score(result, self.failure_penalty) - self.error_penalty * error
@@ -36,13 +35,13 @@ class Objective:
 class Candidates:
     """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
 
-    best: Cells  # once there is a candidate
+    best: ScaledCells  # once there is a candidate
 
     def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
         self.rows, self.best_restart = list[dict](), 0
         self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
 
-    def add(self, stage: str, restart: int, cells: Cells) -> None:
+    def add(self, stage: str, restart: int, cells: ScaledCells) -> None:
         """Score `cells` from the validation starts."""
         result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
@@ -52,8 +51,8 @@ class Candidates:
 
 
 def tune(
-    scaling: Scaling, cells: Cells, config: Tuned, objective: Objective, rng: np.random.Generator
-) -> Iterator[Cells]:
+    scaling: Scaling, cells: ScaledCells, config: Tuned, objective: Objective, rng: np.random.Generator
+) -> Iterator[ScaledCells]:
     """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
 
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.

@@ -42,8 +42,7 @@ def distill_tuned(
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
-    if config.criticality:
-        critics_of(teacher)  # raises now, not after an hour
+    critics = critics_of(teacher) if config.criticality else None  # raises now, not after an hour
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
@@ -51,7 +50,8 @@ def distill_tuned(
     scaling = Scaling.of(task, states)
     if start is not None and start.metric == METRIC:
         scaling = replace(scaling, scale=start.scale)  # with another one the borders of `start` would move
-    labelled = scaling.labelled(teacher, states, criticality=config.criticality)
+    criticality = critics.criticality(states) if critics else None
+    labelled = scaling.labelled(states, teacher.predict(states)[0], criticality)
     objective = Objective(config.failure_penalty, config.error_penalty, labelled)
     candidates = Candidates(scaling, task.start(validation, config.n_validation), objective)
 
@@ -64,7 +64,8 @@ def distill_tuned(
     cells = candidates.best
     for _ in range(config.n_corrections):
         states = visited_states(scaling.policy(cells), task, task.start(starts, config.n_correction_episodes))
-        labelled = labelled.with_more(scaling.labelled(teacher, states, criticality=config.criticality))
+        criticality = critics.criticality(states) if critics else None
+        labelled = labelled.with_more(scaling.labelled(states, teacher.predict(states)[0], criticality))
         cells = anneal(labelled, cells, warm(config), batches)
         candidates.add("correct", candidates.best_restart, cells)
     for cells in tune(scaling, candidates.best, config, objective, search):

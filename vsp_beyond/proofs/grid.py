@@ -10,6 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vsp.policy import VoronoiPolicy
+
+SEEN = 1e-7  # largest distance of an observation (float32) from the state
+TIES = 1e-12  # relative to the distances: far more than float64 loses in one
+ROUNDING = 1e-9  # far more than float64 loses in a step
+
 
 @dataclass(frozen=True)
 class Way:
@@ -83,3 +89,33 @@ def _all_within(good: np.ndarray, ways: Sequence[Way], periodic: bool) -> np.nda
     for way in ways:
         within[way.boxes[~(rectangles_within(count, way.first, way.last) & way.safe)]] = False
     return within.reshape(good.shape)
+
+
+def touches(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Return which boxes of observations, from `low` to `high` (d, m), may hold one in `cell`. (m,)
+
+    Rounding may decide between codewords that are nearly as near, for observations up to `reach` (d,) in size.
+    """
+    sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
+    tie = TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
+    touched = np.ones(low.shape[1], dtype=bool)
+    for other in range(len(policy)):
+        if other != cell:
+            touched &= _least_gap(policy, cell, other, low, high) <= tie
+    return touched
+
+
+def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Bound from below how much farther observations in a box are from codeword `cell` than from `other`.
+
+    Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone function.
+    """
+    total = np.zeros(low.shape[1])
+    for axis, scale in enumerate(policy.scale):
+        gaps = []
+        for end in (low[axis], high[axis]):
+            to_cell, to_other = ((end - policy.codewords[i, axis]) / scale for i in (cell, other))
+            manhattan = policy.metric == "manhattan"
+            gaps.append(np.abs(to_cell) - np.abs(to_other) if manhattan else to_cell**2 - to_other**2)
+        total = total + np.minimum(*gaps)
+    return total

@@ -16,9 +16,8 @@ from vsp.checks import check_count
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.pendulum import TASK
 
-from .grid import Way, around, invariant, steps_into
+from .grid import ROUNDING, SEEN, Way, around, invariant, steps_into, touches
 from .proof import Proof, check_provable
-from .robust import ROUNDING, SEEN, touches
 
 FASTEST, LIMIT = 8.0, 2.0  # largest angular velocity, rad/s; largest torque
 START_SPEED = 1.0  # rad/s, largest of the starts
@@ -94,26 +93,32 @@ def _way(policy: VoronoiPolicy, cell: int, n: int) -> Way:
     raw = w_cos * cos + w_sin * sin + w_speed * speed + bias
     slope = np.abs(w_sin * cos - w_cos * sin) + (abs(w_cos) + abs(w_sin)) * half[0]
     spread = slope * half[0] + abs(w_speed) * half[1] + slack
-    low, high = (np.clip(raw + side * spread, -LIMIT, LIMIT) for side in (-1, 1))
-    free, fixed = np.abs(raw) + spread <= LIMIT, low == high
+    torque, doubt, free = limited(raw, spread, LIMIT)
     # The new speed in the middle, and its slopes along the angle and along the speed
-    torque = np.where(free, raw, (low + high) / 2)
     along = np.where(free, (FALL + PUSH * w_sin) * cos - PUSH * w_cos * sin, FALL * cos)
     bend = FALL + PUSH * (abs(w_cos) + abs(w_sin)) * free
     across = np.where(free, 1 + PUSH * w_speed, 1.0)
-    rest = PUSH * np.where(free, slack, np.where(fixed, 0.0, (high - low) / 2)) + ROUNDING
+    rest = PUSH * np.where(free, slack, doubt) + ROUNDING
     new_speed = speed + FALL * sin + PUSH * torque
     new_angle = angle + DT * new_speed
     speed_by = (np.abs(along) + bend * half[0]) * half[0] + np.abs(across) * half[1] + rest
     angle_by = (np.abs(1 + DT * along) + DT * bend * half[0]) * half[0] + DT * (np.abs(across) * half[1] + rest)
 
-    limited = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
+    speeds = [np.clip(new_speed + side * speed_by, -FASTEST, FASTEST) for side in (-1, 1)]
     at_limit = np.abs(new_speed) + speed_by > FASTEST  # there the new angle follows from the limited speed
     ends = [
         np.where(at_limit, angle + side * half[0] + DT * speed_there, new_angle + side * angle_by)
-        for side, speed_there in zip((-1, 1), limited)
+        for side, speed_there in zip((-1, 1), speeds)
     ]
-    return Way(touched, *boxes_between(ends, limited, n), np.ones(len(touched), dtype=bool))
+    return Way(touched, *boxes_between(ends, speeds, n), np.ones(len(touched), dtype=bool))
+
+
+def limited(value: np.ndarray, spread: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Limit numbers, known up to `spread`, to -`limit` to `limit`. Return their middle values, how far they may be from
+    these, and where the limit surely does not act: there the values stay, and 0 stands for `spread`."""
+    low, high = (np.clip(value + side * spread, -limit, limit) for side in (-1, 1))
+    free = np.abs(value) + spread <= limit
+    return np.where(free, value, (low + high) / 2), np.where(free, 0.0, (high - low) / 2), free
 
 
 def boxes_between(angles: list[np.ndarray], speeds: list[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:

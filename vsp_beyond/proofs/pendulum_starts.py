@@ -17,9 +17,8 @@ from vsp.policy import VoronoiPolicy
 from vsp.run.progress import progress
 from vsp.tasks.pendulum import TASK
 
-from .grid import rectangles_within, summed
-from .pendulum import DT, FALL, FASTEST, LIMIT, PUSH, REACH, PendulumProof, boxes_between
-from .robust import ROUNDING, SEEN, touches
+from .grid import ROUNDING, SEEN, rectangles_within, summed, touches
+from .pendulum import DT, FALL, FASTEST, LIMIT, PUSH, REACH, PendulumProof, boxes_between, limited
 
 HALF_WAY = TASK.max_steps // 2  # most steps followed here; the grid proves the other half
 WIDEST = 0.1  # rad, or rad/s: a box with a larger half width is given up
@@ -117,26 +116,16 @@ def stepped(policy: VoronoiPolicy, cell: int, boxes: Boxes) -> Boxes:
     raw = w_cos * cos + w_sin * sin + w_speed * speed + bias
     raw_slopes = np.stack([w_sin * cos - w_cos * sin, w_speed * ones])
     slack = SEEN * (abs(w_cos) + abs(w_sin) + FASTEST * abs(w_speed)) + ROUNDING
-    torque, torque_slopes, doubt, free = _limited(
-        raw, raw_slopes, boxes.spread(raw_slopes) + bend * curved + slack, LIMIT
-    )
-    slopes = np.stack([FALL * cos, ones]) + PUSH * torque_slopes
+    torque, doubt, free = limited(raw, boxes.spread(raw_slopes) + bend * curved + slack, LIMIT)
+    slopes = np.stack([FALL * cos, ones]) + PUSH * raw_slopes * free
     lost = FALL * curved + PUSH * np.where(free, bend * curved + slack, doubt) + ROUNDING
     new = speed + FALL * sin + PUSH * torque
-    new, slopes, doubt, free = _limited(new, slopes, boxes.spread(slopes) + lost, FASTEST)
-    lost = np.where(free, lost, doubt)
+    new, doubt, free = limited(new, boxes.spread(slopes) + lost, FASTEST)
+    slopes, lost = slopes * free, np.where(free, lost, doubt)
 
     along = np.stack([np.stack([ones, 0 * ones]) + DT * slopes, slopes])  # slopes of the new angle and of the new speed
     rest = np.einsum("ijm,jm->im", np.abs(along), boxes.rest) + np.stack([DT * lost, lost]) + ROUNDING
     return Boxes(boxes.start, np.stack([angle + DT * new, new]), np.einsum("ijm,jkm->ikm", along, boxes.slopes), rest)
-
-
-def _limited(value: np.ndarray, slopes: np.ndarray, spread: np.ndarray, limit: float) -> tuple:
-    """Limit a number to -`limit` to `limit`. Return its value in the middle, its slopes, the uncertainty beyond these,
-    and where the limit does not act; there, value and slopes are unchanged."""
-    low, high = (np.clip(value + side * spread, -limit, limit) for side in (-1, 1))
-    free = np.abs(value) + spread <= limit
-    return np.where(free, value, (low + high) / 2), slopes * free, np.where(free, 0.0, (high - low) / 2), free
 
 
 def _touched(policy: VoronoiPolicy, cell: int, boxes: Boxes) -> np.ndarray:

@@ -3,7 +3,8 @@
 The square is cut into equal boxes. From each box a step leads into the boxes that its next states can touch, over all
 cells that the box may overlap, all roundings, and all disturbances. A box is good if all of these boxes are good or
 surely in the goal. Boxes that are good within a given number of steps are found backwards. What is proved in this way
-holds for every start, also on borders. What is not proved may still hold.
+holds for every start, also on borders. What is not proved may still hold. For rounding, the goal is narrower and the
+pit wider by `ROUNDING`.
 """
 
 from __future__ import annotations
@@ -14,12 +15,8 @@ from vsp.checks import check_count, check_number
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
 
-from .grid import Way, around, steps_into
+from .grid import ROUNDING, SEEN, Way, around, steps_into, touches
 from .proof import check_provable
-
-SEEN = 1e-7  # largest distance of an observation (float32) from the state
-TIES = 1e-12  # relative to the distances: far more than float64 loses in one
-ROUNDING = 1e-9  # far more than float64 loses in a step; the goal is narrower and the pit wider by as much
 
 
 def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1000) -> np.ndarray:
@@ -94,33 +91,3 @@ def _bounds(weights, bias: float, low: np.ndarray, high: np.ndarray) -> tuple[np
     """Return the least and the largest value of a linear function over boxes."""
     ends = [(w * low[i], w * high[i]) if w >= 0 else (w * high[i], w * low[i]) for i, w in enumerate(weights)]
     return tuple(bias + sum(pair[side] for pair in ends) for side in (0, 1))
-
-
-def touches(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Return which boxes of observations, from `low` to `high` (d, m), may hold one in `cell`. (m,)
-
-    Rounding may decide between codewords that are nearly as near, for observations up to `reach` (d,) in size.
-    """
-    sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
-    tie = TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
-    touched = np.ones(low.shape[1], dtype=bool)
-    for other in range(len(policy)):
-        if other != cell:
-            touched &= _least_gap(policy, cell, other, low, high) <= tie
-    return touched
-
-
-def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Bound from below how much farther observations in a box are from codeword `cell` than from `other`.
-
-    Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone function.
-    """
-    total = np.zeros(low.shape[1])
-    for axis, scale in enumerate(policy.scale):
-        gaps = []
-        for end in (low[axis], high[axis]):
-            to_cell, to_other = ((end - policy.codewords[i, axis]) / scale for i in (cell, other))
-            manhattan = policy.metric == "manhattan"
-            gaps.append(np.abs(to_cell) - np.abs(to_other) if manhattan else to_cell**2 - to_other**2)
-        total = total + np.minimum(*gaps)
-    return total
