@@ -96,7 +96,7 @@ study: begin venv ##- studies of the readings, the teachers and simpler policies
 hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
 	$(PY) -m studies.hub_teacher "$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
 agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable
-	$(PY) -m studies.agents "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
+	$(PY) -m studies.zoo "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable

@@ -18,7 +18,7 @@ from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher
 from vsp.paper.studies.teachers import rows_of
 from vsp.run import command
 
-from .agents import CAR, read
+from .zoo import CAR, read
 
 
 def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd.DataFrame]:

@@ -29,10 +29,10 @@ from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
+from .committed import BEYOND, RESULTS, read_results, write_results
 from .comparison.beside import simplest
+from .proofs.bounds import mean_return
 from .proofs.network import teacher_steps_to_goal
-from .proofs.returns import mean_return
-from .results import BEYOND, RESULTS, read_results, write_results
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof

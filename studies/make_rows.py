@@ -9,10 +9,10 @@ import pandas as pd
 
 from vsp.run import command
 
+from .committed import write_results
 from .comparison.beside import beside
 from .comparison.methods import LONG, TABLES
 from .comparison.rows import committed_rows, make_all
-from .results import write_results
 
 
 def main() -> None:

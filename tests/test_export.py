@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, acted, compiled
 
-from studies import agents
+from studies import zoo as agents
 from vsp.export import symbol
 from vsp.paper import published_policy
 from vsp.policy import VoronoiPolicy

@@ -15,8 +15,8 @@ import numpy as np
 
 import vsp
 from studies import comparison
+from studies.committed import read_results
 from studies.comparison import measure
-from studies.results import read_results
 from vsp import VoronoiPolicy
 from vsp.algorithms import EPISODES_AHEAD
 from vsp.paper.baselines import linear_map, refit

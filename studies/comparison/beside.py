@@ -21,7 +21,7 @@ from vsp.tasks.base import GOAL
 from vsp_beyond import optimum, simplify
 from vsp_beyond.optimum.grid import GridPolicy
 
-from ..results import BEYOND, RESULTS, differing, write_results
+from ..committed import BEYOND, RESULTS, differing, write_results
 from ..robots import record_gait
 from . import measure
 from .methods import CHEETAH, LANDER, METHODS, PRESETS, TABLES, TASKS

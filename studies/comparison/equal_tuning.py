@@ -13,7 +13,7 @@ from vsp.rollouts import visited_states
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 
-from ..results import read_results
+from ..committed import read_results
 from .measure import ERROR_SEED, N_ERROR
 from .methods import LONG, TABLES
 from .summary import AS_GOOD, INTERVAL, OURS, TUNED, ahead, method_summary, read_rows, teacher_of

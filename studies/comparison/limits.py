@@ -11,7 +11,7 @@ import os
 import numpy as np
 import pandas as pd
 
-from ..results import read_results
+from ..committed import read_results
 from .methods import PRESETS
 from .summary import INTERVAL, TUNED, method_summary, read_rows, teacher_of
 

@@ -18,7 +18,7 @@ from vsp.protocol.job import provenance
 from vsp.teachers.teacher import Teacher, further_teachers
 from vsp_beyond.few_cells.units import METRIC
 
-from ..results import keys, read_results
+from ..committed import keys, read_results
 from . import measure
 from .makers import Budget
 from .methods import ALIKE, FOUND, LONG, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of

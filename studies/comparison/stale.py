@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from vsp.run import atomic, command
 
-from .. import agents
-from ..results import differing
+from .. import zoo
+from ..committed import differing
 from .beside import beside
 from .methods import LONG, TABLES
 from .rows import jobs_of
@@ -43,8 +43,8 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
             yield f"{table}_{task}.csv", target, [job.about() for job in jobs_of(task, table)]
             for file in beside(task, table):
                 yield file.name, target, file.today
-    for name in agents.TABLES:
-        yield f"{name}.csv", "agents", agents.current(name)[1]
+    for name in zoo.TABLES:
+        yield f"{name}.csv", "agents", zoo.current(name)[1]
 
 
 def main() -> None:

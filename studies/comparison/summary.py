@@ -10,7 +10,7 @@ from scipy import stats
 
 from vsp.protocol.intervals import percentile_interval, share_interval
 
-from ..results import read_results
+from ..committed import read_results
 
 OURS, TUNED = "our cells", "our cells, tuned"
 MEANS = ("failing", "error_teacher", "error_own", "cells")

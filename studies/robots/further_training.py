@@ -49,7 +49,7 @@ def _model(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int
     from stable_baselines3 import TD3
     from stable_baselines3.common.noise import NormalActionNoise
 
-    from .actors import SoftActor
+    from .soft_actor import SoftActor
 
     class Patient(TD3):
         """TD3 that waits until the replay buffer is filled, and whose actor has its own, falling learning rate."""

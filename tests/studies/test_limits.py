@@ -3,8 +3,8 @@ import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS
 
 from studies import comparison
+from studies.committed import read_results, write_results
 from studies.comparison import all_rows, best_mean, near, references, with_regret
-from studies.results import read_results, write_results
 
 MEASURED = {"failing": 0.0, "error_teacher": 0.1, "error_own": 0.1, "cells": 3}
 

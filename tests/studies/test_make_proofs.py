@@ -7,9 +7,9 @@ from support import SIMPLEGOAL
 import vsp
 import vsp_beyond
 from studies import make_proofs
+from studies.committed import read_results, write_results
+from studies.proofs.bounds import mean_return
 from studies.proofs.network import affine_outputs, teacher_steps_to_goal
-from studies.proofs.returns import mean_return
-from studies.results import read_results, write_results
 from vsp.tasks import GOAL
 from vsp_beyond.proofs import check
 

@@ -9,13 +9,13 @@ from small import SMALL
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Constant
 
 from studies import make_rows
+from studies.committed import RESULTS, keys, read_results
 from studies.comparison import beside, measure, rows
 from studies.comparison.beside import kept_jobs
 from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Method, Table
 from studies.comparison.rows import Row, jobs_of, make_all
 from studies.comparison.summary import read_rows
-from studies.results import RESULTS, keys, read_results
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp.run import atomic, sealed
@@ -157,7 +157,7 @@ def test_the_command_writes_results_and_times_apart(small, tmp_path):
 def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     """Rows of other methods are read from the committed tables, and written as they were."""
     made, results = [], tmp_path / "data" / "beyond"
-    for where in ("studies.results", "studies.comparison.beside"):
+    for where in ("studies.committed", "studies.comparison.beside"):
         small.setattr(f"{where}.RESULTS", results)
     watch(small, made)
     command(small, "--out", tmp_path)

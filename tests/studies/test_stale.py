@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
+from studies.committed import RESULTS
 from studies.comparison import beside, rows, stale
 from studies.comparison.methods import METHODS, PRESETS, TASKS
-from studies.results import RESULTS
 from vsp.run import listed
 
 
@@ -38,7 +38,7 @@ def patch(monkeypatch):
 def results(tmp_path, patch):
     """A copy of the committed results, to spoil."""
     shutil.copytree(RESULTS, tmp_path / "beyond")
-    patch.setattr("studies.results.RESULTS", tmp_path / "beyond")
+    patch.setattr("studies.committed.RESULTS", tmp_path / "beyond")
     return tmp_path / "beyond"
 
 

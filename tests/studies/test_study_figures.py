@@ -5,10 +5,10 @@ from drawn import hexes, named
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.colors import to_rgb
 
-from studies import show
+from studies import figures as show
 from studies.comparison.methods import METHODS
-from studies.show import gait as gait_module
-from studies.show.methods import MARKED
+from studies.figures import gaits as gait_module
+from studies.figures.curves import MARKED
 from vsp.show import style
 
 # Return over likeness, and likeness over cells

@@ -8,10 +8,10 @@ from support import PENDULUM
 from studies.comparison.makers import Budget, robot_tree, trained_further
 from studies.comparison.tuning import in_units
 from studies.rivals.trees import ObliqueLinearTree
-from studies.robots.actors import CLIP_SLOPE, SoftActor
 from studies.robots.further_training import train_further
 from studies.robots.imitation import LONGER
 from studies.robots.settings import Walking
+from studies.robots.soft_actor import CLIP_SLOPE, SoftActor
 from vsp import get_task, load_teacher, rollout, visited_states
 from vsp_beyond.few_cells.search import local_init
 from vsp_beyond.few_cells.units import Scaling

@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, PENDULUM, tiny
 
-from studies import agents, hub_teacher
-from studies.results import RESULTS
+from studies import hub_teacher
+from studies import zoo as agents
+from studies.committed import RESULTS
 from vsp.evaluation import likeness
 from vsp.paper.runs import Experiment
 from vsp.run import command, listed
@@ -75,7 +76,7 @@ def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypat
     written = [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
     monkeypatch.setattr(agents.Study, "make", None)  # nothing is left to do
     agents.main()
-    for where in ("studies.agents", "studies.results"):
+    for where in ("studies.zoo", "studies.committed"):
         monkeypatch.setattr(f"{where}.RESULTS", folder)
     shutil.copy(RESULTS / "zoo.csv", folder)
     listed.list_folder(folder)

@@ -34,8 +34,8 @@ from vsp_beyond.few_cells import faithful_preset
 from vsp_beyond.few_cells.duration import expected_seconds
 from vsp_beyond.few_cells.faithful import distill_faithfully
 
+from .committed import BEYOND, RESULTS, keys, read_results, write_results
 from .comparison.methods import METHODS
-from .results import BEYOND, RESULTS, keys, read_results, write_results
 
 SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
 N_EPISODES, START_SEED = 1000, 7  # of agent and policies, from starts that no fit saw

@@ -9,7 +9,7 @@ from vsp.show.state_space import cells, image
 from vsp.show.style import FORCE_MAP
 from vsp.tasks import get_task
 
-from ..agents import actions_of, plane, policy_of
+from ..zoo import actions_of, plane, policy_of
 
 COLUMNS = 4
 
