@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
-from vsp import Policy
+from vsp import Policy, Task
+from vsp.protocol import Method
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import limit
 
@@ -49,7 +50,7 @@ TUNED_SIZES = (2, 3, 4, 8, 13)  # of other methods tuned as ours; "one linear ma
 
 
 @dataclass(frozen=True)
-class Method:
+class Entry:
     """How a policy is made: `make(budget, size, seed, **settings)`."""
 
     make: Callable[..., Policy]
@@ -62,46 +63,51 @@ class Method:
     tasks: tuple[str, ...] = ()  # empty: all tasks
     preset: str = "tuned"  # key of `PRESETS`
 
+    def read(self, task: str) -> dict:
+        """Return the settings that the policies for a task depend on, by name."""
+        config = PRESETS[self.preset](task)
+        return {name: getattr(config, name) for name in self.reads} | self.settings
 
-def _corrected(fit: str, *, by_chance: bool = True, **about) -> Method:
+
+def _corrected(fit: str, *, by_chance: bool = True, **about) -> Entry:
     make = partial(makers.corrected, fit=fit, by_chance=by_chance)
-    return Method(make, EPISODES + ("n_restarts",) * by_chance, settings={"rounds": 5}, **about)
+    return Entry(make, EPISODES + ("n_restarts",) * by_chance, settings={"rounds": 5}, **about)
 
 
-def _uncorrected(fit: str, sizes: tuple[int, ...] = SIZES, **about) -> Method:
-    return Method(partial(makers.uncorrected, fit=fit), EPISODES, sizes, **about)
+def _uncorrected(fit: str, sizes: tuple[int, ...] = SIZES, **about) -> Entry:
+    return Entry(partial(makers.uncorrected, fit=fit), EPISODES, sizes, **about)
 
 
-def _tuned(fit: Method) -> Method:
+def _tuned(fit: Entry) -> Entry:
     make = partial(makers.tuned_fit, imitation=fit.make)
     sizes = FOUND if fit.sizes == FOUND else TUNED_SIZES
     return replace(fit, make=make, reads=EPISODES + TUNING, sizes=sizes, table="tuned")
 
 
-def _robot(make: Callable[..., Policy], reads: tuple[str, ...], sizes: tuple[int, ...] = FOUND, **about) -> Method:
-    return Method(make, reads, sizes, "robots", preset="walking", **about)
+def _robot(make: Callable[..., Policy], reads: tuple[str, ...], sizes: tuple[int, ...] = FOUND, **about) -> Entry:
+    return Entry(make, reads, sizes, "robots", preset="walking", **about)
 
 
-def _further(imitation: Method) -> Method:
+def _further(imitation: Entry) -> Entry:
     make = partial(makers.trained_further, imitation=imitation.make)
     return replace(imitation, make=make, reads=imitation.reads + OF_TRAINING)
 
 
-def _without(**settings) -> Method:
+def _without(**settings) -> Entry:
     """Tune our cells at the size of the preset, with one part removed or changed."""
-    return Method(makers.our_cells, ALL, OF_PRESET, settings=settings, tasks=TASKS)
+    return Entry(makers.our_cells, ALL, OF_PRESET, settings=settings, tasks=TASKS)
 
 
 METHODS = {
-    "our cells, tuned": Method(makers.our_cells, ALL),
-    "our cells": Method(makers.our_cells, ALL, settings={"n_generations": 0}),
-    "our cells, no teacher": Method(makers.no_teacher, ALL, (3, 4)),  # sizes of presets
+    "our cells, tuned": Entry(makers.our_cells, ALL),
+    "our cells": Entry(makers.our_cells, ALL, settings={"n_generations": 0}),
+    "our cells, no teacher": Entry(makers.no_teacher, ALL, (3, 4)),  # sizes of presets
     "k-means cells, DAgger": _corrected("k-means"),
     "CART": _uncorrected("tree"),
     "CART, DAgger": _corrected("tree", by_chance=False),
     "CART, linear leaves, DAgger": _corrected("linear tree", by_chance=False),
     "oblique tree, linear leaves, DAgger": _corrected("oblique tree", version=2),
-    "teacher": Method(makers.the_teacher, sizes=FOUND, chance=False),
+    "teacher": Entry(makers.the_teacher, sizes=FOUND, chance=False),
     "one linear map": _uncorrected("one map", FOUND),
     "our cells, no annealing": _without(initial_temperature=0.04),
     "our cells, one restart": _without(n_restarts=1),
@@ -110,7 +116,7 @@ METHODS = {
     "our cells, no failure penalty": _without(failure_penalty=0.0),
     "our cells, weighted by criticality": _without(criticality=True),
     # The highest likeness to the teacher; and the highest return of policies whose R² is at least a given value
-    "faithful": (_faithful := Method(
+    "faithful": (_faithful := Entry(
         makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"
     )),
     **{f"faithful, R² {r2:g}": replace(_faithful, sizes=(2, 4, 8), table="demanded", settings={"min_r2": r2})
@@ -121,7 +127,7 @@ METHODS = {
     "oblique tree, our fit": _uncorrected("global tree", (2, 4, 8), table="apart"),
     "oblique tree, greedy fit": _uncorrected("oblique tree", (2, 4, 8), table="apart", version=2),
     # The highest return, from the best policy where it is known; and searches with another start or another length
-    "at the limit": (_limit := Method(
+    "at the limit": (_limit := Entry(
         makers.limited, ALL, (1, 2, 3, 4, 8, 12), "limit", version=limit.VERSION, preset="limit"
     )),
     "at the limit, from the teacher": replace(
@@ -200,14 +206,24 @@ TABLES = {
 }  # fmt: skip
 
 
-def methods_of(task: str, table: str) -> dict[str, Method]:
+def methods_of(task: str, table: str) -> dict[str, Entry]:
     """Return the methods that have rows of `task` in `table`, by name."""
     names = TABLES[task][table].methods or [name for name, method in METHODS.items() if method.table == table]
     return {name: METHODS[name] for name in names if task in (METHODS[name].tasks or TABLES)}
 
 
-def sizes_of(task: str, method: Method, table: Table) -> tuple[int, ...]:
+def sizes_of(task: str, method: Entry, table: Table) -> tuple[int, ...]:
     """Return the sizes at which `table` has a method."""
     if OF_PRESET[0] in method.sizes + table.sizes and method.sizes != FOUND:
         return (PRESETS[method.preset](task).n_cells,)
     return tuple(size for size in method.sizes if size in (table.sizes or method.sizes))
+
+
+def method(name: str, size: int) -> Method:
+    """Return a method of the table at a size, for `vsp.compare`."""
+    entry = METHODS[name]
+
+    def make(agent: Policy, task: Task, data: None, seed: int) -> Policy:
+        return entry.make(makers.Budget(agent, task, PRESETS[entry.preset](task)), size, seed, **entry.settings)
+
+    return Method(make, name=name, version=entry.version, settings=lambda task: {"size": size, **entry.read(task.name)})

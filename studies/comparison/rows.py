@@ -20,8 +20,7 @@ from vsp_beyond.few_cells.units import METRIC
 
 from ..committed import keys, read_results
 from . import measure
-from .makers import Budget
-from .methods import ALIKE, FOUND, LONG, METHODS, PRESETS, TABLES, Method, methods_of, sizes_of
+from .methods import ALIKE, FOUND, LONG, METHODS, PRESETS, TABLES, Entry, method, methods_of, sizes_of
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Row(Job):
     kind = "Row"
 
     @property
-    def how(self) -> Method:
+    def how(self) -> Entry:
         """The method."""
         return METHODS[self.method]
 
@@ -56,9 +55,9 @@ class Row(Job):
     @property
     def provenance(self) -> dict[str, str | int]:
         """What identifies the row besides its seed: settings (an id), teacher, version."""
-        how, config = self.how, PRESETS[self.how.preset](self.task)
+        how = self.how
         about: dict = {"task": self.task, "method": self.method, "size": self.size}
-        about["settings"] = {name: getattr(config, name) for name in how.reads} | how.settings
+        about["settings"] = how.read(self.task)
         about["measure"] = measure.settings(**self.measured)
         about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
@@ -75,13 +74,12 @@ class Row(Job):
 
     def make(self) -> tuple[dict, dict]:
         """Distil and measure a policy; return the arrays (of Voronoi cells only) and about of the row's file."""
-        teacher = _teacher(self.task, self.agent)
-        budget = Budget(teacher, get_task(self.task), PRESETS[self.how.preset](self.task))
+        teacher, task = _teacher(self.task, self.agent), get_task(self.task)
         began = time.perf_counter()
-        policy = self.how.make(budget, self.size, self.seed, **self.how.settings)
+        policy = method(self.method, self.size)(teacher, task, None, self.seed)
         seconds = time.perf_counter() - began
-        row = measure.measure(policy, teacher, budget.task, **self.measured)
-        row |= measure.fidelity(policy, teacher, budget.task) if self.how.preset in ALIKE else {}
+        row = measure.measure(policy, teacher, task, **self.measured)
+        row |= measure.fidelity(policy, teacher, task) if self.how.preset in ALIKE else {}
         arrays = {}
         if isinstance(policy, VoronoiPolicy):
             arrays = {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}
@@ -114,7 +112,7 @@ def jobs_of(task: str, table: str = "methods") -> list[Row]:
     ]
 
 
-def _seeds(task: str, table: str, method: Method, size: int) -> range:
+def _seeds(task: str, table: str, method: Entry, size: int) -> range:
     about = TABLES[task][table]
     main = size in (*FOUND, PRESETS[method.preset](task).n_cells)
     seeds = about.seeds if main or about.fewer is None else about.fewer

@@ -13,7 +13,7 @@ from studies.committed import RESULTS, keys, read_results
 from studies.comparison import beside, measure, rows
 from studies.comparison.beside import kept_jobs
 from studies.comparison.makers import Budget
-from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Method, Table
+from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Entry, Table
 from studies.comparison.rows import Row, jobs_of, make_all
 from studies.comparison.summary import read_rows
 from studies.robots import Walking
@@ -164,7 +164,7 @@ def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     files = [results / "methods_SimpleGoal-v0.csv", results / "methods_seconds.csv"]
     before = [file.read_text() for file in files]
     shutil.rmtree(tmp_path / "build")
-    still = Method(lambda budget, size, seed: Constant(0.5, 0.5), sizes=(1, 3))
+    still = Entry(lambda budget, size, seed: Constant(0.5, 0.5), sizes=(1, 3))
     small.setitem(METHODS, "still", still)
     only(small, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "still", "teacher"), sizes=(0, 1, 3)))
     command(small, "--out", tmp_path)

@@ -35,6 +35,8 @@ class Method:
         check_count("n_data", self.n_data, least=0)
         if self.version is None:
             identity(self.make)
+        elif not self.name:
+            raise ValueError(f"version is {self.version} without a name, expected one: other methods have this version")
 
     def __call__(self, agent: Policy, task: Task, data: Episodes | None, seed: int) -> Policy:
         """Make a policy."""
