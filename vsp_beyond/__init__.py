@@ -13,6 +13,7 @@ from collections.abc import Callable
 from vsp import agent as as_agent
 from vsp.evaluation import remark
 from vsp.policy import VoronoiPolicy
+from vsp.protocol import Method
 from vsp.rollouts import Policy
 from vsp.run.progress import shown
 from vsp.tasks import Task, get_task
@@ -20,7 +21,7 @@ from vsp.tasks import Task, get_task
 from .few_cells import Faithful, Tuned, faithful_preset, limit_preset, simplify, tuned_preset
 from .few_cells.config import check_kind
 from .few_cells.duration import expected_time
-from .few_cells.faithful import distill_faithfully
+from .few_cells.faithful import VERSION, distill_faithfully
 from .few_cells.limit import search_limit, whole_search
 from .few_cells.tuned import distill_tuned
 from .proofs import prove
@@ -49,6 +50,15 @@ def faithful(
         played = config.n_episodes + 2 * config.n_validation
         remark(policy, agent, task, played, f"n_cells={2 * config.n_cells}")
     return policy
+
+
+def faithful_method(**options) -> Method:
+    """Return `faithful` as a method of `vsp.compare`; `options` as `faithful_preset` takes them."""
+
+    def make(agent: Policy, task: Task, data: None, seed: int) -> VoronoiPolicy:
+        return distill_faithfully(agent, task, faithful_preset(task, **options), seed=seed)[0]
+
+    return Method(make, name="faithful", version=VERSION, settings=lambda task: vars(faithful_preset(task, **options)))
 
 
 def tuned(

@@ -14,6 +14,7 @@ from vsp import Policy, Task
 from vsp.protocol import Method
 from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import limit
+from vsp_beyond.few_cells.faithful import VERSION
 
 from ..robots import walking_preset
 from . import makers
@@ -117,7 +118,7 @@ METHODS = {
     "our cells, weighted by criticality": _without(criticality=True),
     # The highest likeness to the teacher; and the highest return of policies whose R² is at least a given value
     "faithful": (_faithful := Entry(
-        makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", preset="faithful"
+        makers.faithful, OF_FAITHFUL, (1, 2, 3, 4, 6, 7, 8, 13), "faithful", version=VERSION, preset="faithful"
     )),
     **{f"faithful, R² {r2:g}": replace(_faithful, sizes=(2, 4, 8), table="demanded", settings={"min_r2": r2})
        for r2 in (0.5, 0.7, 0.8, 0.9, 0.95)},

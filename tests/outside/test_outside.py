@@ -65,8 +65,14 @@ def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path, monkey
         assert acted(library, state, 2) == (policy.cells(state), pytest.approx(action, abs=1e-12))
         assert module["act"](state) == pytest.approx(action, abs=1e-12)
     made = vsp_beyond.report(back, agent, SIMPLEGOAL)
+    assert ("\\sin(x)" in back.to_latex()) == (name == "sines")
     drawn = name in ("split", "minkowski")
     assert ("application/json" in made) == drawn and ("no explorer: " in made) == (not drawn)
+
+
+def test_a_page_is_about_cells_and_maps():
+    with pytest.raises(ValueError, match="expected cells and maps"):
+        vsp_beyond.report(PILOT, PILOT, SIMPLEGOAL)
 
 
 def test_a_task_on_arrays_is_registered_and_compared(tmp_path):
@@ -156,6 +162,8 @@ def test_code_without_source_needs_a_version():
     for rule in (lambda *_: [], np.frompyfunc(abs, 1, 1), __import__("functools").partial(next_map.sines)):
         with pytest.raises(ValueError, match="or give it a `version`"):
             identity(rule)
+    with pytest.raises(ValueError, match="version is 1 without a name"):
+        vsp.Method(next_map.sines, version=1)
     rule = types.SimpleNamespace(version=2, settings={"a": 1})
     assert identity(rule)["version"] == 2 and identity(rule)["settings"] == {"a": 1}
     with pytest.raises(ValueError, match="has no identity, expected a name"):

@@ -6,7 +6,7 @@ from support import SIMPLEGOAL, CurvedTeacher, same_arrays, tiny
 from zips import made
 
 import vsp
-from vsp.teachers.agents import agent
+from vsp.teachers.agents import agent, digest_of
 
 STATES = np.random.default_rng(0).random((50, 2)).astype(np.float32)
 
@@ -55,3 +55,13 @@ def test_agents_of_stable_baselines_act_without_dice(algorithm):
     assert same_arrays(returns[:2], returns[1:])
     if algorithm != "TD3":
         assert not np.array_equal(trained.predict(STATES)[0], first)
+
+
+def test_a_model_is_identified_by_its_weights():
+    model = made("PPO", net_arch=[8])
+    before = digest_of(agent(model))
+    assert before == digest_of(agent(model)) != digest_of(agent(made("TD3", net_arch=[8])))
+    model.policy.action_net.bias.data[0] += 1
+    assert digest_of(agent(model)) != before
+    with pytest.raises(ValueError, match='vsp.agent.function, name="mine"'):
+        digest_of(agent(predicting(straight)))

@@ -27,6 +27,7 @@ from .search import even_moves, least_error
 from .tune import cma_es, is_snapshot, score
 from .units import LabelledStates, ScaledCells, Scaling, needed_only, spread, squared_error, unexplained, warn_outside
 
+VERSION = 1  # raise it when the same arguments give another policy
 SNAPSHOTS = 20  # candidates that a tuning yields, evenly spread over its generations
 TUNING_STATES = 8000  # states on which the error of a candidate is measured
 POOL = 20  # times the episodes of a generation: size of the pool of starts, from each of which the teacher plays once
