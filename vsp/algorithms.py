@@ -69,7 +69,7 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
     losses: list[float] = []
     added: list[Change] = []
     for state, action in zip(episode.states, episode.actions):
-        i = partition.locate(state)  # l. 4
+        i = partition.locate(state)  # l. 4 (R2)
         if i != previous:  # l. 5-8
             previous, losses = i, []
         losses.append(partition.loss(i, state, action))  # l. 9

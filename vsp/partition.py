@@ -24,7 +24,7 @@ class Partition:
         self.task, self.config = task, config
         self.codewords = np.zeros((0, d))
         self._graph: np.ndarray | None = None  # of the neighbours, while the codewords stay
-        self.models = SubPolicies(policy_class(config.sub_policy, task), m, initial=config.initial)
+        self.models = SubPolicies(policy_class(config.sub_policy, task), m, initial=config.initial)  # R7
         q = len(self.models.policy_class.terms)
         self.buffers = FITS[config.fit](q, m)
         self.metric = geometry.metric_of(config.metric)

@@ -14,7 +14,7 @@ from vsp import agent as as_agent
 from vsp.evaluation import remark
 from vsp.policy import VoronoiPolicy
 from vsp.protocol import Method
-from vsp.rollouts import Policy
+from vsp.rollouts import Episodes, Policy
 from vsp.run.progress import shown
 from vsp.tasks import Task, get_task
 
@@ -55,7 +55,7 @@ def faithful(
 def faithful_method(**options) -> Method:
     """Return `faithful` as a method of `vsp.compare`; `options` as `faithful_preset` takes them."""
 
-    def make(agent: Policy, task: Task, data: None, seed: int) -> VoronoiPolicy:
+    def make(agent: Policy, task: Task, data: Episodes | None, seed: int) -> VoronoiPolicy:
         return distill_faithfully(agent, task, faithful_preset(task, **options), seed=seed)[0]
 
     return Method(make, name="faithful", version=VERSION, settings=lambda task: vars(faithful_preset(task, **options)))

@@ -25,20 +25,15 @@ def test_criticality_is_the_value_of_the_own_action_over_that_of_the_worst():
     assert np.array_equal(flat.criticality(states), np.zeros(3)) and flat.criticality(states).dtype == np.float64
 
 
-def test_the_value_of_an_action_is_that_of_the_lower_critic():
-    states, actions = np.array([[0.2, 0.4], [0.5, 0.5]]), np.array([[0.5, -1.0], [0.0, 0.25]])
-    both = Critics(teacher_with(qf0=[0, 0, 2, -1], qf1=[1, 0, 0, 0]))  # 2 a - b and x
-    value = both.value(states, actions)
-    assert value == pytest.approx([0.2, -0.25]) and value.dtype == np.float64
+def test_a_teacher_without_critics_is_refused():
     with pytest.raises(ValueError, match="no critics, expected qf0.0.weight"):
         Critics(teacher_with())
     with pytest.raises(ValueError, match="CurvedTeacher has no critics"):
         Critics(CurvedTeacher())
 
 
-def test_values_are_of_actions_in_the_units_of_the_task():
+def test_critics_see_actions_in_units_of_the_action_box():
     task = dataclasses.replace(get_task(MOUNTAINCAR), action_low=np.array([2.0]), action_high=np.array([6.0]))
     actor = {"mu.0.weight": np.zeros((1, 2)), "mu.0.bias": np.zeros(1)}
     critic = {"qf0.0.weight": np.array([[0.0, 0.0, 1.0]]), "qf0.0.bias": np.zeros(1)}
-    value = Critics(Teacher(actor, task, critic=critic)).value(np.zeros((3, 2)), [[2.0], [4.0], [5.0]])
-    assert value.tolist() == [-1, 0, 0.5]
+    assert Critics(Teacher(actor, task, critic=critic)).criticality(np.zeros((1, 2))).tolist() == [1]  # 0 against -1

@@ -39,12 +39,6 @@ class Critics:
         worst = np.min([self._value(states, np.broadcast_to(corner, actions.shape)) for corner in corners], axis=0)
         return np.maximum(self._value(states, actions) - worst, 0.0).astype(np.float64)
 
-    def value(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return the value of `actions` (n, m) in the states (n, d), by the lower of the critics. (n,)"""
-        states = self.teacher.inputs(obs)
-        actions = check_array("actions", actions, (len(states), len(self.teacher.half))).astype(np.float32)
-        return self._value(states, self._scaled(actions)).astype(np.float64)
-
     def _scaled(self, actions: np.ndarray) -> np.ndarray:
         """Return `actions` (n, m) in units of the action box, from -1 to 1, as the critics see them."""
         return (actions - self.teacher.centre) / self.teacher.half
