@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from vsp.checks import check_array
 from vsp.teachers.actors import Actor, layers_of
 from vsp.teachers.teacher import Teacher
 
