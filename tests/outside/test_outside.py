@@ -1,6 +1,7 @@
 """What a researcher adds from outside the packages: each is compared, explained, saved, loaded, exported, shown."""
 
 import dataclasses
+import functools
 import importlib
 import re
 import sys
@@ -106,6 +107,13 @@ def test_a_comparison_makes_what_is_missing_alone(comparison, tmp_path, monkeypa
     key = SIMPLEGOAL, "SVM"
     assert np.array_equal(first.returns[key][0], again.returns[key][0]) and len(again.frame) == 3
     assert "\\toprule" in again.to_latex() and again.plot(SIMPLEGOAL).get_title() == SIMPLEGOAL
+    twins = {name: vsp.Method(make, name="mine", version=1) for name, make in (("a", max), ("b", min))}
+    for methods, why in (
+        (twins, "'b' has the name, version and settings"),
+        ({"agent": METHODS["SVM"]}, "another name"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            vsp.compare(methods, [SIMPLEGOAL], runs=tmp_path)
     with pytest.raises(ValueError, match="one array, expected one by name of the task"):
         vsp.compare({"theirs": np.ones((2, 5))}, TASKS, runs=tmp_path)
 
@@ -139,12 +147,15 @@ import numpy as np
 LEAST = 3
 def helper(x): return x + 1
 class Rule:
+    table = {2: 3}
     def __init__(self, size=1): self.size = size
     def __call__(self, agent, task, data, seed): return helper(LEAST)
 """
 
 
-@pytest.mark.parametrize(("old", "new"), [("return helper", "return -helper"), ("= 3", "= 4"), ("x + 1", "x + 2")])
+@pytest.mark.parametrize(
+    ("old", "new"), [("return helper", "return -helper"), ("= 3", "= 4"), ("x + 1", "x + 2"), ("{2: 3}", "{2: 4}")]
+)
 def test_an_edited_body_helper_or_constant_is_another_rule(old, new, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
@@ -158,8 +169,24 @@ def test_an_edited_body_helper_or_constant_is_another_rule(old, new, tmp_path, m
     assert identity(sys.modules["edited_rule"].Rule(2)) != found[2]
 
 
+def made(k):
+    def rule(x):
+        return x + k
+
+    return rule
+
+
+def test_a_version_stands_for_the_source_alone():
+    """Not for closures, arguments and attributes, and not for another lambda."""
+    functions = [made(1), made(2), functools.partial(made, 1), functools.partial(made, 2), lambda x: x, lambda x: -x]
+    for function in functions:
+        function.version = 1
+    assert len({str(identity(one)) for one in functions}) == 6 and identity(np.sin) != identity(np.cos)
+    assert "source" in identity(functools.cache(made))["settings"]["of"]
+
+
 def test_code_without_source_needs_a_version():
-    for rule in (lambda *_: [], np.frompyfunc(abs, 1, 1), __import__("functools").partial(next_map.sines)):
+    for rule in (lambda *_: [], np.frompyfunc(abs, 1, 1), functools.partial(next_map.sines)):
         with pytest.raises(ValueError, match="or give it a `version`"):
             identity(rule)
     with pytest.raises(ValueError, match="version is 1 without a name"):

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sized
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -71,16 +72,26 @@ class Trial(Job):
     """One policy of one method, and its evaluation."""
 
     method: Method
-    where: str | Task  # a name that begins with a module, so that a worker imports it, or the task
+    where: str | Task  # the task; a name may begin with a module, which a worker then imports
     agent: Policy
     seed: int
-    n_episodes: int
+    most: int  # episodes; a slow engine plays fewer
     kind = "Trial"
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.where, str) or ":" not in self.where:  # else a worker may not know the name
+            object.__setattr__(self, "where", get_task(self.where))
 
     @property
     def task(self) -> str:
         """The name of the task."""
         return get_task(self.where).name
+
+    @property
+    def n_episodes(self) -> int:
+        """The number of episodes."""
+        slowness = get_task(self.where).slowness
+        return self.most if slowness == 1 else max(10, self.most // slowness)
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
@@ -123,17 +134,19 @@ def compare(
     method or an agent that cannot be identified, and for returns that do not fit.
     """
     asked, seeds = {get_task(task).name: task for task in tasks}, list(seeds)
-    for seed in seeds:
-        check_seed(seed)
     made = {name: one if isinstance(one, Method) else Method(one) for name, one in methods.items() if callable(one)}
+    if AGENT in methods or not seeds:
+        raise ValueError(
+            f"methods are {[*methods]} with seeds {seeds}, expected seeds, and another name than {AGENT!r}"
+        )
     trials = {}
     for task, where in asked.items() if made else ():
         teacher = agent((agents or {}).get(task) or load_teacher(task), where)
         for name, method in {AGENT: _ITSELF, **made}.items():
             trials[task, name] = [
-                Trial(method, where if ":" in str(where) else get_task(where), teacher, seed, _fewer(where, n_episodes))
-                for seed in (seeds if method is not _ITSELF else [0])
+                Trial(method, where, teacher, seed, n_episodes) for seed in (seeds if name != AGENT else [0])
             ]
+        _check_apart({name: trials[task, name][0] for name in made})
     make_all((trial for group in trials.values() for trial in group), runs, "comparing", jobs=jobs, unit="trials")
     rows, returns = [], {}
     for task in asked:
@@ -146,6 +159,15 @@ def compare(
                 returns[task, name] = values
                 rows.append(_row(task, name, values))
     return Comparison(pd.DataFrame(rows), returns)
+
+
+def _check_apart(trials: dict[str, Trial]) -> None:
+    """Raise ValueError if different methods have the same identity, so that one would load the other's trials."""
+    known: dict[Path, Trial] = {}
+    for name, trial in trials.items():
+        check_seed(trial.seed)
+        if known.setdefault(trial.path(""), trial).method != trial.method:
+            raise ValueError(f"{name!r} has the name, version and settings of another method, expected its own")
 
 
 def _returns(name: str, given: Any, task: str, tasks: Collection[str]) -> np.ndarray:
@@ -172,10 +194,6 @@ def _measured(loaded: list[tuple[dict, dict]]) -> dict[str, float]:
     }
 
 
-def _fewer(task: str | Task, n: int) -> int:
-    return max(10, n // get_task(task).slowness) if get_task(task).slowness > 1 else n
-
-
 def _task_identity(task: Task) -> Any:
     """Return the name of a task of vsp; for others also what they do, or the class of their environment."""
     if is_own(task):
@@ -183,5 +201,6 @@ def _task_identity(task: Task) -> Any:
     if task.one_by_one:
         spec = gymnasium.spec(task.name)
         maker = load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
-        return [task.name, identity(maker), identity(spec.kwargs), task.max_steps]
+        outcome = getattr(task.step, "args", None)  # what `vsp.register` was given
+        return [task.name, identity(maker), identity(spec.kwargs), identity(outcome), task.max_steps]
     return identity(task)
