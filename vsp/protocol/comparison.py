@@ -29,6 +29,7 @@ from .method import Method
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+COLUMNS = ["task", "method", "policies", "mean", "low", "high", "failing", "cells", "r2", "seconds"]
 AGENT, _ITSELF = "agent", Method(lambda agent, *_: agent, name="the agent itself", version=1)
 Make = Callable[[Policy, Task, Episodes | None, int], Policy]
 Returns = np.ndarray | Mapping[str, np.ndarray]  # (runs, episodes), or by name of the task
@@ -40,8 +41,8 @@ class Comparison:
     """How methods do: a frame with a row per task and method, and the returns (runs, episodes) behind each row.
 
     Columns: task, method, policies (how many), mean (return), low and high (its 95 % interval over policies *and* start
-    states), failing (share of the episodes that miss the goal; NaN where no policy reaches one, and for returns from
-    elsewhere), cells (mean), r2 (median R² of the actions on the agent's own states) and seconds (median).
+    states), failing (share of the episodes that miss the goal; NaN for a task where nobody reaches one, and for returns
+    from elsewhere), cells (mean), r2 (median R² of the actions on the agent's own states) and seconds (median).
     """
 
     frame: pd.DataFrame
@@ -115,7 +116,8 @@ class Trial(Job):
         if key not in _PLAYED:
             _PLAYED[key] = record(agent, task, starts)
         outcomes, seen = rollout(policy, task, starts), _PLAYED[key][1]
-        r2 = r_squared(np.asarray(policy.predict(seen.states)[0]) / task.action_high, seen.actions / task.action_high)
+        half = (task.action_high - task.action_low) / 2
+        r2 = r_squared(np.asarray(policy.predict(seen.states)[0]) / half, seen.actions / half)
         cells = len(policy) if isinstance(policy, Sized) else None
         return asdict(outcomes), {"seconds": seconds, "cells": cells, "r2": r2}
 
@@ -130,7 +132,8 @@ def compare(
     A method is a `Method`, or the function `make` of one that needs no data. Beside them may stand returns that were
     made elsewhere, (runs, episodes), where each run has the same starts; for several tasks, a dictionary by name.
     `agents`: by name of the task, as `vsp.agent` takes them; None: those shipped. Each trial is a file below `runs` and
-    is made once; `jobs` as in `run.workers`. A task whose engine is slow plays fewer episodes. Raises ValueError for a
+    is made once; `jobs` as in `run.workers`. Episodes start from `start_states(task, n_episodes, 1)`, which no method
+    may train on; a task whose engine is slow plays fewer. Raises ValueError for a
     method or an agent that cannot be identified, and for returns that do not fit.
     """
     asked, seeds = {get_task(task).name: task for task in tasks}, list(seeds)
@@ -158,7 +161,9 @@ def compare(
             elif not callable(given := methods.get(name)) and (values := _returns(name, given, task, asked)).size:
                 returns[task, name] = values
                 rows.append(_row(task, name, values))
-    return Comparison(pd.DataFrame(rows), returns)
+    frame = pd.DataFrame(rows).reindex(columns=COLUMNS)
+    reached = frame.groupby("task")["failing"].transform("min") < 1
+    return Comparison(frame.assign(failing=frame["failing"].where(reached)), returns)
 
 
 def _check_apart(trials: dict[str, Trial]) -> None:
@@ -187,11 +192,7 @@ def _measured(loaded: list[tuple[dict, dict]]) -> dict[str, float]:
     """Return what trials show beside their returns."""
     missed = np.mean([arrays["outcomes"] != GOAL for arrays, _ in loaded])
     told = pd.DataFrame([about for _, about in loaded])[["cells", "r2", "seconds"]].astype(float)
-    return {
-        "failing": np.nan if missed == 1 else missed,
-        "cells": told["cells"].mean(),
-        **told[["r2", "seconds"]].median(),
-    }
+    return {"failing": missed, **told.median(), "cells": told["cells"].mean()}
 
 
 def _task_identity(task: Task) -> Any:
