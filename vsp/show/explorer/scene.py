@@ -7,6 +7,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from ...geometry import METRICS
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
@@ -70,9 +71,10 @@ def starts_of(task: Task) -> np.ndarray:
 
 
 def _numbers(policy: VoronoiPolicy, name: str) -> dict:
-    order = policy.where.metric.order
-    about = {"name": name, "metric": policy.metric, "order": None if order == np.inf else order}
-    about["scale"] = policy.scale.tolist()
+    metric = policy.where.metric
+    about = {"name": name, "metric": metric.name, "scale": policy.scale.tolist()}
+    if METRICS.get(metric.name) != metric:  # the script knows these by name; JSON knows no infinity
+        about["order"] = None if metric.order == np.inf else metric.order
     return about | {"codewords": policy.codewords.tolist(), "coefficients": policy.coefficients.tolist()}
 
 
