@@ -22,6 +22,9 @@ def test_a_tree_by_hand():
     for cell, (state, other, far) in near.items():
         assert HAND.border(np.array(state), cell) == (other, pytest.approx(far))
     assert HAND.border(np.array([0.5, 0.1]), 0) == (1, 0)  # on the hyperplane
+    module: dict = {}
+    exec("\n".join(HAND.python()), module)
+    assert [module["locate"](state) for state in states.tolist()] == [1, 0, 2, 1]
 
 
 def test_one_cell_has_no_border():

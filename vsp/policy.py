@@ -9,20 +9,19 @@ import copy
 import hashlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from . import geometry
 from .cells import CELLS, MOST, Cells, Nearest
 from .checks import check_array, check_observations
 from .export import Exportable
-from .geometry import METRICS, Metric
+from .geometry import LOOKUP, METRICS, Metric
 from .run import sealed
 from .run.atomic import DamagedFile
-from .subpolicies import POLICY_CLASSES, PolicyClass, policy_class
+from .subpolicies import POLICY_CLASSES, SubPolicy, policy_class
 from .tasks.base import Task
 from .tasks.registry import BOX, get_task, saved_task
 
@@ -75,14 +74,7 @@ class PiecewisePolicy(Exportable):
 
     kind = "PiecewisePolicy"  # in files
 
-    def __init__(
-        self,
-        where: Cells,
-        coefficients: np.ndarray,
-        *,
-        task: str | Task,
-        sub_policy: str | Callable[[Task], PolicyClass] = "linear",
-    ):
+    def __init__(self, where: Cells, coefficients: np.ndarray, *, task: str | Task, sub_policy: SubPolicy = "linear"):
         self.task, self.where = get_task(task), where
         self.policy_class = policy_class(sub_policy, self.task)
         d, p, m = len(self.task.low), len(self.policy_class.rows), len(self.task.action_low)
@@ -94,9 +86,7 @@ class PiecewisePolicy(Exportable):
         d, m = len(self.task.inputs), len(self.task.outputs)
         return f"<{self.kind} of {self.task.name}: {len(self)} cells, {d} inputs, {m} actions; to_text() shows it>"
 
-    def with_maps(
-        self, coefficients: np.ndarray, *, sub_policy: str | Callable[[Task], PolicyClass] = "linear"
-    ) -> Self:
+    def with_maps(self, coefficients: np.ndarray, *, sub_policy: SubPolicy = "linear") -> Self:
         """Return a policy with the same cells and other maps. Raises ValueError as the constructor does."""
         other = copy.copy(self)
         PiecewisePolicy.__init__(other, self.where, coefficients, task=self.task, sub_policy=sub_policy)
@@ -255,15 +245,9 @@ class VoronoiPolicy(PiecewisePolicy):
     where: Nearest
 
     def __init__(
-        self,
-        codewords: np.ndarray,
-        coefficients: np.ndarray,
-        *,
-        task: str | Task,
-        metric: str | Metric = geometry.LOOKUP,
-        scale: np.ndarray | None = None,
-        sub_policy: str | Callable[[Task], PolicyClass] = "linear",
-    ):
+        self, codewords: np.ndarray, coefficients: np.ndarray, *, task: str | Task, metric: str | Metric = LOOKUP,
+        scale: np.ndarray | None = None, sub_policy: SubPolicy = "linear",
+    ):  # fmt: skip
         task = get_task(task)
         codewords = check_array("codewords", codewords, (-1, len(task.low)))
         super().__init__(Nearest(codewords, metric, scale), coefficients, task=task, sub_policy=sub_policy)

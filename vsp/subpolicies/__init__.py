@@ -4,5 +4,5 @@ To add a class, write a function that takes a task and returns a `PolicyClass`, 
 """
 
 from .base import PolicyClass, linear_outputs
-from .linear import POLICY_CLASSES, policy_class
+from .linear import POLICY_CLASSES, SubPolicy, policy_class
 from .stacked import SubPolicies

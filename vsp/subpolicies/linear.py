@@ -37,10 +37,11 @@ def quadratic(task: Task) -> PolicyClass:
     return PolicyClass("quadratic", (*task.inputs, *terms), (*state_code(task), *code), features(reach(task)), features)
 
 
+SubPolicy = str | Callable[[Task], PolicyClass]  # a class by its name, or what makes it for a task
 POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic}
 
 
-def policy_class(sub_policy: str | Callable[[Task], PolicyClass], task: Task) -> PolicyClass:
+def policy_class(sub_policy: SubPolicy, task: Task) -> PolicyClass:
     """Return the class of sub-policies for `task`: by its name, or by a function of the task.
 
     Raises ValueError for an unknown name, and for a function that returns something else.

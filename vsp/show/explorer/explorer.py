@@ -114,9 +114,7 @@ class Explorer:
 
 
 def explore(
-    policies: PiecewisePolicy | dict[str, VoronoiPolicy],
-    *,
-    teacher: Policy | None = None,
+    policies: PiecewisePolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None,
     history: History | None = None,
 ) -> Explorer:  # fmt: skip
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
