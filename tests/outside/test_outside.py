@@ -14,7 +14,7 @@ import next_split
 import next_task
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, TASKS, acted, compiled, tiny
+from support import SIMPLEGOAL, TASKS, Constant, acted, compiled, tiny
 
 import vsp
 import vsp_beyond
@@ -116,6 +116,23 @@ def test_a_comparison_makes_what_is_missing_alone(comparison, tmp_path, monkeypa
             vsp.compare(methods, [SIMPLEGOAL], runs=tmp_path)
     with pytest.raises(ValueError, match="one array, expected one by name of the task"):
         vsp.compare({"theirs": np.ones((2, 5))}, TASKS, runs=tmp_path)
+
+
+def test_data_are_the_agents_episodes_from_starts_of_the_seed(tmp_path):
+    method = vsp.Method(shown, n_data=7)
+    agent, task = vsp.load_teacher(SIMPLEGOAL), vsp.get_task(SIMPLEGOAL)
+    compared = vsp.compare({"shown": method}, [SIMPLEGOAL], seeds=[0, 1], n_episodes=3, runs=tmp_path)
+    first, second = compared.returns[SIMPLEGOAL, "shown"][:, 0]
+    starts = task.start(np.random.default_rng(np.random.SeedSequence([1, 1])), 7)
+    data = vsp.collect_episodes(agent, task, starts)
+    again = vsp.rollout_from_seed(shown(agent, task, data, 1), task, 3, seed=1).returns[0]
+    assert first != second == again and len(data.states) == len(data.actions) == sum(len(e.states) for e in data)
+
+
+def shown(agent, task, data, seed):
+    """Always the mean action of the seven episodes."""
+    assert len(data) == 7 and np.allclose(agent.predict(data[3].states)[0], data[3].actions, atol=1e-5)
+    return Constant(*data.actions.mean(axis=0))
 
 
 def test_who_always_fails_is_told_so(tmp_path):
