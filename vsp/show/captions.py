@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..checks import check_choice
 from ..run import ROOT
 
 BOOK, HEADINGS = ROOT / "notebooks" / "captions.toml", ROOT / "notebooks" / "headings.toml"
@@ -59,7 +58,6 @@ def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None
 
     `text` and `alt` override the entry in notebooks/captions.toml. Raises ValueError for a figure without any `alt`.
     """
-    check_choice("kind", kind, KINDS)
     known = _book().get((kind, name), Caption("", ""))
     caption = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
     if kind == "figures" and not caption.alt:

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from ..checks import check_array, check_finite
 from ..evaluation import fences
 from .style import DISTILLED, OTHER, TEACHER
 
@@ -24,7 +23,7 @@ def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False
 
     `outliers`: draw them too, as a strip of dots.
     """
-    returns = {name: check_finite(f"returns of {name}", values).ravel() for name, values in returns.items()}
+    returns = {name: values.ravel() for name, values in returns.items()}
     names = [f"{name}\n(n = {values.size:,})" for name, values in returns.items()]
     look = {"widths": 0.5, "patch_artist": True, "medianprops": {"color": "black"}, "showfliers": False}
     boxes = ax.boxplot([*returns.values()], tick_labels=names, **look)["boxes"]
@@ -40,7 +39,6 @@ def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False
 
 def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> Axes:
     """Plot one quantity over the iterations of a distillation."""
-    values = check_array("values", values, (-1,))
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
     if not log:
@@ -65,7 +63,6 @@ def phase(ax: Axes, begin: int, name: str) -> Axes:
 
 def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
     """Plot the mean return of each run, sorted, against the teacher's."""
-    means = check_array("means", means, (-1,))
     ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
     ax.axhline(teacher, color=TEACHER, label="teacher")
     ax.set(xlabel="run, by mean return", ylabel="mean return")
@@ -76,7 +73,6 @@ def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
 def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None) -> Axes:
     """Draw a histogram of the teacher's returns (n,). `bound` (n,), an outline: the most from the same starts."""
     drawn = {"teacher": returns} | ({} if bound is None else {"at most": bound})
-    drawn = {name: check_array("returns", values, (-1,)) for name, values in drawn.items()}
     bins = np.histogram_bin_edges(np.concatenate([*drawn.values()]), bins=30)
     for (name, values), look in zip(drawn.items(), ({"color": TEACHER}, {"histtype": "step", "color": "black"})):
         ax.hist(values, bins=bins, label=f"{name}, mean {values.mean():.2f}", **look)
