@@ -22,7 +22,7 @@ _PASTEL = (  # seaborn's palette of this name
 def cells(
     ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6,
     color: str = BORDER,
-) -> Axes:  # fmt: skip
+) -> None:  # fmt: skip
     """Draw the borders of Voronoi cells, `width` points wide.
 
     `index`: the cell of each grid point; `fill` colours the cells.
@@ -35,12 +35,11 @@ def cells(
         inside = (index == i).astype(float)
         if inside.min() < 1:
             ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
-    return ax
 
 
 def codewords(
     ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False, size: float = 14
-) -> Axes:
+) -> None:
     """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes."""
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
     ax.scatter(*points.T, s=size, label=label, **look)
@@ -49,7 +48,6 @@ def codewords(
         place = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
         offset = (3 if right else -3, 2 if up else -2)
         ax.annotate(str(i), point, xytext=offset, textcoords="offset points", fontsize=7, zorder=6, **place)
-    return ax
 
 
 def square(ax: Axes) -> Axes:
@@ -62,12 +60,11 @@ def square(ax: Axes) -> Axes:
     return ax
 
 
-def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
+def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> None:
     """Draw an arrow per action (n, 2) at its state (n, 2) on a grid; a full diagonal action spans one grid step."""
     step = np.diff(np.unique(states[:, 0]))[0]
     scale = {"angles": "xy", "scale_units": "xy", "scale": 1.4 / step}
     ax.quiver(*states.T, *actions.T, color=color, width=0.006, zorder=3, **scale)
-    return ax
 
 
 def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, **look) -> AxesImage:
@@ -91,25 +88,22 @@ def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
 
 def error_map(
     ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str, beside: np.ndarray | None = None
-) -> AxesImage:
+) -> None:
     """Draw a non-negative quantity over a two-dimensional state, darker where larger, with a colour bar.
 
-    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size. Returns the
-    image.
+    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size.
     """
     drawn = image(ax, x, y, error.reshape(x.shape), cmap="Reds", vmin=0)
     ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
-    return drawn
 
 
-def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
+def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> None:
     """Draw the states of one episode as a line, from a ring (labelled "start") to the state after the last action."""
     last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
     way = np.concatenate([episode.states, last])
     ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
     named = any(line.get_label() == "start" for line in ax.lines)
     ax.plot(*way[0], ls="", color=color, marker="o", mfc="white", ms=5, zorder=5, label=None if named else "start")
-    return ax
 
 
 def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
