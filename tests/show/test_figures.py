@@ -218,10 +218,10 @@ ROWS = pd.DataFrame(
 
 
 def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
-    intervals(ax, ROWS, label="runs")
+    intervals(ax, ROWS)
     lines, dots = ax.collections
     assert [s.tolist() for s in lines.get_segments()] == [[[1, 0], [4, 0]], [[4.5, 1], [6, 1]], [[3, 2], [3, 2]]]
-    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]] and dots.get_label() == "runs"
+    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
     assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
     assert ax.get_ylim() == (2.5, -0.5)
     assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [style.DISTILLED]

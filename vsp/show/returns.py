@@ -75,11 +75,11 @@ def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None)
     ax.legend(frameon=False, loc="upper left")
 
 
-def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED, label: str | None = None) -> Axes:
+def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED) -> Axes:
     """Draw a dot on its interval for each row of `frame` (index: names; columns here, low, high), the first on top."""
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color=color, lw=1.2)
-    ax.scatter(frame["here"], rows, color=color, s=10, zorder=3, label=label)
+    ax.scatter(frame["here"], rows, color=color, s=10, zorder=3)
     ax.set_yticks(rows, frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
     ax.grid(axis="x", color="0.9", lw=0.5)
