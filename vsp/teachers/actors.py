@@ -40,29 +40,12 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {  # torch's, with 
 
 @dataclass(frozen=True)
 class Actor:
-    """A network: layers of weights (inputs, outputs) and biases (outputs,) in float32, with `activation` between them.
+    """A network: layers of weights (inputs, outputs) and biases (outputs,), with `activation` between them."""
 
-    Raises ValueError for layers that do not fit each other.
-    """
-
-    layers: list[tuple[np.ndarray, np.ndarray]]
+    layers: list[tuple[np.ndarray, np.ndarray]]  # of `layers_of`
     activation: str = "ReLU"
     squashed: bool = True  # the output passes through tanh to the action box; else it is limited to the box
     clip_mean: float = np.inf  # limits the output before tanh, as state-dependent exploration does
-
-    def __post_init__(self) -> None:
-        shapes, outputs = [weight.shape for weight, _ in self.layers], [bias.shape for _, bias in self.layers]
-        if (
-            not shapes
-            or [shape[1:] for shape in shapes] != outputs
-            or [shape[:1] for shape in shapes[1:]] != outputs[:-1]
-        ):
-            raise ValueError(
-                f"the layers are {shapes} (inputs, outputs) with biases {outputs}, expected one or more, a bias for "
-                "each output, and as many inputs as the layer before has outputs"
-            )
-        layers = [(w.astype(np.float32, order="C"), b.astype(np.float32)) for w, b in self.layers]  # fixes the sums
-        object.__setattr__(self, "layers", layers)
 
     def forward(self, inputs: np.ndarray) -> np.ndarray:
         """Return the outputs (n, m) at the inputs (n, d) in float32; in [-1, 1] if squashed."""
@@ -70,9 +53,7 @@ class Actor:
         for weight, bias in self.layers[:-1]:
             hidden = act(hidden @ weight + bias)
         weight, bias = self.layers[-1]
-        outputs = hidden @ weight + bias
-        if np.isfinite(self.clip_mean):
-            outputs = np.clip(outputs, -self.clip_mean, self.clip_mean)
+        outputs = np.clip(hidden @ weight + bias, -self.clip_mean, self.clip_mean)
         return np.tanh(outputs) if self.squashed else outputs
 
 
@@ -202,10 +183,10 @@ def part_of(tensors: dict, part: str) -> dict:
 def layers_of(
     tensors: dict[str, np.ndarray], *networks: str, epsilon: float = 0.001, biased: bool = True
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the layers of these networks one after the other; batch normalisation is merged into the next layer.
+    """Return the layers of these networks in float32, one after the other; batch normalisation is merged into the next.
 
-    A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for numbers
-    that are not finite or beyond `MOST_WEIGHT`.
+    A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for layers
+    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
     layers, shift, scale = [], np.zeros(1), np.ones(1)
     for module, parts in (found for network in networks for found in _modules(tensors, network)):
@@ -216,17 +197,18 @@ def layers_of(
                 scale = parts["scale"] / np.sqrt(parts["ra_var"] + epsilon)
             shift = parts["bias"] - parts["ra_mean"] * scale
             continue
-        if {*parts} != {"weight", "bias"} and (biased or {*parts} != {"weight"}) or parts["weight"].ndim != 2:
+        if {*parts} != {"weight", "bias"} and (biased or {*parts} != {"weight"}):
             raise Unknown(f"{module} has the tensors {', '.join(sorted(parts))}, expected a weight and a bias")
-        weight = parts["weight"].T
+        inputs = len(layers[-1][1]) if layers else -1
+        weight = check_array(f"{module}.weight", parts["weight"], (-1, inputs)).T
         bias = check_array(f"{module}.bias", parts.get("bias", np.zeros(weight.shape[1])), weight.shape[1:])
-        bias = bias + np.broadcast_to(shift, len(weight)) @ weight
-        layers.append((scale[:, None] * weight, bias))
-        for part in layers[-1]:
+        weight, bias = scale[:, None] * weight, bias + np.broadcast_to(shift, len(weight)) @ weight
+        for part in (weight, bias):
             check_array(module, part, part.shape, most=MOST_WEIGHT)
+        layers.append((weight.astype(np.float32, order="C"), bias.astype(np.float32)))  # the order fixes the sums
         shift, scale = np.zeros(1), np.ones(1)
-    if scale.shape != (1,):
-        raise Unknown(f"{module} normalises the output, expected a layer after it")
+    if not layers or scale.shape != (1,):
+        raise Unknown("there is no layer, or normalisation is the last: expected a layer at the end")
     return layers
 
 
