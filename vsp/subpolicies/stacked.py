@@ -65,7 +65,8 @@ class SubPolicies:
         error = outputs - actions
         gradient = (2.0 / error[0].size) * pull_back(error)
         counts = steps[:, None, None]
-        mean, square, spread = adam(gradient, *self._moments[:, chosen], counts)
+        mean, square = self._moments[:, chosen]
+        mean, square, spread = adam(gradient, mean, square, counts)
         rate = learning_rate / (1 - BETA1**counts)
         self.coefficients[chosen] = theta - rate * mean / spread / self._units
         self._moments[:, chosen], self._steps[chosen] = (mean, square), steps

@@ -188,7 +188,8 @@ def layers_of(
     A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for layers
     that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
-    layers, shift, scale = [], np.zeros(1), np.ones(1)
+    layers: list[tuple[np.ndarray, np.ndarray]] = []
+    shift, scale = np.zeros(1), np.ones(1)
     for module, parts in (found for network in networks for found in _modules(tensors, network)):
         if {*parts} == {"ra_mean", "ra_var", "scale", "bias", "steps"}:
             for part in ("ra_mean", "ra_var", "bias"):
