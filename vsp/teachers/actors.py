@@ -64,13 +64,12 @@ class Kind(NamedTuple):
     activation: str
     squashed: bool
     others: str  # pattern of the tensors that do not act
-    on_policy: bool = False
 
 
 _SAC = Kind(("actor.latent_pi", "actor.mu"), "ReLU", True, r"critic\.|actor\.log_std\b|actor\.sde_features_extractor\.")
 _PPO = Kind(("mlp_extractor.shared_net", "mlp_extractor.policy_net", "action_net"), "Tanh", False,
-            r"mlp_extractor\.value_net\.|value_net\.|log_std\b|sde_features_extractor\.", True)  # fmt: skip
-_ARS = Kind(("action_net",), "ReLU", True, r"$^", True)
+            r"mlp_extractor\.value_net\.|value_net\.|log_std\b|sde_features_extractor\.")  # fmt: skip
+_ARS = Kind(("action_net",), "ReLU", True, r"$^")
 POLICIES = {
     "stable_baselines3.td3.policies.TD3Policy": Kind(("actor.mu",), "ReLU", True, r"critic\."),  # also DDPG's
     "stable_baselines3.sac.policies.SACPolicy": _SAC,
@@ -89,18 +88,13 @@ _HARMLESS = set(
 _FLATTEN = "stable_baselines3.common.torch_layers.FlattenExtractor"  # does nothing to an observation of one dimension
 
 
-def kind_of(saved: Saved) -> Kind:
-    """Return the kind of the agent's policy. Raises Unknown for another class."""
+def actor_of(saved: Saved) -> Actor:
+    """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
     policy = saved.setting("policy_class")
     name = policy.name if isinstance(policy, Thing) and policy.given is None else "one that only its own code can build"
     if name not in POLICIES:
         raise Unknown(f"its policy class is {name:.100}, expected one of {', '.join(sorted(POLICIES))}")
-    return POLICIES[name]
-
-
-def actor_of(saved: Saved) -> Actor:
-    """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
-    kind, settings = kind_of(saved), _policy_settings(saved)
+    kind, settings = POLICIES[name], _policy_settings(saved)
     for name, value in settings.items():
         if name == "features_extractor_class" and isinstance(value, Thing) and value.name == _FLATTEN:
             continue

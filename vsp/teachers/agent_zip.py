@@ -69,9 +69,7 @@ def read_zip(path: Path) -> Saved:
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file, expected a zip that Stable-Baselines3's `save` wrote")
     try:
-        if path.is_file() and path.stat().st_size > LARGEST:
-            raise ValueError(f"it has {path.stat().st_size} bytes, expected at most {LARGEST}")
-        archive = _archive(atomic.read_bytes(path))
+        archive = _archive(atomic.read_bytes(path, LARGEST))
         settings = json.loads(_member(archive, "data", LARGEST_DATA))
         policy = _member(archive, "policy.pth", LARGEST)
         tensors = _tensors(policy) if policy.startswith(b"PK") else _old_tensors(policy)

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..checks import check_array
 from ..run import atomic
-from .actors import kind_of
 from .agent_zip import Saved
 from .inert import LARGEST, Thing, array, described
 
@@ -39,9 +38,7 @@ def read_normalization(path: str | os.PathLike, d: int) -> Normalization | None:
 
     Raises `MissingFile`, `DamagedFile`, and ValueError for statistics that do not fit.
     """
-    if Path(path).is_file() and Path(path).stat().st_size > LARGEST:
-        raise atomic.DamagedFile(f"{path}: it has {Path(path).stat().st_size} bytes, expected at most {LARGEST}")
-    content = atomic.read_bytes(path)
+    content = atomic.read_bytes(path, LARGEST)
     try:
         saved = described(content)
         fields = saved.state if isinstance(saved, Thing) and saved.name == _CLASS else None
@@ -108,7 +105,8 @@ def sign(path: Path, saved: Saved) -> str:
     for settings in (Path(f"{name}.config.yml"), name / "config.yml", path.parent / "config.yml"):
         if settings.is_file() and _says_normalize(settings):
             return f"{settings} says so"
-    if kind_of(saved).on_policy and saved.settings.get("_last_original_obs") is not None:
+    # An agent with a buffer, off policy, keeps them without a normalisation too
+    if "buffer_size" not in saved.settings and saved.settings.get("_last_original_obs") is not None:
         return "it keeps observations from before a normalisation (_last_original_obs)"
     return ""
 
