@@ -89,17 +89,14 @@ class Picture:
         return self.about.alt
 
 
-def save_figure(
-    fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str | None = None,
-    caption: str | None = None,
-) -> Picture:  # fmt: skip
+def save_figure(fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str = "") -> Picture:
     """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show; NAME may be "beyond/x".
 
-    `alt` describes the figure for readers who cannot see it; both files contain it. By default `alt` and
-    `caption` come from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
+    `alt` describes the figure for readers who cannot see it; both files contain it. By default it comes, as the caption
+    does, from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
     numbers, so the same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
     """
-    about = caption_of("figures", name, text=caption, alt=alt)
+    about = caption_of("figures", name, alt=alt)
     if quick:
         fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
     path = file_of("figures", name, out)
