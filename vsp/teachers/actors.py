@@ -152,10 +152,7 @@ def _shown(value: object) -> str:
 
 def _number(settings: dict, name: str, default: float) -> float:
     """Return a number or truth value of the settings. Raises Unknown for anything else."""
-    try:
-        return float(array(settings.get(name, default)))
-    except (ValueError, TypeError, OverflowError) as error:
-        raise Unknown(f"{name} is {_shown(settings[name]):.100}, expected a number") from error
+    return float(array(settings.get(name, default), name))
 
 
 def _activation(settings: dict, kind: Kind) -> str:
@@ -234,10 +231,7 @@ def check_box(saved: Saved, name: str, low: np.ndarray, high: np.ndarray, task: 
     if not isinstance(space, Thing) or not space.name.endswith("spaces.box.Box") or not isinstance(space.state, dict):
         raise Unknown(f"its {name} is {space.name if isinstance(space, Thing) else 'missing'}, expected a Box")
     for limit, ours in (("low", low), ("high", high)):
-        try:
-            theirs = array(space.state.get(limit))
-        except (ValueError, TypeError, OverflowError) as error:
-            raise Unknown(f"{limit} of its {name} is no array of numbers") from error
+        theirs = array(space.state.get(limit), f"{limit} of its {name}")
         free = np.isinf(theirs) & (name == "observation_space")
         if theirs.shape != ours.shape or not (np.isclose(theirs, ours, rtol=1e-5) | free).all():
             text = f"{limit} of its {name} is {theirs.tolist()!s:.200}, {task} has {ours.tolist()}"

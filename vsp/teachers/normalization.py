@@ -44,12 +44,12 @@ def read_normalization(path: str | os.PathLike, d: int) -> Normalization | None:
         fields = saved.state if isinstance(saved, Thing) and saved.name == _CLASS else None
         if not isinstance(fields, dict):
             raise ValueError(f"expected a {_CLASS}")
-        if not array(fields.get("norm_obs", True)):
+        if not array(fields.get("norm_obs", True), "norm_obs"):
             return None
         running = fields["obs_rms"]
         parts = {} if isinstance(running, dict) else running.state
-        moments = {name: array(parts[name]) for name in ("mean", "var") if name in parts}
-        numbers = {name: float(array(fields[name])) for name in ("epsilon", "clip_obs")}
+        moments = {name: array(parts[name], name) for name in ("mean", "var") if name in parts}
+        numbers = {name: float(array(fields[name], name)) for name in ("epsilon", "clip_obs")}
     except Exception as error:  # of any kind: the content is not trusted
         raise atomic.DamagedFile(f"{path}: not the statistics of observations: {error!r:.300}") from error
     return checked(moments, numbers["epsilon"], numbers["clip_obs"], d, str(path))
