@@ -105,13 +105,16 @@ class Laboratory:
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="trial"))
 
     def _put(self, place: int) -> None:
-        """Show a trial: the explorer, and a table of trials in which an arrow marks it."""
-        table = self.to_frame().iloc[self._places(place)].reset_index()
+        """Show a trial beside the newest others: the explorer, and a table in which an arrow marks it."""
+        others = [n for n in reversed(range(len(self.trials))) if n != place][: SHOWN - 1]
+        table = self.to_frame().iloc[sorted([*others, place], reverse=True)].reset_index()
         table["trial"] = [f"→\N{NO-BREAK SPACE}{n}" if n == place + 1 else str(n) for n in table["trial"]]
         table.columns = [name.replace("_", " ") for name in table]  # heads that can wrap
         page = table.to_html(float_format="{:.4g}".format, border=0, index=False)
         self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{page}</div>'
-        self.explorer.scene = to_json(self.scene(place))
+        policies = {f"trial {n + 1}": _as_linear(self.trials[n][1]) for n in (place, *others)}
+        scene = scene_of(policies, self.task) | {"teacher": {"mean": self._teacher_result["mean"]}}
+        self.explorer.scene = to_json(scene)
 
     def words(self, place: int) -> str:
         """Describe the results of a trial and of the teacher."""
@@ -121,17 +124,6 @@ class Laboratory:
             f"{result['failures'] or 'none'} of {N_STARTS} starts fail to reach the goal. The teacher: mean return "
             f"{teacher['mean']:.2f}, {teacher['failures'] or 'no'} failures."
         )
-
-    def _places(self, place: int) -> list[int]:
-        """Return the indices of the newest trials and of the one at `place`, the newest first."""
-        newest = [n for n in reversed(range(len(self.trials))) if n != place][: SHOWN - 1]
-        return sorted([*newest, place], reverse=True)
-
-    def scene(self, place: int) -> dict:
-        """Return the explorer's scene: the trial at `place` first, then the other trials of the table."""
-        places = [place, *(other for other in self._places(place) if other != place)]
-        policies = {f"trial {other + 1}": _as_linear(self.trials[other][1]) for other in places}
-        return scene_of(policies, self.task) | {"teacher": {"mean": self._teacher_result["mean"]}}
 
     def _ipython_display_(self) -> None:
         still = _WITHOUT + Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher).element()
