@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,8 +37,7 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {  # torch's, with 
 }
 
 
-@dataclass(frozen=True)
-class Actor:
+class Actor(NamedTuple):
     """A network: layers of weights (inputs, outputs) and biases (outputs,), with `activation` between them."""
 
     layers: list[tuple[np.ndarray, np.ndarray]]  # of `layers_of`
