@@ -98,8 +98,7 @@ class Laboratory:
     def to_frame(self) -> pd.DataFrame:
         """Return one row per trial: its results and its settings."""
         rows = [
-            {"cells": len(policy), "mean return": result["mean"], "failures": result["failures"]}
-            | {name: getattr(config, name) for name in self.settings}
+            {"cells": len(policy), **result} | {name: getattr(config, name) for name in self.settings}
             for config, policy, result in self.trials
         ]
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="trial"))
@@ -113,16 +112,16 @@ class Laboratory:
         page = table.to_html(float_format="{:.4g}".format, border=0, index=False)
         self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{page}</div>'
         policies = {f"trial {n + 1}": _as_linear(self.trials[n][1]) for n in (place, *others)}
-        scene = scene_of(policies, self.task) | {"teacher": {"mean": self._teacher_result["mean"]}}
+        scene = scene_of(policies, self.task) | {"teacher": {"mean": self._teacher_result["mean return"]}}
         self.explorer.scene = to_json(scene)
 
     def words(self, place: int) -> str:
         """Describe the results of a trial and of the teacher."""
         (_, policy, result), teacher = self.trials[place], self._teacher_result
         return (
-            f"Trial {place + 1}: {len(policy)} cell{'s' * (len(policy) > 1)}, mean return {result['mean']:.2f}; "
+            f"Trial {place + 1}: {len(policy)} cell{'s' * (len(policy) > 1)}, mean return {result['mean return']:.2f}; "
             f"{result['failures'] or 'none'} of {N_STARTS} starts fail to reach the goal. The teacher: mean return "
-            f"{teacher['mean']:.2f}, {teacher['failures'] or 'no'} failures."
+            f"{teacher['mean return']:.2f}, {teacher['failures'] or 'no'} failures."
         )
 
     def _ipython_display_(self) -> None:
@@ -139,7 +138,7 @@ def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
 def _judge(policy: Policy, task: Task) -> dict[str, float]:
     """Return the mean return and the number of episodes that miss the goal, from the explorer's starts."""
     result = rollout(policy, task, starts_of(task))
-    return {"mean": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
+    return {"mean return": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
 
 
 def _rounded(value: Any) -> Any:
