@@ -70,7 +70,7 @@ def test_any_sequence_of_operations_against_lists(kind, operations):
             buffers.keep(np.array(value[:k]))
             model = [rows for kept, rows in zip(value, model) if kept]
         elif name == "clear":
-            buffers.clear()
+            buffers.reset(slice(None))
             model = [[] for _ in model]
         assert buffers.counts.tolist() == [len(rows) for rows in model]
     assert [held(buffers, i) for i in range(len(model))] == [sums_of(rows) for rows in model]
@@ -110,11 +110,11 @@ def test_sampling_is_uniform_and_with_replacement():
     assert ((counts - 10_000) ** 2 / 10_000).sum() < 22.5  # chi square, 6 degrees of freedom, 0.1 %
 
 
-def test_clear_bounds_the_memory():
+def test_a_reset_of_all_cells_bounds_the_memory():
     buffers = filled(0)
     for _ in range(200):
         buffers.append(np.zeros(100, int), np.zeros((100, 1)), np.zeros((100, 1)))
-        buffers.clear()
+        buffers.reset(slice(None))
     assert len(buffers._inputs) == 1024 and buffers._table.shape[1] <= 128
 
 

@@ -5,7 +5,6 @@ expected, never a silent result. Numbers of another type are the same numbers.
 import dataclasses
 import functools
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +12,7 @@ from spoilt import Argument, actor, array, but_for_none, count, name, refuses, s
 from support import SIMPLEGOAL, CurvedTeacher, network_teacher, partition_of, tiny
 
 import vsp
-from vsp import geometry, show
+from vsp import geometry
 from vsp.paper import baselines, statistics
 from vsp.rollouts import Episode, standard
 from vsp.subpolicies import policy_class
@@ -28,7 +27,6 @@ TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]
 SHORT = tiny(n_epochs=24, n_freeze=4)
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 NET = network_teacher(SIMPLEGOAL)
-GRID = show.grid(np.zeros(2), np.ones(2), 3)
 
 
 def weights(**tensors):
@@ -38,17 +36,6 @@ def weights(**tensors):
 
 def episodes(**arguments):
     return list(vsp.teacher_episodes(task=vsp.get_task(SIMPLEGOAL), rng=np.random.default_rng(0), **arguments))
-
-
-def on_axes(function, **fixed):
-    """A figure's function on axes of its own: what is refused is refused before anything is drawn."""
-    fig, axes = show.panels()
-    plt.close(fig)  # it lives on, but no other test finds it open
-    return lambda **arguments: function(axes[0], **fixed, **arguments)
-
-
-def box_plot(returns):
-    return on_axes(lambda ax: show.box_plot(ax, {"teacher": returns}))()
 
 
 states, actions = array(STATES), array(ACTIONS)
@@ -64,8 +51,6 @@ low, high = (array(end, free=(), also=other) for end, other in (
     (np.zeros(2), [np.ones(2), [0, 2]]), (np.ones(2), [-np.ones(2)])))  # fmt: skip
 returns = {"returns": array(STATES, any_shape=True, nonempty=True)}
 of_runs = {"task": task, "teacher": array(STATES[:, 0], nonempty=True), "runs": array(STATES.T, nonempty=True)}
-x_y = {"x": array(GRID[0], free=()), "y": array(GRID[1], free=())}
-values_on_grid = array(np.arange(9.0) % 2, free=(), any_shape=True, also=[np.zeros(8), np.zeros((3, 4))])
 
 CASES = {
     "agent": (vsp.agent, {"source": Argument(TEACHER, [None, 3, "TD3", np.zeros(2), np.nan])}),
@@ -148,18 +133,6 @@ CASES = {
         statistics.resample,
         {"returns": array(STATES, free=(0, 1), nonempty=True), "n_resamples": count(5), "seed": seed},
     ),
-    # Figures
-    "show.arrows": (on_axes(show.arrows), pairs),
-    "show.box_plot": (box_plot, {"returns": array(STATES[:, 0], any_shape=True)}),
-    "show.caption_of": (functools.partial(show.caption_of, name="mine", alt="It shows."), {"kind": name("figures")}),
-    "show.cells": (on_axes(show.cells), x_y | {"index": values_on_grid}),
-    "show.codewords": (on_axes(show.codewords), {"points": states}),
-    "show.error_map": (on_axes(show.error_map, label="error"), x_y | {"error": values_on_grid}),
-    "show.force_map": (on_axes(show.force_map), x_y | {"force": values_on_grid}),
-    "show.grid": (show.grid, {"low": array(np.zeros(2), free=()), "high": array(np.ones(2), free=()), "resolution": n}),
-    "show.histogram": (on_axes(show.histogram), {"returns": array(STATES[:, 0])}),
-    "show.over_iterations": (on_axes(show.over_iterations, ylabel="cells"), {"values": array(STATES[:, 0])}),
-    "show.run_means": (on_axes(show.run_means, teacher=0.5), {"means": array(STATES[:, 0])}),
 }  # fmt: skip
 
 
@@ -185,7 +158,7 @@ def plain(result):
     return result if isinstance(result, known) else type(result).__name__
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if not case.startswith("show.")])
+@pytest.mark.parametrize("case", CASES)
 def test_numbers_of_another_type_are_the_same_numbers(case):
     function, arguments = CASES[case]
     good = {argument: value.good for argument, value in arguments.items()}

@@ -15,9 +15,9 @@ from .subpolicies import SubPolicies
 class Buffers:
     """Growing per-cell buffers with uniform minibatches: one log of rows, and a list of row numbers per cell.
 
-    Rows live until `clear`, so its period bounds the memory. With r rows between two calls, the log takes at most
-    16 (q + 1 + m) r bytes, since it doubles as it grows. The lists of k cells take at most 8 k r bytes; the worst case
-    is all rows in one cell.
+    Rows live until all cells are empty, so the period of such a reset bounds the memory. With r rows between two of
+    them, the log takes at most 16 (q + 1 + m) r bytes, since it doubles as it grows. The lists of k cells take at most
+    8 k r bytes; the worst case is all rows in one cell.
     """
 
     def __init__(self, q: int, m: int):
@@ -69,14 +69,11 @@ class Buffers:
         """Keep only the buffers of the cells in the mask `kept` (k,)."""
         self._table, self.counts = self._table[kept], self.counts[kept]
 
-    def reset(self, cells: np.ndarray) -> None:
-        """Empty the buffers of `cells` (mask or indices)."""
+    def reset(self, cells: np.ndarray | slice) -> None:
+        """Empty the buffers of `cells` (mask, indices or slice). Once all are empty, the log starts again."""
         self.counts[cells] = 0
-
-    def clear(self) -> None:
-        """Empty all buffers and reuse the log from its start."""
-        self.counts[:] = 0
-        self._size = 0
+        if not self.counts.any():
+            self._size = 0
 
 
 class SufficientStatistics:
@@ -125,10 +122,6 @@ class SufficientStatistics:
         """Set the sums of `cells` (mask, indices or slice) to zero."""
         for sums in (self.products, self.targets, self.squares, self.counts):
             sums[cells] = 0
-
-    def clear(self) -> None:
-        """Set all sums to zero."""
-        self.reset(slice(None))
 
 
 # `Config.fit` to the data that it needs

@@ -78,6 +78,6 @@ class History:
 
         frame = pd.DataFrame({"cells": self.cells, "loss": self.losses}).rename_axis("iteration")
         for kind in ("split", "merge"):
-            counts = pd.Series([e.iteration for e in self.events if e.kind == kind], dtype=int).value_counts()
-            frame[f"{kind}s"] = counts.reindex(frame.index, fill_value=0)
+            iterations = [event.iteration for event in self.events if event.kind == kind]
+            frame[f"{kind}s"] = np.bincount(iterations, minlength=len(frame))
         return frame

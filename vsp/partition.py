@@ -64,17 +64,15 @@ class Partition:
         self.models.keep(kept)
         self.buffers.keep(kept)
 
-    def reset(self, cells: np.ndarray) -> None:
-        """Empty the buffers of `cells`, a mask (k,)."""
+    def reset(self, cells: np.ndarray | slice) -> None:
+        """Empty the buffers of `cells`, a mask (k,) or a slice."""
         self.buffers.reset(cells)
         if self.config.adam_on_reset == "restart":  # R7
             self.models.restart_adam(cells)
 
     def clear(self) -> None:
         """Empty all buffers and reuse their memory."""
-        self.buffers.clear()
-        if self.config.adam_on_reset == "restart":  # R7
-            self.models.restart_adam(slice(None))
+        self.reset(slice(None))
 
     def cells(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (T, d). (T,)"""

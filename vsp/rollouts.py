@@ -76,14 +76,10 @@ def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcom
     """
     steps: Steps = []
     outcomes = _play(policy, get_task(task), starts, steps)
-    n = len(outcomes.returns)
-    if not n:
-        return outcomes, Episodes()
     index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
     order = np.argsort(index, kind="stable")  # by episode; steps stay in time order
-    states, actions = check_data(states[order], actions[order])
-    ends = np.cumsum(np.bincount(index, minlength=n))
-    parts = pairwise([0, *ends.tolist()])
+    states, actions = check_finite("states", states[order]), actions[order]
+    parts = pairwise([0, *np.cumsum(outcomes.lengths).tolist()])
     return outcomes, Episodes(Episode(states[i:j], actions[i:j], checked=True) for i, j in parts)
 
 

@@ -182,13 +182,15 @@ def test_box_plots_show_the_quartiles_and_no_outliers(ax):
     assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
     heights = np.concatenate([line.get_ydata() for line in ax.lines])
     assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
-    assert [100] in [line.get_ydata().tolist() for line in box_plot(ax, returns, outliers=True).lines]
+    box_plot(ax, returns, outliers=True)
+    assert [100] in [line.get_ydata().tolist() for line in ax.lines]
 
 
 def test_returns_stand_under_what_is_possible_and_events_have_ticks(ax):
     show.histogram(ax, np.array([1.0, 2.0]), bound=np.array([2.0, 3.0]))
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["teacher, mean 1.50", "at most, mean 2.50"]
-    assert show.ticks(ax, np.array([1, 2]), "splits", row=0).lines[0].get_xdata().tolist() == [1, 2]
+    show.ticks(ax, np.array([1, 2]), "splits", row=0)
+    assert ax.lines[0].get_xdata().tolist() == [1, 2]
 
 
 def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
@@ -216,10 +218,10 @@ ROWS = pd.DataFrame(
 
 
 def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
-    intervals(ax, ROWS, label="runs")
+    intervals(ax, ROWS)
     lines, dots = ax.collections
     assert [s.tolist() for s in lines.get_segments()] == [[[1, 0], [4, 0]], [[4.5, 1], [6, 1]], [[3, 2], [3, 2]]]
-    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]] and dots.get_label() == "runs"
+    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
     assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
     assert ax.get_ylim() == (2.5, -0.5)
     assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [style.DISTILLED]
@@ -257,11 +259,13 @@ def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     letter([ax], ["one"])
     named = "TEACHER DISTILLED OURS GOAL PIT FAILING OTHER".split()
     assert ax.get_title(loc="left") == "(a) one" and len({getattr(style, name) for name in named}) == 7
-    show.run_means(show.over_iterations(ax, np.array([3.0, 1.0]), ylabel="cells"), np.array([3.0, 1.0]), 2.5)
+    show.over_iterations(ax, np.array([3.0, 1.0]), ylabel="cells")
+    show.run_means(ax, np.array([3.0, 1.0]), 2.5)
     show.reference(ax, 7.0, "x")
     drawn = [np.column_stack(line.get_data()).tolist() for line in ax.lines]
     assert drawn == [[[0, 3], [1, 1]], [[1, 1], [2, 3]], [[0, 2.5], [1, 2.5]], [[7, 0], [7, 1]]]
-    show.margin(show.again(ax, ROWS), ["1 %"], "fail")
+    show.again(ax, ROWS)
+    show.margin(ax, ["1 %"], "fail")
     assert ax.collections[-1].get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
     assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
 

@@ -48,7 +48,9 @@ def test_a_trial_is_a_distillation_and_its_evaluation(lab):
         same, _ = distill(CurvedTeacher(), SIMPLEGOAL, config, seed=3)
         assert np.array_equal(policy.codewords, same.codewords)
         assert np.array_equal(policy.coefficients, same.coefficients)
-        result = vsp.rollout(same, SIMPLEGOAL, lab.scene(0)["starts"])  # those that the explorer plays
+        result = vsp.rollout(
+            same, SIMPLEGOAL, json.loads(lab.explorer.scene)["starts"]
+        )  # those that the explorer plays
         assert row["cells"] == len(same) and row["mean return"] == result.returns.mean()
         assert row["failures"] == (result.outcomes != 1).sum()
 

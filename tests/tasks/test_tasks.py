@@ -19,8 +19,8 @@ from vsp.tasks.registry import BOX, get_task, task_names
 from vsp.tasks.simplegoal import SimpleGoalEnv
 
 
-def step(state, action, **options):
-    (moved,), (reward,), (outcome,) = simplegoal.step(np.array([state]), np.array([action]), **options)
+def step(state, action):
+    (moved,), (reward,), (outcome,) = simplegoal.step(np.array([state]), np.array([action]))
     return moved.tolist(), reward, outcome
 
 
@@ -43,22 +43,10 @@ def test_actions_are_limited_to_one_and_states_to_the_square():
     ("state", "action", "outcome", "bonus"),
     [([0.15, 0.05], [-1, 0], GOAL, 10), ([0.3, 0.5], [1.0, 0], RUNNING, 0), ([0.35, 0.5], [1, 0], PIT, -10)],
 )
-def test_goal_reward_replaces_progress_or_comes_on_top(state, action, outcome, bonus):
-    moved, replaced, found = step(state, action)
+def test_the_reward_of_an_end_replaces_progress(state, action, outcome, bonus):
+    moved, reward, found = step(state, action)
     progress = 10 * (np.hypot(*state) - np.hypot(*moved))
-    assert found == outcome and replaced == pytest.approx(bonus or progress)
-    assert step(state, action, goal_reward="add")[1] == pytest.approx(progress + bonus)
-
-
-def test_goal_reward_reaches_the_gymnasium_class_and_only_two_are_known():
-    progress = 10 * (np.hypot(0.15, 0.05) - np.hypot(0.05, 0.05))
-    for goal_reward, expected in (("replace", 10.0), ("add", 10.0 + progress)):
-        env = gymnasium.make(SIMPLEGOAL, goal_reward=goal_reward).unwrapped
-        env.reset(seed=0)
-        env.state = np.array([0.15, 0.05])
-        assert env.step(np.array([-1.0, 0.0], np.float32))[1] == pytest.approx(expected)
-    with pytest.raises(ValueError, match="'both', expected one of .*replace.*add"):
-        SimpleGoalEnv(goal_reward="both")
+    assert found == outcome and reward == pytest.approx(bonus or progress)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +72,7 @@ def test_starts_cover_the_whole_square_evenly():
 def test_check_env_has_nothing_to_say():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        for options in ({}, {"render_mode": "rgb_array"}, {"goal_reward": "add"}):
+        for options in ({}, {"render_mode": "rgb_array"}):
             check_env(gymnasium.make(SIMPLEGOAL, **options).unwrapped)
 
 

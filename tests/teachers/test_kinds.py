@@ -90,8 +90,8 @@ def activation(name):
 
 
 SAYS = {
-    "layer_norm": kwargs(layer_norm=True), "squash_output is a list": kwargs(squash_output=[]),
-    "clip_mean is 'x'": kwargs(use_sde=True, clip_mean="x"), "clip_mean is 0.0": kwargs(use_sde=False),
+    "layer_norm": kwargs(layer_norm=True), "squash_output is no number": kwargs(squash_output=[]),
+    "clip_mean is no number": kwargs(use_sde=True, clip_mean="x"), "clip_mean is 0.0": kwargs(use_sde=False),
     "hidden layers of .12, 8. units, net_arch": kwargs(net_arch={"pi": [9]}), "extra = a tuple": nested("extra"),
     "activation is a tuple": nested("activation_fn"), "net_arch is a tuple": nested("net_arch"),
     "policy_kwargs are a tuple": {"policy_kwargs": bomb()}, "policy_kwargs are 3": {"policy_kwargs": 3},

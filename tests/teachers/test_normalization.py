@@ -64,7 +64,7 @@ def test_statistics_are_used_as_the_library_does(changes, small, tmp_path):
     env = written(tmp_path / "s.pkl", **changes)
     teacher, raw = (load_teacher(small, SIMPLEGOAL, normalize=n) for n in (str(tmp_path / "s.pkl"), False))
     assert np.abs(teacher.predict(OBS)[0] - raw.predict(env.normalize_obs(OBS))[0]).max() < 1e-6
-    assert teacher.card["normalised"] == env.norm_obs == (teacher.digest != raw.digest)
+    assert (teacher.normalization is not None) == env.norm_obs == (teacher.digest != raw.digest)
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def layer(inputs, outputs, weight=0.0):
     ("weights", "message"),
     [
         (layer(3, 2), "3 inputs and 2 outputs, SimpleGoal-v0 has 2 and 2"),
-        ({}, "expected one or more, a bias for each output"),
+        ({}, "expected a layer at the end"),
         ({"mu.0.weight": layer(2, 2)["mu.0.weight"]}, "mu.0 has the tensors weight, expected a weight and a bias"),
         (layer(2, 2, np.nan), "nan.*expected finite"),
         ({**layer(2, 2), "mu.0.bias": np.full(2, 1e300)}, r"mu.0.bias hold 1e\+300, expected .* at most 1000000"),

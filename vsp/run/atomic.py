@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import secrets
 import shlex
@@ -60,10 +61,15 @@ def write_text(path: str | os.PathLike, text: str) -> None:
     write_bytes(path, text.encode())
 
 
-def read_bytes(path: str | os.PathLike) -> bytes:
-    """Return all bytes of a regular file. Raises `MissingFile`, and `DamagedFile` for a folder, a FIFO or a device."""
+def read_bytes(path: str | os.PathLike, most: float = math.inf) -> bytes:
+    """Return all bytes of a regular file.
+
+    Raises `MissingFile`, and `DamagedFile` for a folder, a FIFO or a device, and for a file of more than `most` bytes.
+    """
     path = Path(path)
     if path.is_file():
+        if (size := path.stat().st_size) > most:
+            raise DamagedFile(f"{path}: it has {size} bytes, expected at most {most}")
         return path.read_bytes()
     if path.exists():
         raise DamagedFile(f"{path}: is a folder, a FIFO or a device, expected a file: move it away")

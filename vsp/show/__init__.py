@@ -1,4 +1,4 @@
-"""Figures (arrays in, `Axes` out), and a widget that distils again whenever a setting changes.
+"""Figures (arrays drawn on `Axes`), and a widget that distils again whenever a setting changes.
 
 Make a figure with `panels`, draw on its axes, save it with `save_figure`.
 """

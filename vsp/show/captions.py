@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..checks import check_choice
 from ..run import ROOT
 
 BOOK, HEADINGS = ROOT / "notebooks" / "captions.toml", ROOT / "notebooks" / "headings.toml"
@@ -54,14 +53,13 @@ def _book() -> dict[tuple[str, str], Caption]:
     return captions
 
 
-def caption_of(kind: str, name: str, *, text: str | None = None, alt: str | None = None) -> Caption:
+def caption_of(kind: str, name: str, *, text: str | None = None, alt: str = "") -> Caption:
     """Return the caption of a figure or table; `kind` is "figures" or "tables".
 
     `text` and `alt` override the entry in notebooks/captions.toml. Raises ValueError for a figure without any `alt`.
     """
-    check_choice("kind", kind, KINDS)
     known = _book().get((kind, name), Caption("", ""))
-    caption = Caption(known.label, known.text if text is None else text, known.alt if alt is None else alt)
+    caption = Caption(known.label, known.text if text is None else text, alt or known.alt)
     if kind == "figures" and not caption.alt:
         raise ValueError(f"figure {name!r} has no alternative text: pass alt= or add it to notebooks/{BOOK.name}")
     return caption

@@ -33,11 +33,9 @@ _LABELS = {"style": {"description_width": "145px"}, "layout": {"width": "455px"}
 class Laboratory:
     """Laboratory: distil again whenever a setting changes, explore the policy, and compare it with earlier trials.
 
-    `config` holds the initial settings, by default the paper's preset. Raises ValueError for tasks other than the
-    paper's, for sub-policies that are not linear or constant, and for a teacher that cannot act in the task.
+    `config` holds the initial settings, to six digits, by default the paper's preset. Raises ValueError for tasks other
+    than the paper's, for sub-policies that are not linear or constant, and for a teacher that cannot act in the task.
     """
-
-    ready, busy = "Change a setting to distil again; this takes about a second.", "distilling …"
 
     def __init__(self, teacher: Policy, task: str | Task, config: Config | None = None, *, seed: int = 0):
         self.teacher, self.task, self.seed = teacher, get_task(task), seed
@@ -47,21 +45,20 @@ class Laboratory:
         if not isinstance(self.config, Config) or self.config.sub_policy not in DRAWN:
             raise ValueError(f"config is {self.config!r}, expected a Config whose sub_policy is one of {list(DRAWN)}")
         self._teacher_result = _judge(teacher, self.task)
-        self._teacher_scene = scene_of({}, self.task, teacher)["teacher"]
         self.trials: list[tuple[Config, VoronoiPolicy, dict]] = []
+        self._listening = True
         self.settings = {name: self._slider(name) for name in REACH}
         about = {"options": DRAWN, "description": "sub-policy", **_LABELS}
         self.settings["sub_policy"] = widgets.Dropdown(value=self.config.sub_policy, **about)
         self.back = widgets.Button(description="back to trial 1", layout={"width": "auto", "align_self": "flex-start"})
-        self.status, self.text = widgets.HTML(self.ready), widgets.HTML(layout={"flex": "1 1 560px", "min_width": "0"})
+        self.status, self.text = widgets.HTML(), widgets.HTML(layout={"flex": "1 1 560px", "min_width": "0"})
         self.explorer = View()
-        self._put(self.trial({}))
+        self._answer()
         controls = widgets.VBox([*self.settings.values(), self.back, self.status], layout={"max_width": "100%"})
         above = widgets.HBox([controls, self.text], layout={"flex_flow": "row wrap"})
         self.view = widgets.VBox([above, self.explorer])
         self.view.add_class("vsp-controls")
         self.back.on_click(self._go_back)
-        self._listening = True
         for control in self.settings.values():
             control.observe(self._answer, names="value")
 
@@ -84,64 +81,48 @@ class Laboratory:
         self._answer()
 
     def _answer(self, _=None) -> None:
-        """Show the trial of the current settings."""
+        """Distil with the current settings, unless an earlier trial had them, and show the trial."""
         if not self._listening:
             return
-        self.status.value = self.busy
-        self._put(self.trial({name: control.value for name, control in self.settings.items()}))
-        self.status.value = self.ready
-
-    def trial(self, changes: dict[str, Any]) -> int:
-        """Change these fields of the configuration, distil and evaluate; return the index in `trials`.
-
-        Settings that were tried before give the index of the earlier trial.
-        """
-        changed = {n: _rounded(v) for n, v in changes.items() if _rounded(v) != _rounded(getattr(self.config, n))}
-        config = dataclasses.replace(self.config, **changed)
-        for place, (earlier, _, _) in enumerate(self.trials):
-            if earlier == config:
-                return place
-        policy, _ = distill(self.teacher, self.task, config, seed=self.seed)
-        self.trials.append((config, policy, _judge(policy, self.task)))
-        return len(self.trials) - 1
+        self.status.value = "distilling …"
+        chosen = {name: _rounded(control.value) for name, control in self.settings.items()}
+        config = dataclasses.replace(self.config, **chosen)
+        tried = [config for config, _, _ in self.trials]
+        if config not in tried:
+            policy, _ = distill(self.teacher, self.task, config, seed=self.seed)
+            self.trials.append((config, policy, _judge(policy, self.task)))
+            tried.append(config)
+        self._put(tried.index(config))
+        self.status.value = "Change a setting to distil again; this takes about a second."
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row per trial: its results and its settings."""
         rows = [
-            {"cells": len(policy), "mean return": result["mean"], "failures": result["failures"]}
-            | {name: getattr(config, name) for name in self.settings}
+            {"cells": len(policy), **result} | {name: getattr(config, name) for name in self.settings}
             for config, policy, result in self.trials
         ]
         return pd.DataFrame(rows, index=pd.RangeIndex(1, len(rows) + 1, name="trial"))
 
     def _put(self, place: int) -> None:
-        """Show a trial: the explorer, and a table of trials in which an arrow marks it."""
-        table = self.to_frame().iloc[self._places(place)].reset_index()
+        """Show a trial beside the newest others: the explorer, and a table in which an arrow marks it."""
+        others = [n for n in reversed(range(len(self.trials))) if n != place][: SHOWN - 1]
+        table = self.to_frame().iloc[sorted([*others, place], reverse=True)].reset_index()
         table["trial"] = [f"→\N{NO-BREAK SPACE}{n}" if n == place + 1 else str(n) for n in table["trial"]]
         table.columns = [name.replace("_", " ") for name in table]  # heads that can wrap
         page = table.to_html(float_format="{:.4g}".format, border=0, index=False)
         self.text.value = f'<div class="jp-RenderedHTMLCommon"><p>{self.words(place)}</p>{page}</div>'
-        self.explorer.scene = to_json(self.scene(place))
+        policies = {f"trial {n + 1}": _as_linear(self.trials[n][1]) for n in (place, *others)}
+        scene = scene_of(policies, self.task) | {"teacher": {"mean": self._teacher_result["mean return"]}}
+        self.explorer.scene = to_json(scene)
 
     def words(self, place: int) -> str:
         """Describe the results of a trial and of the teacher."""
         (_, policy, result), teacher = self.trials[place], self._teacher_result
         return (
-            f"Trial {place + 1}: {len(policy)} cell{'s' * (len(policy) > 1)}, mean return {result['mean']:.2f}; "
+            f"Trial {place + 1}: {len(policy)} cell{'s' * (len(policy) > 1)}, mean return {result['mean return']:.2f}; "
             f"{result['failures'] or 'none'} of {N_STARTS} starts fail to reach the goal. The teacher: mean return "
-            f"{teacher['mean']:.2f}, {teacher['failures'] or 'no'} failures."
+            f"{teacher['mean return']:.2f}, {teacher['failures'] or 'no'} failures."
         )
-
-    def _places(self, place: int) -> list[int]:
-        """Return the indices of the newest trials and of the one at `place`, the newest first."""
-        newest = [n for n in reversed(range(len(self.trials))) if n != place][: SHOWN - 1]
-        return sorted([*newest, place], reverse=True)
-
-    def scene(self, place: int) -> dict:
-        """Return the explorer's scene: the trial at `place` first, then the other trials of the table."""
-        places = [place, *(other for other in self._places(place) if other != place)]
-        policies = {f"trial {other + 1}": _as_linear(self.trials[other][1]) for other in places}
-        return scene_of(policies, self.task) | {"teacher": self._teacher_scene}
 
     def _ipython_display_(self) -> None:
         still = _WITHOUT + Explorer({"trial 1": _as_linear(self.trials[0][1])}, teacher=self.teacher).element()
@@ -157,7 +138,7 @@ def _as_linear(policy: VoronoiPolicy) -> VoronoiPolicy:
 def _judge(policy: Policy, task: Task) -> dict[str, float]:
     """Return the mean return and the number of episodes that miss the goal, from the explorer's starts."""
     result = rollout(policy, task, starts_of(task))
-    return {"mean": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
+    return {"mean return": float(result.returns.mean()), "failures": int((result.outcomes != GOAL).sum())}
 
 
 def _rounded(value: Any) -> Any:

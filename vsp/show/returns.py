@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from ..checks import check_array, check_finite
 from ..evaluation import fences
 from .style import DISTILLED, OTHER, TEACHER
 
@@ -19,12 +18,12 @@ _VERDICTS = {  # marker, and whether it is filled
 _SUBJECTS = {"teacher": TEACHER, "distilled": DISTILLED}
 
 
-def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> Axes:
+def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> None:
     """Draw box plots of the returns of the teacher and of the distilled policies, in this order.
 
     `outliers`: draw them too, as a strip of dots.
     """
-    returns = {name: check_finite(f"returns of {name}", values).ravel() for name, values in returns.items()}
+    returns = {name: values.ravel() for name, values in returns.items()}
     names = [f"{name}\n(n = {values.size:,})" for name, values in returns.items()]
     look = {"widths": 0.5, "patch_artist": True, "medianprops": {"color": "black"}, "showfliers": False}
     boxes = ax.boxplot([*returns.values()], tick_labels=names, **look)["boxes"]
@@ -35,61 +34,52 @@ def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False
         jitter = np.random.default_rng(0).uniform(-0.2, 0.2, beyond.size)
         ax.plot(place + jitter, beyond, ".", color=colour, ms=2, mew=0, alpha=0.5, rasterized=True)
     ax.set(ylabel="return per episode")
-    return ax
 
 
-def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> Axes:
+def over_iterations(ax: Axes, values: np.ndarray, *, ylabel: str, log: bool = False) -> None:
     """Plot one quantity over the iterations of a distillation."""
-    values = check_array("values", values, (-1,))
     ax.plot(np.arange(len(values)), values, color=DISTILLED)
     ax.set(xlabel="iteration n", ylabel=ylabel, yscale="log" if log else "linear")
     if not log:
         ax.locator_params("y", integer=True)
-    return ax
 
 
-def ticks(ax: Axes, iterations: np.ndarray, name: str, *, row: int) -> Axes:
+def ticks(ax: Axes, iterations: np.ndarray, name: str, *, row: int) -> None:
     """Mark iterations by ticks in a row above the axis, the first at the bottom, with a name at the right."""
     height, place = 0.08 * (row + 0.6), ax.get_xaxis_transform()
     ax.plot(iterations, np.full(len(iterations), height), "|", color="black", ms=4, mew=0.5, transform=place)
     ax.text(ax.dataLim.x1, height, name, transform=place, ha="right", va="center", fontsize=7)
-    return ax
 
 
-def phase(ax: Axes, begin: int, name: str) -> Axes:
+def phase(ax: Axes, begin: int, name: str) -> None:
     """Shade the iterations from `begin` on and name them."""
     ax.axvspan(begin, ax.dataLim.x1, color="0.9", lw=0, zorder=0)
     ax.text(begin, 1.0, f" {name}", transform=ax.get_xaxis_transform(), va="bottom", fontsize=7)
-    return ax
 
 
-def run_means(ax: Axes, means: np.ndarray, teacher: float) -> Axes:
+def run_means(ax: Axes, means: np.ndarray, teacher: float) -> None:
     """Plot the mean return of each run, sorted, against the teacher's."""
-    means = check_array("means", means, (-1,))
     ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
     ax.axhline(teacher, color=TEACHER, label="teacher")
     ax.set(xlabel="run, by mean return", ylabel="mean return")
     ax.legend(frameon=False, loc="lower right")
-    return ax
 
 
-def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None) -> Axes:
+def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None) -> None:
     """Draw a histogram of the teacher's returns (n,). `bound` (n,), an outline: the most from the same starts."""
     drawn = {"teacher": returns} | ({} if bound is None else {"at most": bound})
-    drawn = {name: check_array("returns", values, (-1,)) for name, values in drawn.items()}
     bins = np.histogram_bin_edges(np.concatenate([*drawn.values()]), bins=30)
     for (name, values), look in zip(drawn.items(), ({"color": TEACHER}, {"histtype": "step", "color": "black"})):
         ax.hist(values, bins=bins, label=f"{name}, mean {values.mean():.2f}", **look)
     ax.set(xlabel="return per episode", ylabel="episodes", ymargin=0.3)  # room for the legend
     ax.legend(frameon=False, loc="upper left")
-    return ax
 
 
-def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED, label: str | None = None) -> Axes:
+def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED) -> Axes:
     """Draw a dot on its interval for each row of `frame` (index: names; columns here, low, high), the first on top."""
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color=color, lw=1.2)
-    ax.scatter(frame["here"], rows, color=color, s=10, zorder=3, label=label)
+    ax.scatter(frame["here"], rows, color=color, s=10, zorder=3)
     ax.set_yticks(rows, frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
     ax.grid(axis="x", color="0.9", lw=0.5)
@@ -97,19 +87,17 @@ def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILL
     return ax
 
 
-def again(ax: Axes, frame: pd.DataFrame) -> Axes:
+def again(ax: Axes, frame: pd.DataFrame) -> None:
     """Add a second measurement to the rows of `intervals`, as hollow dots; NaN where there is none."""
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color="black", lw=0.6, zorder=4)
     ax.scatter(frame["here"], rows, facecolor="white", edgecolor="black", s=10, lw=0.6, zorder=5)
-    return ax
 
 
-def margin(ax: Axes, texts: list[str], title: str) -> Axes:
+def margin(ax: Axes, texts: list[str], title: str) -> None:
     """Write a text beside each row of `intervals`, right of the axes, under a title."""
     for row, text in enumerate([title, *texts], start=-1):
         ax.text(1.03, row, text, transform=ax.get_yaxis_transform(), va="center", fontsize=7, color="0.3")
-    return ax
 
 
 def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: str = "-") -> Axes:
@@ -118,7 +106,7 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
     return ax
 
 
-def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> Axes:
+def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> None:
     """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value.
 
     `frame` (index: names) has the columns subject (its colour), verdict (its marker) and gap. Values inside the shaded
@@ -138,10 +126,9 @@ def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> 
     ax.set_xlim(-1.1 * limit, 1.1 * limit)
     ax.set_yticks(np.arange(len(frame)), frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
-    return ax
 
 
-def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours: list[str]) -> Axes:
+def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours: list[str]) -> None:
     """Draw horizontal boxes from Q1, median and Q3; whiskers end at the bounds beyond which a return is an outlier."""
     stats = [
         {"label": name, "q1": q1, "med": median, "q3": q3, "fliers": []}
@@ -155,14 +142,12 @@ def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours
     for line in drawn["medians"]:
         line.set(color="black")
     ax.set_ylim(len(stats) - 0.4, -0.6)
-    return ax
 
 
-def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str) -> Axes:
+def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str) -> None:
     """Draw one dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
     import seaborn as sns
 
     sns.swarmplot(frame, x=x, y=y, ax=ax, color=DISTILLED, size=3)
     for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
         ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4, label="mean" if not place else None)
-    return ax

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
-from ..checks import check_array, check_count, check_data, check_finite
 from ..rollouts import Episode
 from ..tasks import simplegoal
 from ..tasks.base import Task
@@ -23,12 +22,12 @@ _PASTEL = (  # seaborn's palette of this name
 def cells(
     ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6,
     color: str = BORDER,
-) -> Axes:  # fmt: skip
+) -> None:  # fmt: skip
     """Draw the borders of Voronoi cells, `width` points wide.
 
     `index`: the cell of each grid point; `fill` colours the cells.
     """
-    index = _on_grid("cells", x, y, index).astype(int)
+    index = index.reshape(x.shape)
     if fill:
         shades = mpl.colors.to_rgba_array(_PASTEL)[index % len(_PASTEL)]
         image(ax, x, y, shades, interpolation="nearest", zorder=0)
@@ -36,14 +35,12 @@ def cells(
         inside = (index == i).astype(float)
         if inside.min() < 1:
             ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
-    return ax
 
 
 def codewords(
     ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False, size: float = 14
-) -> Axes:
+) -> None:
     """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes."""
-    points = check_array("codewords", points, (-1, 2))
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
     ax.scatter(*points.T, s=size, label=label, **look)
     for i, point in enumerate(points if numbers else ()):
@@ -51,7 +48,6 @@ def codewords(
         place = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
         offset = (3 if right else -3, 2 if up else -2)
         ax.annotate(str(i), point, xytext=offset, textcoords="offset points", fontsize=7, zorder=6, **place)
-    return ax
 
 
 def square(ax: Axes) -> Axes:
@@ -64,24 +60,24 @@ def square(ax: Axes) -> Axes:
     return ax
 
 
-def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> Axes:
+def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> None:
     """Draw an arrow per action (n, 2) at its state (n, 2) on a grid; a full diagonal action spans one grid step."""
-    states, actions = check_data(states, actions, 2, 2)
     step = np.diff(np.unique(states[:, 0]))[0]
     scale = {"angles": "xy", "scale_units": "xy", "scale": 1.4 / step}
     ax.quiver(*states.T, *actions.T, color=color, width=0.006, zorder=3, **scale)
-    return ax
 
 
 def image(ax: Axes, x: np.ndarray, y: np.ndarray, pixels: np.ndarray, **look) -> AxesImage:
     """Draw an image whose pixel centres are the points of a `grid`. The axes keep their aspect."""
-    return ax.imshow(pixels, origin="lower", extent=extent(x, y), aspect=ax.get_aspect(), **look)
+    dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
+    edges = (x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy)
+    return ax.imshow(pixels, origin="lower", extent=edges, aspect=ax.get_aspect(), **look)
 
 
 def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray) -> AxesImage:
     """Draw force in [-1, 1] over position and velocity. Return the image, for `force_bar`."""
     ax.set(xlabel="position", ylabel="velocity (per step)")
-    return image(ax, x, y, _on_grid("force", x, y, force), cmap=FORCE_MAP, vmin=-1, vmax=1)
+    return image(ax, x, y, force.reshape(x.shape), cmap=FORCE_MAP, vmin=-1, vmax=1)
 
 
 def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
@@ -92,51 +88,25 @@ def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
 
 def error_map(
     ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str, beside: np.ndarray | None = None
-) -> AxesImage:
+) -> None:
     """Draw a non-negative quantity over a two-dimensional state, darker where larger, with a colour bar.
 
-    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size. Returns the
-    image.
+    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size.
     """
-    drawn = image(ax, x, y, _on_grid("error", x, y, error), cmap="Reds", vmin=0)
+    drawn = image(ax, x, y, error.reshape(x.shape), cmap="Reds", vmin=0)
     ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
-    return drawn
 
 
-def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> Axes:
+def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> None:
     """Draw the states of one episode as a line, from a ring (labelled "start") to the state after the last action."""
     last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
     way = np.concatenate([episode.states, last])
     ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
     named = any(line.get_label() == "start" for line in ax.lines)
     ax.plot(*way[0], ls="", color=color, marker="o", mfc="white", ms=5, zorder=5, label=None if named else "start")
-    return ax
-
-
-def extent(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float, float]:
-    """Return the outer edges (left, right, bottom, top) of an image whose pixel centres are the points of a `grid`."""
-    dx, dy = (x[0, 1] - x[0, 0]) / 2, (y[1, 0] - y[0, 0]) / 2
-    return x[0, 0] - dx, x[0, -1] + dx, y[0, 0] - dy, y[-1, 0] + dy
-
-
-def _grid(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    x = check_array("x", x, (-1, -1))
-    if min(x.shape) < 2:
-        raise ValueError(f"the grid has shape {x.shape}, expected two points or more along each axis")
-    return x, check_array("y", y, x.shape)
-
-
-def _on_grid(what: str, x: np.ndarray, y: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return `values`, one per grid point, in the shape of the grid. Raises ValueError for another number of values."""
-    (x, _), values = _grid(x, y), check_finite(what, values)
-    if values.size != x.size:
-        raise ValueError(f"{what} have shape {values.shape}, expected one for each point of the grid {x.shape}")
-    return values.reshape(x.shape)
 
 
 def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Make a grid over a two-dimensional box, to draw on: x (r, r), y (r, r), and its points as states (r * r, 2)."""
-    low, high = check_array("low", low, (2,)), check_array("high", high, (2,))
-    check_count("resolution", resolution)
-    x, y = np.meshgrid(np.linspace(low[0], high[0], resolution), np.linspace(low[1], high[1], resolution))
+    x, y = np.meshgrid(*np.linspace(low, high, resolution).T)
     return x, y, np.column_stack([x.ravel(), y.ravel()])

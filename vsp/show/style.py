@@ -38,17 +38,14 @@ FORCE_MAP = "PuOr_r"
 _STYLE = {
     "font.size": 8,
     "axes.titlesize": 8,
-    "axes.labelsize": 8,
     "legend.fontsize": 7,
     "xtick.labelsize": 7,
     "ytick.labelsize": 7,
     "axes.linewidth": 0.6,
     "lines.linewidth": 1.0,
     "figure.dpi": 150,
-    "figure.facecolor": "white",
     "savefig.dpi": 300,
     "pdf.fonttype": 42,  # TrueType fonts, embedded
-    "svg.hashsalt": "vsp",
     "axes.spines.top": False,
     "axes.spines.right": False,
 }
@@ -92,24 +89,16 @@ class Picture:
         return self.about.alt
 
 
-def watermark(fig: Figure) -> None:
-    """Mark a figure as that of a quick run."""
-    fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
-
-
-def save_figure(
-    fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str | None = None,
-    caption: str | None = None,
-) -> Picture:  # fmt: skip
+def save_figure(fig: Figure, name: str, *, out: str | os.PathLike, quick: bool = False, alt: str = "") -> Picture:
     """Write OUT/figures/NAME.pdf and .png, close the figure and return the picture to show; NAME may be "beyond/x".
 
-    `alt` describes the figure for readers who cannot see it; both files contain it. By default `alt` and
-    `caption` come from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
+    `alt` describes the figure for readers who cannot see it; both files contain it. By default it comes, as the caption
+    does, from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
     numbers, so the same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
     """
-    about = caption_of("figures", name, text=caption, alt=alt)
+    about = caption_of("figures", name, alt=alt)
     if quick:
-        watermark(fig)
+        fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)
     path = file_of("figures", name, out)
     undated = {"CreationDate": None, "Creator": None, "Producer": None}
     said = (("pdf", {"Subject": about.alt, **undated}), ("png", {"Description": about.alt, "Software": None}))

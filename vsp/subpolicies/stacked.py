@@ -23,8 +23,7 @@ class SubPolicies:
     def __init__(self, policy_class: PolicyClass, m: int, *, initial: str = "uniform"):
         self.policy_class, self.initial = policy_class, initial
         self.coefficients = np.zeros((0, len(policy_class.rows), m))  # (k, p, m)
-        self._mean = np.zeros_like(self.coefficients)  # Adam's moments
-        self._square = np.zeros_like(self.coefficients)
+        self._moments = np.zeros((2, *self.coefficients.shape))  # Adam's: of gradients and of their squares
         self._steps = np.zeros(0, dtype=np.int64)
         self._units = policy_class.units
 
@@ -33,18 +32,17 @@ class SubPolicies:
         shape = (1, *self.coefficients.shape[1:])
         bounds = self.policy_class.bounds / self._units if self.initial == "uniform" else np.zeros((shape[1], 1))
         self.coefficients = np.concatenate([self.coefficients, rng.uniform(-bounds, bounds, size=shape)])
-        self._mean = np.concatenate([self._mean, np.zeros(shape)])
-        self._square = np.concatenate([self._square, np.zeros(shape)])
+        self._moments = np.concatenate([self._moments, np.zeros((2, *shape))], axis=1)
         self._steps = np.append(self._steps, 0)
 
     def keep(self, kept: np.ndarray) -> None:
         """Keep only the cells of the mask `kept` (k,)."""
-        self.coefficients, self._steps = self.coefficients[kept], self._steps[kept]
-        self._mean, self._square = self._mean[kept], self._square[kept]
+        self.coefficients, self._moments = self.coefficients[kept], self._moments[:, kept]
+        self._steps = self._steps[kept]
 
     def restart_adam(self, cells: np.ndarray | slice) -> None:
         """Set Adam's moments and step counts of `cells` (c,) to zero."""
-        self._mean[cells] = self._square[cells] = 0.0
+        self._moments[:, cells] = 0.0
         self._steps[cells] = 0
 
     def predict(self, cell: int, state: np.ndarray) -> np.ndarray:
@@ -67,10 +65,11 @@ class SubPolicies:
         error = outputs - actions
         gradient = (2.0 / error[0].size) * pull_back(error)
         counts = steps[:, None, None]
-        mean, square, spread = adam(gradient, self._mean[chosen], self._square[chosen], counts)
+        mean, square = self._moments[:, chosen]
+        mean, square, spread = adam(gradient, mean, square, counts)
         rate = learning_rate / (1 - BETA1**counts)
         self.coefficients[chosen] = theta - rate * mean / spread / self._units
-        self._mean[chosen], self._square[chosen], self._steps[chosen] = mean, square, steps
+        self._moments[:, chosen], self._steps[chosen] = (mean, square), steps
         return np.square(error).sum(axis=(1, 2)) / error[0].size
 
     def solve(self, cells: np.ndarray, products: np.ndarray, targets: np.ndarray) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import gymnasium
 import numpy as np
 
-from ..checks import check_array, check_choice
+from ..checks import check_array
 from .base import GOAL, OUTCOMES, PIT, RUNNING, Task
 
 GOAL_EDGE = 0.1  # the goal is the box x < 0.1, y < 0.1
@@ -20,21 +18,18 @@ def start(rng: np.random.Generator, n: int) -> np.ndarray:
     return rng.uniform(0.0, 1.0, size=(n, 2))
 
 
-def step(
-    states: np.ndarray, actions: np.ndarray, *, goal_reward: str = "replace", margin: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def step(states: np.ndarray, actions: np.ndarray, *, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move by a tenth of the action; the reward is ten times the distance gained towards the origin.
 
-    Entering the goal pays +10, entering the pit -10. `goal_reward` selects whether this replaces the progress
-    term ("replace", which fits the paper's numbers: its teacher's minimum is exactly -10.0) or is added to it ("add",
-    as in the paper's text). `margin` makes the goal smaller, and the pit larger, on every side.
+    Entering the goal pays +10 and entering the pit -10 instead. The paper's text adds them to the progress, but its
+    numbers do not: its teacher's minimum is exactly -10.0. `margin` makes the goal smaller, and the pit larger, on
+    every side.
     """
     moved = np.clip(states + STRIDE * np.clip(actions, -1.0, 1.0), 0.0, 1.0)
     progress = 10.0 * (np.hypot(states[:, 0], states[:, 1]) - np.hypot(moved[:, 0], moved[:, 1]))
     in_goal = (moved < GOAL_EDGE - margin).all(axis=1)
     in_pit = ((moved > PIT_LOW - margin) & (moved < PIT_HIGH + margin)).all(axis=1)
-    bonus = 10.0 * in_goal - 10.0 * in_pit
-    rewards = progress + bonus if goal_reward == "add" else np.where(in_goal | in_pit, bonus, progress)
+    rewards = np.select([in_goal, in_pit], [10.0, -10.0], progress)
     outcomes = np.select([in_goal, in_pit], [GOAL, PIT], RUNNING)
     return moved, rewards, outcomes
 
@@ -44,12 +39,10 @@ class SimpleGoalEnv(gymnasium.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
-    def __init__(self, render_mode: str | None = None, goal_reward: str = "replace"):
-        check_choice("goal_reward", goal_reward, ("replace", "add"))
+    def __init__(self, render_mode: str | None = None):
         self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (2,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.render_mode = render_mode
-        self._step = partial(step, goal_reward=goal_reward)
         self.state = np.zeros(2)  # float64; the observation is its float32 copy
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
@@ -59,7 +52,7 @@ class SimpleGoalEnv(gymnasium.Env):
 
     def step(self, action: np.ndarray):
         action = check_array("action", action, (2,))
-        (self.state,), (reward,), (outcome,) = self._step(self.state[None], action[None])
+        (self.state,), (reward,), (outcome,) = step(self.state[None], action[None])
         info = {"outcome": OUTCOMES[outcome]}
         return self.state.astype(np.float32), float(reward), bool(outcome != RUNNING), False, info
 

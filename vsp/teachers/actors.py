@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -38,31 +37,13 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {  # torch's, with 
 }
 
 
-@dataclass(frozen=True)
-class Actor:
-    """A network: layers of weights (inputs, outputs) and biases (outputs,) in float32, with `activation` between them.
+class Actor(NamedTuple):
+    """A network: layers of weights (inputs, outputs) and biases (outputs,), with `activation` between them."""
 
-    Raises ValueError for layers that do not fit each other.
-    """
-
-    layers: list[tuple[np.ndarray, np.ndarray]]
+    layers: list[tuple[np.ndarray, np.ndarray]]  # of `layers_of`
     activation: str = "ReLU"
     squashed: bool = True  # the output passes through tanh to the action box; else it is limited to the box
     clip_mean: float = np.inf  # limits the output before tanh, as state-dependent exploration does
-
-    def __post_init__(self) -> None:
-        shapes, outputs = [weight.shape for weight, _ in self.layers], [bias.shape for _, bias in self.layers]
-        if (
-            not shapes
-            or [shape[1:] for shape in shapes] != outputs
-            or [shape[:1] for shape in shapes[1:]] != outputs[:-1]
-        ):
-            raise ValueError(
-                f"the layers are {shapes} (inputs, outputs) with biases {outputs}, expected one or more, a bias for "
-                "each output, and as many inputs as the layer before has outputs"
-            )
-        layers = [(w.astype(np.float32, order="C"), b.astype(np.float32)) for w, b in self.layers]  # fixes the sums
-        object.__setattr__(self, "layers", layers)
 
     def forward(self, inputs: np.ndarray) -> np.ndarray:
         """Return the outputs (n, m) at the inputs (n, d) in float32; in [-1, 1] if squashed."""
@@ -70,9 +51,7 @@ class Actor:
         for weight, bias in self.layers[:-1]:
             hidden = act(hidden @ weight + bias)
         weight, bias = self.layers[-1]
-        outputs = hidden @ weight + bias
-        if np.isfinite(self.clip_mean):
-            outputs = np.clip(outputs, -self.clip_mean, self.clip_mean)
+        outputs = np.clip(hidden @ weight + bias, -self.clip_mean, self.clip_mean)
         return np.tanh(outputs) if self.squashed else outputs
 
 
@@ -83,13 +62,12 @@ class Kind(NamedTuple):
     activation: str
     squashed: bool
     others: str  # pattern of the tensors that do not act
-    on_policy: bool = False
 
 
 _SAC = Kind(("actor.latent_pi", "actor.mu"), "ReLU", True, r"critic\.|actor\.log_std\b|actor\.sde_features_extractor\.")
 _PPO = Kind(("mlp_extractor.shared_net", "mlp_extractor.policy_net", "action_net"), "Tanh", False,
-            r"mlp_extractor\.value_net\.|value_net\.|log_std\b|sde_features_extractor\.", True)  # fmt: skip
-_ARS = Kind(("action_net",), "ReLU", True, r"$^", True)
+            r"mlp_extractor\.value_net\.|value_net\.|log_std\b|sde_features_extractor\.")  # fmt: skip
+_ARS = Kind(("action_net",), "ReLU", True, r"$^")
 POLICIES = {
     "stable_baselines3.td3.policies.TD3Policy": Kind(("actor.mu",), "ReLU", True, r"critic\."),  # also DDPG's
     "stable_baselines3.sac.policies.SACPolicy": _SAC,
@@ -108,18 +86,13 @@ _HARMLESS = set(
 _FLATTEN = "stable_baselines3.common.torch_layers.FlattenExtractor"  # does nothing to an observation of one dimension
 
 
-def kind_of(saved: Saved) -> Kind:
-    """Return the kind of the agent's policy. Raises Unknown for another class."""
+def actor_of(saved: Saved) -> Actor:
+    """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
     policy = saved.setting("policy_class")
     name = policy.name if isinstance(policy, Thing) and policy.given is None else "one that only its own code can build"
     if name not in POLICIES:
         raise Unknown(f"its policy class is {name:.100}, expected one of {', '.join(sorted(POLICIES))}")
-    return POLICIES[name]
-
-
-def actor_of(saved: Saved) -> Actor:
-    """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
-    kind, settings = kind_of(saved), _policy_settings(saved)
+    kind, settings = POLICIES[name], _policy_settings(saved)
     for name, value in settings.items():
         if name == "features_extractor_class" and isinstance(value, Thing) and value.name == _FLATTEN:
             continue
@@ -177,10 +150,7 @@ def _shown(value: object) -> str:
 
 def _number(settings: dict, name: str, default: float) -> float:
     """Return a number or truth value of the settings. Raises Unknown for anything else."""
-    try:
-        return float(array(settings.get(name, default)))
-    except (ValueError, TypeError, OverflowError) as error:
-        raise Unknown(f"{name} is {_shown(settings[name]):.100}, expected a number") from error
+    return float(array(settings.get(name, default), name))
 
 
 def _activation(settings: dict, kind: Kind) -> str:
@@ -202,12 +172,13 @@ def part_of(tensors: dict, part: str) -> dict:
 def layers_of(
     tensors: dict[str, np.ndarray], *networks: str, epsilon: float = 0.001, biased: bool = True
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the layers of these networks one after the other; batch normalisation is merged into the next layer.
+    """Return the layers of these networks in float32, one after the other; batch normalisation is merged into the next.
 
-    A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for numbers
-    that are not finite or beyond `MOST_WEIGHT`.
+    A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for layers
+    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`.
     """
-    layers, shift, scale = [], np.zeros(1), np.ones(1)
+    layers: list[tuple[np.ndarray, np.ndarray]] = []
+    shift, scale = np.zeros(1), np.ones(1)
     for module, parts in (found for network in networks for found in _modules(tensors, network)):
         if {*parts} == {"ra_mean", "ra_var", "scale", "bias", "steps"}:
             for part in ("ra_mean", "ra_var", "bias"):
@@ -216,17 +187,18 @@ def layers_of(
                 scale = parts["scale"] / np.sqrt(parts["ra_var"] + epsilon)
             shift = parts["bias"] - parts["ra_mean"] * scale
             continue
-        if {*parts} != {"weight", "bias"} and (biased or {*parts} != {"weight"}) or parts["weight"].ndim != 2:
+        if {*parts} != {"weight", "bias"} and (biased or {*parts} != {"weight"}):
             raise Unknown(f"{module} has the tensors {', '.join(sorted(parts))}, expected a weight and a bias")
-        weight = parts["weight"].T
+        inputs = len(layers[-1][1]) if layers else -1
+        weight = check_array(f"{module}.weight", parts["weight"], (-1, inputs)).T
         bias = check_array(f"{module}.bias", parts.get("bias", np.zeros(weight.shape[1])), weight.shape[1:])
-        bias = bias + np.broadcast_to(shift, len(weight)) @ weight
-        layers.append((scale[:, None] * weight, bias))
-        for part in layers[-1]:
+        weight, bias = scale[:, None] * weight, bias + np.broadcast_to(shift, len(weight)) @ weight
+        for part in (weight, bias):
             check_array(module, part, part.shape, most=MOST_WEIGHT)
+        layers.append((weight.astype(np.float32, order="C"), bias.astype(np.float32)))  # the order fixes the sums
         shift, scale = np.zeros(1), np.ones(1)
-    if scale.shape != (1,):
-        raise Unknown(f"{module} normalises the output, expected a layer after it")
+    if not layers or scale.shape != (1,):
+        raise Unknown("there is no layer, or normalisation is the last: expected a layer at the end")
     return layers
 
 
@@ -257,10 +229,7 @@ def check_box(saved: Saved, name: str, low: np.ndarray, high: np.ndarray, task: 
     if not isinstance(space, Thing) or not space.name.endswith("spaces.box.Box") or not isinstance(space.state, dict):
         raise Unknown(f"its {name} is {space.name if isinstance(space, Thing) else 'missing'}, expected a Box")
     for limit, ours in (("low", low), ("high", high)):
-        try:
-            theirs = array(space.state.get(limit))
-        except (ValueError, TypeError, OverflowError) as error:
-            raise Unknown(f"{limit} of its {name} is no array of numbers") from error
+        theirs = array(space.state.get(limit), f"{limit} of its {name}")
         free = np.isinf(theirs) & (name == "observation_space")
         if theirs.shape != ours.shape or not (np.isclose(theirs, ours, rtol=1e-5) | free).all():
             text = f"{limit} of its {name} is {theirs.tolist()!s:.200}, {task} has {ours.tolist()}"

@@ -24,7 +24,6 @@ from .inert import Thing, Unknown, described
 LARGEST = 2**27  # bytes of a zip, of the policy in it, and of the tensors in float64; a TD3 agent takes 2**24
 LARGEST_DATA = 2**24  # bytes of the agent's settings, in JSON
 MOST_MEMBERS = 10_000  # members of a zip
-MAGIC = 0x1950A86A20F9469CFC6C  # begins a file of tensors that torch wrote before version 1.6
 
 _DTYPES = {f"torch.{name}Storage": kind for name, kind in (("Float", "<f4"), ("Double", "<f8"), ("Long", "<i8"))}
 
@@ -69,9 +68,7 @@ def read_zip(path: Path) -> Saved:
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file, expected a zip that Stable-Baselines3's `save` wrote")
     try:
-        if path.is_file() and path.stat().st_size > LARGEST:
-            raise ValueError(f"it has {path.stat().st_size} bytes, expected at most {LARGEST}")
-        archive = _archive(atomic.read_bytes(path))
+        archive = _archive(atomic.read_bytes(path, LARGEST))
         settings = json.loads(_member(archive, "data", LARGEST_DATA))
         policy = _member(archive, "policy.pth", LARGEST)
         tensors = _tensors(policy) if policy.startswith(b"PK") else _old_tensors(policy)
@@ -118,9 +115,7 @@ def _old_tensors(content: bytes) -> dict[str, np.ndarray]:
     """Return the tensors in a file of torch before 1.6: five pickles, then the number of elements and bytes of each
     storage, in the order of the last pickle."""
     file = io.BytesIO(content[:LARGEST_PICKLE])
-    magic, _, _, found, names = (described(file) for _ in range(5))
-    if magic != MAGIC:
-        raise ValueError("the policy begins with other bytes than torch's files, expected a file of tensors")
+    _, _, _, found, names = (described(file) for _ in range(5))
     views, place, storages = _views(found), file.tell(), {}
     kinds = {view.name: view.dtype for view in views.values()}
     for name in names:

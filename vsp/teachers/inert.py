@@ -98,8 +98,8 @@ def described(source: bytes | BinaryIO) -> Any:
     return found
 
 
-def array(thing: Any) -> np.ndarray:
-    """Return a NumPy array or number that a pickle describes, in float64. Raises ValueError for anything else."""
+def array(thing: Any, what: str) -> np.ndarray:
+    """Return a NumPy array or number that a pickle describes, in float64. Raises Unknown for anything else."""
     match thing:
         case int() | float():
             return np.array(thing, dtype=np.float64)
@@ -108,10 +108,13 @@ def array(thing: Any) -> np.ndarray:
         case Thing(name, (kind, bytes(raw))) if name.endswith("multiarray.scalar"):
             shape, fortran = [], False
         case Thing(name, (bytes() | bytearray() as raw, kind, (*shape,), str(order))) if name.endswith("._frombuffer"):
-            fortran = ("C", "F").index(order)
+            fortran = order == "F"
         case _:
-            raise ValueError("expected a NumPy array in the pickle")
-    return np.frombuffer(raw, _dtype(kind)).reshape(shape, order="F" if fortran else "C").astype(np.float64)
+            raise Unknown(f"{what} is no number or array of numbers")
+    try:
+        return np.frombuffer(raw, _dtype(kind)).reshape(shape, order="F" if fortran else "C").astype(np.float64)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise Unknown(f"{what} is no array of numbers") from error
 
 
 def _dtype(thing: Any) -> np.dtype:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from ..checks import check_array
 from ..run import atomic
-from .actors import kind_of
 from .agent_zip import Saved
 from .inert import LARGEST, Thing, array, described
 
@@ -38,20 +38,18 @@ def read_normalization(path: str | os.PathLike, d: int) -> Normalization | None:
 
     Raises `MissingFile`, `DamagedFile`, and ValueError for statistics that do not fit.
     """
-    if Path(path).is_file() and Path(path).stat().st_size > LARGEST:
-        raise atomic.DamagedFile(f"{path}: it has {Path(path).stat().st_size} bytes, expected at most {LARGEST}")
-    content = atomic.read_bytes(path)
+    content = atomic.read_bytes(path, LARGEST)
     try:
         saved = described(content)
         fields = saved.state if isinstance(saved, Thing) and saved.name == _CLASS else None
         if not isinstance(fields, dict):
             raise ValueError(f"expected a {_CLASS}")
-        if not array(fields.get("norm_obs", True)):
+        if not array(fields.get("norm_obs", True), "norm_obs"):
             return None
         running = fields["obs_rms"]
         parts = {} if isinstance(running, dict) else running.state
-        moments = {name: array(parts[name]) for name in ("mean", "var") if name in parts}
-        numbers = {name: float(array(fields[name])) for name in ("epsilon", "clip_obs")}
+        moments = {name: array(parts[name], name) for name in ("mean", "var") if name in parts}
+        numbers = {name: float(array(fields[name], name)) for name in ("epsilon", "clip_obs")}
     except Exception as error:  # of any kind: the content is not trusted
         raise atomic.DamagedFile(f"{path}: not the statistics of observations: {error!r:.300}") from error
     return checked(moments, numbers["epsilon"], numbers["clip_obs"], d, str(path))
@@ -107,13 +105,14 @@ def sign(path: Path, saved: Saved) -> str:
     for settings in (Path(f"{name}.config.yml"), name / "config.yml", path.parent / "config.yml"):
         if settings.is_file() and _says_normalize(settings):
             return f"{settings} says so"
-    if kind_of(saved).on_policy and saved.settings.get("_last_original_obs") is not None:
+    # An agent with a buffer, off policy, keeps them without a normalisation too
+    if "buffer_size" not in saved.settings and saved.settings.get("_last_original_obs") is not None:
         return "it keeps observations from before a normalisation (_last_original_obs)"
     return ""
 
 
 def _says_normalize(path: Path) -> bool:
-    """Whether a file of settings asks for normalised observations. Its YAML is read as plain nodes: nothing is built.
+    """Whether a file of settings asks for normalised observations. Of its YAML only texts are read: nothing is built.
 
     `normalize` may be true, a mapping, or a text such as "dict(norm_obs=True, norm_reward=False)".
     """
@@ -121,18 +120,11 @@ def _says_normalize(path: Path) -> bool:
 
     try:
         with open(path, "rb") as file:
-            nodes = [yaml.compose(file.read(LARGEST_SETTINGS), Loader=yaml.SafeLoader)]
-        seen = set()
-        for node in nodes:  # which grows: a mapping, or a list of pairs as the zoo writes it
-            pairs = node.value if isinstance(node, yaml.MappingNode) else []
-            if isinstance(node, yaml.SequenceNode) and id(node) not in seen:  # an alias may lead back
-                seen.add(id(node))
-                nodes += node.value
-                pairs = [node.value] if len(node.value) == 2 else []
-            for value in [value for key, value in pairs if key.value == "normalize"]:
-                text = str(value.value) if isinstance(value, yaml.ScalarNode) else yaml.serialize(value)
-                off = text.strip().lower() in ("false", "no", "off", "null", "none", "~", "")
-                return not off and not re.search(r"(?i)norm_obs['\"]?\s*[=:]\s*(false|no|off)\b", text)
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
-        pass
-    return False
+            events = yaml.parse(file.read(LARGEST_SETTINGS), Loader=yaml.SafeLoader)
+            texts = [event.value for event in events if isinstance(event, yaml.ScalarEvent)]
+    except (yaml.YAMLError, UnicodeDecodeError):
+        return False
+    after = dict(pairwise(texts))  # a value comes after its name, in a mapping and in the zoo's lists of pairs
+    given = [after.get("normalize", "no"), after.get("norm_obs", "yes")]
+    off = any(text.strip().lower() in ("false", "no", "off", "null", "none", "~", "") for text in given)
+    return not off and not re.search(r"(?i)norm_obs['\"]?\s*[=:]\s*(false|no|off)\b", given[0])
