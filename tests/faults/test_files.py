@@ -85,7 +85,7 @@ def of_study(path: Path) -> object:
 
 
 KINDS = {
-    "run": Kind(run, lambda path: runs.load_run(path, EXPERIMENT)),
+    "run": Kind(run, lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2])),
     "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
     "policy": Kind(copied("beyond/methods_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
     "checkpoint of a training": Kind(checkpoint, training.read_checkpoint),
@@ -220,7 +220,7 @@ LOADERS = {
     "teacher of a task": lambda path: vsp.load_teacher(path, SIMPLEGOAL),
     "agent": vsp.agent,
     "policy": vsp.VoronoiPolicy.load,
-    "run": lambda path: runs.load_run(path, EXPERIMENT),
+    "run": lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2]),
     "row": partial(load_arrays, kind="Row"),
     "checkpoint": training.read_checkpoint,
     "sealed": read_sealed,

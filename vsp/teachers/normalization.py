@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -112,7 +111,7 @@ def sign(path: Path, saved: Saved) -> str:
 
 
 def _says_normalize(path: Path) -> bool:
-    """Whether a file of settings asks for normalised observations. Of its YAML only texts are read: nothing is built.
+    """Whether a file of settings asks for normalised observations. Its YAML is read as plain nodes: nothing is built.
 
     `normalize` may be true, a mapping, or a text such as "dict(norm_obs=True, norm_reward=False)".
     """
@@ -120,11 +119,18 @@ def _says_normalize(path: Path) -> bool:
 
     try:
         with open(path, "rb") as file:
-            events = yaml.parse(file.read(LARGEST_SETTINGS), Loader=yaml.SafeLoader)
-            texts = [event.value for event in events if isinstance(event, yaml.ScalarEvent)]
-    except (yaml.YAMLError, UnicodeDecodeError):
-        return False
-    after = dict(pairwise(texts))  # a value comes after its name, in a mapping and in the zoo's lists of pairs
-    given = [after.get("normalize", "no"), after.get("norm_obs", "yes")]
-    off = any(text.strip().lower() in ("false", "no", "off", "null", "none", "~", "") for text in given)
-    return not off and not re.search(r"(?i)norm_obs['\"]?\s*[=:]\s*(false|no|off)\b", given[0])
+            nodes = [yaml.compose(file.read(LARGEST_SETTINGS), Loader=yaml.SafeLoader)]
+        seen = set()
+        for node in nodes:  # which grows: a mapping, or a list of pairs as the zoo writes it
+            pairs = node.value if isinstance(node, yaml.MappingNode) else []
+            if isinstance(node, yaml.SequenceNode) and id(node) not in seen:  # an alias may lead back
+                seen.add(id(node))
+                nodes += node.value
+                pairs = [node.value] if len(node.value) == 2 else []
+            for value in [value for key, value in pairs if key.value == "normalize"]:
+                text = str(value.value) if isinstance(value, yaml.ScalarNode) else yaml.serialize(value)
+                off = text.strip().lower() in ("false", "no", "off", "null", "none", "~", "")
+                return not off and not re.search(r"(?i)norm_obs['\"]?\s*[=:]\s*(false|no|off)\b", text)
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError):
+        pass
+    return False
