@@ -220,7 +220,7 @@ LOADERS = {
     "teacher of a task": lambda path: vsp.load_teacher(path, SIMPLEGOAL),
     "agent": vsp.agent,
     "policy": vsp.VoronoiPolicy.load,
-    "run": lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2]),
+    "run": partial(load_arrays, kind="Run"),
     "row": partial(load_arrays, kind="Row"),
     "checkpoint": training.read_checkpoint,
     "sealed": read_sealed,
