@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsp import Partition, get_task, preset
 from vsp.buffers import Buffers
-from vsp.config import paper_preset
 from vsp.paper.readings import Readings
-from vsp.partition import Partition
 from vsp.rollouts import Episode
-from vsp.tasks import get_task
 
 from .feedback import Exercise
 
@@ -27,7 +25,7 @@ MERGE = Exercise("2.4", "merge_regions", ("merge_regions",), cures=((IndexError,
 
 TASK = "SimpleGoal-v0"
 # The settings of the cases below; new cells start at 0, so that random numbers do not matter
-SMALL = replace(paper_preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
+SMALL = replace(preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
 
 
 def on_a_line(places: list[float], maps: list) -> Partition:
@@ -63,7 +61,7 @@ class SplitCase(NamedTuple):
     splits: list[float]
     what: str
     hint: int
-    full: tuple[int, ...] = ()  # number of states in each buffer afterwards; empty: any
+    full: tuple[tuple[int, ...], ...] = ()  # numbers of states in the buffers that are right; empty: any
 
 
 # fmt: off
@@ -94,7 +92,7 @@ SPLITS = (
               "two places in one episode: go on after a split", 4),
     SplitCase([0.1], [0], [0.4], [0.5], [], "a mean loss exactly at the limit: only more than the limit counts", 1),
     SplitCase([0.05, 0.55, 0.75, 0.95], [1, 0, 0, 0], [0.27], [0], [0.27], "one state between two cells of a row", 1,
-              (0, 0, 1, 1, 0)),
+              ((0, 0, 1, 1, 0),)),
 )
 # fmt: on
 
@@ -111,7 +109,7 @@ def split_regions(function: Callable) -> None:
             raise SPLIT.wrong(elsewhere, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         _returned(SPLIT, added, partition.codewords[before:], "one for every new cell")
         expected = "those of the cell that was split and of its old neighbours emptied, no others"
-        _emptied(SPLIT, partition.buffers, [case.full], expected)
+        _emptied(SPLIT, partition.buffers, case.full, expected)
     for seed in range(4):
         _on_a_random_walk(function, np.random.default_rng(seed))
     SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
@@ -127,10 +125,10 @@ def _returned(exercise: Exercise, returned: object, right: np.ndarray, what: str
         exercise.refuse_if(sorted(values.tolist()) != sorted(right.tolist()), "other codewords returned", what, 1)
 
 
-def _emptied(exercise: Exercise, buffers: Buffers, full: list[tuple], expected: str) -> None:
-    """Check the numbers of states in the buffers; each of `full` is right, an empty one stands for any."""
+def _emptied(exercise: Exercise, buffers: Buffers, full: tuple[tuple[int, ...], ...], expected: str) -> None:
+    """Check the numbers of states in the buffers: one of `full`, or any if there are none."""
     counts = tuple(buffers.counts.tolist())
-    wrong = () not in full and counts not in full
+    wrong = len(full) > 0 and counts not in full
     exercise.refuse_if(wrong, f"buffers of {counts} states in a row of cells that had one each", expected, 5)
 
 
@@ -162,7 +160,7 @@ class MergeCase(NamedTuple):
     what: str
     hint: int
     order: tuple[int, ...] = ()  # place of each cell in the row, if it is not its index
-    full: tuple[tuple[int, ...], ...] = ((),)  # numbers of states in the buffers that are right; an empty one: any
+    full: tuple[tuple[int, ...], ...] = ()  # as in `SplitCase`
 
 
 # fmt: off

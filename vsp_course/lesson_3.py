@@ -12,13 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import sem
 
+from vsp import VoronoiPolicy, get_task, load_teacher, preset, start_states
 from vsp.algorithms import distill
-from vsp.config import paper_preset
-from vsp.evaluation import start_states
-from vsp.policy import VoronoiPolicy
 from vsp.rollouts import rollout
-from vsp.tasks import GOAL, get_task
-from vsp.teachers import load_teacher
+from vsp.tasks import GOAL
 
 from .feedback import Exercise, Mistake, Question
 from .lesson_3_repairs import BLAME, DAGGER, REFIT, blame, corrected, dagger_round, last_states, refit  # noqa: F401
@@ -54,8 +51,7 @@ QUESTIONS = {
 @READING.checks
 def reading(answers: object) -> None:
     """3.1: answers `higher median`, `inside the box`, `pit episodes`, `sees the pit`."""
-    first = READING.ask(answers, QUESTIONS)
-    READING.passed(f"a plot may hide just what went wrong.{first}")
+    READING.ask(answers, QUESTIONS, "a plot may hide just what went wrong.")
 
 
 @PAIRED_GAP.checks
@@ -97,6 +93,8 @@ def standard_errors(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float]
 @INTERVAL.checks
 def interval(function: Callable) -> None:
     """3.3: `interval(returns, rng)` returns the ends of a 95 % interval of the mean, by resampling policies."""
+    unrelated = "an interval as narrow as if every episode were an independent sample"
+    of_draws = "the middle 95 % of the means of resampled policies, of a few thousand draws"
     for seed in range(1, 4):
         rng = np.random.default_rng(seed)
         luck = 6 * rng.exponential(size=(30, 400))  # skewed, so that mean and median differ
@@ -108,8 +106,18 @@ def interval(function: Callable) -> None:
         outside = f"an interval from {low:.2f} to {high:.2f} without the mean {means.mean():.2f}"
         INTERVAL.refuse_if(not low <= means.mean() <= high, outside, "one around it", 1)
         width = 2 * 1.96 * means.std() / np.sqrt(len(means))  # the bootstrap interval in large samples
+        single = 2 * 1.96 * returns.std() / np.sqrt(returns.size)
+        middle = np.ptp(np.percentile(means, [2.5, 97.5]))
         narrow_or_wide = f"an interval that is too {'narrow' if high - low < width else 'wide'}"
-        INTERVAL.compare(high - low, width, _other_widths(returns, width, narrow_or_wide), rtol=NEAR)
+        mistakes = [
+            Mistake(0.0, "an interval of no width", "draws *with* replacement, which differ from each other", 2),
+            Mistake(single, unrelated, "one as wide as the policies differ", 3),
+            Mistake(middle, "the range of single policies", "the range of *means*", 2),
+            Mistake(1.645 / 1.96 * width, "an interval for 90 %", "one for 95 %: a tail of 2.5 % on either side", 1),
+            Mistake(width / 1.96, "one standard error to either side", "the middle 95 % of the resampled means", 1),
+            Mistake(None, narrow_or_wide, of_draws, 2),
+        ]
+        INTERVAL.compare(high - low, width, mistakes, rtol=NEAR)
         aside = f"an interval around {(low + high) / 2:.2f}, aside of the mean {means.mean():.2f}"
         off = abs((low + high) / 2 - means.mean()) > NEAR / 2 * width
         INTERVAL.refuse_if(off, aside, "a tail of 2.5 % on either side, of resampled policies", 1)
@@ -119,26 +127,11 @@ def interval(function: Callable) -> None:
     INTERVAL.passed("policies are resampled, with all their episodes.")
 
 
-def _other_widths(returns: np.ndarray, width: float, narrow_or_wide: str) -> list[Mistake]:
-    means = returns.mean(axis=1)
-    single = 2 * 1.96 * returns.std() / np.sqrt(returns.size)
-    unrelated = "an interval as narrow as if every episode were an independent sample"
-    middle = "the middle 95 % of the means of resampled policies, of a few thousand draws"
-    return [
-        Mistake(0.0, "an interval of no width", "draws *with* replacement, which differ from each other", 2),
-        Mistake(single, unrelated, "one as wide as the policies differ", 3),
-        Mistake(np.ptp(np.percentile(means, [2.5, 97.5])), "the range of single policies", "the range of *means*", 2),
-        Mistake(1.645 / 1.96 * width, "an interval for 90 %", "one for 95 %: a tail of 2.5 % on either side", 1),
-        Mistake(width / 1.96, "one standard error to either side", "the middle 95 % of the resampled means", 1),
-        Mistake(None, narrow_or_wide, middle, 2),
-    ]
-
-
 @functools.cache
 def _best_policy() -> float:
     """The highest mean return of the lesson's policies, from fresh starts."""
     task, teacher = get_task(TASK), load_teacher(TASK)
-    policies = [distill(teacher, task, paper_preset(TASK), seed=seed)[0] for seed in SEEDS]
+    policies = [distill(teacher, task, preset(TASK), seed=seed)[0] for seed in SEEDS]
     return max(rollout(policy, task, start_states(task, 2000, FRESH)).returns.mean() for policy in policies)
 
 

@@ -10,12 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vsp.algorithms import teacher_episodes
+from vsp import Policy, Task, VoronoiPolicy, get_task, load_teacher, teacher_episodes
 from vsp.paper import baselines
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, collect_episodes, rollout, visited_states
-from vsp.tasks import GOAL, PIT, Task, get_task
-from vsp.teachers import load_teacher
+from vsp.rollouts import collect_episodes, rollout, visited_states
+from vsp.tasks import GOAL, PIT
 
 from .feedback import Exercise, Mistake
 
@@ -98,17 +96,15 @@ def refit(function: Callable) -> None:
         states = rng.uniform(size=(300, 2))
         actions = np.clip(np.sin(5 * states) - states[:, ::-1], -1, 1)
         cells = policy.cells(states)
-        _refits(function, policy, states, actions, "where every cell has many states")
-        known, few = cells != 2, "where a cell has fewer states than parameters"
-        _refits(function, policy, states[known], actions[known], "where no state is in a cell")
-        for n in (1, 2):
-            kept = known & ((cells != 3) | (np.cumsum(cells == 3) <= n))
-            _refits(function, policy, states[kept], actions[kept], few)
+        _refits(function, policy, states, actions)
+        for n in (300, 1, 2):  # states in cell 3, at most; none in cell 2
+            kept = (cells != 2) & ((cells != 3) | (np.cumsum(cells == 3) <= n))
+            _refits(function, policy, states[kept], actions[kept])
     REFIT.passed("in these cells no maps are nearer to the teacher.")
 
 
-def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray, where: str) -> None:
-    """Check a case in which cells 2 and 3 have few states or none, as `where` tells."""
+def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actions: np.ndarray) -> None:
+    """Check a case in which cell 2 may have no states, and cell 3 fewer than parameters."""
     before, cells = policy.coefficients.copy(), policy.cells(states)
     new = REFIT.call(function, policy, states, actions, keep=True)
     REFIT.refuse_if(not isinstance(new, VoronoiPolicy), f"a {type(new).__name__}", "a vsp.VoronoiPolicy", 1)
@@ -123,6 +119,7 @@ def _refits(function: Callable, policy: VoronoiPolicy, states: np.ndarray, actio
     whole = baselines.linear_map(states, actions, TASK)
     if np.allclose(new.coefficients[0], whole.coefficients[0]):
         raise REFIT.wrong("the same map in every cell", "one per cell, from the states in it", 2)
+    where = "where a cell has fewer states than parameters"
     REFIT.refuse_if(missed, f"a map that misses the actions {where}", "one that meets them", 3)
     error, least = (np.square(p.linear(states) - actions).mean() for p in (new, best))
     REFIT.refuse_if(error > 1.0001 * least, f"a squared error of {error:.3g}", f"the least there is, {least:.3g}", 2)

@@ -436,13 +436,14 @@ def test_the_first_prediction_is_kept(monkeypatch, capsys):
     assert table.loc["a higher loss", "you said first"] == "fewer cells"
 
 
-def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch):
+def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch, capsys):
     monkeypatch.setattr(feedback, "_FIRST", {})
     quiz = feedback.Exercise("0.1", "quiz")
     questions = {n: feedback.Question(("yes", "no"), feedback.seal("0.1", n, "yes"), 1) for n in "abc"}
     with pytest.raises(feedback.NotYet, match="question 'b': not 'no'"):
-        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions)
-    assert quiz.ask(dict.fromkeys("abc", "yes"), questions) == " Of your first answers 1 of 3 were right."
+        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions, "well read.")
+    quiz.ask(dict.fromkeys("abc", "yes"), questions, "well read.")
+    assert capsys.readouterr().out == "✓ 0.1 quiz: well read. Of your first answers 1 of 3 were right.\n"
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):
