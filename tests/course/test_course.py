@@ -25,7 +25,7 @@ from vsp.paper import baselines
 from vsp.paper.statistics import spread
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
-from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
+from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, slides
 from vsp_course.lesson_2 import _algorithm_1
 
 LESSONS = build.read_sources()
@@ -198,7 +198,7 @@ def test_the_guide_keeps_answers_apart_from_what_students_see():
     for lesson in LESSONS.values():
         assert all(cell.source in lecturers for cell in by_kind(lesson, build.is_solution))
         assert all(cell.source in lecturers for cell in by_kind(lesson, build.for_lecturer))
-        assert f"| all | {build.points(lesson)} |" in students
+        assert f"| all | {sum(cell.metadata.nbgrader.points for cell in by_kind(lesson, build.is_check))} |" in students
     assert students.count("| Exercise ") == len(EXERCISES) == lecturers.count("### Exercise ")
 
 
@@ -553,7 +553,7 @@ def small_lesson(worked):
 
 
 def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
-    made = pages.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
+    made = build.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
     assert [len(cell.outputs) for cell in made.cells] == [1, 0, 0, 1]
     assert made.cells[0].outputs[0].text == "42\n" and made.cells[3].outputs[0].data["text/plain"] == "5"
     assert [cell.execution_count for cell in made.cells] == [1, 2, 3, 4]
@@ -562,4 +562,4 @@ def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
 
 def test_a_page_must_not_need_an_answer():
     with pytest.raises(RuntimeError, match="needs-x.*name 'x'"):
-        pages.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))
+        build.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))
