@@ -53,26 +53,25 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
     texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
     texts["guide.md"] = guide(lessons)
+    made = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     with folder_lock(folder, f"another run writes into {folder}"):
-        _keep_edited(folder, texts)
+        _keep_edited(folder, made)
         for name, text in texts.items():
             write_text(folder / name, text)
-        made = {name: sha256(folder / name) for name in texts}
         write_sealed(folder / MADE, json.dumps(made).encode())
         write_handout(folder / "handout.zip", students)
     return [folder / name for name in (*texts, "handout.zip")]
 
 
-def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
-    """Rename files that somebody edited: their content is neither the last build's nor this one's."""
+def _keep_edited(folder: Path, made: dict[str, str]) -> None:
+    """Rename files that somebody edited: their checksum is neither the last build's nor this one's in `made`."""
     try:
-        made = json.loads(read_sealed(folder / MADE))
+        last = json.loads(read_sealed(folder / MADE))
     except (FileNotFoundError, DamagedFile):
-        made = {}  # no record of the last build
-    for name, text in texts.items():
+        last = {}  # no record of the last build
+    for name, checksum in made.items():
         path = folder / name
-        ours = (made.get(name), hashlib.sha256(text.encode()).hexdigest())
-        if path.exists() and sha256(path) not in ours:
+        if path.exists() and sha256(path) not in (last.get(name), checksum):
             names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
             kept = next(name for name in names if not name.exists())
             path.rename(kept)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from vsp import Task, VoronoiPolicy, geometry, get_task, load_teacher, teacher_episodes
+from vsp import Policy, Task, VoronoiPolicy, agent, geometry, get_task, load_teacher, teacher_episodes
 from vsp.paper import baselines
 from vsp.rollouts import Episodes
 
@@ -85,14 +85,8 @@ def fit_linear(function: Callable) -> None:
     FIT_LINEAR.passed("weights and bias, and no map has a smaller squared error.")
 
 
-class _Map:
-    """A linear policy for cases whose error is known."""
-
-    def __init__(self, weights: np.ndarray):
-        self.weights = weights
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        return np.asarray(obs) @ self.weights, None
+def _linear(weights: np.ndarray) -> Policy:
+    return agent(lambda states: states @ weights)
 
 
 @ACTION_ERROR.checks
@@ -100,8 +94,8 @@ def action_error(function: Callable) -> None:
     """1.3: `action_error(policy, teacher, states)` returns the mean squared difference of two policies' actions."""
     for rng, d, m in _draws():
         states = rng.normal(size=(30, d))
-        policy, teacher = (_Map(rng.normal(size=(d, m))) for _ in range(2))
-        difference = states @ policy.weights - states @ teacher.weights
+        policy, teacher = (_linear(rng.normal(size=(d, m))) for _ in range(2))
+        difference = policy.predict(states)[0] - teacher.predict(states)[0]
         squares, both_sides = np.square(difference), "a mean in which errors to either side cancel"
         value = np.asarray(ACTION_ERROR.call(function, policy, teacher, states))
         shape = f"an array of shape {value.shape}"

@@ -75,8 +75,7 @@ def running_mean(function: Callable) -> None:
         (np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0])),
         (np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3.0, 5.0, 1.0, 4.0, 0.0])),
     ]
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
+    for rng in map(np.random.default_rng, range(4)):
         cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
         cases.append((cells, rng.uniform(size=len(cells))))
     remember = "the mean since the cell was entered (is the cell of the step before remembered in every step?)"

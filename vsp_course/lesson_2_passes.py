@@ -110,8 +110,19 @@ def split_regions(function: Callable) -> None:
         _returned(SPLIT, added, partition.codewords[before:], "one for every new cell")
         expected = "those of the cell that was split and of its old neighbours emptied, no others"
         _emptied(SPLIT, partition.buffers, case.full, expected)
-    for seed in range(4):
-        _on_a_random_walk(function, np.random.default_rng(seed))
+    for rng in map(np.random.default_rng, range(4)):  # vsp's pass on random walks, under both readings of R14
+        partition = _with_codewords(rng.uniform(size=(4, 2)))
+        partition.models.coefficients[:] = rng.normal(size=partition.models.coefficients.shape)
+        states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
+        episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
+        split, *readings = (copy.deepcopy(partition) for _ in range(3))
+        SPLIT.call(function, split, episode, SMALL, np.random.default_rng(0), keep=True)
+        for reading, after in zip(readings, ("reset", "kept")):
+            Readings(loss_after_split=after).split(reading, episode, SMALL, np.random.default_rng(0))
+        if not any(np.array_equal(split.codewords, reading.codewords) for reading in readings):
+            splits, right = (_count(len(p.codewords) - 4, "split") for p in (split, readings[0]))
+            where = "where both conditions hold, by `partition.loss` and `partition.far`"
+            raise SPLIT.wrong(f"{splits} on a random walk", f"{right}, {where}", 1)
     SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
 
 
@@ -134,22 +145,6 @@ def _emptied(exercise: Exercise, buffers: Buffers, full: tuple[tuple[int, ...], 
 
 def _count(n: int, what: str) -> str:
     return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
-
-
-def _on_a_random_walk(function: Callable, rng: np.random.Generator) -> None:
-    """Compare with vsp's pass on a random partition and episode, under both readings of R14."""
-    partition = _with_codewords(rng.uniform(size=(4, 2)))
-    partition.models.coefficients[:] = rng.normal(size=partition.models.coefficients.shape)
-    states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
-    episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
-    split, *readings = (copy.deepcopy(partition) for _ in range(3))
-    SPLIT.call(function, split, episode, SMALL, np.random.default_rng(0), keep=True)
-    for reading, after in zip(readings, ("reset", "kept")):
-        Readings(loss_after_split=after).split(reading, episode, SMALL, np.random.default_rng(0))
-    if not any(np.array_equal(split.codewords, reading.codewords) for reading in readings):
-        splits, right = (_count(len(p.codewords) - 4, "split") for p in (split, readings[0]))
-        where = "where both conditions hold, by `partition.loss` and `partition.far`"
-        raise SPLIT.wrong(f"{splits} on a random walk", f"{right}, {where}", 1)
 
 
 class MergeCase(NamedTuple):
@@ -202,25 +197,21 @@ def merge_regions(function: Callable) -> None:
         gone = [i for i in range(len(places)) if i not in kept]
         _returned(MERGE, removed, before[gone], "one for every cell that went")
         _emptied(MERGE, partition.buffers, case.full, "those of the survivor and of its neighbours emptied, no others")
-    for seed in range(9):
-        _with_random_maps(function, np.random.default_rng(seed))
+    for rng in map(np.random.default_rng, range(9)):  # random maps, under each of the readings
+        partition = _with_codewords(rng.uniform(size=(12, 2)))
+        partition.models.coefficients[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
+        merged = copy.deepcopy(partition)
+        MERGE.call(function, merged, SMALL, keep=True)
+        alive = (partition.codewords[:, None] == merged.codewords).all(axis=2).any(axis=1)
+        readings = [_survivors(partition, anew, again) for anew, again in ((True, False), (False, False), (True, True))]
+        if not any(np.array_equal(alive, survivors) for survivors in readings):
+            left = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
+            expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
+            raise MERGE.wrong(left, expected, 4)
+        same = np.array_equal(merged.models.coefficients, partition.models.coefficients[alive])
+        expected = "those that they had: nothing is averaged"
+        MERGE.refuse_if(not same, "other maps in the cells that are left", expected, 1)
     MERGE.passed("similar neighbours have become one, and no other cell was removed.")
-
-
-def _with_random_maps(function: Callable, rng: np.random.Generator) -> None:
-    """Check that the cells left of a random partition are those of one of the readings, with their maps."""
-    partition = _with_codewords(rng.uniform(size=(12, 2)))
-    partition.models.coefficients[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
-    merged = copy.deepcopy(partition)
-    MERGE.call(function, merged, SMALL, keep=True)
-    alive = (partition.codewords[:, None] == merged.codewords).all(axis=2).any(axis=1)
-    readings = [_survivors(partition, anew, again) for anew, again in ((True, False), (False, False), (True, True))]
-    if not any(np.array_equal(alive, survivors) for survivors in readings):
-        left = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
-        expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
-        raise MERGE.wrong(left, expected, 4)
-    same = np.array_equal(merged.models.coefficients, partition.models.coefficients[alive])
-    MERGE.refuse_if(not same, "other maps in the cells that are left", "those that they had: nothing is averaged", 1)
 
 
 def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:

@@ -41,9 +41,8 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     share = f"{error / constant:.0%} of the error that constants have in the same cells"
     OWN_CLASS.refuse_if(error > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
     linear = _errors(policy_class("linear", task), teacher, task)
-    OWN_CLASS.passed(
-        f"{len(own_class.rows)} coefficients per action, {share}; x and y alone have {linear / constant:.0%}."
-    )
+    number = f"{len(own_class.rows)} coefficients per action"
+    OWN_CLASS.passed(f"{number}, {share}; x and y alone have {linear / constant:.0%}.")
 
 
 def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
