@@ -2,14 +2,13 @@
 
 import _thread
 import ast
-import builtins
 import dataclasses
 import functools
 import os
 import re
 import signal
+import sys
 import zipfile
-from collections import Counter
 
 import course_answers
 import numpy as np
@@ -72,19 +71,6 @@ def identity(cell):
 # The sources
 
 
-def test_sources_hold_no_output_and_unique_ids(lesson):
-    nbformat.validate(lesson)
-    assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(lesson))
-    assert max(Counter(cell.id for cell in lesson.cells).values()) == 1
-
-
-def test_worked_cells_are_short_and_define_no_helpers(lesson):
-    for cell in code_cells(lesson):
-        assert len(cell.source.splitlines()) < (25 if build.is_solution(cell) else 15), cell.id
-        defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(ast.parse(cell.source)))
-        assert build.is_solution(cell) or not defines, cell.id
-
-
 def test_pictures_have_alternative_text(lesson):
     for cell in code_cells(lesson):
         calls = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)]
@@ -105,16 +91,13 @@ def test_every_exercise_has_a_text_with_hints_an_answer_a_check_and_notes(lesson
             assert all(f"*{part}.*" in notes.source for part in ("Common mistakes", "Discuss", "Exam")), cell.id
 
 
-@pytest.mark.parametrize("number", EXERCISES)
-def test_hints_are_counted_from_one(number):
-    assert hints(number) == set(range(1, 1 + len(hints(number)))) != set()
-
-
 def hints(number):
-    """The numbers of the hints of an exercise."""
+    """The numbers of the hints of an exercise, counted from one."""
     texts = (cell.source for lesson in LESSONS.values() for cell in lesson.cells)
     (text,) = (text for text in texts if f"## Exercise {number} " in text)
-    return {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
+    found = {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
+    assert found == set(range(1, 1 + len(found))) != set()
+    return found
 
 
 def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
@@ -229,17 +212,6 @@ def test_the_solutions_of_lesson_2_together_are_the_papers_method():
     assert np.array_equal(own.coefficients, ours.coefficients)
 
 
-def refuse(*packages):
-    """An `__import__` that finds none of `packages`."""
-    imports = builtins.__import__
-
-    def find(name, *others, **named):
-        assert name.split(".")[0] not in packages, name
-        return imports(name, *others, **named)
-
-    return find
-
-
 def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
     def stub(*given):
         raise NotImplementedError
@@ -293,7 +265,8 @@ def test_splits_and_merges_are_as_the_text_says():
 
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
     """And needs no package that the hand-out leaves out."""
-    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "studies"))
+    for package in ("torch", "stable_baselines3", "papermill", "studies"):
+        monkeypatch.setitem(sys.modules, package, None)  # an import fails
     made = build.student(lesson)
     _, failed = run(made, monkeypatch)
     checks = {cell.id for cell in by_kind(made, build.is_check)}
@@ -372,17 +345,6 @@ def test_other_right_answers_pass(entry, capsys, monkeypatch):
 def test_what_is_no_answer_at_all_is_refused_in_words(number):
     for nothing in (None, 7, "text"):
         assert _refused(number, (lambda nothing=nothing: nothing) if number == "3.7" else nothing).startswith(number)
-
-
-def test_a_function_that_alters_its_arguments_is_refused_and_spoils_no_other_case():
-    def spoils(states, actions):
-        actions += 1.0
-        return states
-
-    exercise, given = feedback.Exercise("1.2", "fit"), (np.ones(2), np.ones(3))
-    with pytest.raises(feedback.NotYet, match="found argument 2 altered in place, expected it as it was"):
-        exercise.call(spoils, *given)
-    assert (given[0] == 1).all() and (given[1] == 1).all()
 
 
 def test_the_policies_to_beat_are_those_of_the_lesson():
@@ -469,15 +431,12 @@ def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
         feedback.Exercise("1.2", "fit").call(names["fit"])
 
 
-def test_errors_of_many_lines_and_what_is_no_number_are_told_in_one_line():
+def test_errors_of_many_lines_are_told_in_one_line():
     def fails():
         raise ValueError("first\n   second")
 
-    exercise = feedback.Exercise("1.2", "fit")
     with pytest.raises(feedback.NotYet, match=r"ValueError \(first second\) in line"):
-        exercise.call(fails)
-    with pytest.raises(feedback.NotYet, match=r"a result that is not made of numbers, \['up'\], expected numbers of"):
-        exercise.array(["up"], (1,))
+        feedback.Exercise("1.2", "fit").call(fails)
 
 
 def test_a_long_message_is_shown_in_lines():
