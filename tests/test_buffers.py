@@ -12,14 +12,6 @@ def rows_of(buffers, cell):
     return [(buffers._inputs[i, 0], buffers._actions[i, 0]) for i in numbers]
 
 
-def filled(*cells):
-    buffers, numbers = Buffers(1, 1), np.arange(len(cells), dtype=float)[:, None]
-    for _ in range(max(cells) + 1):
-        buffers.add()
-    buffers.append(np.array(cells), numbers, -numbers)
-    return buffers
-
-
 OPERATIONS = st.one_of(
     st.tuples(st.just("append"), st.lists(st.integers(0, 99), min_size=1, max_size=90)),
     st.tuples(st.just("add"), st.just(None)),
@@ -93,25 +85,9 @@ def test_growth_far_beyond_the_first_size_loses_nothing():
         assert np.array_equal(own, states[cells == cell])
 
 
-def test_a_minibatch_holds_own_rows_alone():
-    buffers = filled(*np.random.default_rng(0).permutation(np.repeat(np.arange(5), 30)))
-    buffers.reset(np.array([2]))
-    inputs, actions = buffers.sample(np.array([4, 0]), 400, np.random.default_rng(1))
-    assert inputs.shape == (2, 400, 2) and actions.shape == (2, 400, 1)
-    for cell, drawn in zip((4, 0), inputs):
-        assert set(drawn[:, 0]) == {state for state, _ in rows_of(buffers, cell)}
-    assert np.array_equal(inputs[..., 0], -actions[..., 0])
-
-
-def test_sampling_is_uniform_and_with_replacement():
-    buffers = filled(*[0] * 7)
-    drawn, _ = buffers.sample(np.array([0]), 70_000, np.random.default_rng(2))
-    counts = np.bincount(drawn[0, :, 0].astype(int), minlength=7)
-    assert ((counts - 10_000) ** 2 / 10_000).sum() < 22.5  # chi square, 6 degrees of freedom, 0.1 %
-
-
 def test_clear_bounds_the_memory():
-    buffers = filled(0)
+    buffers = Buffers(1, 1)
+    buffers.add()
     for _ in range(200):
         buffers.append(np.zeros(100, int), np.zeros((100, 1)), np.zeros((100, 1)))
         buffers.clear()
