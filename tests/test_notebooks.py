@@ -124,15 +124,26 @@ sys.meta_path.insert(0, Blocked())
 """
 
 
-def test_they_draw_without_torch():
-    """Everything that they import, and a teacher."""
-    statements = {
+def imports(paths):
+    """The statements by which notebooks import."""
+    return {
         ast.unparse(node)
-        for path in NOTEBOOKS
+        for path in paths
         for cell in code_cells(nbformat.read(path, as_version=4))
         for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Import | ast.ImportFrom)
     }  # fmt: skip
-    assert len(statements) > 10
+
+
+def test_the_papers_five_import_no_part_but_vsp():
+    """Which imports no other part itself: `test_imports.py`."""
+    statements = imports(NOTEBOOKS[:5])
+    assert "import vsp" in statements
+    assert not [one for one in statements if re.match(r"(from|import) (vsp_beyond|vsp_course|studies)\b", one)]
+
+
+def test_they_draw_without_torch():
+    """Everything that they import, and a teacher."""
+    statements = imports(NOTEBOOKS)
     python("\n".join([BLOCKED, *sorted(statements), "vsp.load_teacher('SimpleGoal-v0')"]))
 
 
