@@ -70,21 +70,6 @@ def test_any_sequence_of_operations_against_lists(kind, operations):
         assert [rows_of(buffers, i) for i in range(len(model))] == model
 
 
-def test_growth_far_beyond_the_first_size_loses_nothing():
-    buffers, rng = Buffers(2, 1), np.random.default_rng(0)
-    for _ in range(4):
-        buffers.add()
-    cells = rng.integers(4, size=20_000)
-    states = rng.random((20_000, 2))
-    for part in np.split(np.arange(20_000), [1, 70, 3000, 19_000]):
-        buffers.append(cells[part], states[part], states[part, :1] * 2)
-    inputs, actions = buffers.sample(np.arange(4), 500, rng)
-    assert np.array_equal(actions[..., 0], inputs[..., 0] * 2) and (inputs[..., 2] == 1).all()
-    for cell in range(4):
-        own = buffers._inputs[buffers._table[cell, : buffers.counts[cell]], :2]
-        assert np.array_equal(own, states[cells == cell])
-
-
 def test_clear_bounds_the_memory():
     buffers = Buffers(1, 1)
     buffers.add()
