@@ -113,7 +113,7 @@ article: begin venv ## the article of ten minutes: docs/article.html, one file t
 # Pages are laid out as the repository is, so that links work on both. The old site stays until the new one is whole.
 site test-site: export SITE := $(OUT)/build/site
 site: begin venv-site ## the companion as pages for a browser, into build/site/: 1 to 3 minutes
-	@$(PY) -m vsp_course.pages --out="$$OUT"
+	@$(PY) -m vsp_course.build --pages --out="$$OUT"
 	@rm -rf "$$SITE-work"; source="$$SITE-work/source"; mkdir -p "$$source/notebooks/course" "$$source/data"; \
 	cp docs/*.md README.md CITATION.cff "$$source"; cp -R figures "$$source"; \
 	cp figures/executed/*.ipynb figures/beyond/executed/*.ipynb "$$source/notebooks"; \

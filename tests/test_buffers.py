@@ -12,14 +12,6 @@ def rows_of(buffers, cell):
     return [(buffers._inputs[i, 0], buffers._actions[i, 0]) for i in numbers]
 
 
-def filled(*cells):
-    buffers, numbers = Buffers(1, 1), np.arange(len(cells), dtype=float)[:, None]
-    for _ in range(max(cells) + 1):
-        buffers.add()
-    buffers.append(np.array(cells), numbers, -numbers)
-    return buffers
-
-
 OPERATIONS = st.one_of(
     st.tuples(st.just("append"), st.lists(st.integers(0, 99), min_size=1, max_size=90)),
     st.tuples(st.just("add"), st.just(None)),

@@ -19,7 +19,6 @@ ROOMS |= {"tasks": {"checks"}, "subpolicies": {"checks", "tasks"}, "run": set()}
 ROOMS |= {"teachers": METHOD | BASIS - {"subpolicies"}, "show": METHOD | BASIS | {"teachers"}}
 ROOMS |= {"protocol": METHOD | BASIS | {"teachers", "show"}}
 ROOMS |= {"paper": METHOD | BASIS | {"teachers", "show", "protocol"}}
-DEFINITIONS = ast.FunctionDef, ast.ClassDef
 
 TREES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts): ast.parse(path.read_text(encoding="utf-8"))
@@ -89,18 +88,3 @@ print(*sys.modules)
     assert not tops & {"pandas", "sklearn", "matplotlib", "torch", "stable_baselines3", *PARTS.keys() - {"vsp"}}
     assert len([name for name in by_vsp if name.partition(".")[0] == "vsp"]) <= 36
     assert not {"torch", "stable_baselines3"} & set(by_all)
-
-
-def without_docstring(tree):
-    """The public functions, classes and methods of a module that do not say what they do."""
-    public = [node for node in tree.body if isinstance(node, DEFINITIONS) and not node.name.startswith("_")]
-    for thing in public:
-        bases = [ast.unparse(base) for base in getattr(thing, "bases", [])]
-        if isinstance(thing, ast.ClassDef) and not {"Protocol", "gymnasium.Env"} & set(bases):
-            public += [part for part in thing.body if isinstance(part, DEFINITIONS) and not part.name.startswith("_")]
-    return [node.name for node in public if not ast.get_docstring(node)]
-
-
-def test_everything_public_says_what_it_does():
-    assert not [name for name, tree in TREES.items() if not ast.get_docstring(tree)]
-    assert not {name: names for name, tree in TREES.items() if (names := without_docstring(tree))}

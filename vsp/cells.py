@@ -33,10 +33,10 @@ class Cells(Protocol):
     def __len__(self) -> int: ...
 
     @property
-    def arrays(self) -> dict[str, np.ndarray]: ...
+    def arrays(self) -> dict[str, np.ndarray]: ...  # noqa: D102
 
     @property
-    def options(self) -> dict[str, Any]: ...
+    def options(self) -> dict[str, Any]: ...  # noqa: D102
 
     def locate(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (n, d). (n,)"""

@@ -17,7 +17,7 @@ Steps = list[tuple[np.ndarray, np.ndarray, np.ndarray]]  # running episodes (a,)
 class Policy(Protocol):
     """Any object with Stable-Baselines3's `predict`: observations (n, d) to clipped actions (n, m), and no state."""
 
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]: ...
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]: ...  # noqa: D102
 
 
 @dataclass(frozen=True)

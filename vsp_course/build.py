@@ -1,11 +1,13 @@
 """Build the student versions, the hand-out, the solutions, the slides and the lecturer's guide from the lessons.
 
     python -m vsp_course.build --out .
+    python -m vsp_course.build --pages --out .
 
 A source is a notebook with nbgrader's metadata: solution cells, whose answers stand between `### BEGIN SOLUTION` and
 `### END SOLUTION`, and check cells. Cells tagged `lecturer` go to the guide alone; those tagged `slide` to the slides,
 and what is said to them to the guide.
 In a student version, nbgrader's stub replaces each answer, as `nbgrader generate_assignment` does with the solution.
+The pages of the site are student versions with the output of the worked cells, run as students get them.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from vsp.run.atomic import ROOT, DamagedFile, sha256, write_text
 from vsp.run.command import in_one_line
 from vsp.run.locks import folder_lock
 from vsp.run.notebook import NotebookNode, nbformat
+from vsp.run.run_notebook import KERNEL, clean_outputs
 from vsp.run.sealed import read_sealed, write_sealed
 
 from .handout import write_handout
@@ -30,9 +33,9 @@ from .slides import is_slide, slides, spoken
 
 SOURCES = ROOT / "notebooks" / "course"
 HERE = Path(__file__).parent
-GUIDE = HERE / "guide.md"  # how the lecturer's guide begins
 MADE = ".made"  # checksums of the files written last
 BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
+TIMEOUT = 600  # seconds for a cell of a page
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
 _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
 
@@ -50,25 +53,25 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
     texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
     texts["guide.md"] = guide(lessons)
+    made = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     with folder_lock(folder, f"another run writes into {folder}"):
-        _keep_edited(folder, texts)
+        _keep_edited(folder, made)
         for name, text in texts.items():
             write_text(folder / name, text)
-        made = {name: sha256(folder / name) for name in texts}
         write_sealed(folder / MADE, json.dumps(made).encode())
         write_handout(folder / "handout.zip", students)
     return [folder / name for name in (*texts, "handout.zip")]
 
 
-def _keep_edited(folder: Path, texts: dict[str, str]) -> None:
-    """Rename files that somebody edited: their content is neither the last build's nor this one's."""
+def _keep_edited(folder: Path, made: dict[str, str]) -> None:
+    """Rename files that somebody edited: their checksum is neither the last build's nor this one's in `made`."""
     try:
-        made = json.loads(read_sealed(folder / MADE))
+        last = json.loads(read_sealed(folder / MADE))
     except (FileNotFoundError, DamagedFile):
-        made = {}  # no record of the last build
-    for path, text in ((folder / name, text) for name, text in texts.items()):
-        ours = (made.get(path.relative_to(folder).as_posix()), hashlib.sha256(text.encode()).hexdigest())
-        if path.exists() and sha256(path) not in ours:
+        last = {}  # no record of the last build
+    for name, checksum in made.items():
+        path = folder / name
+        if path.exists() and sha256(path) not in (last.get(name), checksum):
             names = (path.with_name(f"{path.stem}.kept-{n}{path.suffix}") for n in itertools.count(1))
             kept = next(name for name in names if not name.exists())
             path.rename(kept)
@@ -123,14 +126,9 @@ def for_lecturer(cell: NotebookNode) -> bool:
     return "lecturer" in cell.metadata.get("tags", [])
 
 
-def points(lesson: NotebookNode) -> int:
-    """Sum the points of all exercises of a lesson."""
-    return sum(cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell))
-
-
 def guide(lessons: dict[str, NotebookNode]) -> str:
     """Return the lecturer's guide in Markdown: an overview, then notes and solutions for each lesson."""
-    parts = [GUIDE.read_text(encoding="utf-8"), "# What students see\n"]
+    parts = [(HERE / "guide.md").read_text(encoding="utf-8"), "# What students see\n"]
     parts += [_overview(name, lesson) for name, lesson in lessons.items()]
     parts += ["# For lecturers only\n"]
     parts += [f"{_notes(lesson)}\n### The slides, one by one\n\n{spoken(lesson)}" for lesson in lessons.values()]
@@ -141,10 +139,11 @@ def _overview(name: str, lesson: NotebookNode) -> str:
     """Title, aims and exercises with their points."""
     text = "\n".join(cell.source for cell in lesson.cells if not is_slide(cell))
     exercises = re.findall(r"^## (Exercise .*)", text, re.MULTILINE)
-    worth = [cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell)]
-    rows = [f"| {exercise} | {n} |" for exercise, n in zip(exercises, worth, strict=True)]
-    table = "\n".join(["| exercise | points |", "|---|---|", *rows, f"| all | {points(lesson)} |"])
-    return f"{_deeper(lesson.cells[0].source)}\n\nThe notebook: `student/{name}`.\n\n{table}\n"
+    points = [cell.metadata.nbgrader.points for cell in lesson.cells if is_check(cell)]
+    rows = [f"| {exercise} | {n} |" for exercise, n in zip(exercises, points, strict=True)]
+    table = "\n".join(["| exercise | points |", "|---|---|", *rows, f"| all | {sum(points)} |"])
+    aims = re.sub(r"^#", "##", lesson.cells[0].source, flags=re.MULTILINE)  # headings one level down
+    return f"{aims}\n\nThe notebook: `student/{name}`.\n\n{table}\n"
 
 
 def _notes(lesson: NotebookNode) -> str:
@@ -157,22 +156,55 @@ def _notes(lesson: NotebookNode) -> str:
         if titles and not for_lecturer(cell):
             heading = f"{'##' if cell is lesson.cells[0] else '###'} {titles[0]}\n"
         if for_lecturer(cell) or is_solution(cell):
-            lines += [heading] if heading else []
-            lines += [f"```python\n{cell.source}\n```\n" if is_solution(cell) else f"{cell.source}\n"]
+            lines += [heading, f"```python\n{cell.source}\n```\n" if is_solution(cell) else f"{cell.source}\n"]
             heading = ""
-    return "\n".join(lines)
+    return "\n".join(filter(None, lines))
 
 
-def _deeper(markdown: str) -> str:
-    """Markdown with its headings one level down."""
-    return re.sub(r"^#", "##", markdown, flags=re.MULTILINE)
+def write_pages(out: str | os.PathLike) -> list[Path]:
+    """Write the pages of the site to OUT/build/course/pages and return the files. Same sources, same bytes."""
+    folder, lessons = Path(out) / "build" / "course" / "pages", read_sources()
+    for name, lesson in lessons.items():
+        write_text(folder / name, nbformat.writes(page(student(lesson))) + "\n")
+    return [folder / name for name in lessons]
+
+
+def page(lesson: NotebookNode) -> NotebookNode:
+    """Run a student version and return it with the outputs of its worked cells; exercises and checks show none.
+
+    Raises RuntimeError if a worked cell fails.
+    """
+    from nbclient import NotebookClient
+
+    lesson.metadata.kernelspec = {"name": KERNEL, "display_name": "Python 3", "language": "python"}
+    options = {"kernel_name": KERNEL, "allow_errors": True, "resources": {"metadata": {"path": str(SOURCES)}}}
+    quiet = ["--log-level=CRITICAL"]  # no messages of the kernel itself
+    NotebookClient(lesson, timeout=TIMEOUT, extra_arguments=quiet, **options).execute()
+    code = [cell for cell in lesson.cells if cell.cell_type == "code"]
+    for number, cell in enumerate(code, 1):
+        cell.metadata.pop("execution", None)  # times
+        cell.execution_count = number
+        errors = [output.evalue for output in cell.outputs if output.output_type == "error"]
+        if is_solution(cell) or is_check(cell):
+            cell.outputs = []
+        elif errors:
+            raise RuntimeError(f"cell {cell.id} fails where no exercise is solved: {errors[0]}")
+        cell.outputs = clean_outputs(cell.outputs, number)
+    lesson.metadata.pop("widgets", None)
+    lesson.metadata.language_info = {"name": "python"}
+    return lesson
 
 
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--out", default=".", help="files go to OUT/build/course")
-    *_, guide, handout = build(parser.parse_args().out)
+    parser.add_argument("--pages", action="store_true", help="write the pages of the site, and nothing else")
+    options = parser.parse_args()
+    if options.pages:
+        print(*write_pages(options.out), sep="\n")
+        return
+    *_, guide, handout = build(options.out)
     print(f"lessons, slides and project are in {guide.parent}; begin with {guide}; for students: {handout}")
 
 

@@ -12,14 +12,11 @@ import hashlib
 import inspect
 import textwrap
 import traceback
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from vsp.rollouts import Episode
 
 WIDTH = 83  # characters of a message's lines: nbgrader's Validate cuts longer ones
 _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with questions
@@ -47,7 +44,7 @@ class Question(NamedTuple):
     options: Sequence[str]
     right: str  # the `seal` of the right answer
     hint: int
-    teaching: Mapping[str, str] = MappingProxyType({})
+    teaching: Mapping[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -154,44 +151,34 @@ class Exercise:
             mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, rtol))
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
-    def answers(self, given: Any, options: dict[str, Any]) -> None:
-        """Raise NotYet unless the dictionary `given` has one of the `options` (or a number) for each key."""
+    def answers(self, given: Any, options: Mapping[str, Sequence[str]]) -> None:
+        """Raise NotYet unless the dictionary `given` has one of the `options` for each key, or without any, a value."""
         self.refuse_if(not isinstance(given, dict), f"{given!r}", "a dictionary of answers")
         for key, choices in options.items():
             answer = given.get(key)
             if answer is None:
                 todo = "write your answer in place of None and run that cell, without the stub"
                 raise NotYet(f"{self.number} {self.name}: question {key!r} is not answered yet: {todo}.")
-            if choices is float:
-                self.refuse_if(not isinstance(answer, int | float | np.number), f"{answer!r} for {key!r}", "a number")
-            else:
-                self.refuse_if(answer not in choices, f"{answer!r} for {key!r}", f"one of {list(choices)}")
+            unknown = len(choices) > 0 and answer not in choices
+            self.refuse_if(unknown, f"{answer!r} for {key!r}", f"one of {list(choices)}")
 
-    def ask(self, given: Any, questions: dict[str, Question]) -> str:
-        """Raise NotYet unless the dictionary `given` has the right answer to every question.
+    def ask(self, given: Any, questions: dict[str, Question], text: str) -> None:
+        """Raise NotYet unless the dictionary `given` has the right answer to every question; else print `text`.
 
-        Returns a sentence for `passed` that says how many of the first answers were right: who guesses sees it in the
-        result.
+        With it comes how many of the first answers were right: who guesses sees it in the result.
         """
-        self.answers(given, {key: question.options for key, question in questions.items()})
-        first = self.first(given)
+        first = self.first(given, {key: question.options for key, question in questions.items()})
         right = [seal(self.number, key, first[key]) == question.right for key, question in questions.items()]
         for key, question in questions.items():
             if seal(self.number, key, given[key]) != question.right:
                 words = f"not {given[key]!r}: {question.teaching.get(given[key], 'look again')}."
                 raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}{self._pointer(question.hint)}")
-        return f" Of your first answers {sum(right)} of {len(questions)} were right."
+        self.passed(f"{text} Of your first answers {sum(right)} of {len(questions)} were right.")
 
-    def first(self, given: dict) -> dict:
-        """The first answers that this was called with since the kernel started."""
+    def first(self, given: Any, options: Mapping[str, Sequence[str]]) -> dict:
+        """The first complete answers since the kernel started. Raises NotYet as `answers` does."""
+        self.answers(given, options)
         return _FIRST.setdefault(self.number, dict(given))
-
-
-def joined(episodes: Iterable[Episode]) -> tuple[np.ndarray, np.ndarray]:
-    """Concatenate the states (n, d) and actions (n, m) of all episodes."""
-    parts = [(episode.states, episode.actions.astype(float)) for episode in episodes]
-    states, actions = (np.concatenate(column) for column in zip(*parts))
-    return states, actions
 
 
 def seal(number: str, key: str, answer: str) -> str:

@@ -9,17 +9,15 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from vsp import geometry
-from vsp.algorithms import teacher_episodes
+from vsp import Policy, Task, VoronoiPolicy, agent, geometry, get_task, load_teacher, teacher_episodes
 from vsp.paper import baselines
-from vsp.policy import VoronoiPolicy
-from vsp.tasks import Task, get_task
-from vsp.teachers import load_teacher
+from vsp.rollouts import Episodes
 
-from .feedback import Exercise, Mistake, Question, joined
+from .feedback import Exercise, Mistake, Question
 
 GIVEN = ((0.3, 0.3), (0.7, 0.6))  # codewords that the notebook begins with
 AT_MOST = 8  # codewords set by hand
+TWICE = ("a codeword that is there twice", "all of them different", 1)
 CELLS = 8  # codewords asked of a rule
 DRAWS = 100  # of random codewords, for each data set
 MARGIN = 0.85  # times the error of random codewords, which a rule has to beat; the best of five sets rarely does
@@ -48,8 +46,7 @@ QUESTIONS = {
 @READING.checks
 def reading(answers: object) -> None:
     """1.1: answers `right of the pit`, `beyond the pit`, `at the limit`, `sudden turn`."""
-    first = READING.ask(answers, QUESTIONS)
-    READING.passed(f"you read the arrows as the network means them.{first}")
+    READING.ask(answers, QUESTIONS, "you read the arrows as the network means them.")
 
 
 def _draws() -> Iterator[tuple[np.random.Generator, int, int]]:
@@ -88,14 +85,8 @@ def fit_linear(function: Callable) -> None:
     FIT_LINEAR.passed("weights and bias, and no map has a smaller squared error.")
 
 
-class _Map:
-    """A linear policy for cases whose error is known."""
-
-    def __init__(self, weights: np.ndarray):
-        self.weights = weights
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        return np.asarray(obs) @ self.weights, None
+def _linear(weights: np.ndarray) -> Policy:
+    return agent(lambda states: states @ weights)
 
 
 @ACTION_ERROR.checks
@@ -103,8 +94,8 @@ def action_error(function: Callable) -> None:
     """1.3: `action_error(policy, teacher, states)` returns the mean squared difference of two policies' actions."""
     for rng, d, m in _draws():
         states = rng.normal(size=(30, d))
-        policy, teacher = (_Map(rng.normal(size=(d, m))) for _ in range(2))
-        difference = states @ policy.weights - states @ teacher.weights
+        policy, teacher = (_linear(rng.normal(size=(d, m))) for _ in range(2))
+        difference = policy.predict(states)[0] - teacher.predict(states)[0]
         squares, both_sides = np.square(difference), "a mean in which errors to either side cancel"
         value = np.asarray(ACTION_ERROR.call(function, policy, teacher, states))
         shape = f"an array of shape {value.shape}"
@@ -136,33 +127,30 @@ def nearest(function: Callable) -> None:
         if value.shape in mistaken_shapes:
             raise NEAREST.wrong(mistaken_shapes[value.shape], "which row of `codewords` is nearest, for each state", 1)
         cells = NEAREST.array(value, (len(states),), hint=1)
-        distances = (cells != np.round(cells)).any()
-        NEAREST.refuse_if(distances, "numbers that are no integers", "indices of codewords, not distances to them", 1)
+        fractions = (cells != np.round(cells)).any()
+        NEAREST.refuse_if(fractions, "numbers that are no integers", "indices of codewords, not distances to them", 1)
         whole = value.dtype.kind in "iu"
         NEAREST.refuse_if(not whole, f"indices of type {value.dtype}", "integers: nothing else can index an array")
         right = geometry.nearest(codewords, states)
+        distances, signed = geometry.distances(states, codewords), (states[:, None] - codewords).sum(axis=2)
+        last = len(codewords) - 1 - distances[:, ::-1].argmin(axis=1)
+        euclidean, chebyshev = (geometry.nearest(codewords, states, metric) for metric in ("euclidean", "chebyshev"))
+        plane = geometry.nearest(codewords[:, :2], states[:, :2])
+        cancel = "differences that cancel", "absolute values first, then the sum", 2
         number = f"the wrong cell for {(cells != right).sum()} of {len(states)} states"
-        rest = Mistake(None, number, "the right one for all", 1)
-        NEAREST.compare(cells, right, [*_other_cells(codewords, states), rest])
+        mistakes = [
+            Mistake(last, "the later of two codewords that are equally near", "the one with the lower index", 3),
+            Mistake(euclidean, "the cells of the Euclidean distance", "those of the Manhattan distance", 2),
+            Mistake(chebyshev, "cells by the largest difference along one axis", "those by the sum over the axes", 2),
+            Mistake(np.abs(signed).argmin(axis=1), *cancel),
+            Mistake(signed.argmin(axis=1), *cancel),
+            Mistake(plane, "distances in the first two inputs alone", "all columns: states may have more than two", 2),
+            Mistake(distances.argmax(axis=1), "the codeword farthest away", "the nearest one", 1),
+            Mistake(right + 1, "indices that begin at 1", "indices that begin at 0", 1),
+            Mistake(None, number, "the right one for all", 1),
+        ]
+        NEAREST.compare(cells, right, mistakes)
     NEAREST.passed("every state found its cell.")
-
-
-def _other_cells(codewords: np.ndarray, states: np.ndarray) -> list[Mistake]:
-    distances, signed = geometry.distances(states, codewords), (states[:, None] - codewords).sum(axis=2)
-    last = len(codewords) - 1 - distances[:, ::-1].argmin(axis=1)
-    euclidean, chebyshev = (geometry.nearest(codewords, states, metric) for metric in ("euclidean", "chebyshev"))
-    plane = geometry.nearest(codewords[:, :2], states[:, :2])
-    cancel = "differences that cancel", "absolute values first, then the sum", 2
-    return [
-        Mistake(last, "the later of two codewords that are equally near", "the one with the lower index", 3),
-        Mistake(euclidean, "the cells of the Euclidean distance", "those of the Manhattan distance", 2),
-        Mistake(chebyshev, "cells by the largest difference along one axis", "those by the sum over the axes", 2),
-        Mistake(np.abs(signed).argmin(axis=1), *cancel),
-        Mistake(signed.argmin(axis=1), *cancel),
-        Mistake(plane, "distances in the first two inputs alone", "all columns: states may have more than two", 2),
-        Mistake(distances.argmax(axis=1), "the codeword farthest away", "the nearest one", 1),
-        Mistake(distances.argmin(axis=1) + 1, "indices that begin at 1", "indices that begin at 0", 1),
-    ]
 
 
 @ACT.checks
@@ -193,7 +181,6 @@ def act(function: Callable) -> None:
 
 def piecewise(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task: str | Task) -> VoronoiPolicy:
     """Fit least-squares maps in the cells of `codewords` (k, d) to states (n, d) and actions (n, m)."""
-    task = get_task(task)
     maps = np.zeros((len(codewords), states.shape[1] + 1, actions.shape[1]))
     maps[:, -1] = actions.mean(axis=0)  # in cells without states
     return baselines.refit(VoronoiPolicy(codewords, maps, task=task), states, actions)
@@ -217,7 +204,7 @@ def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task
         raise BY_HAND.unsolved()
     inside = ((points >= 0) & (points <= 1)).all()
     BY_HAND.refuse_if(not inside, "a codeword outside the unit square", "all of them inside", 1)
-    _all_different(BY_HAND, points)
+    BY_HAND.refuse_if(not geometry.all_differ(points), *TWICE)
     BY_HAND.refuse_if(len(points) > AT_MOST, f"{len(points)} codewords", f"at most {AT_MOST}", 3)
     policies = (piecewise(c, states, actions, task) for c in (points[:1], points))
     single, all_cells = (np.square(policy.predict(states)[0] - actions).mean() for policy in policies)
@@ -226,24 +213,19 @@ def by_hand(codewords: np.ndarray, states: np.ndarray, actions: np.ndarray, task
     BY_HAND.passed(f"{len(points)} codewords leave {share:.0%} of the error of one map.")
 
 
-def _all_different(exercise: Exercise, points: np.ndarray) -> None:
-    twice = len(np.unique(points, axis=0)) < len(points)
-    exercise.refuse_if(twice, "a codeword that is there twice", "all of them different", 1)
-
-
 @PLACE.checks
 def place(function: Callable) -> None:
     """1.7: `place(states, actions, k)` returns k codewords that beat random ones, on both tasks."""
-    data_sets = [("SimpleGoal-v0", 150, seed) for seed in range(5)]
-    data_sets += [("MountainCarContinuous-v0", 10, seed) for seed in range(5)]
-    for name, n_episodes, seed in data_sets:
-        rng = np.random.default_rng(seed)
-        states, actions = joined(teacher_episodes(load_teacher(name), get_task(name), n_episodes, rng))
-        points = PLACE.array(PLACE.call(function, states, actions, CELLS), (CELLS, states.shape[1]), "codewords", 1)
-        _all_different(PLACE, points)
-        error, different = leftover(points, states, actions), np.unique(states, axis=0)
-        draws = [rng.choice(different, CELLS, replace=False) for _ in range(DRAWS)]
-        ratio = error / np.median([leftover(draw, states, actions) for draw in draws])
-        share, hint = f"{ratio:.1%} of the error of random codewords on {name}", 2 if ratio > 1 else 3
-        PLACE.refuse_if(ratio > MARGIN, share, f"at most {MARGIN:.0%}, on both tasks", hint)
+    for name, n_episodes in (("SimpleGoal-v0", 150), ("MountainCarContinuous-v0", 10)):
+        for rng in map(np.random.default_rng, range(5)):
+            episodes = Episodes(teacher_episodes(load_teacher(name), get_task(name), n_episodes, rng))
+            states, actions = episodes.states, episodes.actions
+            placed = PLACE.call(function, states, actions, CELLS)
+            points = PLACE.array(placed, (CELLS, states.shape[1]), "codewords", 1)
+            PLACE.refuse_if(not geometry.all_differ(points), *TWICE)
+            error, different = leftover(points, states, actions), np.unique(states, axis=0)
+            draws = [rng.choice(different, CELLS, replace=False) for _ in range(DRAWS)]
+            ratio = error / np.median([leftover(draw, states, actions) for draw in draws])
+            share, hint = f"{ratio:.1%} of the error of random codewords on {name}", 2 if ratio > 1 else 3
+            PLACE.refuse_if(ratio > MARGIN, share, f"at most {MARGIN:.0%}, on both tasks", hint)
     PLACE.passed(f"your rule beats random codewords on both tasks, with {CELLS} cells.")

@@ -13,15 +13,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from vsp.algorithms import distill, teacher_episodes
-from vsp.algorithms import merge_regions as vsp_merge
-from vsp.algorithms import split_regions as vsp_split
-from vsp.config import Config
-from vsp.history import History
-from vsp.partition import Partition
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Episode, Policy
-from vsp.tasks import Task
+import vsp
+from vsp import Config, History, Partition, Policy, Task, VoronoiPolicy, teacher_episodes
+from vsp.algorithms import distill
+from vsp.rollouts import Episode
 
 from .feedback import Exercise, Mistake, NotYet, Question
 from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, re-exported
@@ -50,28 +45,27 @@ QUESTIONS = {
     "fewer cells by": Question(CAUSES, "fb8f27a3b939a5dc", 2, FEWER),
     "loss jumps by": Question(CAUSES, "71c02946198a22ee", 3, JUMPS),
 }
-TREND = ("more cells", "as many", "fewer cells")
-SAME = 0.12  # a smaller relative change of the mean number of cells counts as none
 CHANGES = {
     "a lower distance": {"min_pol_distance": 0.15},
     "a higher loss": {"max_pol_loss": 1e-3},
     "easier merges": {"min_param_distance": 1.0},
     "exact maps": {"fit": "closed_form"},
 }
+PREDICTIONS = dict.fromkeys(CHANGES, ("more cells", "as many", "fewer cells"))
 SEEDS = range(3)  # of the runs for each change
 
 
 @READING.checks
 def reading(answers: dict, history: History, config: Config) -> None:
     """2.1: answers `last change` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
-    READING.answers(answers, {"last change": float})
-    given, last = answers["last change"], max((event.iteration for event in history.events), default=0)
+    READING.answers(answers, {"last change": ()})
+    given, last = answers["last change"], max(event.iteration for event in history.events)
+    READING.refuse_if(not isinstance(given, int | float | np.number), f"{given!r} for 'last change'", "a number")
     if abs(given - last) > 0.04 * config.n_epochs:
         side = "the number of cells still changes after it" if given < last else "nothing changes there any more"
         side = "that is where the freeze begins" if given == config.n_epochs - config.n_freeze else side
         raise READING.wrong(f"iteration {given:g}, but {side}", "the last step of the left curve", 1)
-    first = READING.ask(answers, QUESTIONS)
-    READING.passed(f"the plot has told you what the algorithm does when.{first}")
+    READING.ask(answers, QUESTIONS, "the plot has told you what the algorithm does when.")
 
 
 @RUNNING_MEAN.checks
@@ -81,37 +75,29 @@ def running_mean(function: Callable) -> None:
         (np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0])),
         (np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3.0, 5.0, 1.0, 4.0, 0.0])),
     ]
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
+    for rng in map(np.random.default_rng, range(4)):
         cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
         cases.append((cells, rng.uniform(size=len(cells))))
     remember = "the mean since the cell was entered (is the cell of the step before remembered in every step?)"
     for cells, losses in cases:
         value = RUNNING_MEAN.array(RUNNING_MEAN.call(function, cells, losses), losses.shape, hint=1)
-        steps, entered = np.arange(1, len(losses) + 1), np.append(True, cells[1:] != cells[:-1])
-        right, visit = _mean_since(entered, losses), entered.cumsum()
-        earlier = [losses[:t][cells[:t] == cells[t - 1]].mean() for t in steps]
-        whole = [losses[visit == v].mean() for v in visit]
-        sums = right * (steps - [np.argmax(visit == v) for v in visit])
+        series, entered = pd.Series(losses), np.append(True, cells[1:] != cells[:-1])
+        visits, outside = series.groupby(entered.cumsum()), series.groupby((cells != cells[0]).cumsum())
+        right = visits.expanding().mean()
+        earlier = [losses[: t + 1][cells[: t + 1] == cell].mean() for t, cell in enumerate(cells)]
         other = f"another number at step {np.argmin(np.isclose(value, right))} of cells {cells.tolist()}"
         begins = "a mean that begins anew at every step outside the first cell"
         mistakes = [
-            Mistake(losses.cumsum() / steps, "the mean since the episode began", "it since the cell was entered", 2),
+            Mistake(series.expanding().mean(), "the mean since the episode began", "it since the cell was entered", 2),
             Mistake(earlier, "losses of an earlier visit to the cell", "a new beginning at every entrance", 2),
-            Mistake(whole, "losses of later steps", "only those up to the step", 1),
-            Mistake(sums, "sums", "means", 1),
+            Mistake(visits.transform("mean"), "losses of later steps", "only those up to the step", 1),
+            Mistake(visits.cumsum(), "sums", "means", 1),
             Mistake(losses, "the losses themselves, as if the mean began anew at every step", remember, 2),
-            Mistake(_mean_since(cells != cells[0], losses), begins, remember, 2),
+            Mistake(outside.expanding().mean(), begins, remember, 2),
             Mistake(None, other, "the mean since its cell was entered", 1),
         ]
         RUNNING_MEAN.compare(value, right, mistakes)
     RUNNING_MEAN.passed("it restarts whenever the episode enters another cell.")
-
-
-def _mean_since(begins: np.ndarray, losses: np.ndarray) -> list[float]:
-    """Return the mean loss at every step since the last one where the mask `begins` (T,) is true."""
-    first = np.maximum.accumulate(np.where(begins, np.arange(len(losses)), 0))
-    return [losses[first[t] : t + 1].mean() for t in range(len(losses))]
 
 
 class _Log:
@@ -152,24 +138,24 @@ def algorithm_1(function: Callable) -> None:
     """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)` makes the right calls in the right order."""
     for schedule in ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 14, 50)):
         names = ("n_epochs", "n_split", "n_merge", "n_freeze", "n_reset")
-        config, log, right = replace(SMALL, **dict(zip(names, schedule))), _Log(), _Log()
+        config, log = replace(SMALL, **dict(zip(names, schedule))), _Log()
         episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(config.n_epochs)]
         rng = np.random.default_rng(0)
         ALGORITHM_1.call(function, log, list(episodes), config, rng, log.split, log.merge, keep=True, empty=True)
-        _algorithm_1(right, episodes, config, rng, right.split, right.merge)
-        _on_schedule(log, right, episodes, config, "the freeze begins at n_epochs - n_freeze")
-        few, log, right = episodes[:-5], _Log(), _Log()  # the run may stop with an error when there are no more
+        _on_schedule(log, episodes, config, "the freeze begins at n_epochs - n_freeze")
+        few, log = episodes[:-5], _Log()  # the run may stop with an error when there are no more
         with contextlib.suppress(Exception):
             function(log, list(few), config, rng, log.split, log.merge)
-        _algorithm_1(right, few, config, rng, right.split, right.merge)
         words = f"the freeze begins at n_epochs - n_freeze, however many episodes there are ({len(few)})"
-        _on_schedule(log, right, few, config, words)
+        _on_schedule(log, few, config, words)
     ALGORITHM_1.passed("every pass comes when it is due, and none in the freeze.")
 
 
-def _on_schedule(log: _Log, right: _Log, episodes: list[Episode], config: Config, freeze: str) -> None:
+def _on_schedule(log: _Log, episodes: list[Episode], config: Config, freeze: str) -> None:
     """Compare what was done with what is right, iteration by iteration."""
-    observed, expected = log.episodes, "the first state of the first episode, added before it is observed"
+    right, observed = _Log(), log.episodes
+    _algorithm_1(right, episodes, config, None, right.split, right.merge)
+    expected = "the first state of the first episode, added before it is observed"
     ALGORITHM_1.refuse_if(not observed, "no episode observed", "one in every iteration", 1)
     ALGORITHM_1.refuse_if(log.rounds[0] != right.rounds[0], "another first codeword or none", expected, 1)
     in_order = len(observed) == len(episodes) and all(seen is e for seen, e in zip(observed, episodes))
@@ -198,7 +184,7 @@ def grown(
 
     vsp's function replaces one that is still a stub; a printed line says which.
     """
-    ours, stubs = (vsp_split, vsp_merge, _algorithm_1), set()
+    ours, stubs = (vsp.split_regions, vsp.merge_regions, _algorithm_1), set()
     students = [_or_ours(function, our, stubs) for function, our in zip((split, merge, frame), ours)]
     made = []
     for passes in (students, ours):
@@ -247,7 +233,7 @@ def _algorithm_1(
 @PREDICTION.checks
 def prediction(answers: dict, teacher: Policy, task: Task, config: Config) -> None:
     """2.6: for each of `CHANGES`, whether there will be more cells, as many, or fewer. The first answers are kept."""
-    first, means = _first(answers), runs(teacher, task, config)["mean"]
+    first, means = PREDICTION.first(answers, PREDICTIONS), runs(teacher, task, config)["mean"]
     wrong, wrong_first = (_disagree(means, given) for given in (answers, first))
     why = "what the runs do: look at them in the cell below, and find out why"
     PREDICTION.refuse_if(bool(wrong), f"wrong predictions for {wrong}", why, 1)
@@ -256,25 +242,16 @@ def prediction(answers: dict, teacher: Policy, task: Task, config: Config) -> No
 
 
 def _disagree(means: pd.Series, given: dict) -> list[str]:
-    """Return the predictions in `given` that the mean numbers of cells contradict."""
-    wrong = []
-    for name in CHANGES:
-        ratio = means[name] / means.iloc[0]
-        near = [TREND[i] for i in {int(np.digitize(-ratio, [-1 - s, -1 + s])) for s in (SAME / 2, 2 * SAME)}]
-        wrong += [name] if given[name] not in near else []
-    return wrong
-
-
-def _first(given: object) -> dict[str, str]:
-    """The first complete prediction since the kernel started. Raises NotYet if there is none."""
-    PREDICTION.answers(given, dict.fromkeys(CHANGES, TREND))
-    return PREDICTION.first(given)
+    """Return the predictions in `given` that the mean numbers of cells contradict. Near a limit, two are right."""
+    ratios = means / means.iloc[0]
+    right = {"more cells": ratios > 1.06, "as many": abs(ratios - 1) < 0.24, "fewer cells": ratios < 0.94}
+    return [name for name in CHANGES if not right[given[name]][name]]
 
 
 def predicted(given: object, teacher: Policy, task: Task, config: Config) -> pd.DataFrame | None:
     """Return the table of `runs` with the first prediction. Without one, print so and return None."""
     try:
-        first = pd.Series(_first(given))
+        first = pd.Series(PREDICTION.first(given, PREDICTIONS))
     except NotYet as missing:
         print(missing)
         return None

@@ -12,12 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsp import Partition, get_task, preset
 from vsp.buffers import Buffers
-from vsp.config import paper_preset
 from vsp.paper.readings import Readings
-from vsp.partition import Partition
 from vsp.rollouts import Episode
-from vsp.tasks import get_task
 
 from .feedback import Exercise
 
@@ -27,7 +25,7 @@ MERGE = Exercise("2.4", "merge_regions", ("merge_regions",), cures=((IndexError,
 
 TASK = "SimpleGoal-v0"
 # The settings of the cases below; new cells start at 0, so that random numbers do not matter
-SMALL = replace(paper_preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
+SMALL = replace(preset(TASK), max_pol_loss=0.25, min_pol_distance=0.2, min_param_distance=0.6, initial="zeros")
 
 
 def on_a_line(places: list[float], maps: list) -> Partition:
@@ -63,7 +61,7 @@ class SplitCase(NamedTuple):
     splits: list[float]
     what: str
     hint: int
-    full: tuple[int, ...] = ()  # number of states in each buffer afterwards; empty: any
+    full: tuple[tuple[int, ...], ...] = ()  # numbers of states in the buffers that are right; empty: any
 
 
 # fmt: off
@@ -94,7 +92,7 @@ SPLITS = (
               "two places in one episode: go on after a split", 4),
     SplitCase([0.1], [0], [0.4], [0.5], [], "a mean loss exactly at the limit: only more than the limit counts", 1),
     SplitCase([0.05, 0.55, 0.75, 0.95], [1, 0, 0, 0], [0.27], [0], [0.27], "one state between two cells of a row", 1,
-              (0, 0, 1, 1, 0)),
+              ((0, 0, 1, 1, 0),)),
 )
 # fmt: on
 
@@ -111,9 +109,20 @@ def split_regions(function: Callable) -> None:
             raise SPLIT.wrong(elsewhere, f"{_count(len(case.splits), 'split')}, in a case of {case.what}", case.hint)
         _returned(SPLIT, added, partition.codewords[before:], "one for every new cell")
         expected = "those of the cell that was split and of its old neighbours emptied, no others"
-        _emptied(SPLIT, partition.buffers, [case.full], expected)
-    for seed in range(4):
-        _on_a_random_walk(function, np.random.default_rng(seed))
+        _emptied(SPLIT, partition.buffers, case.full, expected)
+    for rng in map(np.random.default_rng, range(4)):  # vsp's pass on random walks, under both readings of R14
+        partition = _with_codewords(rng.uniform(size=(4, 2)))
+        partition.models.coefficients[:] = rng.normal(size=partition.models.coefficients.shape)
+        states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
+        episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
+        split, *readings = (copy.deepcopy(partition) for _ in range(3))
+        SPLIT.call(function, split, episode, SMALL, np.random.default_rng(0), keep=True)
+        for reading, after in zip(readings, ("reset", "kept")):
+            Readings(loss_after_split=after).split(reading, episode, SMALL, np.random.default_rng(0))
+        if not any(np.array_equal(split.codewords, reading.codewords) for reading in readings):
+            splits, right = (_count(len(p.codewords) - 4, "split") for p in (split, readings[0]))
+            where = "where both conditions hold, by `partition.loss` and `partition.far`"
+            raise SPLIT.wrong(f"{splits} on a random walk", f"{right}, {where}", 1)
     SPLIT.passed("codewords come where the mean loss is too high and no codeword is near.")
 
 
@@ -127,31 +136,15 @@ def _returned(exercise: Exercise, returned: object, right: np.ndarray, what: str
         exercise.refuse_if(sorted(values.tolist()) != sorted(right.tolist()), "other codewords returned", what, 1)
 
 
-def _emptied(exercise: Exercise, buffers: Buffers, full: list[tuple], expected: str) -> None:
-    """Check the numbers of states in the buffers; each of `full` is right, an empty one stands for any."""
+def _emptied(exercise: Exercise, buffers: Buffers, full: tuple[tuple[int, ...], ...], expected: str) -> None:
+    """Check the numbers of states in the buffers: one of `full`, or any if there are none."""
     counts = tuple(buffers.counts.tolist())
-    wrong = () not in full and counts not in full
+    wrong = len(full) > 0 and counts not in full
     exercise.refuse_if(wrong, f"buffers of {counts} states in a row of cells that had one each", expected, 5)
 
 
 def _count(n: int, what: str) -> str:
     return f"{n or 'no'} {what}{'' if n == 1 else 's'}"
-
-
-def _on_a_random_walk(function: Callable, rng: np.random.Generator) -> None:
-    """Compare with vsp's pass on a random partition and episode, under both readings of R14."""
-    partition = _with_codewords(rng.uniform(size=(4, 2)))
-    partition.models.coefficients[:] = rng.normal(size=partition.models.coefficients.shape)
-    states = np.clip(np.cumsum(rng.normal(scale=0.08, size=(60, 2)), axis=0) + 0.5, 0, 1)
-    episode = Episode(states, rng.uniform(-1, 1, (60, 2)))
-    split, *readings = (copy.deepcopy(partition) for _ in range(3))
-    SPLIT.call(function, split, episode, SMALL, np.random.default_rng(0), keep=True)
-    for reading, after in zip(readings, ("reset", "kept")):
-        Readings(loss_after_split=after).split(reading, episode, SMALL, np.random.default_rng(0))
-    if not any(np.array_equal(split.codewords, reading.codewords) for reading in readings):
-        splits, right = (_count(len(p.codewords) - 4, "split") for p in (split, readings[0]))
-        where = "where both conditions hold, by `partition.loss` and `partition.far`"
-        raise SPLIT.wrong(f"{splits} on a random walk", f"{right}, {where}", 1)
 
 
 class MergeCase(NamedTuple):
@@ -162,7 +155,7 @@ class MergeCase(NamedTuple):
     what: str
     hint: int
     order: tuple[int, ...] = ()  # place of each cell in the row, if it is not its index
-    full: tuple[tuple[int, ...], ...] = ((),)  # numbers of states in the buffers that are right; an empty one: any
+    full: tuple[tuple[int, ...], ...] = ()  # as in `SplitCase`
 
 
 # fmt: off
@@ -204,25 +197,21 @@ def merge_regions(function: Callable) -> None:
         gone = [i for i in range(len(places)) if i not in kept]
         _returned(MERGE, removed, before[gone], "one for every cell that went")
         _emptied(MERGE, partition.buffers, case.full, "those of the survivor and of its neighbours emptied, no others")
-    for seed in range(9):
-        _with_random_maps(function, np.random.default_rng(seed))
+    for rng in map(np.random.default_rng, range(9)):  # random maps, under each of the readings
+        partition = _with_codewords(rng.uniform(size=(12, 2)))
+        partition.models.coefficients[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
+        merged = copy.deepcopy(partition)
+        MERGE.call(function, merged, SMALL, keep=True)
+        alive = (partition.codewords[:, None] == merged.codewords).all(axis=2).any(axis=1)
+        readings = [_survivors(partition, anew, again) for anew, again in ((True, False), (False, False), (True, True))]
+        if not any(np.array_equal(alive, survivors) for survivors in readings):
+            left = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
+            expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
+            raise MERGE.wrong(left, expected, 4)
+        same = np.array_equal(merged.models.coefficients, partition.models.coefficients[alive])
+        expected = "those that they had: nothing is averaged"
+        MERGE.refuse_if(not same, "other maps in the cells that are left", expected, 1)
     MERGE.passed("similar neighbours have become one, and no other cell was removed.")
-
-
-def _with_random_maps(function: Callable, rng: np.random.Generator) -> None:
-    """Check that the cells left of a random partition are those of one of the readings, with their maps."""
-    partition = _with_codewords(rng.uniform(size=(12, 2)))
-    partition.models.coefficients[:] = rng.integers(3, size=(12, 1, 1)) + rng.uniform(0, 0.2, size=(12, 3, 2))
-    merged = copy.deepcopy(partition)
-    MERGE.call(function, merged, SMALL, keep=True)
-    alive = (partition.codewords[:, None] == merged.codewords).all(axis=2).any(axis=1)
-    readings = [_survivors(partition, anew, again) for anew, again in ((True, False), (False, False), (True, True))]
-    if not any(np.array_equal(alive, survivors) for survivors in readings):
-        left = f"cells {np.flatnonzero(alive).tolist()} left of {len(alive)} with random maps"
-        expected = f"{np.flatnonzero(readings[0]).tolist()}: a turn removes all neighbours alike, of any index"
-        raise MERGE.wrong(left, expected, 4)
-    same = np.array_equal(merged.models.coefficients, partition.models.coefficients[alive])
-    MERGE.refuse_if(not same, "other maps in the cells that are left", "those that they had: nothing is averaged", 1)
 
 
 def _survivors(partition: Partition, anew: bool, again: bool) -> np.ndarray:

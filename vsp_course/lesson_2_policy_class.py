@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import approx_fprime
 
-from vsp import geometry
-from vsp.algorithms import teacher_episodes
-from vsp.buffers import Buffers
-from vsp.config import paper_preset
+from vsp import Partition, Policy, PolicyClass, Task, preset, teacher_episodes
 from vsp.export import SHARED
-from vsp.partition import Partition
-from vsp.rollouts import Episode, Policy
-from vsp.subpolicies import POLICY_CLASSES, PolicyClass, SubPolicies, policy_class
-from vsp.tasks import Task
+from vsp.rollouts import Episode, Episodes
+from vsp.subpolicies import POLICY_CLASSES, policy_class
 
-from .feedback import Exercise, joined
+from .feedback import Exercise
 
 OWN_CLASS = Exercise("2.7", "my_policy_class")
 ENOUGH = 0.8  # of the error that constants have; arbitrary features, such as the sine of 50 x, save less
@@ -32,13 +28,12 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     OWN_CLASS.refuse_if(not isinstance(own_class, PolicyClass), f"a {type(own_class).__name__}", "a PolicyClass", 1)
     states = np.random.default_rng(0).uniform(task.low, task.high, size=(50, len(task.low)))
     features = _features(own_class, states)
+    plain = type(own_class) is PolicyClass  # which computes no more than weighted sums of its features
     for name in POLICY_CLASSES:
-        there = policy_class(name, task)
-        known = there.features(states)
-        same = _within(features, known) and _within(known, features)
-        if same and type(own_class) in (PolicyClass, type(there)):
-            raise OWN_CLASS.wrong(f"the features of {name!r}", "a class that is not there yet", 1)
-    sums = type(own_class) is PolicyClass and _within(features, policy_class("linear", task).features(states))
+        known = policy_class(name, task).features(states)
+        there = plain and _within(features, known) and _within(known, features)
+        OWN_CLASS.refuse_if(there, f"the features of {name!r}", "a class that is not there yet", 1)
+    sums = plain and _within(features, states)
     OWN_CLASS.refuse_if(sums, "features that are sums of the state's components", "at least one that is no such sum", 4)
     _code(own_class, states, features)
     _gradient(own_class, features, len(task.outputs))
@@ -46,9 +41,8 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     share = f"{error / constant:.0%} of the error that constants have in the same cells"
     OWN_CLASS.refuse_if(error > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
     linear = _errors(policy_class("linear", task), teacher, task)
-    OWN_CLASS.passed(
-        f"{len(own_class.rows)} coefficients per action, {share}; x and y alone have {linear / constant:.0%}."
-    )
+    number = f"{len(own_class.rows)} coefficients per action"
+    OWN_CLASS.passed(f"{number}, {share}; x and y alone have {linear / constant:.0%}.")
 
 
 def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
@@ -111,16 +105,13 @@ def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
 def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:
     """Mean squared error after training, in the cells of eight codewords, on fresh states of the teacher."""
     rng = np.random.default_rng(7)
-    (states, actions), (fresh, right) = (joined(teacher_episodes(teacher, task, 300, rng)) for _ in range(2))
-    partition = Partition(task, paper_preset(task))
-    partition.models = SubPolicies(own_class, len(task.outputs), initial="uniform")
-    partition.buffers = buffers = Buffers(len(own_class.terms), len(task.outputs))
-    for codeword in states[rng.choice(len(states), 8, replace=False)]:
+    seen, fresh = (Episodes(teacher_episodes(teacher, task, 300, rng)) for _ in range(2))
+    config = replace(preset(task), sub_policy=lambda task: own_class, n_minibatches=400, batch_size=128)
+    partition = Partition(task, config)
+    for codeword in seen.states[rng.choice(len(seen.states), 8, replace=False)]:
         partition.add(codeword, rng)
-    partition.observe(Episode(states, actions))
-    cells = np.flatnonzero(buffers.counts)
-    for rate in (0.05,) * 400 + (0.01,) * 400:
-        inputs, goals = buffers.sample(cells, 128, rng)
-        partition.models.train(cells, inputs, goals, learning_rate=rate)
-    own = partition.models.coefficients[geometry.nearest(partition.codewords, fresh)]
-    return float(np.square(own_class.outputs(own_class.features(fresh), own) - right).mean())
+    partition.observe(Episode(seen.states, seen.actions))
+    for rate in (0.05, 0.01):
+        partition.config = replace(config, learning_rate=rate)
+        partition.train(rng)
+    return float(np.square(partition.policy().linear(fresh.states) - fresh.actions).mean())

@@ -2,14 +2,13 @@
 
 import _thread
 import ast
-import builtins
 import dataclasses
 import functools
 import os
 import re
 import signal
+import sys
 import zipfile
-from collections import Counter
 
 import course_answers
 import numpy as np
@@ -25,7 +24,7 @@ from vsp.paper import baselines
 from vsp.paper.statistics import spread
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
-from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
+from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, slides
 from vsp_course.lesson_2 import _algorithm_1
 
 LESSONS = build.read_sources()
@@ -72,19 +71,6 @@ def identity(cell):
 # The sources
 
 
-def test_sources_hold_no_output_and_unique_ids(lesson):
-    nbformat.validate(lesson)
-    assert all(not cell.outputs and cell.execution_count is None for cell in code_cells(lesson))
-    assert max(Counter(cell.id for cell in lesson.cells).values()) == 1
-
-
-def test_worked_cells_are_short_and_define_no_helpers(lesson):
-    for cell in code_cells(lesson):
-        assert len(cell.source.splitlines()) < (25 if build.is_solution(cell) else 15), cell.id
-        defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in ast.walk(ast.parse(cell.source)))
-        assert build.is_solution(cell) or not defines, cell.id
-
-
 def test_pictures_have_alternative_text(lesson):
     for cell in code_cells(lesson):
         calls = [node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)]
@@ -105,16 +91,13 @@ def test_every_exercise_has_a_text_with_hints_an_answer_a_check_and_notes(lesson
             assert all(f"*{part}.*" in notes.source for part in ("Common mistakes", "Discuss", "Exam")), cell.id
 
 
-@pytest.mark.parametrize("number", EXERCISES)
-def test_hints_are_counted_from_one(number):
-    assert hints(number) == set(range(1, 1 + len(hints(number)))) != set()
-
-
 def hints(number):
-    """The numbers of the hints of an exercise."""
+    """The numbers of the hints of an exercise, counted from one."""
     texts = (cell.source for lesson in LESSONS.values() for cell in lesson.cells)
     (text,) = (text for text in texts if f"## Exercise {number} " in text)
-    return {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
+    found = {int(n) for n in re.findall(r"Hint (\d)</summary>", text)}
+    assert found == set(range(1, 1 + len(found))) != set()
+    return found
 
 
 def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
@@ -198,7 +181,7 @@ def test_the_guide_keeps_answers_apart_from_what_students_see():
     for lesson in LESSONS.values():
         assert all(cell.source in lecturers for cell in by_kind(lesson, build.is_solution))
         assert all(cell.source in lecturers for cell in by_kind(lesson, build.for_lecturer))
-        assert f"| all | {build.points(lesson)} |" in students
+        assert f"| all | {sum(cell.metadata.nbgrader.points for cell in by_kind(lesson, build.is_check))} |" in students
     assert students.count("| Exercise ") == len(EXERCISES) == lecturers.count("### Exercise ")
 
 
@@ -227,17 +210,6 @@ def test_the_solutions_of_lesson_2_together_are_the_papers_method():
     own, ours = lesson_2.grown(*solutions, teacher, task, vsp.preset(SIMPLEGOAL).quick())
     assert np.array_equal(own.codewords, ours.codewords) and len(own) > 5
     assert np.array_equal(own.coefficients, ours.coefficients)
-
-
-def refuse(*packages):
-    """An `__import__` that finds none of `packages`."""
-    imports = builtins.__import__
-
-    def find(name, *others, **named):
-        assert name.split(".")[0] not in packages, name
-        return imports(name, *others, **named)
-
-    return find
 
 
 def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
@@ -293,7 +265,8 @@ def test_splits_and_merges_are_as_the_text_says():
 
 def test_an_untouched_copy_fails_at_the_exercises_alone(lesson, monkeypatch, capsys):
     """And needs no package that the hand-out leaves out."""
-    monkeypatch.setattr(builtins, "__import__", refuse("torch", "stable_baselines3", "papermill", "studies"))
+    for package in ("torch", "stable_baselines3", "papermill", "studies"):
+        monkeypatch.setitem(sys.modules, package, None)  # an import fails
     made = build.student(lesson)
     _, failed = run(made, monkeypatch)
     checks = {cell.id for cell in by_kind(made, build.is_check)}
@@ -374,17 +347,6 @@ def test_what_is_no_answer_at_all_is_refused_in_words(number):
         assert _refused(number, (lambda nothing=nothing: nothing) if number == "3.7" else nothing).startswith(number)
 
 
-def test_a_function_that_alters_its_arguments_is_refused_and_spoils_no_other_case():
-    def spoils(states, actions):
-        actions += 1.0
-        return states
-
-    exercise, given = feedback.Exercise("1.2", "fit"), (np.ones(2), np.ones(3))
-    with pytest.raises(feedback.NotYet, match="found argument 2 altered in place, expected it as it was"):
-        exercise.call(spoils, *given)
-    assert (given[0] == 1).all() and (given[1] == 1).all()
-
-
 def test_the_policies_to_beat_are_those_of_the_lesson():
     source = next(c.source for c in LESSONS["lesson_3_does_it_work.ipynb"].cells if c.id == "distil")
     assert f"for seed in range({len(lesson_3.SEEDS)})" in source and lesson_3.SEEDS.start == 0
@@ -436,13 +398,14 @@ def test_the_first_prediction_is_kept(monkeypatch, capsys):
     assert table.loc["a higher loss", "you said first"] == "fewer cells"
 
 
-def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch):
+def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch, capsys):
     monkeypatch.setattr(feedback, "_FIRST", {})
     quiz = feedback.Exercise("0.1", "quiz")
     questions = {n: feedback.Question(("yes", "no"), feedback.seal("0.1", n, "yes"), 1) for n in "abc"}
     with pytest.raises(feedback.NotYet, match="question 'b': not 'no'"):
-        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions)
-    assert quiz.ask(dict.fromkeys("abc", "yes"), questions) == " Of your first answers 1 of 3 were right."
+        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions, "well read.")
+    quiz.ask(dict.fromkeys("abc", "yes"), questions, "well read.")
+    assert capsys.readouterr().out == "✓ 0.1 quiz: well read. Of your first answers 1 of 3 were right.\n"
 
 
 def test_jupyter_shows_the_message_alone(monkeypatch):
@@ -468,15 +431,12 @@ def test_an_error_is_told_with_the_line_where_it_arose(tmp_path):
         feedback.Exercise("1.2", "fit").call(names["fit"])
 
 
-def test_errors_of_many_lines_and_what_is_no_number_are_told_in_one_line():
+def test_errors_of_many_lines_are_told_in_one_line():
     def fails():
         raise ValueError("first\n   second")
 
-    exercise = feedback.Exercise("1.2", "fit")
     with pytest.raises(feedback.NotYet, match=r"ValueError \(first second\) in line"):
-        exercise.call(fails)
-    with pytest.raises(feedback.NotYet, match=r"a result that is not made of numbers, \['up'\], expected numbers of"):
-        exercise.array(["up"], (1,))
+        feedback.Exercise("1.2", "fit").call(fails)
 
 
 def test_a_long_message_is_shown_in_lines():
@@ -552,7 +512,7 @@ def small_lesson(worked):
 
 
 def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
-    made = pages.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
+    made = build.page(small_lesson(nbformat.v4.new_code_cell("2 + 3")))
     assert [len(cell.outputs) for cell in made.cells] == [1, 0, 0, 1]
     assert made.cells[0].outputs[0].text == "42\n" and made.cells[3].outputs[0].data["text/plain"] == "5"
     assert [cell.execution_count for cell in made.cells] == [1, 2, 3, 4]
@@ -561,4 +521,4 @@ def test_a_page_shows_what_is_worked_out_and_nothing_of_the_exercises():
 
 def test_a_page_must_not_need_an_answer():
     with pytest.raises(RuntimeError, match="needs-x.*name 'x'"):
-        pages.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))
+        build.page(small_lesson(nbformat.v4.new_code_cell("print(x)", id="needs-x")))

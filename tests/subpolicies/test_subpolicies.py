@@ -31,38 +31,10 @@ def minibatch(rng, c, size, d=2, m=2):
 # Training
 
 
-@pytest.mark.parametrize("m", [1, 3])
-def test_training_equals_torch_cell_by_cell(m):
-    torch = pytest.importorskip("torch")
-    models, rng = models_of(3, m=m), np.random.default_rng(1)
-    twins = [torch.nn.Linear(2, m, dtype=torch.float64) for _ in range(3)]
-    for twin, start in zip(twins, models.coefficients):
-        twin.weight.data, twin.bias.data = torch.tensor(start[:-1].T), torch.tensor(start[-1])
-    optimisers = [torch.optim.Adam(twin.parameters(), lr=0.01) for twin in twins]
-    for step in range(100):
-        cells = np.array([0, 1, 2]) if step % 3 else np.array([0, 2])  # cells without data skip the step
-        inputs, actions = minibatch(rng, len(cells), 16, m=m)
-        losses = models.train(cells, inputs, actions, learning_rate=0.01)
-        for c, x, a, loss in zip(cells, inputs, actions, losses):
-            optimisers[c].zero_grad()
-            torch_loss = torch.nn.functional.mse_loss(twins[c](torch.tensor(x[:, :-1])), torch.tensor(a))
-            torch_loss.backward()
-            optimisers[c].step()
-            assert torch_loss.item() == pytest.approx(loss, rel=1e-12)
-    for twin, coefficients in zip(twins, models.coefficients):
-        expected = np.vstack([twin.weight.detach().numpy().T, twin.bias.detach().numpy()])
-        assert np.allclose(coefficients, expected, rtol=1e-10, atol=1e-12)
-
-
 @pytest.mark.parametrize("d", [1, 9])
-def test_first_parameters_are_those_of_torch_linear(d):
-    torch = pytest.importorskip("torch")
+def test_first_parameters_are_uniform_as_in_torch_linear(d):
     coefficients, bound = models_of(400, d=d).coefficients, 1 / np.sqrt(d)
-    torch.manual_seed(0)
-    layers = [torch.nn.Linear(d, 2) for _ in range(400)]
-    largest = max(float(p.detach().abs().max()) for layer in layers for p in layer.parameters())
-    for value in (largest, np.abs(coefficients).max()):
-        assert 0.98 * bound < value <= bound + 1e-7
+    assert 0.98 * bound < np.abs(coefficients).max() <= bound
     assert abs(coefficients.mean()) < 0.1 * bound and coefficients.var() == pytest.approx(bound**2 / 3, rel=0.1)
 
 
@@ -72,18 +44,6 @@ def test_zeros_draws_as_many_random_numbers_as_uniform():
         SubPolicies(linear(2), 2, initial=initial).add(rng)
     assert rngs[0].random() == rngs[1].random()
     assert not models_of(3, initial="zeros").coefficients.any()
-
-
-def test_dropping_cells_takes_their_moments_along():
-    inputs, actions = minibatch(np.random.default_rng(0), 3, 8)
-    models, uncut = models_of(3), models_of(3)
-    for each in (models, uncut):
-        for _ in range(5):
-            each.train(np.arange(3), inputs, actions, learning_rate=0.1)
-    models.keep(np.array([False, False, True]))
-    models.train(np.array([0]), inputs[2:], actions[2:], learning_rate=0.1)
-    uncut.train(np.array([2]), inputs[2:], actions[2:], learning_rate=0.1)
-    assert np.allclose(models.coefficients[0], uncut.coefficients[2], rtol=1e-13)
 
 
 def test_restart_makes_adam_as_new_and_leaves_the_map():

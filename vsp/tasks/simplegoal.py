@@ -45,12 +45,12 @@ class SimpleGoalEnv(gymnasium.Env):
         self.render_mode = render_mode
         self.state = np.zeros(2)  # float64; the observation is its float32 copy
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None):
+    def reset(self, *, seed: int | None = None, options: dict | None = None):  # noqa: D102
         super().reset(seed=seed)
         self.state = start(self.np_random, 1)[0]
         return self.state.astype(np.float32), {}
 
-    def step(self, action: np.ndarray):
+    def step(self, action: np.ndarray):  # noqa: D102
         action = check_array("action", action, (2,))
         (self.state,), (reward,), (outcome,) = step(self.state[None], action[None])
         info = {"outcome": OUTCOMES[outcome]}
