@@ -59,7 +59,7 @@ def test_success_twice(tmp_path):
     assert str(tmp_path) not in text and "quick = False" in text
     assert run_notebook.run_notebook(notebook, out) == []
     assert tree(out) == first
-    assert run_notebook.run_notebook(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
+    assert run_notebook.run_notebook(notebook, out, quick=True) == ["figures/a.txt"]
     assert not list((out / "build" / "running" / "story").iterdir())
 
 
@@ -95,7 +95,6 @@ FAULTS = {
     "failing cell": (["1 / 0"], "code cell (1 / 0) failed: ZeroDivisionError"),
     "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
     "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell (import sys) failed: SystemExit"),
-    "never ran": (["# skip", "2"], "code cell (# skip) never ran"),
     "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
     "address": (["object()"], "code cell (object()) shows 'at 0x"),
     "path": (["print(out)"], "code cell (print(out)) shows '/"),
@@ -146,14 +145,6 @@ def test_limit_on_the_size_of_files(tmp_path, limit_files, cell):
     assert tree(tmp_path) == before
 
 
-def test_wrong_parameter(tmp_path):
-    unknown = r"story.ipynb: unknown parameter 'quik', expected one of \['out', 'quick', 'runs'\]"
-    for given, message in (({"quik": True}, unknown), ({"quick": 3}, "quick is 3, expected bool as False")):
-        with pytest.raises(run_notebook.NotebookError, match=message):
-            run_notebook.run_notebook(write(tmp_path, DRAW), tmp_path / "out", parameters=given)
-    assert not (tmp_path / "out").exists()
-
-
 def test_unfit_notebook(tmp_path):
     for content in (b"", b"\x80\x04N.", b'{"cells": 3}', b"!!python/name:os.system"):
         (tmp_path / "x.ipynb").write_bytes(content)
@@ -161,7 +152,8 @@ def test_unfit_notebook(tmp_path):
             run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
     with pytest.raises(atomic.MissingFile, match="none.ipynb: no such file"):
         run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
-    with pytest.raises(run_notebook.NotebookError, match="story.ipynb: unknown parameter 'out'"):
-        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="quick = False"), tmp_path)
-    with pytest.raises(run_notebook.NotebookError, match="parameters cell: expected `name = literal` lines"):
-        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="out = f()"), tmp_path)
+    untagged = write(tmp_path, DRAW)
+    untagged.write_text(untagged.read_text().replace('"parameters"', '"other"'))
+    with pytest.raises(run_notebook.NotebookError, match='story.ipynb: 0 cells have the tag "parameters", expected one'):
+        run_notebook.run_notebook(untagged, tmp_path)
+    assert not (tmp_path / "out").exists()
