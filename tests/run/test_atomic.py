@@ -7,10 +7,10 @@ import pytest
 
 from vsp.run import atomic
 from vsp.run.atomic import DamagedFile, MissingFile, atomic_path, read_bytes, sha256, write_text
-from vsp.run.listed import list_file, read_listed, read_table, write_listed
+from vsp.run.listed import list_file, read_listed, write_listed
 from vsp.run.sealed import read_sealed
 
-READERS = (read_bytes, sha256, read_sealed, read_listed, read_table)
+READERS = (read_bytes, sha256, read_sealed, read_listed)
 
 
 def visible(folder):

@@ -154,6 +154,6 @@ def test_unfit_notebook(tmp_path):
         run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
     untagged = write(tmp_path, DRAW)
     untagged.write_text(untagged.read_text().replace('"parameters"', '"other"'))
-    with pytest.raises(run_notebook.NotebookError, match='story.ipynb: 0 cells have the tag "parameters", expected one'):
+    with pytest.raises(run_notebook.NotebookError, match='0 cells have the tag "parameters", expected one'):
         run_notebook.run_notebook(untagged, tmp_path)
     assert not (tmp_path / "out").exists()

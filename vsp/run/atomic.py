@@ -67,7 +67,7 @@ def read_bytes(path: str | os.PathLike) -> bytes:
         return path.read_bytes()
     if path.exists():
         raise DamagedFile(f"{path}: is a folder, a FIFO or a device, expected a file: move it away")
-    raise MissingFile(": ".join(filter(None, (f"{path}: no such file", remedy(path)))))
+    raise MissingFile(fault(path, "no such file"))
 
 
 def sha256(path: str | os.PathLike) -> str:
@@ -75,10 +75,10 @@ def sha256(path: str | os.PathLike) -> str:
     return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
-def remedy(path: str | os.PathLike) -> str:
-    """Say how to restore a file of the checkout; empty for files elsewhere."""
-    if not Path(os.path.realpath(path)).is_relative_to(ROOT):
-        return ""
-    if not (ROOT / "environment.lock").exists():
-        return "it lies in the checkout only: `git clone ADDRESS vsp`"
-    return f"`git checkout {shlex.quote(str(path))}` restores a committed file"
+def fault(path: str | os.PathLike, what: str, *remedies: str) -> str:
+    """Say in one line what is wrong with the file at `path` and the remedies; git restores a file of the checkout."""
+    if Path(os.path.realpath(path)).is_relative_to(ROOT):
+        restore = f"`git checkout {shlex.quote(str(path))}` restores a committed file"
+        fetch = "it lies in the checkout only: `git clone ADDRESS vsp`"
+        remedies += (restore if (ROOT / "environment.lock").exists() else fetch,)
+    return f"{path}: {what}" + (f": {'; '.join(remedies)}" if remedies else "")

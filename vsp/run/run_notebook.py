@@ -3,8 +3,8 @@
     python -m vsp.run.run_notebook notebooks/01_teacher.ipynb --out . --quick --expect figures/environments.pdf
 
 A notebook has a cell tagged `parameters`, after which the run sets `out`, `quick` and `runs`. The notebook writes
-`figures/` and `data/results/` into the folder `out`. This is a staging folder, and the files move to the real `out` only
-after every cell ran without an error. `runs` is the real `out`/data/runs.
+`figures/` and `data/results/` into the folder `out`. This is a staging folder, and the files move to the real `out`
+only after every cell ran without an error. `runs` is the real `out`/data/runs.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[Note
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return variables for kernels: no settings of the user, and nothing is written outside `folder`, which it makes."""
+    """Make `folder`; return variables for kernels: no settings of the user, and nothing is written outside `folder`."""
     folder.mkdir()
     for fonts in Path(sys.prefix).glob("matplotlib/fontlist-*.json"):  # made by the set-up
         shutil.copy(fonts, folder)
