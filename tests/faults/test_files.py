@@ -24,6 +24,7 @@ from studies.recipes import Recipe
 from vsp.paper import results, runs
 from vsp.run import atomic, run_notebook
 from vsp.run.atomic import DamagedFile
+from vsp.run.command import CommandError
 from vsp.run.listed import MANIFEST, list_folder, read_listed
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
@@ -228,7 +229,7 @@ LOADERS = {
     "study": lambda path: of_study(path.with_suffix(".csv")),
     "notebook": lambda path: run_notebook._read(path),
 }
-REFUSALS = (ValueError, FileNotFoundError, run_notebook.NotebookError)
+REFUSALS = (ValueError, FileNotFoundError, CommandError)
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import pytest
 from support import write_story as write
 
 from vsp.run import atomic, listed, run_notebook
+from vsp.run.command import CommandError
 from vsp.run.notebook import nbformat
 
 DRAW = """\
@@ -148,12 +149,12 @@ def test_limit_on_the_size_of_files(tmp_path, limit_files, cell):
 def test_unfit_notebook(tmp_path):
     for content in (b"", b"\x80\x04N.", b'{"cells": 3}', b"!!python/name:os.system"):
         (tmp_path / "x.ipynb").write_bytes(content)
-        with pytest.raises(run_notebook.NotebookError, match="x.ipynb: not a notebook"):
+        with pytest.raises(CommandError, match="x.ipynb: not a notebook"):
             run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
     with pytest.raises(atomic.MissingFile, match="none.ipynb: no such file"):
         run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
     untagged = write(tmp_path, DRAW)
     untagged.write_text(untagged.read_text().replace('"parameters"', '"other"'))
-    with pytest.raises(run_notebook.NotebookError, match='0 cells have the tag "parameters", expected one'):
+    with pytest.raises(CommandError, match='0 cells have the tag "parameters", expected one'):
         run_notebook.run_notebook(untagged, tmp_path)
     assert not (tmp_path / "out").exists()

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import secrets
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]  # the checkout, or where vsp is installed
@@ -27,9 +25,8 @@ def data_folder(name: str) -> Path:
     return installed if installed.is_dir() else ROOT / "data" / name
 
 
-@contextlib.contextmanager
-def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it replaces `path` only if the block succeeds.
+def write_bytes(path: str | os.PathLike, content: bytes) -> None:
+    """Write `content` to `path` atomically, by way of a temporary file beside it.
 
     A reader (or a run after a crash) sees the old file or the complete new one, never a partial one.
     """
@@ -37,22 +34,16 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
     try:
-        yield temporary
-        with open(temporary, "rb") as written:
-            os.fsync(written.fileno())  # the rename must not reach the disk before the content
+        with open(temporary, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())  # the rename must not reach the disk before the content
         os.replace(temporary, path)
     except OSError as error:
-        if error.errno:
-            error.filename = error.filename or str(path)  # the system does not name the file when a disk is full
+        error.filename = error.filename or str(path)  # the system does not name the file when a disk is full
         raise
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def write_bytes(path: str | os.PathLike, content: bytes) -> None:
-    """Write `content` to `path` atomically."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:

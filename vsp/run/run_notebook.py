@@ -46,12 +46,8 @@ KERNEL_SETTINGS = {
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 # A user can fix these: a damaged file, a full or read-only disk, a cluster
-_MENDABLE = ("DamagedFile", "MissingFile", "OSError", "PermissionError", "WorkerDied", "UnlikeWorker", "NoScheduler")
+_MENDABLE = ("CommandError", "DamagedFile", "MissingFile", "OSError", "PermissionError")
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
-
-
-class NotebookError(CommandError):
-    """A notebook that did not run to its end without an error; the message names it and the cell."""
 
 
 def run_notebook(
@@ -66,8 +62,8 @@ def run_notebook(
 
     `expect` names files, relative to `out`, that the notebook must make. An executed copy, without anything that varies
     between runs, goes to the folder `executed` in `out`. Raises CommandError if another process runs the same notebook
-    into the same `out`, NotebookError, DamagedFile, MissingFile, or OSError for a full or read-only disk. The earlier
-    files of `out` then stay, unless the disk fails while files are moved.
+    into the same `out` or if a cell fails, MissingFile, or OSError for a full or read-only disk. The earlier files of
+    `out` then stay, unless the disk fails while files are moved.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source = _read(notebook)
@@ -87,7 +83,7 @@ def run_notebook(
             _write_copy(source, cells, staging / executed / notebook.name)
             missing = [name for name in expect if not (staging / name).is_file()]
             if missing:
-                raise NotebookError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
+                raise CommandError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
             return _publish(staging, out)
         finally:
             shutil.rmtree(work, ignore_errors=True)
@@ -99,9 +95,9 @@ def _read(notebook: Path) -> NotebookNode:
         source = nbformat.reads(content.decode(), as_version=4)
         tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
     except (nbformat.ValidationError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise NotebookError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
+        raise CommandError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
     if len(tagged) != 1:
-        raise NotebookError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
+        raise CommandError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
     return source
 
 
@@ -123,7 +119,7 @@ def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[Note
     except (CellTimeoutError, DeadKernelError) as error:
         begun = [cell for cell in _code_cells(copy) if cell.metadata.papermill.start_time]
         where = _name(notebook, *begun[-1:])
-        raise NotebookError(f"{where} did not end: {type(error).__name__}: {error}") from error
+        raise CommandError(f"{where} did not end: {type(error).__name__}: {error}") from error
     return [cell for cell in _code_cells(copy) if "injected-parameters" not in cell.metadata.tags]
 
 
@@ -146,7 +142,7 @@ def _name(notebook: Path, cell: NotebookNode | None = None) -> str:
 
 
 def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> None:
-    """Raise NotebookError if the cell failed, or shows what differs between machines, such as `folders`.
+    """Raise CommandError if the cell failed, or shows what differs between machines, such as `folders`.
 
     An error that a user can fix, such as a damaged file, is told in one line, others with the traceback.
     """
@@ -155,10 +151,10 @@ def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> N
         if output.output_type == "error":
             traceback = _COLOUR.sub("", "\n".join(["", *output.traceback]))
             details = "" if output.ename in _MENDABLE else traceback
-            raise NotebookError(f"{where} failed: {output.ename}: {output.evalue}{details}")
+            raise CommandError(f"{where} failed: {output.ename}: {output.evalue}{details}")
         shown = output.get("text") or json.dumps(output.get("data", {}))
         if varying := _VARIES.findall(shown) + [folder for folder in folders if folder in shown]:
-            raise NotebookError(f"{where} shows {varying[0]!r}, which differs between runs: end with `;`, or fix it")
+            raise CommandError(f"{where} shows {varying[0]!r}, which differs between runs: end with `;`, or fix it")
 
 
 def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> None:
