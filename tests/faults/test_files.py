@@ -22,9 +22,8 @@ from studies import training
 from studies.comparison.rows import Job, make_row
 from studies.recipes import Recipe
 from vsp.paper import results, runs
-from vsp.run import atomic, run_notebook
+from vsp.run import atomic
 from vsp.run.atomic import DamagedFile
-from vsp.run.command import CommandError
 from vsp.run.listed import MANIFEST, list_folder, read_listed
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
@@ -227,9 +226,8 @@ LOADERS = {
     "sealed": read_sealed,
     "listed": read_listed,
     "study": lambda path: of_study(path.with_suffix(".csv")),
-    "notebook": lambda path: run_notebook._read(path),
 }
-REFUSALS = (ValueError, FileNotFoundError, CommandError)
+REFUSALS = (ValueError, FileNotFoundError)
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def run_notebook(
     `out` then stay, unless the disk fails while files are moved.
     """
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
-    source = _read(notebook)
+    source = nbformat.reads(read_bytes(notebook).decode(), as_version=4)
     running = out / "build" / "running" / notebook.stem
     with folder_lock(running, f"another run of {notebook.stem} writes into {out}"):
         for left in running.iterdir():
@@ -89,18 +89,6 @@ def run_notebook(
             shutil.rmtree(work, ignore_errors=True)
 
 
-def _read(notebook: Path) -> NotebookNode:
-    content = read_bytes(notebook)
-    try:
-        source = nbformat.reads(content.decode(), as_version=4)
-        tagged = [cell for cell in source.cells if "parameters" in cell.metadata.get("tags", [])]
-    except (nbformat.ValidationError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise CommandError(f"{notebook.name}: not a notebook: {error!r:.300}") from error
-    if len(tagged) != 1:
-        raise CommandError(f'{notebook.name}: {len(tagged)} cells have the tag "parameters", expected one')
-    return source
-
-
 def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[NotebookNode]:
     """Run a copy of the notebook by papermill with the parameters `values`. Returns its code cells, up to an error."""
     import papermill
@@ -118,8 +106,7 @@ def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[Note
         pass  # `_check_cell` finds the error
     except (CellTimeoutError, DeadKernelError) as error:
         begun = [cell for cell in _code_cells(copy) if cell.metadata.papermill.start_time]
-        where = _name(notebook, *begun[-1:])
-        raise CommandError(f"{where} did not end: {type(error).__name__}: {error}") from error
+        raise CommandError(f"{_name(notebook, begun[-1])} did not end: {type(error).__name__}: {error}") from error
     return [cell for cell in _code_cells(copy) if "injected-parameters" not in cell.metadata.tags]
 
 
@@ -135,10 +122,10 @@ def _code_cells(path: Path) -> list[NotebookNode]:
     return [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
 
 
-def _name(notebook: Path, cell: NotebookNode | None = None) -> str:
+def _name(notebook: Path, cell: NotebookNode) -> str:
     """Return the name of the notebook, and of the cell by its first line, for messages."""
-    first = cell.source.strip().partition("\n")[0] if cell else ""
-    return f"{notebook.name}, code cell ({first})" if first else notebook.name
+    first = cell.source.strip().partition("\n")[0]
+    return f"{notebook.name}, code cell ({first})"
 
 
 def _check_cell(notebook: Path, cell: NotebookNode, folders: Sequence[str]) -> None:
@@ -217,8 +204,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with in_one_line(name):
         print(f"{name}: running", flush=True)
         changed = run_notebook(**options)
-        files = f"{len(changed)} file{'s' * (len(changed) != 1)}"
-        print(f"{name}: done in {time.monotonic() - began:.0f} s, {files} changed", flush=True)
+        print(f"{name}: done in {time.monotonic() - began:.0f} s, files changed: {len(changed)}", flush=True)
 
 
 if __name__ == "__main__":
