@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
+from ..checks import check_choice
 from ..policy import VoronoiPolicy
 from ..run.atomic import data_folder
 from ..run.listed import read_listed
@@ -48,22 +49,20 @@ def printed_spread_values(task: str, subject: str) -> dict[str, float]:
     return {metric.lower().partition("/")[0]: value for metric, value in printed_spread(task)[subject].items()}
 
 
-def printed_text_numbers(task: str | None = None) -> pd.DataFrame:
+def printed_text_numbers() -> pd.DataFrame:
     """Return the numbers in running text and captions: one row per number, its id as index.
 
     Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
-    (NaN for a version or a name), unit, printed (the paper's spelling), where. `task` selects its rows and "both".
+    (NaN for a version or a name), unit, printed (the paper's spelling), where.
     """
-    frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
-    return frame if task is None else frame[frame["task"].isin([check_task(task), "both"])]
+    return _read("text_numbers.csv", numbers=["value"]).set_index("id")
 
 
 def printed_value(id: str) -> float:
     """Return the value `id` of `printed_text_numbers()`; shares are in percent. Raises ValueError for other ids."""
-    frame = printed_text_numbers()
-    if not isinstance(id, str) or id not in frame.index:
-        raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
-    return float(frame.at[id, "value"])
+    values = printed_text_numbers()["value"]
+    check_choice("id", id, values.index)
+    return float(values[id])
 
 
 def spread_id(task: str, subject: str, metric: str) -> str:
@@ -128,8 +127,7 @@ def _numbers(columns: Iterable[str]) -> list[str]:
 
 def check_task(task: str) -> str:
     """Return `task`. Raises ValueError for a task that is not in the paper."""
-    if not isinstance(task, str) or task not in TASKS:
-        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no others")
+    check_choice("the paper's task", task, TASKS)
     return task
 
 

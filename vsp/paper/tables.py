@@ -82,14 +82,11 @@ def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = Non
 def present(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the frame for readers.
 
-    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among other
-    values), and shares become percentages. `low` and `high` become one column of text, and headings are in words. Where
-    each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
+    A named index becomes a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among
+    other values), and shares become percentages. `low` and `high` become one column of text, and headings are in words.
+    Where each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
     """
-    index = frame.index
-    if index.names != [None] or (len(index) and isinstance(index[0], str)):
-        frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
-    frame = frame.reset_index(drop=True).apply(_in_words)
+    frame = frame.reset_index(drop=frame.index.names == [None]).apply(_in_words)
     frame = _counts(frame) if QUANTITIES & {*frame} else frame
     for name in frame:
         if re.sub(r"_(low|high)$", "", str(name)) in headings()["percent"]:
@@ -195,13 +192,13 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3) -> pd.DataF
     return pd.DataFrame({"codeword": codewords, **columns})
 
 
-def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
+def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> HTML:
     """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
 
-    `digits`: decimals of the numbers; None: as many as they have. Raises ValueError unless the sub-policies are linear.
+    Raises ValueError unless the sub-policies are linear.
     """
     policy.check_linear()
-    frame, task, where = equation_table(policy, digits=digits), policy.task, "One map for all states"
+    frame, task, where = equation_table(policy), policy.task, "One map for all states"
     if len(policy) > 1:
         sizes = ", ".join(f"{size:.3g}" for size in policy.scale)
         units = "" if (policy.scale == 1).all() else f" of states divided by ({sizes})"
@@ -233,7 +230,7 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
-    known, prefix = printed_text_numbers(check_task(task)), PREFIX[task]
+    known, prefix = printed_text_numbers(), PREFIX[check_task(task)]
     teacher, runs = _returns(teacher, runs)
     check_count("cells", cells)
     means = runs.mean(axis=1)
