@@ -116,7 +116,7 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
         bounds["outliers"] = np.floor(bounds["outliers"].iloc[0]), np.ceil(bounds["outliers"].iloc[1])
-        for name in bounds.columns.intersection(list(here)):
+        for name in bounds:
             row = here[name], *bounds[name]
             row = row if row[0] == row[0] else (np.nan, np.nan, np.nan)  # an empty set of outliers has no mean
             rows[f"{prefix}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..checks import check_array, check_finite
+from ..checks import check_finite
 from ..evaluation import fences
 from ..protocol.intervals import bootstrap_draws
 
@@ -72,11 +72,8 @@ def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -
     """Bootstrap the statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
 
     Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
-    that a resample leaves empty is NaN. Raises ValueError if there are no returns, or some are not finite.
+    that a resample leaves empty is NaN.
     """
-    returns = check_array("returns", returns, (-1, -1))
-    if not returns.size:
-        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
     p, n = returns.shape
     draws = bootstrap_draws(p, n_resamples, seed)
     counts = np.stack([np.bincount(draw, minlength=p) for draw in draws]).astype(np.int32)  # of each policy. (r, p)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ..checks import check_array, check_count
 from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
@@ -217,7 +216,7 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
     """
     printed = printed_spread(task)
     table = pd.DataFrame({"metric": printed.index})
-    for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), _returns(teacher, runs)):
+    for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), (teacher, runs)):
         here = spread(values)
         here |= {"coverage": 100 * here["coverage"], "median/q2": here["median"]}
         table[f"{label}, paper"] = printed[name].to_numpy()
@@ -231,8 +230,6 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
     known, prefix = printed_text_numbers(), PREFIX[check_task(task)]
-    teacher, runs = _returns(teacher, runs)
-    check_count("cells", cells)
     means = runs.mean(axis=1)
     distilled = outlier_numbers(runs) | {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
     distilled["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
@@ -245,11 +242,6 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
     counts = [isinstance(value, int) and not np.isnan(other) for value, other in zip(here.values(), printed)]
     frame["paper"] = pd.Series([int(x) if count else float(x) for x, count in zip(printed, counts)], dtype=object)
     return frame.assign(here=pd.Series([*here.values()], dtype=object))
-
-
-def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Check and return the returns of the teacher (n,) and of the runs (p, n). Raises ValueError."""
-    return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
 
 
 # The runs
