@@ -189,7 +189,7 @@ STORY_PARAMETERS = 'out = ".."\nruns = "../data/runs"\nquick = False'
 
 def write_story(folder: Path, *cells: str) -> Path:
     """story.ipynb, a notebook of code cells."""
-    from vsp.run.notebook import nbformat  # which takes long, and few tests write notebooks
+    import nbformat  # which takes long, and few tests write notebooks
 
     notebook = nbformat.v4.new_notebook()
     notebook.metadata.kernelspec = {"name": "python3", "display_name": "Python 3", "language": "python"}

@@ -7,10 +7,10 @@ import re
 import tomllib
 from pathlib import Path
 
+import nbformat
 import pytest
 from support import python
 
-from vsp.run.notebook import nbformat
 from vsp.show import captions
 
 ROOT = Path(__file__).resolve().parents[1]

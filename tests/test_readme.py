@@ -6,6 +6,7 @@ import re
 import subprocess
 import tomllib
 
+import nbformat
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,7 +16,6 @@ from studies.comparison import all_rows, largest_alike, method_summary, read_res
 from vsp.paper import quartiles_from_fences
 from vsp.paper.ledger import distinct_results
 from vsp.run.atomic import ROOT
-from vsp.run.notebook import nbformat
 
 PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))

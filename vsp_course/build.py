@@ -19,10 +19,12 @@ import os
 import re
 from pathlib import Path
 
+import nbformat
+from nbformat import NotebookNode
+
 from vsp.run.atomic import ROOT, DamagedFile, sha256, write_text
 from vsp.run.command import in_one_line
 from vsp.run.locks import folder_lock
-from vsp.run.notebook import NotebookNode, nbformat
 from vsp.run.sealed import read_sealed, write_sealed
 
 from .handout import write_handout

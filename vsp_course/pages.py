@@ -11,9 +11,11 @@ import argparse
 import os
 from pathlib import Path
 
+import nbformat
+from nbformat import NotebookNode
+
 from vsp.run.atomic import write_text
 from vsp.run.command import in_one_line
-from vsp.run.notebook import NotebookNode, nbformat
 from vsp.run.run_notebook import KERNEL, clean_outputs
 
 from .build import SOURCES, is_check, is_solution, read_sources, student

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from nbformat import NotebookNode
 
 from vsp import show
-from vsp.run.notebook import NotebookNode
 from vsp.show.explorer import Explorer, standalone
 
 from . import drawing

@@ -4,11 +4,11 @@ import re
 import tomllib
 from pathlib import Path
 
+import nbformat
 import pandas as pd
 from sphinx.util.docutils import SphinxDirective
 
 from vsp.paper.results import read_results
-from vsp.run.notebook import nbformat
 from vsp.show.captions import BOOK, caption_of
 
 ROOT = Path(__file__).resolve().parents[2]

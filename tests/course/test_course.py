@@ -12,6 +12,7 @@ import zipfile
 from collections import Counter
 
 import course_answers
+import nbformat
 import numpy as np
 import pytest
 from course_answers import EXERCISES
@@ -24,7 +25,6 @@ from vsp.algorithms import split_regions, teacher_episodes
 from vsp.paper import baselines
 from vsp.paper.statistics import spread
 from vsp.run import atomic
-from vsp.run.notebook import nbformat
 from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, pages, slides
 from vsp_course.lesson_2 import _algorithm_1
 

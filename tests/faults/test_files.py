@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import nbformat
 import numpy as np
 import pytest
 import yaml
@@ -25,7 +26,6 @@ from vsp.paper import results, runs
 from vsp.run import atomic
 from vsp.run.atomic import DamagedFile
 from vsp.run.listed import MANIFEST, list_folder, read_listed
-from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays
 from vsp_course import build
 

@@ -4,6 +4,7 @@ from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
+import nbformat
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,7 +19,6 @@ from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_exper
 from vsp.policy import VoronoiPolicy
 from vsp.protocol import interval
 from vsp.rollouts import Outcomes
-from vsp.run.notebook import nbformat
 from vsp.tasks import registry, simplegoal
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 from vsp.tasks.registry import _TASKS, get_task

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+import nbformat
 import pytest
 from support import write_story as write
 
 from vsp.run import listed, run_notebook
-from vsp.run.notebook import nbformat
 
 DRAW = """\
 from pathlib import Path

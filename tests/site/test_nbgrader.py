@@ -4,13 +4,13 @@ import os
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
 from nbgrader.api import Gradebook
 from nbgrader.apps import NbGraderAPI
 from traitlets.config import Config
 
 from vsp.run.atomic import ROOT
-from vsp.run.notebook import nbformat
 from vsp_course import build
 
 ASSIGNMENT = "homework"

@@ -23,11 +23,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from unittest import mock
 
+import nbformat
+from nbformat import NotebookNode
+
 from .atomic import ROOT, read_bytes, write_text
 from .command import CommandError, in_one_line
 from .listed import MANIFEST, list_file
 from .locks import folder_lock
-from .notebook import NotebookNode, nbformat
 
 KERNEL = "python3"
 EXECUTED = "figures/executed"
