@@ -39,9 +39,7 @@ KERNEL_FOLDER = ("TMPDIR", "JOBLIB_TEMP_FOLDER", "IPYTHONDIR", "JUPYTER_RUNTIME_
 KERNEL_SETTINGS = {
     "OMP_NUM_THREADS": "1",  # the same sums in the same order, also without make
     "OPENBLAS_NUM_THREADS": "1",
-    "JUPYTER_PREFER_ENV_PATH": "1",  # no kernel of another Python, whatever is installed
     "MPLBACKEND": "module://matplotlib_inline.backend_inline",  # figures are outputs
-    "SDL_VIDEODRIVER": "dummy",  # no search for a screen, and no message about it on standard error
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",  # no debugger message on standard error
 }
 _VARIES = re.compile(r"\bat 0x[0-9a-f]{6,}|ipykernel_\d+")  # addresses of objects; process numbers in warnings
