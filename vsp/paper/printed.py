@@ -25,14 +25,11 @@ PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # prefixes o
 SUBJECTS = {"DRL": "teacher", "Ours": "distilled"}  # the paper's names, and ours
 SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
-_POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
-
 
 def printed_hyperparameters(task: str) -> dict[str, int | float | bool]:
     """Return the hyperparameters of `task` by their names in the paper (appendix, first table)."""
-    column = check_task(task)
-    frame = _read("hyperparameters.csv")
-    return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
+    rows = _read("hyperparameters.csv").set_index("hyperparameter")[check_task(task)]
+    return {name: ast.literal_eval(text) for name, text in rows.items()}
 
 
 def printed_spread(task: str) -> pd.DataFrame:
@@ -85,7 +82,7 @@ def printed_values() -> pd.DataFrame:
         for row in _read("hyperparameters.csv").to_dict("records"):
             name = row["hyperparameter"]
             rows.append((f"{PREFIX[task]}_hyper_{name}", task, row["where"], name, "protocol", row[task]))
-        for k, row in enumerate(_read(_POLICIES[task]).to_dict("records"), start=1):
+        for k, row in enumerate(_read(f"{SHORT[task].lower()}_linear_policies.csv").to_dict("records"), start=1):
             for name in _numbers(row):
                 if row[name] != "0":  # 0 stands for a term that the paper does not print
                     rows.append((f"{PREFIX[task]}_cell_{k}_{name}", task, row["where"], name, "Ours", row[name]))
@@ -105,7 +102,7 @@ def linear_policies(task: str) -> pd.DataFrame:
     Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
     such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
     """
-    frame = _read(_POLICIES[check_task(task)])
+    frame = _read(f"{SHORT[check_task(task)].lower()}_linear_policies.csv")
     return frame.astype(dict.fromkeys(_numbers(frame), np.float64))
 
 

@@ -68,12 +68,11 @@ def run_notebook(
         for left in running.iterdir():
             shutil.rmtree(left, ignore_errors=True)  # left by a killed run
         # A new name each time: an orphaned kernel may still write to an old folder
-        work = Path(tempfile.mkdtemp(dir=running))
-        staging = work / "out"
-        try:
+        with tempfile.TemporaryDirectory(dir=running, ignore_cleanup_errors=True) as work:
+            staging = Path(work, "out")
             staging.mkdir()
             values = {"out": str(staging), "quick": quick, "runs": str(out / "data" / "runs")}
-            cells = _execute(notebook, values, work)
+            cells = _execute(notebook, values, Path(work))
             for cell in cells:
                 _check_cell(notebook, cell)
             _write_copy(source, cells, staging / executed / notebook.name)
@@ -81,8 +80,6 @@ def run_notebook(
             if missing:
                 raise CommandError(f"{notebook.name}: ran, but did not make {', '.join(missing)}")
             return _publish(staging, out)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
 
 
 def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[NotebookNode]:
@@ -125,7 +122,7 @@ def _name(notebook: Path, cell: NotebookNode) -> str:
 
 
 def _check_cell(notebook: Path, cell: NotebookNode) -> None:
-    """Raise CommandError if the cell failed: in one line if a user can fix it, as a damaged file, else with traceback."""
+    """Raise CommandError if the cell failed, in one line if a user can fix it, such as a damaged file."""
     for output in cell.outputs:
         if output.output_type == "error":
             traceback = _COLOUR.sub("", "\n".join(["", *output.traceback]))
