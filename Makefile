@@ -189,5 +189,5 @@ $(USE_RUNS): runs
 $(NOTEBOOKS): begin venv
 	@$(call once,$@,$(call inputs,$@) $(if $(filter $@,$(USE_RUNS)),"$$STAMPS/runs"),$(call outputs,$@),\
 	  $(PY) -m vsp.run.run_notebook notebooks/$@.ipynb --out="$$OUT" --executed=$(call executed,$@) \
-	  $${QUICK:+-p quick true} --expect $(call outputs,$@) && echo $@ >> "$$STAMPS/made")
+	  $${QUICK:+--quick} --expect $(call outputs,$@) && echo $@ >> "$$STAMPS/made")
 $(foreach n,$(NOTEBOOKS),$(eval $(call outputs,$(n)): $(n) ;))

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from vsp.paper.results import read_results
 from vsp.run import kernels, listed
 
 COLUMNS = ["table", "what", "rule", "target", "measured", "unit", "low", "high", "met", "note", "machine"]
@@ -52,7 +53,7 @@ def add(path: Path, new: dict) -> None:
 
 def read(path: Path) -> pd.DataFrame:
     """The table at `path`, empty if there is none."""
-    return listed.read_table(path) if path.exists() else pd.DataFrame(columns=COLUMNS)
+    return read_results(path.stem, path.parent) if path.exists() else pd.DataFrame(columns=COLUMNS)
 
 
 def write(path: Path, frame: pd.DataFrame) -> None:

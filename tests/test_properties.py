@@ -50,7 +50,6 @@ cell = {"cell": count(1, least=0, most=1)}
 low, high = (array(end, free=(), also=other) for end, other in (
     (np.zeros(2), [np.ones(2), [0, 2]]), (np.ones(2), [-np.ones(2)])))  # fmt: skip
 returns = {"returns": array(STATES, any_shape=True, nonempty=True)}
-of_runs = {"task": task, "teacher": array(STATES[:, 0], nonempty=True), "runs": array(STATES.T, nonempty=True)}
 
 CASES = {
     "agent": (vsp.agent, {"source": Argument(TEACHER, [None, 3, "TD3", np.zeros(2), np.nan])}),
@@ -115,8 +114,6 @@ CASES = {
     "paper.hyperparameter_table": (lambda task: vsp.paper.hyperparameter_table([task]), {"task": task}),
     "paper.interpretation_table": (vsp.paper.interpretation_table, {"task": task}),
     "paper.equation_table": (functools.partial(vsp.paper.equation_table, TWO), digits),
-    "paper.spread_table": (vsp.paper.spread_table, of_runs),
-    "paper.text_number_table": (vsp.paper.text_number_table, of_runs | {"cells": n}),
     "paper.baselines.linear_map": (baselines.linear_map, pairs | {"task": task}),
     "paper.baselines.kmeans_cells": (
         baselines.kmeans_cells, pairs | {"cells": count(2, most=len(STATES)), "task": task, "seed": seed},
@@ -129,10 +126,6 @@ CASES = {
         functools.partial(vsp.paper.interval, statistic=np.mean), returns | {"n_resamples": count(5), "seed": seed},
     ),
     "paper.statistics.outlier_numbers": (statistics.outlier_numbers, returns),
-    "paper.statistics.resample": (
-        statistics.resample,
-        {"returns": array(STATES, free=(0, 1), nonempty=True), "n_resamples": count(5), "seed": seed},
-    ),
 }  # fmt: skip
 
 

@@ -5,12 +5,13 @@ The lessons need no torch, because teachers act by NumPy, so a student's set-up 
 
 from __future__ import annotations
 
+import io
 import re
 import tomllib
 import zipfile
 from pathlib import Path
 
-from vsp.run.atomic import ROOT, atomic_path
+from vsp.run.atomic import ROOT, write_bytes
 
 FOLDER = "vsp-course"
 UNUSED = ("papermill",)  # dependencies of the package that the course does not need
@@ -27,11 +28,13 @@ def write_handout(path: Path, copies: dict[str, str]) -> None:
     files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
     contents = {name: text.encode() for name, text in texts.items()}
     contents |= {name: file.read_bytes() for name, file in files.items()}
-    with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
         for name in sorted(contents):
             member = zipfile.ZipInfo(f"{FOLDER}/{name}")  # dated 1980, as all of them
             member.external_attr = 0o644 << 16
             archive.writestr(member, contents[name], zipfile.ZIP_DEFLATED)
+    write_bytes(path, content.getvalue())
 
 
 def requirements() -> str:

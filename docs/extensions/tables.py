@@ -7,12 +7,11 @@ from pathlib import Path
 import pandas as pd
 from sphinx.util.docutils import SphinxDirective
 
-from vsp.run.listed import read_table
+from vsp.paper.results import read_results
 from vsp.run.notebook import nbformat
 from vsp.show.captions import BOOK, caption_of
 
 ROOT = Path(__file__).resolve().parents[2]
-TRUST = ROOT / "data" / "results" / "trust.csv"
 _SAVES = {"figures": "save_figure", "tables": "save_table"}
 
 
@@ -49,7 +48,7 @@ class _Table(SphinxDirective):
 
 class Measured(_Table):
     def run(self):
-        return self.parse_text_to_nodes(measured(read_table(TRUST)))
+        return self.parse_text_to_nodes(measured(read_results("trust")))
 
 
 class Artefacts(_Table):

@@ -22,9 +22,9 @@ from studies import training
 from studies.comparison.rows import Row, make_all
 from studies.recipes import Recipe
 from vsp.paper import results, runs
-from vsp.run import atomic, run_notebook
+from vsp.run import atomic
 from vsp.run.atomic import DamagedFile
-from vsp.run.listed import MANIFEST, list_folder, read_listed, read_table
+from vsp.run.listed import MANIFEST, list_folder, read_listed
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed
 from vsp_course import build
@@ -225,11 +225,9 @@ LOADERS = {
     "checkpoint": training.read_checkpoint,
     "sealed": read_sealed,
     "listed": read_listed,
-    "table": read_table,
     "study": lambda path: of_study(path.with_suffix(".csv")),
-    "notebook": lambda path: run_notebook._read(path),
 }
-REFUSALS = (ValueError, FileNotFoundError, run_notebook.NotebookError)
+REFUSALS = (ValueError, FileNotFoundError)
 
 
 @pytest.fixture

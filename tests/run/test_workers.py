@@ -9,8 +9,9 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from vsp.run import workers
+from vsp.run.command import CommandError
 from vsp.run.listed import MANIFEST
-from vsp.run.workers import NoScheduler, UnlikeWorker, WorkerDied, _call, results
+from vsp.run.workers import _call, results
 
 
 def power(base, exponent):
@@ -54,7 +55,7 @@ def test_an_error_of_a_job_is_that_of_the_call(jobs):
 def test_a_killed_worker_is_named():
     """Nothing waits for it in vain; the message says how much was done and that the same command resumes."""
     told = r"a study: a worker process was killed \(.*SIGKILL.*\) with [345] of 6 rows done.*same command to resume"
-    with pytest.raises(WorkerDied, match=told):
+    with pytest.raises(CommandError, match=told):
         ask(die, [(n,) for n in range(3)], 2, done=3)
     assert ask(die, [(3,), (4,)], 2) == {0: 3, 1: 4}  # and the pool is as good as new
 
@@ -62,7 +63,7 @@ def test_a_killed_worker_is_named():
 def test_a_worker_with_other_code_is_refused(monkeypatch):
     call = _call
     monkeypatch.setattr(workers, "_call", lambda expected, *rest: call({**expected, "numpy": "1.0"}, *rest))
-    with pytest.raises(UnlikeWorker, match="expected .*'numpy': '1.0'.*same checkout"):
+    with pytest.raises(CommandError, match="expected .*'numpy': '1.0'.*same checkout"):
         ask(power, [(1, 1)], 1)
 
 
@@ -80,11 +81,11 @@ def test_what_a_result_depends_on_is_looked_for_in_folders_too(tmp_path, monkeyp
 def test_an_address_without_a_scheduler_is_one_clear_error(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "ANSWER", 0.5)
-    with pytest.raises(NoScheduler, match="no Dask scheduler with workers answers at 'tcp://127.0.0.1:9'"):
+    with pytest.raises(CommandError, match="no Dask scheduler with workers answers at 'tcp://127.0.0.1:9'"):
         ask(power, [(1, 1)], "tcp://127.0.0.1:9")
 
 
 def test_a_cluster_without_its_package_is_one_clear_error(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(NoScheduler, match="Dask cluster, which needs the package `distributed`"):
+    with pytest.raises(CommandError, match="Dask cluster, which needs the package `distributed`"):
         ask(power, [(1, 1)], "tcp://127.0.0.1:9")

@@ -33,9 +33,8 @@ def kmeans_cells(states: np.ndarray, actions: np.ndarray, *, cells: int, task: s
 def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPolicy:
     """One linear map for the whole space, by least squares on `states` (n, d) and `actions` (n, m): a single cell."""
     states, actions = check_data(states, actions)
-    inputs = np.column_stack([states, np.ones(len(states))])
-    coefficients = np.linalg.lstsq(inputs, actions, rcond=None)[0]
-    return VoronoiPolicy(states.mean(axis=0)[None], coefficients[None], task=task)
+    maps = np.zeros((1, states.shape[1] + 1, actions.shape[1]))
+    return refit(VoronoiPolicy(states.mean(axis=0)[None], maps, task=task), states, actions)
 
 
 def refit(policy: P, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> P:

@@ -67,9 +67,7 @@ def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES)
     settings = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"])
     parts = [measured(task, result, n_resamples=n_resamples) for task, result in results.items()]
     frame = printed.printed_values().join(pd.concat([settings, *parts]), on="id")
-    doubted = audit.in_doubt()
-    rows = zip(frame.itertuples(), _wide(frame))
-    frame["verdict"] = [verdict(row, in_doubt=row.id in doubted, wide=wide) for row, wide in rows]
+    frame["verdict"] = verdicts(frame, in_doubt=frame["id"].isin(audit.in_doubt()), wide=_wide(frame))
     frame["part"] = _first_match(frame["id"], PARTS)
     frame["cell"] = _first_match(frame["id"], CELLS)
     return frame[COLUMNS]
@@ -95,17 +93,14 @@ def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
     return table.reindex(index=parts, columns=VERDICTS).fillna(0).astype(int).rename_axis(columns=None)
 
 
-def verdict(row, *, in_doubt: bool = False, wide: bool = False) -> str:
-    """Return the verdict by this module's rules; `row` has paper (as printed), value, here, low and high."""
-    if in_doubt:
-        return CONTRADICTED
-    if np.isnan(row.here):
-        return UNCHECKED
-    if np.isnan(row.low):
-        return REPRODUCED if np.isclose(row.here, row.value, rtol=1e-9) else DIFFERS
-    half = 0.5 * last_digit(row.paper)
-    low, high = row.here - np.sqrt(2) * (row.here - row.low), row.here + np.sqrt(2) * (row.high - row.here)
-    return DIFFERS if not low - half <= row.value <= high + half else UNTOLD if wide else REPRODUCED
+def verdicts(rows: pd.DataFrame, *, in_doubt: pd.Series, wide: pd.Series) -> np.ndarray:
+    """Return the verdicts by this module's rules; `rows` have paper (as printed), value, here, low and high."""
+    here, half = rows["here"], 0.5 * rows["paper"].map(last_digit)
+    low, high = here - np.sqrt(2) * (here - rows["low"]), here + np.sqrt(2) * (rows["high"] - here)
+    same = rows["low"].isna() & np.isclose(here, rows["value"], rtol=1e-9)
+    inside = rows["value"].between(low - half, high + half)  # false for settings, which have no interval
+    rules = {CONTRADICTED: in_doubt, UNCHECKED: here.isna(), REPRODUCED: same, DIFFERS: ~inside, UNTOLD: wide}
+    return np.select([*rules.values()], [*rules], REPRODUCED)  # the first that applies
 
 
 def last_digit(printed: str) -> float:
@@ -121,7 +116,7 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
         here["coverage"] *= 100
         bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
         bounds["outliers"] = np.floor(bounds["outliers"].iloc[0]), np.ceil(bounds["outliers"].iloc[1])
-        for name in bounds.columns.intersection(list(here)):
+        for name in bounds:
             row = here[name], *bounds[name]
             row = row if row[0] == row[0] else (np.nan, np.nan, np.nan)  # an empty set of outliers has no mean
             rows[f"{prefix}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
@@ -209,13 +204,12 @@ def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) ->
     from scipy.stats import trim_mean  # here: it takes long to import
 
     teacher, means = result.teacher_returns, result.returns.mean(axis=1)
-    task = result.runs[0].policy.task
     measures: dict[str, tuple] = {
         "interquartile mean of the runs": (means, partial(trim_mean, proportiontocut=0.25), teacher.mean()),
         "probability that an episode beats the teacher's": ((result.returns > teacher).mean(axis=1), np.mean, np.nan),
     }
     for name, code in SHARES.items():
-        if name != "pit" or task.name == "SimpleGoal-v0":  # MountainCar has no pit
+        if name != "pit" or result.experiment.task == "SimpleGoal-v0":  # MountainCar has no pit
             shares = (result.outcomes == code).mean(axis=1)
             teachers = np.mean(result.teacher_outcomes.outcomes == code)
             measures[f"share of episodes: {name}"] = shares, np.mean, teachers

@@ -23,20 +23,16 @@ def main() -> None:
     arguments = parser.parse_args()
     runs, jobs = arguments.out / "data" / "runs", arguments.jobs
     if arguments.study:
-        study(arguments.out, runs, jobs)
-        return
-    for task in N_RUNS:
-        results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
-        print(f"{task}: {len(results.runs)} runs are complete", flush=True)
+        from .studies import interpretations, simpler, teachers
 
-
-def study(out: Path, runs: Path, jobs: int | str) -> None:
-    """Write the tables of the studies; the paper's runs are in the folder `runs`."""
-    from .studies import interpretations, simpler, teachers
-
-    write_results(interpretations.study(out / "build" / "study", jobs=jobs), "readings", out=out)
-    write_results(teachers.study(out / "build" / "study", jobs=jobs), "teachers", out=out)
-    write_results(simpler.study(runs, jobs=jobs), "simpler", out=out, float_format=None)
+        out, study_runs = arguments.out, arguments.out / "build" / "study"
+        write_results(interpretations.study(study_runs, jobs=jobs), "readings", out=out)
+        write_results(teachers.study(study_runs, jobs=jobs), "teachers", out=out)
+        write_results(simpler.study(runs, jobs=jobs), "simpler", out=out, float_format=None)
+    else:
+        for task in N_RUNS:
+            results = paper_results(task, runs=runs, quick=arguments.quick, jobs=jobs)
+            print(f"{task}: {len(results.runs)} runs are complete", flush=True)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
+from ..checks import check_choice
 from ..policy import VoronoiPolicy
 from ..run.atomic import data_folder
 from ..run.listed import read_listed
@@ -24,14 +25,11 @@ PREFIX = {"SimpleGoal-v0": "sg", "MountainCarContinuous-v0": "mc"}  # prefixes o
 SUBJECTS = {"DRL": "teacher", "Ours": "distilled"}  # the paper's names, and ours
 SHORT = {"SimpleGoal-v0": "SimpleGoal", "MountainCarContinuous-v0": "MountainCar"}
 
-_POLICIES = dict(zip(TASKS, ("simplegoal_linear_policies.csv", "mountaincar_linear_policies.csv"), strict=True))
-
 
 def printed_hyperparameters(task: str) -> dict[str, int | float | bool]:
     """Return the hyperparameters of `task` by their names in the paper (appendix, first table)."""
-    column = check_task(task)
-    frame = _read("hyperparameters.csv")
-    return {name: ast.literal_eval(text) for name, text in zip(frame["hyperparameter"], frame[column], strict=True)}
+    rows = _read("hyperparameters.csv").set_index("hyperparameter")[check_task(task)]
+    return {name: ast.literal_eval(text) for name, text in rows.items()}
 
 
 def printed_spread(task: str) -> pd.DataFrame:
@@ -48,22 +46,20 @@ def printed_spread_values(task: str, subject: str) -> dict[str, float]:
     return {metric.lower().partition("/")[0]: value for metric, value in printed_spread(task)[subject].items()}
 
 
-def printed_text_numbers(task: str | None = None) -> pd.DataFrame:
+def printed_text_numbers() -> pd.DataFrame:
     """Return the numbers in running text and captions: one row per number, its id as index.
 
     Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
-    (NaN for a version or a name), unit, printed (the paper's spelling), where. `task` selects its rows and "both".
+    (NaN for a version or a name), unit, printed (the paper's spelling), where.
     """
-    frame = _read("text_numbers.csv", numbers=["value"]).set_index("id")
-    return frame if task is None else frame[frame["task"].isin([check_task(task), "both"])]
+    return _read("text_numbers.csv", numbers=["value"]).set_index("id")
 
 
 def printed_value(id: str) -> float:
     """Return the value `id` of `printed_text_numbers()`; shares are in percent. Raises ValueError for other ids."""
-    frame = printed_text_numbers()
-    if not isinstance(id, str) or id not in frame.index:
-        raise ValueError(f"unknown id {id!r}, expected one of {frame.index.tolist()}")
-    return float(frame.at[id, "value"])
+    values = printed_text_numbers()["value"]
+    check_choice("id", id, values.index)
+    return float(values[id])
 
 
 def spread_id(task: str, subject: str, metric: str) -> str:
@@ -86,7 +82,7 @@ def printed_values() -> pd.DataFrame:
         for row in _read("hyperparameters.csv").to_dict("records"):
             name = row["hyperparameter"]
             rows.append((f"{PREFIX[task]}_hyper_{name}", task, row["where"], name, "protocol", row[task]))
-        for k, row in enumerate(_read(_POLICIES[task]).to_dict("records"), start=1):
+        for k, row in enumerate(_read(f"{SHORT[task].lower()}_linear_policies.csv").to_dict("records"), start=1):
             for name in _numbers(row):
                 if row[name] != "0":  # 0 stands for a term that the paper does not print
                     rows.append((f"{PREFIX[task]}_cell_{k}_{name}", task, row["where"], name, "Ours", row[name]))
@@ -106,7 +102,7 @@ def linear_policies(task: str) -> pd.DataFrame:
     Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
     such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
     """
-    frame = _read(_POLICIES[check_task(task)])
+    frame = _read(f"{SHORT[check_task(task)].lower()}_linear_policies.csv")
     return frame.astype(dict.fromkeys(_numbers(frame), np.float64))
 
 
@@ -128,8 +124,7 @@ def _numbers(columns: Iterable[str]) -> list[str]:
 
 def check_task(task: str) -> str:
     """Return `task`. Raises ValueError for a task that is not in the paper."""
-    if not isinstance(task, str) or task not in TASKS:
-        raise ValueError(f"unknown task {task!r}, expected one of {list(TASKS)}: the paper has no others")
+    check_choice("the paper's task", task, TASKS)
     return task
 
 

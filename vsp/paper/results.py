@@ -5,6 +5,7 @@ A row states its provenance (`protocol.jobs`); `studies.comparison.stale` compar
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 
@@ -18,7 +19,8 @@ _TYPES = {"settings": str, "teacher": str, "checksum": str, "version": "Int64"} 
 
 def read_results(name: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
     """Read the table data/results/NAME.csv, or NAME.csv in another `folder`."""
-    return listed.read_table(Path(folder or RESULTS) / f"{name}.csv", dtype=_TYPES)
+    content = listed.read_listed(Path(folder or RESULTS) / f"{name}.csv")
+    return pd.read_csv(io.BytesIO(content), dtype=_TYPES)
 
 
 def write_results(frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str | None = "%.6f") -> None:

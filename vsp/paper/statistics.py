@@ -12,10 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
-from ..checks import check_array, check_finite
+from ..checks import check_finite
 from ..evaluation import fences
 from ..protocol.intervals import bootstrap_draws
 
@@ -47,12 +45,16 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     """
     facts, returns = spread(returns), np.ravel(returns)
     lower, upper = facts["lower_fence"], facts["upper_fence"]
-    sides = {"below": returns[returns < lower], "above": returns[returns > upper]}
-    outside = np.concatenate([*sides.values()])
     numbers = {name: facts[name] for name in ("mean", "std", "min", "max")}
-    numbers |= {"whisker_low": lower, "whisker_high": upper, "outliers": len(outside)}
+    numbers |= {"whisker_low": lower, "whisker_high": upper}
+    return numbers | _outliers(returns[returns < lower], returns[returns > upper])
+
+
+def _outliers(below: np.ndarray, above: np.ndarray) -> dict[str, float]:
+    outside = np.concatenate([below, above])
+    numbers: dict[str, float] = {"outliers": len(outside)}
     numbers |= {f"outliers_{name}": value for name, value in _moments(outside).items()}
-    for side, values in sides.items():
+    for side, values in (("below", below), ("above", above)):
         moments = _moments(values)
         numbers[f"outliers_{side}_share"] = 100 * len(values) / len(outside) if len(outside) else np.nan
         numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
@@ -67,103 +69,55 @@ def _moments(values: np.ndarray) -> dict[str, float]:
 
 
 def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -> pd.DataFrame:
-    """Bootstrap all statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
+    """Bootstrap the statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
 
     Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
-    that a resample leaves empty is NaN. Raises ValueError if there are no returns, or some are not finite.
+    that a resample leaves empty is NaN.
     """
-    returns = check_array("returns", returns, (-1, -1))
-    if not returns.size:
-        raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
-    draws = bootstrap_draws(len(returns), n_resamples, seed)
-    sample = _SortedReturns(np.ascontiguousarray(returns))
-    batches = (draws[i : i + _BATCH] for i in range(0, n_resamples, _BATCH))
-    with threadpool_limits(1):  # NumPy's loops run in parallel in threads
-        columns = Parallel(n_jobs=-1, prefer="threads")(delayed(sample.statistics)(batch) for batch in batches)
-    return pd.DataFrame({name: np.concatenate([batch[name] for batch in columns]) for name in columns[0]})
+    p, n = returns.shape
+    draws = bootstrap_draws(p, n_resamples, seed)
+    counts = np.stack([np.bincount(draw, minlength=p) for draw in draws]).astype(np.int32)  # of each policy. (r, p)
+    order = np.argsort(returns, axis=None, kind="stable")
+    values, policy = returns.ravel()[order], order // n
+    q1, median, q3 = _quartiles(values, policy, counts)
+    lower, upper = fences(q1, q3)
+    ends = zip(counts, values.searchsorted(lower), values.searchsorted(upper, "right"))
+    outliers = [
+        _outliers(np.repeat(values[:low], times[policy[:low]]), np.repeat(values[high:], times[policy[high:]]))
+        for times, low, high in ends
+    ]
+    frame = pd.DataFrame(outliers).assign(q1=q1, median=median, q3=q3, iqr=q3 - q1)
+    frame = frame.assign(whisker_low=lower, whisker_high=upper, coverage=100 * (1 - frame["outliers"] / (p * n)))
+    means = returns.mean(axis=1)
+    mean = (counts * n * means).sum(axis=1) / (p * n)
+    within, between = np.square(returns - means[:, None]).sum(axis=1), n * np.square(means - mean[:, None])
+    squares = (counts * (within + between)).sum(axis=1)
+    lowest = np.where(counts, returns.min(axis=1), np.inf).min(axis=1)
+    highest = np.where(counts, returns.max(axis=1), -np.inf).max(axis=1)
+    return frame.assign(mean=mean, std=np.sqrt(squares / max(1, p * n - 1)), min=lowest, max=highest)
 
 
-_BATCH = 25  # resamples at a time, so that their arrays stay in the cache
+def _quartiles(values: np.ndarray, policy: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return the quartiles of each resample, as `np.percentile` does, without sorting it. (3, r)
 
-
-class _SortedReturns:
-    """Returns (p, n) of policies, sorted once, so that no resample needs sorting.
-
-    A resample contains each policy, with all its returns, some number of times. Its order statistics are found in
-    cumulative counts: first the block of sorted returns, then the return inside it.
+    A resample contains the returns of each policy as often as `counts` (r, p) says; `values` are all returns, sorted,
+    and `policy` says whose. Bisection finds the first value up to which enough returns of the resample lie.
     """
-
-    def __init__(self, returns: np.ndarray):
-        (p, n), self.block = returns.shape, math.ceil(math.sqrt(returns.size))
-        order = np.argsort(returns.ravel(), kind="stable")
-        self.values, self.policy = returns.ravel()[order], order // n
-        cells = self.policy * self.block + np.arange(p * n) // self.block
-        in_block = np.bincount(cells, minlength=p * self.block).reshape(p, self.block)
-        # Returns of each policy before each block
-        self.until = np.pad(in_block.cumsum(axis=1), ((0, 0), (1, 0))).astype(float)
-        means = returns.mean(axis=1)
-        squares = np.square(returns - means[:, None]).sum(axis=1)
-        self.by_policy = np.full(p, n), means, squares, returns.min(axis=1), returns.max(axis=1)
-
-    def statistics(self, draws: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the columns of `resample`, for the resamples that draw these policies (r, p)."""
-        counts = np.stack([np.bincount(draw, minlength=draws.shape[1]) for draw in draws]).astype(float)
-        q1, median, q3 = self._quantiles(counts, (0.25, 0.5, 0.75))
-        lower, upper = np.stack(fences(q1, q3))
-        n = len(self.values)
-        low, high = self.values.searchsorted(lower), self.values.searchsorted(upper, "right")
-        places = np.arange(max(1, low.max()))  # outliers of any resample
-        below = self._part(places, counts[:, self.policy[places]] * (places < low[:, None]))
-        places = np.arange(min(n - 1, high.min()), n)
-        above = self._part(places, counts[:, self.policy[places]] * (places >= high[:, None]))
-        size, mean, squares, least, most = self.by_policy
-        parts = {"": (counts * size, mean, counts * squares, least, most), "outliers_below_": below}
-        parts |= {"outliers_above_": above, "outliers_": tuple(np.hstack(pair) for pair in zip(below, above))}
-        numbers = {prefix + name: x for prefix, part in parts.items() for name, x in _pooled(*part).items()}
-        outliers = (below[0] + above[0])[:, 0]
-        some = np.where(outliers > 0, outliers, np.nan)
-        for side, part in (("below", below), ("above", above)):
-            numbers[f"outliers_{side}_share"] = 100 * part[0][:, 0] / some
-        numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, "whisker_low": lower, "whisker_high": upper}
-        return numbers | {"outliers": outliers, "coverage": 100 * (1 - outliers / n)}
-
-    def _quantiles(self, counts: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
-        """Interpolate linearly between order statistics, as `np.percentile` does; return an array (r,) per share."""
-        until, quantiles = counts @ self.until, []
-        for place in np.multiply(shares, len(self.values) - 1):
-            below, above = (self._ranked(counts, until, rank) for rank in (math.floor(place), math.ceil(place)))
-            quantiles.append(below + (place - math.floor(place)) * (above - below))
-        return quantiles
-
-    def _ranked(self, counts: np.ndarray, until: np.ndarray, rank: int) -> np.ndarray:
-        """Return the value of this rank (0: smallest) in each resample; `until`: values before each block. (r,)"""
-        block = (until[:, 1:] <= rank).sum(axis=1, keepdims=True)
-        places = np.minimum(block * self.block + np.arange(self.block), len(self.values) - 1)
-        inside = np.take_along_axis(counts, self.policy[places], axis=1).cumsum(axis=1)
-        passed = np.take_along_axis(until, block, axis=1) + inside <= rank
-        return self.values[block[:, 0] * self.block + passed.sum(axis=1)]
-
-    def _part(self, places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the arguments (r, 1) of `_pooled` of the sorted returns at `places` (k,), counted `weights` (r, k)."""
-        values, size, there = self.values[places], weights.sum(axis=1), weights > 0
-        mean = values[0] + np.einsum("rk,k->r", weights, values - values[0]) / np.maximum(1, size)
-        squares = np.einsum("rk,rk->r", weights, np.square(values - mean[:, None]))
-        least, most = values[there.argmax(axis=1)], values[::-1][there[:, ::-1].argmax(axis=1)]
-        return tuple(x[:, None] for x in (size, mean, squares, least, most))
-
-
-def _pooled(size, mean, squares, least, most) -> dict[str, np.ndarray]:
-    """Return moments and range of the parts of each resample together, NaN where all are empty. (r,)
-
-    All arguments are (r, parts), or (parts,) where all resamples share them; `squares` are sums of squared deviations
-    from the mean.
-    """
-    n = size.sum(axis=1)
-    centre = (size * mean).sum(axis=1) / np.maximum(1, n)
-    total = (squares + size * np.square(mean - centre[:, None])).sum(axis=1)
-    low, high = np.where(size > 0, least, np.inf).min(axis=1), np.where(size > 0, most, -np.inf).max(axis=1)
-    moments = {"mean": centre, "std": np.sqrt(total / np.maximum(1, n - 1)), "min": low, "max": high}
-    return {name: np.where(n > 0, x, np.nan) for name, x in moments.items()}
+    whose = policy[:, None] == np.arange(counts.shape[1])
+    until = np.cumsum(whose, axis=0, dtype=np.int32)  # how many returns of each policy lie up to each value
+    quartiles = []
+    for place in np.multiply((0.25, 0.5, 0.75), len(values) - 1):
+        neighbours = []
+        for rank in (math.floor(place), math.ceil(place)):
+            low, high = np.zeros(len(counts), dtype=int), np.full(len(counts), len(values) - 1)
+            while (low < high).any():
+                middle = (low + high) // 2
+                enough = np.einsum("rp,rp->r", counts, until[middle]) > rank
+                low, high = np.where(enough, low, middle + 1), np.where(enough, middle, high)
+            neighbours.append(values[low])
+        below, above = neighbours
+        quartiles.append(below + (place - math.floor(place)) * (above - below))
+    return np.array(quartiles)
 
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): `count` values lie in [low, high]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ..checks import check_array, check_count
 from ..config import paper_preset
 from ..export import codeword_latex, equations_latex, symbol
 from ..policy import VoronoiPolicy
@@ -82,14 +81,11 @@ def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = Non
 def present(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the frame for readers.
 
-    Row names become a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among other
-    values), and shares become percentages. `low` and `high` become one column of text, and headings are in words. Where
-    each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
+    A named index becomes a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among
+    other values), and shares become percentages. `low` and `high` become one column of text, and headings are in words.
+    Where each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
     """
-    index = frame.index
-    if index.names != [None] or (len(index) and isinstance(index[0], str)):
-        frame = frame.reset_index(names=[name or " " * i for i, name in enumerate(index.names)])
-    frame = frame.reset_index(drop=True).apply(_in_words)
+    frame = frame.reset_index(drop=frame.index.names == [None]).apply(_in_words)
     frame = _counts(frame) if QUANTITIES & {*frame} else frame
     for name in frame:
         if re.sub(r"_(low|high)$", "", str(name)) in headings()["percent"]:
@@ -195,13 +191,13 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3) -> pd.DataF
     return pd.DataFrame({"codeword": codewords, **columns})
 
 
-def show_policy(policy: VoronoiPolicy, *, digits: int | None = 3, caption: str = "") -> HTML:
+def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> HTML:
     """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
 
-    `digits`: decimals of the numbers; None: as many as they have. Raises ValueError unless the sub-policies are linear.
+    Raises ValueError unless the sub-policies are linear.
     """
     policy.check_linear()
-    frame, task, where = equation_table(policy, digits=digits), policy.task, "One map for all states"
+    frame, task, where = equation_table(policy), policy.task, "One map for all states"
     if len(policy) > 1:
         sizes = ", ".join(f"{size:.3g}" for size in policy.scale)
         units = "" if (policy.scale == 1).all() else f" of states divided by ({sizes})"
@@ -220,7 +216,7 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
     """
     printed = printed_spread(task)
     table = pd.DataFrame({"metric": printed.index})
-    for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), _returns(teacher, runs)):
+    for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), (teacher, runs)):
         here = spread(values)
         here |= {"coverage": 100 * here["coverage"], "median/q2": here["median"]}
         table[f"{label}, paper"] = printed[name].to_numpy()
@@ -233,9 +229,7 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
 
     `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
     """
-    known, prefix = printed_text_numbers(check_task(task)), PREFIX[task]
-    teacher, runs = _returns(teacher, runs)
-    check_count("cells", cells)
+    known, prefix = printed_text_numbers(), PREFIX[check_task(task)]
     means = runs.mean(axis=1)
     distilled = outlier_numbers(runs) | {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}
     distilled["runs_above_teacher_share"] = 100 * np.mean(means > teacher.mean())
@@ -248,11 +242,6 @@ def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells
     counts = [isinstance(value, int) and not np.isnan(other) for value, other in zip(here.values(), printed)]
     frame["paper"] = pd.Series([int(x) if count else float(x) for x, count in zip(printed, counts)], dtype=object)
     return frame.assign(here=pd.Series([*here.values()], dtype=object))
-
-
-def _returns(teacher: np.ndarray, runs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Check and return the returns of the teacher (n,) and of the runs (p, n). Raises ValueError."""
-    return check_array("teacher's returns", teacher, (-1,)), check_array("runs' returns", runs, (-1, len(teacher)))
 
 
 # The runs

@@ -37,10 +37,10 @@ class Job:
     if TYPE_CHECKING:  # a subclass has these as fields or as properties
 
         @property
-        def task(self) -> str: ...
+        def task(self) -> str: ...  # noqa: D102
 
         @property
-        def provenance(self) -> dict[str, str | int]: ...
+        def provenance(self) -> dict[str, str | int]: ...  # noqa: D102
 
     def make(self) -> tuple[dict[str, np.ndarray], dict]:
         """Make the result: arrays, and what else the file says."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import math
 import os
 import secrets
 import shlex
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]  # the checkout, or where vsp is installed
@@ -28,9 +26,8 @@ def data_folder(name: str) -> Path:
     return installed if installed.is_dir() else ROOT / "data" / name
 
 
-@contextlib.contextmanager
-def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it replaces `path` only if the block succeeds.
+def write_bytes(path: str | os.PathLike, content: bytes) -> None:
+    """Write `content` to `path` atomically, by way of a temporary file beside it.
 
     A reader (or a run after a crash) sees the old file or the complete new one, never a partial one.
     """
@@ -38,22 +35,16 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
     try:
-        yield temporary
-        with open(temporary, "rb") as written:
-            os.fsync(written.fileno())  # the rename must not reach the disk before the content
+        with open(temporary, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())  # the rename must not reach the disk before the content
         os.replace(temporary, path)
     except OSError as error:
-        if error.errno:
-            error.filename = error.filename or str(path)  # the system does not name the file when a disk is full
+        error.filename = error.filename or str(path)  # the system does not name the file when a disk is full
         raise
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def write_bytes(path: str | os.PathLike, content: bytes) -> None:
-    """Write `content` to `path` atomically."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:
@@ -73,7 +64,7 @@ def read_bytes(path: str | os.PathLike, most: float = math.inf) -> bytes:
         return path.read_bytes()
     if path.exists():
         raise DamagedFile(f"{path}: is a folder, a FIFO or a device, expected a file: move it away")
-    raise MissingFile(": ".join(filter(None, (f"{path}: no such file", remedy(path)))))
+    raise MissingFile(fault(path, "no such file"))
 
 
 def sha256(path: str | os.PathLike) -> str:
@@ -81,10 +72,10 @@ def sha256(path: str | os.PathLike) -> str:
     return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
-def remedy(path: str | os.PathLike) -> str:
-    """Say how to restore a file of the checkout; empty for files elsewhere."""
-    if not Path(os.path.realpath(path)).is_relative_to(ROOT):
-        return ""
-    if not (ROOT / "environment.lock").exists():
-        return "it lies in the checkout only: `git clone ADDRESS vsp`"
-    return f"`git checkout {shlex.quote(str(path))}` restores a committed file"
+def fault(path: str | os.PathLike, what: str, *remedies: str) -> str:
+    """Say in one line what is wrong with the file at `path` and the remedies; git restores a file of the checkout."""
+    if Path(os.path.realpath(path)).is_relative_to(ROOT):
+        restore = f"`git checkout {shlex.quote(str(path))}` restores a committed file"
+        fetch = "it lies in the checkout only: `git clone ADDRESS vsp`"
+        remedies += (restore if (ROOT / "environment.lock").exists() else fetch,)
+    return f"{path}: {what}" + (f": {'; '.join(remedies)}" if remedies else "")

@@ -43,7 +43,7 @@ def in_one_line(what: str = "") -> Iterator[None]:
     `what` names the work, and precedes messages that do not name it.
     """
     begin = f"error: {what}: " if what else "error: "
-    signal.signal(signal.SIGTERM, _interrupt)  # all code that started kernels or workers then ends them
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # all code that started kernels or workers then ends them
     try:
         yield
     except KeyboardInterrupt:
@@ -54,7 +54,3 @@ def in_one_line(what: str = "") -> Iterator[None]:
         if error.errno not in _DISK:
             raise
         sys.exit(f"{begin}{error}: free some space, make it writable, or name another folder: OUT=folder")
-
-
-def _interrupt(signum: int, frame: object) -> None:
-    raise KeyboardInterrupt

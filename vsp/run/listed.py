@@ -6,17 +6,11 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
-import re
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from .atomic import DamagedFile, read_bytes, remedy, sha256, write_bytes, write_text
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .atomic import DamagedFile, fault, read_bytes, sha256, write_bytes, write_text
 
 MANIFEST = "MANIFEST.sha256"
 
@@ -43,8 +37,8 @@ def list_file(path: str | os.PathLike) -> None:
 def list_folder(folder: str | os.PathLike) -> int:
     """Write a new manifest of `folder` with all its files, as they are, except hidden ones. Returns their number."""
     folder = Path(folder)
-    paths = [path for path in folder.iterdir() if path.is_file() and path.name != MANIFEST]
-    listed = {path.name: sha256(path) for path in paths if not path.name.startswith(".")}
+    paths = [path for path in folder.glob("[!.]*") if path.is_file() and path.name != MANIFEST]
+    listed = {path.name: sha256(path) for path in paths}
     _write_manifest(folder, listed)
     return len(listed)
 
@@ -53,30 +47,22 @@ def read_listed(path: str | os.PathLike) -> bytes:
     """Return the content of a file that the manifest of its folder lists. Raises `MissingFile` or `DamagedFile`."""
     path = Path(path)
     content = read_bytes(path)
-    digest, expected = hashlib.sha256(content).hexdigest(), _listed(path.parent).get(path.name)
+    digest, expected = hashlib.sha256(content).hexdigest(), _listed(path.parent).get(path.name, "no such file")
     if digest != expected:
-        restore, accept = remedy(path), f"`python -m vsp.run.manifest {shlex.quote(str(path.parent))}` accepts it"
-        remedies = "; ".join(filter(None, (restore, f"if the file is correct, {accept}")))
-        raise DamagedFile(f"{path}: SHA-256 is {digest}, {MANIFEST} lists {expected or 'no such file'}: {remedies}")
+        accept = f"if the file is correct, `python -m vsp.run.manifest {shlex.quote(str(path.parent))}` accepts it"
+        raise DamagedFile(fault(path, f"SHA-256 is {digest}, {MANIFEST} lists {expected}", accept))
     return content
 
 
-def read_table(path: str | os.PathLike, **options) -> pd.DataFrame:
-    """Return the table in a listed CSV file; `options` are those of `pandas.read_csv`. Raises as `read_listed` does."""
-    import pandas as pd
-
-    return pd.read_csv(io.BytesIO(read_listed(path)), **options)
-
-
 def _listed(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest."""
+    """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest.
+
+    A damaged line lists no file that exists, and neither does a last line that was cut.
+    """
     manifest = folder / MANIFEST
     text = read_bytes(manifest).decode(errors="replace") if os.path.lexists(manifest) else ""
-    lines = [re.fullmatch(r"([0-9a-f]{64})  ([^/]+)", line) for line in text.removesuffix("\n").split("\n") if text]
-    listed = {line[2]: line[1] for line in lines if line}
-    if len(listed) < len(lines) or text[-1:] not in ("", "\n"):
-        raise DamagedFile(f"{manifest}: expected `sha256sum`'s lines, each name once. {remedy(manifest)}")
-    return listed
+    lines = [line.partition("  ") for line in text.split("\n")[:-1]]
+    return {name: digest for digest, _, name in lines}
 
 
 def _write_manifest(folder: Path, listed: dict[str, str]) -> None:

@@ -8,7 +8,9 @@ import os
 
 import numpy as np
 
-from .atomic import DamagedFile, read_bytes, remedy, write_bytes
+from .atomic import DamagedFile, fault, read_bytes, write_bytes
+
+_REMEDY = "delete it if `make` makes it, else save it again"
 
 
 def write_sealed(path: str | os.PathLike, payload: bytes) -> None:
@@ -22,7 +24,8 @@ def read_sealed(path: str | os.PathLike) -> bytes:
     seal, payload = content[:65], content[65:]
     digest = hashlib.sha256(payload).hexdigest()
     if seal != digest.encode() + b"\n":
-        raise _damaged(path, f"damaged, or no file of vsp (its SHA-256 is {digest}, its first line says {seal!r})")
+        what = f"damaged, or no file of vsp (its SHA-256 is {digest}, its first line says {seal!r})"
+        raise DamagedFile(fault(path, what, _REMEDY))
     return payload
 
 
@@ -50,12 +53,8 @@ def load_arrays(path: str | os.PathLike, *, kind: str | tuple[str, ...]) -> tupl
         about = json.loads(header["__metadata__"]["about"])
         stated = about.get("kind")
     except (SafetensorError, ValueError, KeyError, AttributeError, TypeError, RecursionError) as error:
-        raise _damaged(path, f"right checksum, but `save_arrays` did not write it: {error!r:.300}") from error
+        what = f"right checksum, but `save_arrays` did not write it: {error!r:.300}"
+        raise DamagedFile(fault(path, what, _REMEDY)) from error
     if stated not in (kinds := (kind,) if isinstance(kind, str) else kind):
-        raise _damaged(path, f"holds a {stated!r}, expected a {' or '.join(map(repr, kinds))}")
+        raise DamagedFile(fault(path, f"holds a {stated!r}, expected a {' or '.join(map(repr, kinds))}", _REMEDY))
     return arrays, about
-
-
-def _damaged(path: str | os.PathLike, what: str) -> DamagedFile:
-    remedies = filter(None, ("delete it if `make` makes it, else save it again", remedy(path)))
-    return DamagedFile(f"{path}: {what}: {'; '.join(remedies)}")

@@ -29,18 +29,6 @@ IDLE = 20  # seconds after which an idle worker ends, even if the process that s
 PACKAGES = ("numpy", "scipy", "scikit-learn", "gymnasium", "cma", "torch", "stable-baselines3", "mujoco", "box2d")
 
 
-class UnlikeWorker(CommandError):
-    """A worker of a cluster whose code or libraries differ from those of the calling process."""
-
-
-class WorkerDied(CommandError):
-    """A worker process was killed; the message says how much work was done."""
-
-
-class NoScheduler(CommandError):
-    """An address where no Dask scheduler answers."""
-
-
 def results(
     work: Callable, arguments: Sequence[tuple], label: str, *, jobs: int | str, total: int, unit: str
 ) -> Iterator[tuple[int, Any]]:
@@ -48,8 +36,8 @@ def results(
 
     `total` includes jobs that were done before. `jobs` is the number of worker processes (-1: one per core) or the
     address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; its owner can run code here and on the workers. Every
-    job runs with one thread. Raises what `work` raises, WorkerDied (on a cluster, after one job killed four workers),
-    UnlikeWorker and NoScheduler.
+    job runs with one thread. Raises what `work` raises, and CommandError if a worker was killed (on a cluster, after
+    one job killed four workers), if a worker's code or libraries differ from those here, or if no scheduler answers.
     """
     if not arguments:
         return
@@ -62,7 +50,7 @@ def results(
         if type(error).__name__ not in ("TerminatedWorkerError", "KilledWorker"):  # loky's and Dask's
             raise
         how = re.search(r"\{(.*)\}", str(error))
-        raise WorkerDied(
+        raise CommandError(
             f"{label}: a worker process was killed{f' ({how[1]})' if how else ''} with {done} of {total} {unit} done. "
             "Finished files stay on disk: run the same command to resume. If memory ran out, use fewer workers: JOBS=1"
         ) from error
@@ -85,7 +73,7 @@ def _as_they_end(work: Callable, arguments: Sequence[tuple], jobs: int | str) ->
 
 def _call(expected: dict[str, str], work: Callable, i: int, *given) -> tuple[int, object]:
     if (here := identity()) != expected:
-        raise UnlikeWorker(
+        raise CommandError(
             f"the worker on {platform.node()} has {here}, expected {expected}: give it the same checkout and .venv"
         )
     with threadpool_limits(1):  # the same sums in the same order on any machine
@@ -113,9 +101,9 @@ def _client(address: str):
         client = Client(address, timeout=ANSWER, set_as_default=False)
         client.wait_for_workers(1, timeout=ANSWER)
     except ImportError as error:
-        raise NoScheduler(f"{address!r} asks for a Dask cluster, which needs the package `distributed`") from error
+        raise CommandError(f"{address!r} asks for a Dask cluster, which needs the package `distributed`") from error
     except (OSError, ValueError) as error:  # TimeoutError is an OSError
-        raise NoScheduler(
+        raise CommandError(
             f"no Dask scheduler with workers answers at {address!r}, expected one as in tcp://host:8786: {error}"
         ) from error
     return client

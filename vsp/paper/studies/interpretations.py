@@ -114,7 +114,8 @@ def provenance_of(experiment: Experiment, seeds: range) -> dict[str, str | int]:
 def study(runs: str | os.PathLike, *, jobs: int | str = 1, tried: dict | None = None) -> pd.DataFrame:
     """Run every variant with the seeds CHOOSING, and those nearest to the paper with the seeds CONFIRMING.
 
-    Returns one row per phase, variant and task, and one for all tasks together (task "both"); see `_row` and `_joint`.
+    Returns one row per phase, variant and task; see `_row`. One for all tasks together (task "both") has the distance
+    averaged over the tasks, and this minus the default's ("gap").
     """
     tried = variants() if tried is None else tried
     chosen = _phase("choosing", tried, CHOOSING, runs, jobs)
@@ -139,8 +140,13 @@ def _phase(phase: str, tried: dict, seeds, runs, jobs: int | str) -> pd.DataFram
     for (name, task), one in work.items():
         row, away[name, task] = _row(load_runs(one, seeds, runs=runs), own[task], landmarks(task))
         rows.append({"phase": phase, "variant": name, "task": task, **provenance_of(one, seeds), **row})
-    single = pd.DataFrame(rows).astype({"version": "Int64"})  # integers, beside rows without a version
-    return pd.concat([single, _joint(phase, away, printed.TASKS)], ignore_index=True)
+    # Variants share seeds, and resamples of all variants draw the same seeds, so gaps are taken resample by resample
+    joint = pd.DataFrame(away).T.groupby(level=0, sort=False).mean()
+    default = joint.loc["default"].to_numpy()
+    for name, values in zip(joint.index, joint.to_numpy()):
+        intervals = _with_interval("distance", values) | _with_interval("gap", values - default)
+        rows.append({"phase": phase, "variant": name, "task": "both", **intervals})
+    return pd.DataFrame(rows).astype({"version": "Int64"})  # integers, beside rows without a version
 
 
 def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[dict[str, float], np.ndarray]:
@@ -152,27 +158,13 @@ def _row(made: list[Run], teacher: Outcomes, there: dict[str, float]) -> tuple[d
     codes = np.stack([run.outcomes.outcomes for run in made])
     cells = np.array([len(run.policy) for run in made])
     facts, own, draws = spread(returns), spread(teacher.returns), resample(returns, n_resamples=N_RESAMPLES)
-    away = [distance(standing(drawn, own), there) for drawn in (facts, *draws.to_dict("records"))]
+    away = np.array([distance(standing(drawn, own), there) for drawn in (facts, *draws.to_dict("records"))])
     row = {"runs": len(made), "cells": cells.mean(), "cells_min": cells.min(), "cells_max": cells.max()}
     row |= {name: facts[name] for name in ("mean", "std", "q1", "median", "q3")}
     row["mean_low"], row["mean_high"] = percentile_interval(draws["mean"])
     row |= outcome_shares(codes)
     row["runs_above_teacher"] = np.mean(returns.mean(axis=1) > own["mean"])
-    return row | _with_interval("distance", np.array(away)), np.array(away)
-
-
-def _joint(phase: str, away: dict[tuple[str, str], np.ndarray], tasks) -> pd.DataFrame:
-    """Return each variant's distance averaged over the tasks, and this minus the default's ("gap").
-
-    Variants share seeds, and resamples of all variants draw the same seeds, so gaps are taken resample by resample.
-    """
-    names = list(dict.fromkeys(name for name, _ in away))
-    joint = {name: np.mean([away[name, task] for task in tasks], axis=0) for name in names}
-    rows = []
-    for name, values in joint.items():
-        intervals = _with_interval("distance", values) | _with_interval("gap", values - joint["default"])
-        rows.append({"phase": phase, "variant": name, "task": "both", **intervals})
-    return pd.DataFrame(rows)
+    return row | _with_interval("distance", away), away
 
 
 def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:

@@ -15,7 +15,8 @@ from ...protocol.job import settings_id
 from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
 from .. import printed
 from ..baselines import linear_map
-from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
+from ..runs import EVALUATION_SEED, SHARES, Experiment, Run, load_runs, make_all, paper_experiment
+from ..tables import run_summary
 from .simpler import teacher_data
 
 VERSION = 1  # raise it when the same runs give other rows
@@ -40,20 +41,16 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) 
 
 def rows_of(experiment: Experiment, name: str, made: list[Run]) -> pd.DataFrame:
     """Return the rows of the teacher with this `name`, one per run of `made`."""
-    rows, made_with = [], provenance_of(experiment)
+    made_with = provenance_of(experiment)
     teacher = rollout_from_seed(experiment.teacher, experiment.task, seed=EVALUATION_SEED).returns
     about = {
         "task": experiment.task, "teacher": name, "settings": made_with["settings"], "checksum": made_with["teacher"],
         "version": made_with["version"], "steps": experiment.teacher.card["recipe"]["steps"],
         "linear_error": linear_error(experiment),
     }  # fmt: skip
-    for run in made:
-        returns = run.outcomes.returns
-        scores = {"mean": returns.mean(), "std": returns.std(ddof=1)}
-        scores |= {"teacher_mean": teacher.mean(), "teacher_std": teacher.std(ddof=1)}
-        shares = outcome_shares(run.outcomes.outcomes)
-        rows.append({**about, "seed": run.seed, "cells": len(run.policy), **scores, **shares})
-    return pd.DataFrame(rows)
+    rows = run_summary(made, experiment).assign(teacher_mean=teacher.mean(), teacher_std=teacher.std(ddof=1))
+    columns = ["seed", "cells", "mean", "std", "teacher_mean", "teacher_std", *SHARES]
+    return pd.DataFrame(about, index=rows.index).join(rows[columns])
 
 
 def provenance_of(experiment: Experiment) -> dict[str, str | int]:
