@@ -52,16 +52,13 @@ class Tuned:
     failure_penalty: float = 0.0
     """Subtracted from the mean return per failed episode, wherever candidates are compared: a mean hides rare failures.
     An episode fails if it does not end in a goal. For tasks without a goal, such as walking, leave it at 0."""
-    error_penalty: float = 0.0
-    """Subtracted from the mean return per unit of mean squared action error (in half action ranges, on the teacher's
-    states). 0 maximises the return alone, however much the policy then differs from the teacher."""
     n_validation: int = 5000
     """Episodes that decide between restarts, between rounds, and between the stages of tuning."""
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self)).items():
             value = getattr(self, name)
-            optional = name.endswith("_penalty") or name in ("n_corrections", "n_generations")
+            optional = name in ("n_corrections", "n_generations", "failure_penalty")
             off = optional and isinstance(value, int | kind) and not isinstance(value, bool) and value == 0
             if not off:
                 check_field(name, value, kind)
