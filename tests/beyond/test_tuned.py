@@ -12,6 +12,7 @@ from vsp.paper import printed
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
+from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, score, tune
@@ -171,18 +172,12 @@ def test_states_are_drawn_in_proportion_to_their_criticality(criticality, shares
     assert again == pytest.approx(np.tile(shares, 2) / 2, abs=0.03)
 
 
-class Anxious(CurvedTeacher):
-    """Whose actions are critical on the left only."""
-
-    def criticality(self, obs):
-        return (np.asarray(obs)[:, 0] < 0.5).astype(float)
-
-
 def test_the_setting_asks_the_teacher_for_its_criticality():
     critical = dataclasses.replace(SMALL, criticality=True)
-    without, with_it = (distill_tuned(Anxious(), SIMPLEGOAL, config, seed=0) for config in (SMALL, critical))
+    teacher = load_teacher(SIMPLEGOAL)
+    without, with_it = (distill_tuned(teacher, SIMPLEGOAL, config, seed=0) for config in (SMALL, critical))
     assert without[1]["mean"][0] == with_it[1]["mean"][0] and without[1]["mean"][1] != with_it[1]["mean"][1]
-    assert vsp_beyond.tuned(Anxious(), SIMPLEGOAL, critical, seed=0).to_json() == with_it[0].to_json()
+    assert vsp_beyond.tuned(teacher, SIMPLEGOAL, critical, seed=0).to_json() == with_it[0].to_json()
     with pytest.raises(ValueError, match="has no critics"):
         distill_tuned(support.network_teacher(SIMPLEGOAL), SIMPLEGOAL, critical, seed=0)
 

@@ -44,8 +44,7 @@ def tune(scaling: Scaling, cells: ScaledCells, config: Tuned, rng: np.random.Gen
     for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
         starts = scaling.task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
-        policies = [scaling.policy(cells.like(vector)) for vector in vectors]
-        results = rollout_population(policies, scaling.task, starts)
+        results = rollout_population([scaling.policy(cells.like(vector)) for vector in vectors], scaling.task, starts)
         search.tell(vectors, [-score(result, config.failure_penalty) for result in results])
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)

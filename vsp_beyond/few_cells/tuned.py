@@ -21,7 +21,7 @@ from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
 from .config import Tuned, check_kind
-from .criticality import critics_of
+from .criticality import Critics
 from .tune import Candidates, tune
 from .units import METRIC, Scaling, warn_outside
 
@@ -42,7 +42,7 @@ def distill_tuned(
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
-    critics = critics_of(teacher) if config.criticality else None  # raises now, not after an hour
+    critics = Critics(teacher) if config.criticality else None  # raises now, not after an hour
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
