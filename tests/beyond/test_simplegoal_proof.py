@@ -65,8 +65,6 @@ def test_a_square_is_cut_by_hand():
 
 def test_a_line_beside_the_square_or_along_its_edge_leaves_it_whole():
     assert SQUARE.cut((1, 0, 0)) == SQUARE.cut((0, 0, 3)) == (None, SQUARE) and SQUARE.cut((1, 0, -1)) == (SQUARE, None)
-    with pytest.raises(ValueError, match="0 = 0"):
-        SQUARE.cut((0, 0, 0))
 
 
 def test_lines_meet_and_are_in_smallest_integers():
@@ -115,7 +113,7 @@ def test_pieces_do_what_the_program_does(policy):
     for piece in pieces:
         if piece.starts.area() < 1e-20:  # its corners are one point in float64
             continue
-        corners = np.array(piece.starts.points(), dtype=float)
+        corners = np.array(piece.starts.points())
         along, to = np.roll(corners, -1, axis=0) - corners, starts[:, None] - corners
         inside = (along[:, 0] * to[..., 1] >= along[:, 1] * to[..., 0]).all(axis=1)
         n_pieces += inside
