@@ -163,7 +163,7 @@ def test_the_largest_disturbance_is_smaller_than_what_breaks_it():
     around = policy_of([[0.2, 0.5], [0.8, 0.5]], [DOWN_LEFT, [[0, 0], [0, 0], [0, -1]]])
     assert not proved(steps_to_goal(around, n=50)) and np.isnan(largest_disturbance(around, n=50))
     calm = vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{SIMPLEGOAL}.policy")
-    largest = largest_disturbance(calm, n=300, tolerance=5e-4)
+    largest = largest_disturbance(calm, n=300)
     assert proved(steps_to_goal(calm, disturbance=largest, n=300)) and largest < 0.05
     assert not proved(steps_to_goal(calm, disturbance=largest + 5e-4, n=300))
 
