@@ -20,7 +20,7 @@ from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
-from .config import Tuned, check_kind
+from .config import Tuned
 from .criticality import Critics
 from .tune import Candidates, tune
 from .units import METRIC, Scaling, warn_outside
@@ -38,7 +38,6 @@ def distill_tuned(
     size or task, and for `criticality` with a teacher that has no critics.
     """
     check_seed(seed)
-    check_kind(config, Tuned)
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
