@@ -32,36 +32,43 @@ def simplify(
     Candidates are compared by `score` from the same `config.n_validation` starts, so report the result from others.
     Returns the policy, its codewords `gathered`, and one row per candidate: stage ("cells", "prune", "round"), cells,
     nonzero coefficients, digits (0: not rounded), mean return, failing, kept. The rows of stage "cells" are the curve
-    of return over cells; `attrs` hold the teacher's mean return. If no number of cells suffices, the best one is
-    simplified, and `tolerance` counts from its return. Raises ValueError as `distill_tuned`
-    does, and for a tolerance below 0.
+    of return over cells. If no number of cells suffices, the best one is simplified, and `tolerance` counts from its
+    return. Raises ValueError as `distill_tuned` does, and for a tolerance below 0.
     """
     check_seed(seed)
     check_kind(config, Tuned)
     check_number("tolerance", tolerance, least=0)
     task = get_task(task)
     starts = start_states(task, config.n_validation, seed)
-    of_teacher = rollout(teacher, task, starts)
-    threshold = score(of_teacher, config.failure_penalty) - tolerance
-    tried = _Tried(task, starts, config.failure_penalty)
-    policies = []
+    threshold = score(rollout(teacher, task, starts), config.failure_penalty) - tolerance
+    policies, scores, rows = [], list[float](), list[dict]()
+
+    def reaches(threshold: float, stage: str, policy: VoronoiPolicy, digits: int = 0) -> bool:
+        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
+        result = rollout(policy, task, starts)
+        scores.append(score(result, config.failure_penalty))
+        rows.append({
+            "stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients), "digits": digits,
+            "mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL),
+            "kept": scores[-1] >= threshold,
+        })  # fmt: skip
+        return scores[-1] >= threshold
+
     for k in progress(range(1, config.n_cells + 1), "cells tried", total=config.n_cells, unit="sizes"):
         policies.append(distill_tuned(teacher, task, dataclasses.replace(config, n_cells=k), seed=seed)[0])
-        if tried.reaches(threshold, "cells", policies[-1]):
+        if reaches(threshold, "cells", policies[-1]):
             break
-    best = int(np.argmax(tried.scores))
-    if tried.scores[best] < threshold:  # no number of cells suffices
-        threshold = tried.scores[best] - tolerance
+    best = int(np.argmax(scores))
+    if scores[best] < threshold:  # no number of cells suffices
+        threshold = scores[best] - tolerance
     states = visited_states(policies[best], task, starts[:N_VISITED])
-    policy = prune(gathered(policies[best], states), lambda pruned: tried.reaches(threshold, "prune", pruned))
+    policy = prune(gathered(policies[best], states), lambda pruned: reaches(threshold, "prune", pruned))
     for digits in DIGITS:
         short = rounded(policy, digits)
-        if short is not None and tried.reaches(threshold, "round", short, digits=digits):
+        if short is not None and reaches(threshold, "round", short, digits):
             policy = short
             break
-    history = pd.DataFrame(tried.rows)
-    history.attrs["teacher"] = float(of_teacher.returns.mean())
-    return policy, history
+    return policy, pd.DataFrame(rows)
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
@@ -112,22 +119,3 @@ def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     if len(np.unique(codewords, axis=0)) < len(codewords):
         return None
     return VoronoiPolicy(codewords, coefficients, task=policy.task, metric=METRIC, scale=scale)
-
-
-class _Tried:
-    """The policies tried so far, with their scores from the same starts."""
-
-    def __init__(self, task: Task, starts: np.ndarray, failure_penalty: float):
-        self.rows, self.scores = list[dict](), list[float]()
-        self._task, self._starts, self._failure_penalty = task, starts, failure_penalty
-
-    def reaches(self, threshold: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:
-        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
-        result = rollout(policy, self._task, self._starts)
-        self.scores.append(score(result, self._failure_penalty))
-        self.rows.append({
-            "stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients), "digits": digits,
-            "mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL),
-            "kept": self.scores[-1] >= threshold,
-        })  # fmt: skip
-        return self.rows[-1]["kept"]
