@@ -86,7 +86,7 @@ def test_lines_meet_and_are_in_smallest_integers():
 def test_the_areas_by_hand(action, goal, pit, outside, longest):
     proof = vsp_beyond.prove(policy_of([[0.5, 0.5]], [action]))
     assert proof.areas == {"goal": goal, "pit": pit, "left": 1 - goal - pit}
-    assert proof.longest == longest and proof.failing_outside == outside
+    assert proof.claim["longest"] == longest and proof.failing_outside == outside
     shares = ", ".join(f"{name} {float(area):.6g}" for name, area in proof.areas.items())
     assert str(proof) == f"SimpleGoal-v0, cells: 1, proved: {shares}, longest {longest}"
     assert all(len(corners) > 2 for corners in proof.polygons()) and len(proof.polygons()) == len(proof.pieces)

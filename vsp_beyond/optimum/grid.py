@@ -31,7 +31,8 @@ class Grid:
 
     def finer(self, times: float) -> Grid:
         """Return a grid over the same box, with the spacing of the points divided by `times`."""
-        m, n = (_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic))
+        ends = [not closed for closed in self.periodic]  # an axis has one point more than steps, unless it is a circle
+        m, n = (2 * round(times * (n - end) / 2) + end for n, end in zip(self.shape, ends))
         return replace(self, shape=(m, n))
 
     def points(self) -> np.ndarray:
@@ -60,11 +61,6 @@ class Grid:
         place = np.clip((x - low) / (high - low), 0.0, 1.0) * (n - 1)
         first = np.minimum(place.astype(np.int64), n - 2)
         return first, first + 1, place - first
-
-
-def _steps(n: int, times: float, periodic: bool) -> int:
-    """Return the points of an axis of n points with `times` as many steps: one more than steps, unless periodic."""
-    return 2 * round(times * (n - (not periodic)) / 2) + (not periodic)
 
 
 def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:

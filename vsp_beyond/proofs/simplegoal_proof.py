@@ -51,14 +51,10 @@ class SimpleGoalProof(Proof):
         return [np.array(piece.starts.points()) for piece in self.pieces]
 
     @property
-    def longest(self) -> int:
-        """The number of steps of the longest episode."""
-        return max(len(piece.steps) for piece in self.pieces)
-
-    @property
     def claim(self) -> dict:
         """The areas, as fractions, and the number of steps of the longest episode."""
-        return {**{name: str(area) for name, area in self.areas.items()}, "longest": self.longest}
+        areas = {name: str(area) for name, area in self.areas.items()}
+        return areas | {"longest": max(len(piece.steps) for piece in self.pieces)}
 
     def parts(self) -> list:
         """Return the itineraries as lines "end step step ...". A step such as "3+=--" gives the cell, the limit that
