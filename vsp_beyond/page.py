@@ -99,11 +99,9 @@ def _explorer(policy: PiecewisePolicy, agent: Policy) -> str:
 
 def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     """Return the states in which the actions differ most, one per cell at most."""
-    cells, rows, seen = policy.cells(alike.states), "", set[int]()
-    for i in np.argsort(-alike.errors):
-        if cells[i] in seen or len(seen) == 3:
-            continue
-        seen.add(cells[i])
+    worst, rows = np.argsort(-alike.errors), ""
+    firsts = np.unique(policy.cells(alike.states[worst]), return_index=True)[1]  # of each cell, the worst state
+    for i in worst[np.sort(firsts)[:3]]:
         state = ", ".join(f"{name} {value:.3g}" for name, value in zip(policy.task.inputs, alike.states[i]))
         actions = (
             ", ".join(f"{a:.3g}" for a in np.ravel(one.predict(alike.states[i : i + 1])[0])) for one in (policy, agent)
@@ -119,16 +117,14 @@ def _kept(policy: PiecewisePolicy) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.vsp"
         policy.save(path)
-        proof, saved = (
-            _proof(path) if isinstance(policy, VoronoiPolicy) and policy.task.name in PROVERS else "",
-            path.read_bytes(),
-        )
+        saved = path.read_bytes()
+        provable = isinstance(policy, VoronoiPolicy) and policy.task.name in PROVERS
+        proof = _proof(path) if provable else ""
     files = {"policy.vsp": saved, "policy.c": policy.to_c().encode(), "policy.py": policy.to_python().encode()}
-    data = {name: base64.b64encode(content).decode() for name, content in files.items()}
-    links = (
-        f'<a download="{name}" href="data:application/octet-stream;base64,{code}">{name}</a>'
-        for name, code in data.items()
-    )
+    links = []
+    for name, content in files.items():
+        data = base64.b64encode(content).decode()
+        links.append(f'<a download="{name}" href="data:application/octet-stream;base64,{data}">{name}</a>')
     return f"{proof}<h2>The policy as a file</h2><p>{', '.join(links)}</p>"
 
 

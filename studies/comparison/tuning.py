@@ -11,7 +11,7 @@ from vsp.paper.baselines import Tree
 from vsp.rollouts import visited_states
 from vsp.subpolicies import linear_outputs
 from vsp_beyond import Tuned
-from vsp_beyond.few_cells.tune import Candidates, Objective, tune
+from vsp_beyond.few_cells.tune import Candidates, tune
 from vsp_beyond.few_cells.units import ScaledCells, Scaling, joined, parted
 
 from ..rivals.small_network import SmallNetwork
@@ -121,10 +121,9 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
     starts, _, _, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     frame, numbers = in_units(start, Scaling.of(task, states))
-    objective = Objective(config.failure_penalty)
-    candidates = Candidates(frame, task.start(validation, config.n_validation), objective)
+    candidates = Candidates(frame, task.start(validation, config.n_validation), config.failure_penalty)
     candidates.add("fit", 0, numbers)
-    for snapshot in tune(frame, numbers, config, objective, search):
+    for snapshot in tune(frame, numbers, config, search):
         candidates.add("tune", 0, snapshot)
     return frame.policy(candidates.best)
 

@@ -42,7 +42,7 @@ def _triangles(pieces: Sequence[Piece]) -> tuple[np.ndarray, np.ndarray, np.ndar
     their corners, and that reward (n,)."""
     starts, ends, last = [], [], []
     for piece in pieces:
-        corners = [(x / w, y / w) for x, y, w in piece.starts.corners]
+        corners = piece.starts.points()
         state = piece.state if piece.outcome == TRUNCATED else piece.before
         after = [state.at(*corner) for corner in corners]
         for i in range(1, len(corners) - 1):

@@ -8,6 +8,7 @@ from vsp.paper.printed import published_policy
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import visited_states
 from vsp.tasks.registry import get_task
+from vsp_beyond.explain import rules
 from vsp_beyond.explain.rules import Rule, RulePolicy, _merged, apply, describe_rules, find_rules
 
 
@@ -36,20 +37,21 @@ def published():
 def test_a_border_along_an_axis_is_one_rule_per_cell():
     """And a cell that nobody visits has none."""
     policy = constants([[0.2, 0.5], [0.6, 0.5], [9.0, 9.0]], [1, -1, 0])  # the border is x = 0.4
-    table = describe_rules(policy, uniform(2000, 0), uniform(2000, 1), agreement=0.999)
+    table = describe_rules(policy, uniform(2000, 0), uniform(2000, 1))
     assert table["rule"].tolist() == ["x <= 0.4", "x > 0.4", "none"] and table["cell"].tolist() == [0, 1, 2]
     assert table["coverage"].tolist()[:2] == table["fidelity"].tolist()[:2] == [1.0, 1.0]
     assert table["share"].sum() == 1 and table["share"][0] == np.mean(uniform(2000, 1)[:, 0] <= 0.4)
     assert table["share"][2] == 0 and np.isnan(table["coverage"][2])
-    assert table.attrs == {"agreement": 1.0, "asked": 0.999, "reached": True, "rules": 2, "digits": 1}
+    assert table.attrs == {"agreement": 1.0}
 
 
-def test_coverage_and_fidelity_by_hand():
+def test_coverage_and_fidelity_by_hand(monkeypatch):
     """Two, two and four states in three cells, and one split: it sets the four apart."""
+    monkeypatch.setattr(rules, "MOST", 2)
     policy = constants([[0.2, 0.5], [0.5, 0.5], [0.8, 0.5]], [0, 0, 0])
     states = np.column_stack([np.tile([0.1, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9, 1.0], 5), np.full(40, 0.5)])
-    table = describe_rules(policy, states, states, leaves=2)
-    assert table.attrs["agreement"] == 0.75 and not table.attrs["reached"] and table.attrs["rules"] == 2
+    table = describe_rules(policy, states, states)
+    assert table.attrs["agreement"] == 0.75
     assert table["rule"].tolist() == ["x <= 0.65", "none", "x > 0.65"]  # 0.6 or 0.7 would be a state's own
     assert table["coverage"].tolist() == [1, 0, 1] and table["share"].tolist() == [0.25, 0.25, 0.5]
     assert table["fidelity"][0] == 0.5 and np.isnan(table["fidelity"][1]) and table["fidelity"][2] == 1
@@ -82,9 +84,7 @@ def test_boxes_side_by_side_become_one():
 def test_inputs_may_have_any_number_and_unit():
     rng = np.random.default_rng(0)
     states = np.column_stack([rng.uniform(-1, 1, (1500, 2)), rng.uniform(-8, 8, 1500)])
-    table = describe_rules(
-        constants([[0, 0, -3], [0, 0, 5]], [0, 0], PENDULUM), states[:700], states[700:], agreement=0.98
-    )
+    table = describe_rules(constants([[0, 0, -3], [0, 0, 5]], [0, 0], PENDULUM), states[:700], states[700:])
     assert table["rule"].tolist() == ["ω <= 1", "ω > 1"]
 
 
@@ -99,7 +99,7 @@ def test_what_was_asked_is_reached_and_recomputed_from_the_words(published):
     held = np.array([eval(f"({_chained(text)})", {"x": x, "y": y}) for text in read])
     assert (held.sum(axis=0) == 1).all()  # one rule for each state
     assert np.mean(table["cell"].to_numpy()[held.argmax(axis=0)] == policy.cells(unseen)) == table.attrs["agreement"]
-    assert table.attrs["agreement"] >= 0.95 and table.attrs["reached"]
+    assert table.attrs["agreement"] >= 0.95
     in_cell = policy.cells(unseen) == table["cell"].to_numpy()[:, None]
     assert np.allclose(table["coverage"], (held & in_cell).sum(axis=1) / in_cell.sum(axis=1))
     assert np.allclose(table["fidelity"], (held & in_cell).sum(axis=1) / held.sum(axis=1))
@@ -123,13 +123,11 @@ def test_a_smaller_tree_or_shorter_numbers_do_not_reach_it(published):
     assert np.mean(apply(shorter, unseen) == truth) < 0.95 <= np.mean(apply(rules, unseen) == truth)
 
 
-def test_more_agreement_takes_more_rules_until_it_is_out_of_reach(published):
+def test_where_no_tree_agrees_enough_the_best_is_used(published, monkeypatch):
     policy, states, unseen, table = published
-    few, many = (describe_rules(policy, states, unseen, agreement=asked) for asked in (0.8, 0.96))
-    assert few.attrs["rules"] < table.attrs["rules"] < many.attrs["rules"]
-    assert 0.8 <= few.attrs["agreement"] < 0.95 < 0.96 <= many.attrs["agreement"]
-    best = describe_rules(policy, states, unseen, agreement=1.0, leaves=20)
-    assert not best.attrs["reached"] and best.attrs["rules"] <= 20 and 0.7 < best.attrs["agreement"] < 1
+    monkeypatch.setattr(rules, "MOST", 20)
+    best = describe_rules(policy, states, unseen)
+    assert len(best) <= 20 and 0.7 < best.attrs["agreement"] < table.attrs["agreement"]
 
 
 def test_rules_act_as_the_policy_where_they_agree(published):

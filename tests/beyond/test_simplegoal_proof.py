@@ -65,8 +65,6 @@ def test_a_square_is_cut_by_hand():
 
 def test_a_line_beside_the_square_or_along_its_edge_leaves_it_whole():
     assert SQUARE.cut((1, 0, 0)) == SQUARE.cut((0, 0, 3)) == (None, SQUARE) and SQUARE.cut((1, 0, -1)) == (SQUARE, None)
-    with pytest.raises(ValueError, match="0 = 0"):
-        SQUARE.cut((0, 0, 0))
 
 
 def test_lines_meet_and_are_in_smallest_integers():
@@ -88,7 +86,7 @@ def test_lines_meet_and_are_in_smallest_integers():
 def test_the_areas_by_hand(action, goal, pit, outside, longest):
     proof = vsp_beyond.prove(policy_of([[0.5, 0.5]], [action]))
     assert proof.areas == {"goal": goal, "pit": pit, "left": 1 - goal - pit}
-    assert proof.longest == longest and proof.failing_outside == outside
+    assert proof.claim["longest"] == longest and proof.failing_outside == outside
     shares = ", ".join(f"{name} {float(area):.6g}" for name, area in proof.areas.items())
     assert str(proof) == f"SimpleGoal-v0, cells: 1, proved: {shares}, longest {longest}"
     assert all(len(corners) > 2 for corners in proof.polygons()) and len(proof.polygons()) == len(proof.pieces)
@@ -115,7 +113,7 @@ def test_pieces_do_what_the_program_does(policy):
     for piece in pieces:
         if piece.starts.area() < 1e-20:  # its corners are one point in float64
             continue
-        corners = np.array(piece.starts.points(), dtype=float)
+        corners = np.array(piece.starts.points())
         along, to = np.roll(corners, -1, axis=0) - corners, starts[:, None] - corners
         inside = (along[:, 0] * to[..., 1] >= along[:, 1] * to[..., 0]).all(axis=1)
         n_pieces += inside
@@ -165,7 +163,7 @@ def test_the_largest_disturbance_is_smaller_than_what_breaks_it():
     around = policy_of([[0.2, 0.5], [0.8, 0.5]], [DOWN_LEFT, [[0, 0], [0, 0], [0, -1]]])
     assert not proved(steps_to_goal(around, n=50)) and np.isnan(largest_disturbance(around, n=50))
     calm = vsp.VoronoiPolicy.load(comparison.RESULTS / f"faithful_{SIMPLEGOAL}.policy")
-    largest = largest_disturbance(calm, n=300, tolerance=5e-4)
+    largest = largest_disturbance(calm, n=300)
     assert proved(steps_to_goal(calm, disturbance=largest, n=300)) and largest < 0.05
     assert not proved(steps_to_goal(calm, disturbance=largest + 5e-4, n=300))
 

@@ -27,14 +27,14 @@ def some(codewords=((0.12345, 0.5), (0.75, 0.5))):
 # Nearer codewords
 
 
-def far(k, task, metric="euclidean"):
+def far(k, task):
     """k codewords far off whose borders run among the states."""
     task, rng = get_task(task), np.random.default_rng(0)
     d, m = len(task.low), len(task.action_low)
     around = rng.normal(size=(k, d))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
     coefficients, scale = rng.normal(size=(k, d + 1, m)), np.linspace(0.5, 1.0, d)
-    return VoronoiPolicy((0.1 + 50.0 * around) * scale, coefficients, task=task, metric=metric, scale=scale)
+    return VoronoiPolicy((0.1 + 50.0 * around) * scale, coefficients, task=task, metric="euclidean", scale=scale)
 
 
 @pytest.mark.parametrize(("task", "k"), [(SIMPLEGOAL, 2), (PENDULUM, 3), (PENDULUM, 4)])
@@ -60,7 +60,7 @@ def test_two_codewords_by_hand():
 LINE = VoronoiPolicy([[0, 0], [1, 1], [3, 3]], np.zeros((3, 3, 2)), task=SIMPLEGOAL, metric="euclidean")
 
 
-@pytest.mark.parametrize("policy", [far(4, SIMPLEGOAL), far(2, SIMPLEGOAL, metric="manhattan"), LINE])
+@pytest.mark.parametrize("policy", [far(4, SIMPLEGOAL), LINE])
 def test_where_borders_have_no_common_point_nothing_moves(policy):
     assert gathered(policy, np.random.default_rng(0).random((50, 2))) is policy
 
@@ -99,7 +99,6 @@ def test_it_returns_within_the_tolerance_by_stages_in_order():
     starts = start_states(policy.task, 100, 1)
     result, of_teacher = (rollout(actor, policy.task, starts) for actor in (policy, teacher))
     assert score(result, 100.0) >= score(of_teacher, 100.0) - 5.0
-    assert tried.attrs == {"teacher": pytest.approx(of_teacher.returns.mean())}
     last = tried[tried["kept"]].iloc[-1]
     assert (last["cells"], last["nonzero"]) == (len(policy), np.count_nonzero(policy.coefficients))
     assert last["mean"] == pytest.approx(result.returns.mean())

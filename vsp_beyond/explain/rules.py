@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from vsp.checks import check_array, check_count, check_number
+from vsp.checks import check_array
 from vsp.policy import VoronoiPolicy
 from vsp.subpolicies.base import linear_outputs, number
 
+AGREEMENT = 0.95  # share of the states in which rules must agree with the look-up
 MOST = 200  # leaves of the largest tree to try
 _DIGITS = range(1, 17)  # how many digits to try for the numbers in rules, in this order
 
@@ -31,7 +32,6 @@ class Rule:
 
     def holds(self, states: np.ndarray) -> np.ndarray:
         """Return which of the states (n, d) lie in the box. (n,) bool"""
-        states = check_array("states", states, (-1, len(self.low)))
         return np.all((states > self.low) & (states <= self.high), axis=1)
 
     def text(self, names: tuple[str, ...]) -> str:
@@ -45,22 +45,19 @@ class Rule:
         return " and ".join(conditions) or "always"
 
 
-def describe_rules(
-    policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
-) -> pd.DataFrame:
-    """Describe the cells of `policy` by the fewest rules that agree with its look-up in a share `agreement` of states.
+def describe_rules(policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray) -> pd.DataFrame:
+    """Describe the cells of `policy` by the fewest rules that agree with its look-up in a share `AGREEMENT` of states.
 
     Rules are fitted to `states` (n, d). States of other episodes, `unseen` (u, d), both select and evaluate the rules,
-    so the agreement is slightly optimistic. The tree may have up to `leaves` leaves.
+    so the agreement is slightly optimistic.
 
     One row per rule, cell by cell. Columns: cell; share (of all states that are in this cell); rule; coverage (share of
     the cell's states where the rule holds, largest first); fidelity (share of the rule's states that are in the cell).
-    A cell without a rule has one row with the rule "none". `attrs` has agreement, asked (the requested agreement),
-    reached (whether the agreement is as high as requested), rules (their number) and digits (of the numbers in them).
+    A cell without a rule has one row with the rule "none". `attrs` has the agreement that is reached.
 
-    Raises ValueError for arrays of a wrong shape, no states, `agreement` outside 0 to 1, or fewer than 2 leaves.
+    Raises ValueError for arrays of a wrong shape, and for no states.
     """
-    rules, digits = find_rules(policy, states, unseen, agreement=agreement, leaves=leaves)
+    rules, _ = find_rules(policy, states, unseen)
     cells, rows = policy.cells(unseen), []
     for cell in range(len(policy)):
         inside = cells == cell
@@ -72,32 +69,25 @@ def describe_rules(
         if not of_cell:
             rows.append({**known, "rule": "none", "coverage": _share(~inside, inside), "fidelity": np.nan})
     frame = pd.DataFrame(rows).sort_values(["cell", "coverage"], ascending=[True, False], ignore_index=True)
-    reached = float(np.mean(apply(rules, unseen) == cells))
-    frame.attrs = {"agreement": reached, "asked": agreement, "reached": reached >= agreement}
-    frame.attrs |= {"rules": len(rules), "digits": digits}
+    frame.attrs["agreement"] = float(np.mean(apply(rules, unseen) == cells))
     return frame
 
 
-def find_rules(
-    policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray, *, agreement: float = 0.95, leaves: int = MOST
-) -> tuple[list[Rule], int]:
+def find_rules(policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray) -> tuple[list[Rule], int]:
     """Find the rules, exactly one of which holds in each state, and the number of digits in them.
 
-    Arguments and errors are those of `describe_rules`. If no tree reaches the requested agreement, the best one is
-    used.
+    Arguments and errors are those of `describe_rules`. If no tree reaches `AGREEMENT`, the best one is used.
     """
     d = len(policy.task.low)
     states, unseen = check_array("states", states, (-1, d)), check_array("unseen", unseen, (-1, d))
     if not (len(states) and len(unseen)):
         raise ValueError(f"{len(states)} states and {len(unseen)} unseen states, expected at least one of each")
-    check_number("agreement", agreement, least=0, most=1)
-    check_count("leaves", leaves, least=2)
     cells = policy.cells(unseen)
-    rules, best = _smallest(states, policy.cells(states), unseen, cells, agreement, leaves)
+    rules, best = _smallest(states, policy.cells(states), unseen, cells)
     places = -np.round(np.log10(np.maximum(np.ptp(states, axis=0), 1e-12))).astype(int)  # decimal place of the range
     for digits in _DIGITS:
         short = _rounded(rules, digits + places)
-        if np.mean(apply(short, unseen) == cells) >= min(agreement, best):
+        if np.mean(apply(short, unseen) == cells) >= min(AGREEMENT, best):
             return short, digits
     return rules, digits
 
@@ -126,16 +116,16 @@ def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:
     return np.array([rule.cell for rule in rules])[holds.argmax(axis=0)]
 
 
-def _smallest(states, cells, unseen, truth, agreement: float, most: int) -> tuple[list[Rule], float]:
+def _smallest(states, cells, unseen, truth) -> tuple[list[Rule], float]:
     """Return the rules and the agreement of the smallest tree that agrees enough, else of the one that agrees most."""
     from sklearn.tree import DecisionTreeClassifier
 
     best, most_right = None, -1.0
-    for leaves in range(2, most + 1):
+    for leaves in range(2, MOST + 1):
         tree = DecisionTreeClassifier(max_leaf_nodes=leaves, random_state=0).fit(states, cells)
         right = float(np.mean(tree.predict(unseen) == truth))
         best, most_right = (tree, right) if right > most_right else (best, most_right)
-        if right >= agreement or tree.get_n_leaves() < leaves:  # it agrees enough, or nothing is left to split
+        if right >= AGREEMENT or tree.get_n_leaves() < leaves:  # it agrees enough, or nothing is left to split
             break
     d = states.shape[1]
     return _merged(list(_leaves(best, 0, np.full(d, -np.inf), np.full(d, np.inf)))), most_right

@@ -52,16 +52,13 @@ class Tuned:
     failure_penalty: float = 0.0
     """Subtracted from the mean return per failed episode, wherever candidates are compared: a mean hides rare failures.
     An episode fails if it does not end in a goal. For tasks without a goal, such as walking, leave it at 0."""
-    error_penalty: float = 0.0
-    """Subtracted from the mean return per unit of mean squared action error (in half action ranges, on the teacher's
-    states). 0 maximises the return alone, however much the policy then differs from the teacher."""
     n_validation: int = 5000
     """Episodes that decide between restarts, between rounds, and between the stages of tuning."""
 
     def __post_init__(self) -> None:
         for name, kind in get_type_hints(type(self)).items():
             value = getattr(self, name)
-            optional = name.endswith("_penalty") or name in ("n_corrections", "n_generations")
+            optional = name in ("n_corrections", "n_generations", "failure_penalty")
             off = optional and isinstance(value, int | kind) and not isinstance(value, bool) and value == 0
             if not off:
                 check_field(name, value, kind)
@@ -163,16 +160,13 @@ def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: flo
     engine, which steps one state at a time.
     """
     task = get_task(task)
-    config = _FAITHFUL.get(task.name) or _faithful_by_size(task)
-    return dataclasses.replace(config, n_cells=config.n_cells if n_cells is None else n_cells, min_r2=min_r2)
-
-
-def _faithful_by_size(task: Task) -> Faithful:
     generations, tuning, validation = (40, 20, 200) if task.one_by_one else (100, 100, 1000)
-    return Faithful(
+    by_size = Faithful(
         n_cells=6, n_episodes=_episodes(task), n_restarts=32 if len(task.low) <= 8 else 16, n_generations=generations,
         n_tuning_episodes=tuning, n_validation=validation,
     )  # fmt: skip
+    config = _FAITHFUL.get(task.name, by_size)
+    return dataclasses.replace(config, n_cells=config.n_cells if n_cells is None else n_cells, min_r2=min_r2)
 
 
 def _episodes(task: Task) -> int:
@@ -203,12 +197,9 @@ def tuned_preset(task: str | Task) -> Tuned:
     For a task without tested settings, they follow from its size, as those of `faithful_preset` do.
     """
     task = get_task(task)
-    return TUNED.get(task.name) or _tuned_by_size(task)
-
-
-def _tuned_by_size(task: Task) -> Tuned:
     tuning, validation = (20, 200) if task.one_by_one else (60, 500)
-    return Tuned(
+    by_size = Tuned(
         n_cells=4, n_episodes=min(_episodes(task), 500), n_correction_episodes=100, n_generations=60,
         n_tuning_episodes=tuning, n_validation=validation,
     )  # fmt: skip
+    return TUNED.get(task.name, by_size)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from vsp.teachers.actors import Actor, layers_of
-from vsp.teachers.teacher import Teacher
 
 
 class Critics:
@@ -17,7 +16,7 @@ class Critics:
     Raises ValueError for a teacher without critics, or whose critics give more than a value, as TQC's quantiles.
     """
 
-    def __init__(self, teacher: Teacher):
+    def __init__(self, teacher: Any):
         tensors, self.teacher = getattr(teacher, "critic", {}), teacher
         if not tensors:
             raise ValueError(f"{type(teacher).__name__} has no critics, expected qf0.0.weight, ...: load one with them")
@@ -34,19 +33,11 @@ class Critics:
         """
         states = self.teacher.inputs(obs)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self.teacher.half))), dtype=np.float32)
-        actions = self._scaled(self.teacher.predict(obs)[0])
+        # The critics see actions in units of the action box, from -1 to 1
+        actions = (self.teacher.predict(obs)[0] - self.teacher.centre) / self.teacher.half
         worst = np.min([self._value(states, np.broadcast_to(corner, actions.shape)) for corner in corners], axis=0)
         return np.maximum(self._value(states, actions) - worst, 0.0).astype(np.float64)
-
-    def _scaled(self, actions: np.ndarray) -> np.ndarray:
-        """Return `actions` (n, m) in units of the action box, from -1 to 1, as the critics see them."""
-        return (actions - self.teacher.centre) / self.teacher.half
 
     def _value(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         inputs = np.column_stack([states, actions])
         return np.min([network.forward(inputs)[:, 0] for network in self.networks], axis=0)
-
-
-def critics_of(teacher: Any) -> Critics:
-    """Return the critics of `teacher`, or `teacher` itself if it says what is critical."""
-    return teacher if hasattr(teacher, "criticality") else Critics(teacher)

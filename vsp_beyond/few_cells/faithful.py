@@ -21,7 +21,7 @@ from vsp.run.progress import steps
 from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
-from .config import Faithful, check_kind
+from .config import Faithful
 from .population import rollout_population
 from .search import even_moves, least_error
 from .tune import cma_es, is_snapshot, score
@@ -50,7 +50,6 @@ def distill_faithfully(
     most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does.
     """
     check_seed(seed)
-    check_kind(config, Faithful)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
 

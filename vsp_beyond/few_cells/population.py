@@ -13,11 +13,13 @@ from vsp.tasks.base import Task
 
 
 def rollout_population(policies: list[Policy], task: Task, starts: np.ndarray) -> list[Outcomes]:
-    """Roll out policies of one kind in one batch. Voronoi policies must be Euclidean, of one shape and scale."""
+    """Roll out policies of one kind, Voronoi policies in one batch: they must be Euclidean, of one shape and scale."""
+    maps = [policy for policy in policies if isinstance(policy, VoronoiPolicy)]
+    if not maps:
+        return [rollout(policy, task, starts) for policy in policies]
     numbers = np.repeat(np.arange(float(len(policies))), len(starts))
     all_starts = np.column_stack([np.tile(starts, (len(policies), 1)), numbers])
-    maps = [policy for policy in policies if isinstance(policy, VoronoiPolicy)]
-    result = rollout(PolicyBatch(maps) if maps else InTurn(policies), numbered(task, len(policies)), all_starts)
+    result = rollout(PolicyBatch(maps), numbered(task, len(policies)), all_starts)
     parts = (np.split(part, len(policies)) for part in (result.returns, result.lengths, result.outcomes))
     return [Outcomes(*of_one) for of_one in zip(*parts)]
 
@@ -40,19 +42,6 @@ def numbered(task: Task, n: int) -> Task:
 
     low, high, size = np.append(task.low, 0.0), np.append(task.high, n), 1 + (task.start_size or len(task.low))
     return replace(task, low=low, high=high, start_size=size, begin=begin, see=see, step=step)
-
-
-class InTurn:
-    """Several policies as one; each predicts for its own states. Observations are as for `PolicyBatch`."""
-
-    def __init__(self, policies: list[Policy]):
-        self._policies = policies
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations and indices (n, d + 1)."""
-        cuts = np.searchsorted(obs[:, -1], np.arange(1, len(self._policies)))
-        parts = np.split(obs[:, :-1], cuts)
-        return np.concatenate([policy.predict(part)[0] for policy, part in zip(self._policies, parts)]), None
 
 
 class PolicyBatch:

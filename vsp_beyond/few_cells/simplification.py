@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 
-from vsp.checks import check_array, check_count, check_number, check_seed
+from vsp.checks import check_number, check_seed
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, rollout, visited_states
@@ -18,6 +18,7 @@ from vsp.tasks.registry import get_task
 from .config import Tuned, check_kind
 from .tune import score
 from .tuned import distill_tuned
+from .units import METRIC
 
 N_VISITED = 100  # episodes that show where the states lie
 DIGITS = range(1, 17)  # significant digits to try, the fewest first
@@ -31,51 +32,55 @@ def simplify(
     Candidates are compared by `score` from the same `config.n_validation` starts, so report the result from others.
     Returns the policy, its codewords `gathered`, and one row per candidate: stage ("cells", "prune", "round"), cells,
     nonzero coefficients, digits (0: not rounded), mean return, failing, kept. The rows of stage "cells" are the curve
-    of return over cells; `attrs` hold the teacher's mean return. If no number of cells suffices, the best one is
-    simplified, and `tolerance` counts from its return. Raises ValueError as `distill_tuned`
-    does, and for a tolerance below 0.
+    of return over cells. If no number of cells suffices, the best one is simplified, and `tolerance` counts from its
+    return. Raises ValueError as `distill_tuned` does, and for a tolerance below 0.
     """
     check_seed(seed)
     check_kind(config, Tuned)
     check_number("tolerance", tolerance, least=0)
     task = get_task(task)
     starts = start_states(task, config.n_validation, seed)
-    of_teacher = rollout(teacher, task, starts)
-    threshold = score(of_teacher, config.failure_penalty) - tolerance
-    tried = _Tried(task, starts, config.failure_penalty)
-    policies = []
+    threshold = score(rollout(teacher, task, starts), config.failure_penalty) - tolerance
+    policies, scores, rows = [], list[float](), list[dict]()
+
+    def reaches(threshold: float, stage: str, policy: VoronoiPolicy, digits: int = 0) -> bool:
+        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
+        result = rollout(policy, task, starts)
+        scores.append(score(result, config.failure_penalty))
+        rows.append({
+            "stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients), "digits": digits,
+            "mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL),
+            "kept": scores[-1] >= threshold,
+        })  # fmt: skip
+        return scores[-1] >= threshold
+
     for k in progress(range(1, config.n_cells + 1), "cells tried", total=config.n_cells, unit="sizes"):
         policies.append(distill_tuned(teacher, task, dataclasses.replace(config, n_cells=k), seed=seed)[0])
-        if tried.reaches(threshold, "cells", policies[-1]):
+        if reaches(threshold, "cells", policies[-1]):
             break
-    best = int(np.argmax(tried.scores))
-    if tried.scores[best] < threshold:  # no number of cells suffices
-        threshold = tried.scores[best] - tolerance
+    best = int(np.argmax(scores))
+    if scores[best] < threshold:  # no number of cells suffices
+        threshold = scores[best] - tolerance
     states = visited_states(policies[best], task, starts[:N_VISITED])
-    policy = prune(gathered(policies[best], states), lambda pruned: tried.reaches(threshold, "prune", pruned))
+    policy = prune(gathered(policies[best], states), lambda pruned: reaches(threshold, "prune", pruned))
     for digits in DIGITS:
         short = rounded(policy, digits)
-        if short is not None and tried.reaches(threshold, "round", short, digits=digits):
+        if short is not None and reaches(threshold, "round", short, digits):
             policy = short
             break
-    history = pd.DataFrame(tried.rows)
-    history.attrs["teacher"] = float(of_teacher.returns.mean())
-    return policy, history
+    return policy, pd.DataFrame(rows)
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
     """Move the codewords nearer to `states` (n, d) without changing the cells: tuning fixes the borders only.
 
     The borders of up to d + 1 Euclidean cells have a point in common, at the same distance from all codewords. Moving
-    all codewords towards it by the same proportion moves no border. Other policies are returned unchanged. Raises
-    ValueError for an empty array of states, and for states that do not fit the task or are not finite.
+    all codewords towards it by the same proportion moves no border. Where the borders have no common point, the policy
+    is returned unchanged.
     """
-    states = check_array("states", states, (-1, len(policy.task.low)))
-    if not len(states):
-        raise ValueError(f"states have shape {states.shape}, expected at least one state")
     points = policy.codewords / policy.scale
     k, d = points.shape
-    if policy.metric != "euclidean" or not 1 < k <= d + 1:
+    if not 1 < k <= d + 1:
         return policy
     middle, unit = states.mean(axis=0) / policy.scale, (states / policy.scale).std(axis=0).mean() or 1.0
     points = points - middle
@@ -88,7 +93,7 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
     nearest = -(arms @ common).sum() / np.square(arms).sum()  # proportion that brings codewords nearest to the middle
     least = unit / np.linalg.norm(arms, axis=1).max()  # proportion that keeps them apart
     codewords = (middle + common + max(nearest, least) * arms) * policy.scale
-    return like(policy, codewords, policy.coefficients, policy.scale)
+    return VoronoiPolicy(codewords, policy.coefficients, task=policy.task, metric=METRIC, scale=policy.scale)
 
 
 def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
@@ -96,47 +101,21 @@ def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
 
     Coefficients are tried in order of increasing effect on the action, for a change of the input by `policy.scale`.
     """
-    policy.check_linear()
     sizes = np.abs(policy.coefficients) * np.append(policy.scale, 1.0)[:, None]
     for place in np.argsort(sizes, axis=None, kind="stable"):
         coefficients = policy.coefficients.copy()
         if not coefficients.flat[place]:
             continue
         coefficients.flat[place] = 0.0
-        without = like(policy, policy.codewords, coefficients, policy.scale)
+        without = policy.with_maps(coefficients)
         policy = without if good(without) else policy
     return policy
 
 
 def rounded(policy: VoronoiPolicy, digits: int) -> VoronoiPolicy | None:
     """Return the policy rounded to `digits` significant digits; None if two codewords become equal."""
-    check_count("digits", digits)
     short = np.vectorize(lambda value: float(f"{value:.{digits}g}"))
     codewords, coefficients, scale = map(short, (policy.codewords, policy.coefficients, policy.scale))
-    distinct = len(np.unique(codewords, axis=0)) == len(codewords)
-    return like(policy, codewords, coefficients, scale) if distinct else None
-
-
-def like(policy: VoronoiPolicy, codewords: np.ndarray, coefficients: np.ndarray, scale: np.ndarray) -> VoronoiPolicy:
-    """Return a policy for the same task with the same metric, and these numbers."""
-    kind = policy.policy_class.name
-    return VoronoiPolicy(codewords, coefficients, task=policy.task, metric=policy.metric, scale=scale, sub_policy=kind)
-
-
-class _Tried:
-    """The policies tried so far, with their scores from the same starts."""
-
-    def __init__(self, task: Task, starts: np.ndarray, failure_penalty: float):
-        self.rows, self.scores = list[dict](), list[float]()
-        self._task, self._starts, self._failure_penalty = task, starts, failure_penalty
-
-    def reaches(self, threshold: float, stage: str, policy: VoronoiPolicy, *, digits: int = 0) -> bool:
-        """Roll out `policy`, add its row, and return whether it scores at least `threshold`."""
-        result = rollout(policy, self._task, self._starts)
-        self.scores.append(score(result, self._failure_penalty))
-        self.rows.append({
-            "stage": stage, "cells": len(policy), "nonzero": np.count_nonzero(policy.coefficients), "digits": digits,
-            "mean": result.returns.mean(), "failing": np.mean(result.outcomes != GOAL),
-            "kept": self.scores[-1] >= threshold,
-        })  # fmt: skip
-        return self.rows[-1]["kept"]
+    if len(np.unique(codewords, axis=0)) < len(codewords):
+        return None
+    return VoronoiPolicy(codewords, coefficients, task=policy.task, metric=METRIC, scale=scale)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,47 +12,31 @@ from vsp.tasks.base import GOAL
 
 from .config import Tuned
 from .population import rollout_population
-from .units import LabelledStates, ScaledCells, Scaling, squared_error
+from .units import ScaledCells, Scaling
 
 SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
 
 
-@dataclass(frozen=True)
-class Objective:
-    """The objective to maximise: the mean return, minus penalties for failures and for differing from the teacher."""
-
-    failure_penalty: float
-    error_penalty: float = 0.0
-    labelled: LabelledStates | None = None  # the states of the teacher, for the error penalty
-
-    def score(self, result: Outcomes, cells: ScaledCells) -> float:
-        """Return the value for `cells` whose episodes ended as `result`."""
-        error = squared_error(self.labelled, cells) if self.labelled and self.error_penalty else 0.0
-        return score(result, self.failure_penalty) - self.error_penalty * error
-
-
 class Candidates:
-    """Candidates, scored by an `Objective` from the same starts; of equally good ones the first is kept."""
+    """Candidates, compared by `score` from the same starts; of equally good ones the first is kept."""
 
     best: ScaledCells  # once there is a candidate
 
-    def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
+    def __init__(self, scaling: Scaling, starts: np.ndarray, failure_penalty: float):
         self.rows, self.best_restart = list[dict](), 0
-        self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
+        self._scaling, self._starts, self._failure_penalty, self._best_score = scaling, starts, failure_penalty, -np.inf
 
     def add(self, stage: str, restart: int, cells: ScaledCells) -> None:
         """Score `cells` from the validation starts."""
         result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
         self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
-        if (value := self._objective.score(result, cells)) > self._best_score:
+        if (value := score(result, self._failure_penalty)) > self._best_score:
             self._best_score, self.best, self.best_restart = value, cells, restart
 
 
-def tune(
-    scaling: Scaling, cells: ScaledCells, config: Tuned, objective: Objective, rng: np.random.Generator
-) -> Iterator[ScaledCells]:
-    """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
+def tune(scaling: Scaling, cells: ScaledCells, config: Tuned, rng: np.random.Generator) -> Iterator[ScaledCells]:
+    """Run CMA-ES (Hansen 2016) on the `score`; each generation rolls out its candidates from fresh starts.
 
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
     """
@@ -61,9 +44,8 @@ def tune(
     for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
         starts = scaling.task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
-        candidates = [cells.like(vector) for vector in vectors]
-        results = rollout_population([scaling.policy(cells) for cells in candidates], scaling.task, starts)
-        search.tell(vectors, [-objective.score(*pair) for pair in zip(results, candidates)])
+        results = rollout_population([scaling.policy(cells.like(vector)) for vector in vectors], scaling.task, starts)
+        search.tell(vectors, [-score(result, config.failure_penalty) for result in results])
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)
 

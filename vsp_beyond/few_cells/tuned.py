@@ -20,9 +20,9 @@ from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
 
 from .anneal import anneal, linear_init, random_init, warm
-from .config import Tuned, check_kind
-from .criticality import critics_of
-from .tune import Candidates, Objective, tune
+from .config import Tuned
+from .criticality import Critics
+from .tune import Candidates, tune
 from .units import METRIC, Scaling, warn_outside
 
 
@@ -38,11 +38,10 @@ def distill_tuned(
     size or task, and for `criticality` with a teacher that has no critics.
     """
     check_seed(seed)
-    check_kind(config, Tuned)
     task = get_task(task)
     if start is not None:
         _check_start(start, task, config)
-    critics = critics_of(teacher) if config.criticality else None  # raises now, not after an hour
+    critics = Critics(teacher) if config.criticality else None  # raises now, not after an hour
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
@@ -52,8 +51,7 @@ def distill_tuned(
         scaling = replace(scaling, scale=start.scale)  # with another one the borders of `start` would move
     criticality = critics.criticality(states) if critics else None
     labelled = scaling.labelled(states, teacher.predict(states)[0], criticality)
-    objective = Objective(config.failure_penalty, config.error_penalty, labelled)
-    candidates = Candidates(scaling, task.start(validation, config.n_validation), objective)
+    candidates = Candidates(scaling, task.start(validation, config.n_validation), config.failure_penalty)
 
     first = linear_init(labelled, config.n_cells, init) if start is None else scaling.cells(start)
     candidates.add("line" if start is None else "start", 0, first)
@@ -68,7 +66,7 @@ def distill_tuned(
         labelled = labelled.with_more(scaling.labelled(states, teacher.predict(states)[0], criticality))
         cells = anneal(labelled, cells, warm(config), batches)
         candidates.add("correct", candidates.best_restart, cells)
-    for cells in tune(scaling, candidates.best, config, objective, search):
+    for cells in tune(scaling, candidates.best, config, search):
         candidates.add("tune", candidates.best_restart, cells)
     return scaling.policy(candidates.best), pd.DataFrame(candidates.rows)
 

@@ -31,7 +31,8 @@ class Grid:
 
     def finer(self, times: float) -> Grid:
         """Return a grid over the same box, with the spacing of the points divided by `times`."""
-        m, n = (_steps(n, times, closed) for n, closed in zip(self.shape, self.periodic))
+        ends = [not closed for closed in self.periodic]  # an axis has one point more than steps, unless it is a circle
+        m, n = (2 * round(times * (n - end) / 2) + end for n, end in zip(self.shape, ends))
         return replace(self, shape=(m, n))
 
     def points(self) -> np.ndarray:
@@ -42,22 +43,13 @@ class Grid:
 
     def interpolation(self, states: np.ndarray) -> sparse.csr_array:
         """Return the matrix that maps values at the points (n,) to values at the states (t, 2)."""
-        columns, weights = self._corners(states)
-        ends = np.arange(len(states) + 1) * 4
-        return sparse.csr_array((weights.ravel(), columns.ravel(), ends), shape=(len(states), np.prod(self.shape)))
-
-    def at(self, states: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Interpolate values at the points (n,) at the states (t, 2). (t,)"""
-        columns, weights = self._corners(states)
-        return (weights * values[columns]).sum(axis=1)
-
-    def _corners(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the indices of the four points around each state, and their weights. (t, 4) each"""
         (i, j, u), (k, m, v) = (self._between(states[:, axis], axis) for axis in (0, 1))
         width = self.shape[1]
         columns = np.stack([i * width + k, i * width + m, j * width + k, j * width + m], axis=1)
         weights = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v], axis=1)
-        return columns.astype(np.int32), weights
+        ends = np.arange(len(states) + 1, dtype=np.int32) * 4
+        shape = len(states), np.prod(self.shape)
+        return sparse.csr_array((weights.ravel(), columns.ravel().astype(np.int32), ends), shape=shape)
 
     def _between(self, x: np.ndarray, axis: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the two neighbours of each x along an axis, and its distance from the first in units of spacing."""
@@ -71,11 +63,6 @@ class Grid:
         return first, first + 1, place - first
 
 
-def _steps(n: int, times: float, periodic: bool) -> int:
-    """Return the points of an axis of n points with `times` as many steps: one more than steps, unless periodic."""
-    return 2 * round(times * (n - (not periodic)) / 2) + (not periodic)
-
-
 def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:
     """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step. (n,)
 
@@ -83,23 +70,20 @@ def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0
     keeps them short. Raises RuntimeError if the values do not converge.
     """
     moves = [_move(task, grid, action, price) for action in actions]
-    values = np.zeros(len(grid.points()))
+    rewards = np.concatenate([of_action for of_action, _ in moves])  # (a n,)
+    matrix = sparse.vstack([of_action for _, of_action in moves], format="csr")  # (a n, n)
+    n = matrix.shape[1]
+    values = np.zeros(n)
     for _ in range(MOST_IMPROVEMENTS):
-        before, (values, best) = values, _improved(moves, values)
+        offers = (rewards + matrix @ values).reshape(-1, n)
+        before, values = values, offers.max(axis=0)
         if np.abs(values - before).max() < CLOSE:
             return values
-        values = _followed(moves, best, values)
+        best = offers.argmax(axis=0) * n + np.arange(n)  # the rows of the best actions
+        rewards_of_best, matrix_of_best = rewards[best], matrix[best]
+        for _ in range(SWEEPS):
+            values = rewards_of_best + matrix_of_best @ values
     raise RuntimeError(f"values still change by {np.abs(values - before).max():g}, expected less than {CLOSE:g}")
-
-
-def _improved(moves: list, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values one step earlier, and the indices of the best actions there. (n,) each"""
-    most, best = np.full(len(values), -np.inf), np.zeros(len(values), dtype=np.intp)
-    for i, (rewards, matrix) in enumerate(moves):
-        offer = rewards + matrix @ values
-        better = offer > most
-        most[better], best[better] = offer[better], i
-    return most, best
 
 
 def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarray, sparse.csr_array]:
@@ -111,19 +95,6 @@ def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarr
     after, rewards, outcomes = task.step(points, np.full((len(points), 1), action))
     goes_on = sparse.diags_array((outcomes == RUNNING).astype(np.float64))
     return rewards - price, (goes_on @ grid.interpolation(after)).tocsr()
-
-
-def _followed(moves: list, best: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the values after `SWEEPS` steps with the actions whose indices are `best` (n,)."""
-    order = np.argsort(best, kind="stable")
-    rows = np.split(order, np.searchsorted(best[order], np.arange(1, len(moves))))
-    matrix = sparse.vstack([matrix[some] for (_, matrix), some in zip(moves, rows)], format="csr")
-    rewards = np.concatenate([rewards[some] for (rewards, _), some in zip(moves, rows)])
-    for _ in range(SWEEPS):
-        next_values = np.empty_like(values)
-        next_values[order] = rewards + matrix @ values
-        values = next_values
-    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,4 +137,4 @@ class GridPolicy:
 
     def _offers(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         after, rewards, outcomes = self.task.step(states, actions[:, None])
-        return rewards - self.price + (outcomes == RUNNING) * self.grid.at(after, self.values)
+        return rewards - self.price + (outcomes == RUNNING) * (self.grid.interpolation(after) @ self.values)

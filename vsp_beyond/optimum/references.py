@@ -9,7 +9,6 @@ starts inside the goal at d < 0.1, entering at once is better and returns 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,31 +53,18 @@ class Shortest:
         return self.DOOR
 
 
-@dataclass(frozen=True)
-class _Solvable:
-    """How to solve a task with two state variables and one action."""
-
-    grid: Grid
-    state_of: Callable[[np.ndarray], np.ndarray]  # from observations (n, d) to states (n, 2)
-    price: float = 0.0  # per step
-
-
 def _angle_first(obs: np.ndarray) -> np.ndarray:
     """Return Pendulum's angle and velocity (n, 2) from observations (n, 3)."""
     return np.column_stack([np.arctan2(obs[:, 1], obs[:, 0]), obs[:, 2]])
 
 
 N_ACTIONS = 61  # between which `GridPolicy` interpolates
-_SOLVABLE = {
+_SOLVABLE: dict[str, tuple[Grid, Callable[[np.ndarray], np.ndarray], float]] = {  # grid, `state_of`, price of a step
     # A gentler push gives a higher return but reaches the goal later. At this price all 10,000 report starts reach the
     # goal by step 985 of 999. At a price 10 % lower, some do not
-    "MountainCarContinuous-v0": _Solvable(
-        Grid((-1.2, -0.07), (0.6, 0.07), (361, 361)), state_of=lambda obs: obs, price=3e-4
-    ),
+    "MountainCarContinuous-v0": (Grid((-1.2, -0.07), (0.6, 0.07), (361, 361)), lambda obs: obs, 3e-4),
     # Upright at rest has to be a point of the grid: holding the pendulum beside it would cost some return in every step
-    "Pendulum-v1": _Solvable(
-        Grid((-np.pi, -8.0), (np.pi, 8.0), (360, 361), periodic=(True, False)), state_of=_angle_first
-    ),
+    "Pendulum-v1": (Grid((-np.pi, -8.0), (np.pi, 8.0), (360, 361), periodic=(True, False)), _angle_first, 0.0),
 }
 TASKS = ("SimpleGoal-v0", *_SOLVABLE)
 
@@ -100,8 +86,8 @@ def best_policy(task: str | Task, *, finer: float = 1.0, price: float | None = N
         return Shortest()
     if task.name not in _SOLVABLE:
         raise ValueError(f"the best return of {task.name} is not known, expected one of {TASKS}")
-    about = _SOLVABLE[task.name]
-    grid, actions = about.grid.finer(finer), np.linspace(task.action_low[0], task.action_high[0], N_ACTIONS)
-    price = about.price if price is None else price
+    grid, state_of, least_price = _SOLVABLE[task.name]
+    grid, actions = grid.finer(finer), np.linspace(task.action_low[0], task.action_high[0], N_ACTIONS)
+    price = least_price if price is None else price
     values = best_values(task, grid, actions, price=price)
-    return GridPolicy(task, grid, values, actions, about.state_of, price)
+    return GridPolicy(task, grid, values, actions, state_of, price)

@@ -37,39 +37,37 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
     rounding of g. Raises ValueError for a policy of another task or class, and for the metric "chebyshev".
     """
     check_provable(policy, TASK)
-    rows = []
-    for low, high in pairwise(_borders(policy)):
-        cell = min(range(len(policy)), key=lambda i: (_distance(policy, (low + high) / 2, i), i))
+    parts, rows = list[tuple[Fraction, Fraction, int]](), []
+    for low, high in pairwise(_possible_borders(policy)):
+        cell = int(np.argmin(_distances(policy, (low + high) / 2)))
+        if parts and parts[-1][2] == cell:  # no border: a third codeword is nearer
+            low, _, _ = parts.pop()
+        parts.append((low, high, cell))
+    for low, high, cell in parts:
         weight, _, bias = policy.coefficients[cell, :, 0]
         ends = np.array([float(low), float(high)])
-        rows.append([float(low), float(high), cell, *(1000 * acceleration(ends, weight * ends + bias))])
+        rows.append([*ends, cell, *(1000 * acceleration(ends, weight * ends + bias))])
     table = pd.DataFrame(rows, columns=["low", "high", "cell", "g_low", "g_high"])
-    runs = (table["cell"] != table["cell"].shift()).cumsum()  # no border where a third codeword is nearer
-    table = table.groupby(runs).agg(
-        {"low": "first", "high": "last", "cell": "first", "g_low": "first", "g_high": "last"}
-    )
-    return table.assign(dead=table["g_low"] * table["g_high"] <= 0.0).reset_index(drop=True)
+    return table.assign(dead=table["g_low"] * table["g_high"] <= 0.0)
 
 
-def _borders(policy: VoronoiPolicy) -> list[Fraction]:
-    """Return the ends of the line of starts, and all places between at which two codewords are equally near. For the
-    Manhattan distance, return also where the difference of two distances bends."""
-    borders = {LOW, HIGH}
-    for i, j in combinations(range(len(policy)), 2):
-        bends = {Fraction(float(policy.codewords[k, 0])) for k in (i, j)} if policy.metric == "manhattan" else set()
-        ends = sorted({LOW, HIGH} | {bend for bend in bends if LOW < bend < HIGH})
-        borders |= set(ends)
-        for low, high in pairwise(ends):
-            gap, gap_at_high = (_distance(policy, x, i) - _distance(policy, x, j) for x in (low, high))
+def _possible_borders(policy: VoronoiPolicy) -> list[Fraction]:
+    """Return the ends of the line of starts, and all places between at which two codewords are equally near, or at
+    which a Manhattan distance bends."""
+    bends = [Fraction(float(place)) for place in policy.codewords[:, 0]]
+    ends = sorted({LOW, HIGH, *(bend for bend in bends if LOW < bend < HIGH)})
+    borders = set(ends)
+    for low, high in pairwise(ends):
+        at_low, at_high = _distances(policy, low), _distances(policy, high)
+        for i, j in combinations(range(len(policy)), 2):
+            gap, gap_at_high = at_low[i] - at_low[j], at_high[i] - at_high[j]
             if gap * gap_at_high < 0:  # the difference is linear between them
                 borders.add(low + (high - low) * gap / (gap - gap_at_high))
     return sorted(borders)
 
 
-def _distance(policy: VoronoiPolicy, x: Fraction, i: int) -> Fraction:
-    """Return the distance from the state (x, 0) to a codeword, squared if it is Euclidean."""
-    total = Fraction(0)
-    for value, code, scale in zip((x, Fraction(0)), policy.codewords[i], policy.scale):
-        gap = abs(value - Fraction(float(code))) / Fraction(float(scale))
-        total += gap if policy.metric == "manhattan" else gap * gap
-    return total
+def _distances(policy: VoronoiPolicy, x: Fraction) -> np.ndarray:
+    """Return the exact distances from the state (x, 0) to the codewords, squared if they are Euclidean. (k,)"""
+    exact = np.vectorize(Fraction, otypes=[object])
+    gaps = np.abs([x, Fraction(0)] - exact(policy.codewords)) / exact(policy.scale)
+    return (gaps if policy.metric == "manhattan" else gaps**2).sum(axis=1)

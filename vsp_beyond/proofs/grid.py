@@ -96,26 +96,16 @@ def touches(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray,
 
     Rounding may decide between codewords that are nearly as near, for observations up to `reach` (d,) in size.
     """
+    power = 1 if policy.metric == "manhattan" else 2  # Euclidean distances are squared, as in the look-up
     sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
-    tie = TIES * float(np.sum(sizes if policy.metric == "manhattan" else sizes**2))
+    tie = TIES * float(np.sum(sizes**power))
     touched = np.ones(low.shape[1], dtype=bool)
     for other in range(len(policy)):
         if other != cell:
-            touched &= _least_gap(policy, cell, other, low, high) <= tie
+            farther = np.zeros(low.shape[1])  # at least, than from `other`: each coordinate adds a monotone function
+            for axis, scale in enumerate(policy.scale):
+                places = policy.codewords[[cell, other], axis]
+                at_ends = [np.abs((end - places[:, None]) / scale) ** power for end in (low[axis], high[axis])]
+                farther += np.minimum(*(to_cell - to_other for to_cell, to_other in at_ends))
+            touched &= farther <= tie
     return touched
-
-
-def _least_gap(policy: VoronoiPolicy, cell: int, other: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Bound from below how much farther observations in a box are from codeword `cell` than from `other`.
-
-    Distances are measured as in the look-up: Euclidean ones are squared. Each coordinate adds a monotone function.
-    """
-    total = np.zeros(low.shape[1])
-    for axis, scale in enumerate(policy.scale):
-        gaps = []
-        for end in (low[axis], high[axis]):
-            to_cell, to_other = ((end - policy.codewords[i, axis]) / scale for i in (cell, other))
-            manhattan = policy.metric == "manhattan"
-            gaps.append(np.abs(to_cell) - np.abs(to_other) if manhattan else to_cell**2 - to_other**2)
-        total = total + np.minimum(*gaps)
-    return total

@@ -51,8 +51,8 @@ class PendulumProof(Proof):
         """The grid's `n`, the number of proved boxes of starts, the number of all boxes of starts, and the most steps
         from any box."""
         of_starts = (self.steps > 0)[:, self.starts]
-        counts = {"proved": int(of_starts.sum()), "starts": of_starts.size}
-        return {"n": len(self.steps), **counts, "longest": int(self.steps[~self.kept].max(initial=0))}
+        longest = int(self.steps[~self.kept].max(initial=0))
+        return {"n": len(self.steps), "proved": int(of_starts.sum()), "starts": of_starts.size, "longest": longest}
 
     def parts(self) -> list:
         """Return for each row its runs of boxes: steps (-1 in the set), length, steps, length, ..."""

@@ -8,11 +8,10 @@ curvature, limits and rounding add to r.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from vsp.checks import check_count
 from vsp.policy import VoronoiPolicy
 from vsp.run.progress import progress
 from vsp.tasks.pendulum import TASK
@@ -23,7 +22,7 @@ from .pendulum import DT, FALL, FASTEST, LIMIT, PUSH, REACH, PendulumProof, boxe
 HALF_WAY = TASK.max_steps // 2  # most steps followed here; the grid proves the other half
 WIDEST = 0.1  # rad, or rad/s: a box with a larger half width is given up
 MOST_WAYS = 40  # branches of one box, one for each cell that its states may be in; with more it is given up
-PARTS = 4  # parts into which each side of a box is cut
+PARTS, LEVELS = 4, 3  # parts into which each side of a box is cut, and how often boxes are cut
 CHUNK = 100_000  # boxes at a time
 
 
@@ -46,7 +45,7 @@ class Boxes:
 
     def at(self, index: np.ndarray) -> Boxes:
         """Return the boxes at `index`."""
-        return Boxes(*(getattr(self, field.name)[..., index] for field in fields(self)))
+        return Boxes(*(part[..., index] for part in vars(self).values()))
 
     def spread(self, along: np.ndarray) -> np.ndarray:
         """Bound the change of a function with slopes `along` (2, m) between the middle and any other state. (m,)"""
@@ -54,36 +53,31 @@ class Boxes:
         return through + (np.abs(along) * self.rest).sum(axis=0)
 
 
-def shares_of_starts(proof: PendulumProof, *, parts: int = PARTS, levels: int = 3) -> list[float]:
+def shares_of_starts(proof: PendulumProof) -> list[float]:
     """Return the share of starts from which the pendulum surely gets upright within 200 steps, first as proved by a
     grid's `proof`, then by smaller and smaller boxes. Takes a minute.
 
-    Boxes of starts that the grid leaves unproved are cut into `parts` x `parts` boxes, which are followed. Those that
-    stay unproved are cut again, `levels` times in all. Returns `levels` + 1 shares. Raises ValueError for a `proof` of
-    another kind, and for counts below 1.
+    Boxes of starts that the grid leaves unproved are cut into `PARTS` x `PARTS` boxes, which are followed. Those that
+    stay unproved are cut again, `LEVELS` times in all. Returns `LEVELS` + 1 shares.
     """
-    if not isinstance(proof, PendulumProof):
-        raise ValueError(f"the proof is {proof!r}, expected a PendulumProof, as prove_pendulum returns")
-    check_count("parts", parts, most=64)
-    check_count("levels", levels, most=8)
     n = len(proof.steps)
     half = np.array([np.pi, FASTEST]) / n
     left = np.argwhere((proof.steps == 0) & proof.starts).T
     middles, shares = half[:, None] * (2 * left + 1 - n), [proof.share]
     good = summed(~(proof.kept | ((proof.steps > 0) & (proof.steps <= TASK.max_steps - HALF_WAY))), periodic=True)
-    for level in range(1, levels + 1):
-        half, middles = half / parts, _cut(middles, half, parts)
+    for level in range(1, LEVELS + 1):
+        half, middles = half / PARTS, _cut(middles, half)
         cuts = range(0, middles.shape[1], CHUNK)
         failed = [_failed(proof.policy, middles[:, i : i + CHUNK], half, good)
                   for i in progress(cuts, f"starts cut {level} times", total=len(cuts), unit="chunks")]  # fmt: skip
         middles = np.concatenate(failed, axis=1)
-        shares.append(1.0 - middles.shape[1] / (n * int(proof.starts.sum()) * parts ** (2 * level)))
+        shares.append(1.0 - middles.shape[1] / (n * int(proof.starts.sum()) * PARTS ** (2 * level)))
     return shares
 
 
-def _cut(middles: np.ndarray, half: np.ndarray, parts: int) -> np.ndarray:
-    """Return the middles of the `parts` x `parts` boxes in each box. (2, m parts^2)"""
-    offsets = (2 * np.arange(parts) + 1) / parts - 1
+def _cut(middles: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Return the middles of the `PARTS` x `PARTS` boxes in each box. (2, m PARTS^2)"""
+    offsets = (2 * np.arange(PARTS) + 1) / PARTS - 1
     grid = np.stack(np.meshgrid(offsets, offsets)).reshape(2, 1, -1) * half[:, None, None]
     return (middles[:, :, None] + grid).reshape(2, -1)
 
@@ -101,7 +95,9 @@ def _failed(policy: VoronoiPolicy, middles: np.ndarray, half: np.ndarray, good: 
         boxes = boxes.at(~failed[boxes.start])
         if not len(boxes):
             break
-        boxes = _joined([stepped(policy, cell, boxes.at(_touched(policy, cell, boxes))) for cell in range(len(policy))])
+        ways = [stepped(policy, cell, boxes.at(_touched(policy, cell, boxes))) for cell in range(len(policy))]
+        parts = zip(*[vars(way).values() for way in ways])
+        boxes = Boxes(*(np.concatenate(part, axis=-1) for part in parts))
     failed[boxes.start] = True
     return middles[:, failed]
 
@@ -143,7 +139,3 @@ def _arrived(boxes: Boxes, good: np.ndarray) -> np.ndarray:
     half = boxes.half
     angles, speeds = ([middle - width, middle + width] for middle, width in zip(boxes.centre, half))
     return rectangles_within(good, *boxes_between(angles, speeds, good.shape[1] - 1))
-
-
-def _joined(parts: list[Boxes]) -> Boxes:
-    return Boxes(*(np.concatenate([getattr(part, field.name) for part in parts], axis=-1) for field in fields(Boxes)))

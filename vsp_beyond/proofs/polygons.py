@@ -26,11 +26,8 @@ class Polygon:
     def cut(self, line: Line) -> tuple[Polygon | None, Polygon | None]:
         """Return the parts on the negative and on the positive side; None for a part without area.
 
-        For a line (0, 0, c), everything lies on the side of the sign of c. Raises ValueError for (0, 0, 0), which the
-        caller has to decide.
+        For a line (0, 0, c), everything lies on the side of the sign of c. The line (0, 0, 0) has no sides.
         """
-        if line == (0, 0, 0):
-            raise ValueError("the line is 0 = 0, expected one with two sides")
         sides = [_side(line, corner) for corner in self.corners]
         if min(sides) >= 0:
             return None, self
@@ -53,12 +50,12 @@ class Polygon:
 
     def middle(self) -> tuple[float, float]:
         """Return the mean of the corners, rounded."""
-        n = len(self.corners)
-        return sum(x / w for x, _, w in self.corners) / n, sum(y / w for _, y, w in self.corners) / n
+        x, y = zip(*self.points())
+        return sum(x) / len(x), sum(y) / len(y)
 
-    def points(self) -> list[tuple[Fraction, Fraction]]:
-        """Return the corners as pairs of fractions."""
-        return [(Fraction(x, w), Fraction(y, w)) for x, y, w in self.corners]
+    def points(self) -> list[tuple[float, float]]:
+        """Return the corners, rounded."""
+        return [(x / w, y / w) for x, y, w in self.corners]
 
     def area(self) -> Fraction:
         """Return the exact area, by the shoelace formula."""

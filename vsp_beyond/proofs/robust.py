@@ -18,6 +18,8 @@ from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE, TASK
 from .grid import ROUNDING, SEEN, Way, around, steps_into, touches
 from .proof import check_provable
 
+TOLERANCE = 1e-4  # of the largest disturbance
+
 
 def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1000) -> np.ndarray:
     """Return the most steps from any state of each box into the goal, without entering the pit; 0 where this is not
@@ -36,15 +38,14 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
     return steps_into(ended, ways, TASK.max_steps)
 
 
-def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000, tolerance: float = 1e-4) -> float:
-    """Return the largest disturbance of a step, to `tolerance`, for which a grid proves that every start outside the
+def largest_disturbance(policy: VoronoiPolicy, *, n: int = 1000) -> float:
+    """Return the largest disturbance of a step, to `TOLERANCE`, for which a grid proves that every start outside the
     pit reaches the goal; NaN if this is not proved even without a disturbance. A coarse grid finds a smaller one, by
     about 1 / n."""
-    check_number("tolerance", tolerance, least=1e-6, most=0.1)
     low, high = 0.0, STRIDE
     if not proved(steps_to_goal(policy, n=n)):
         return float("nan")
-    while high - low > tolerance:
+    while high - low > TOLERANCE:
         middle = (low + high) / 2
         low, high = (middle, high) if proved(steps_to_goal(policy, disturbance=middle, n=n)) else (low, middle)
     return low

@@ -217,15 +217,15 @@ class Distance:
 
 def _ended(piece: Piece) -> Iterator[Piece]:
     """Yield the parts of `piece` in the goal, in the pit, and elsewhere; goal and pit are open sets."""
-    for part, inside in _within(piece, IN_GOAL):
+    for part, inside in within(piece, IN_GOAL):
         if inside:
             yield replace(part, outcome=GOAL)
             continue
-        for rest, fell in _within(part, IN_PIT):
+        for rest, fell in within(part, IN_PIT):
             yield replace(rest, outcome=PIT if fell else RUNNING)
 
 
-def _within(piece: Piece, lines: Sequence[Line]) -> Iterator[tuple[Piece, bool]]:
+def within(piece: Piece, lines: Sequence[Line]) -> Iterator[tuple[Piece, bool]]:
     """Yield the parts of `piece` that are not on the positive side of a line, and the part on that of all lines."""
     for line in lines:
         outside, inside = _split(piece, line)

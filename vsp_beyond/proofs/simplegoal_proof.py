@@ -11,9 +11,9 @@ import numpy as np
 from vsp.policy import VoronoiPolicy
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
-from .polygons import Polygon, total
+from .polygons import total
 from .proof import Proof
-from .simplegoal import IN_PIT, Piece, follow
+from .simplegoal import IN_PIT, Piece, follow, within
 
 ENDS = {GOAL: "goal", PIT: "pit", TRUNCATED: "left"}
 SIDES = {-1: "-", 0: "=", 1: "+"}  # at the low limit or wall, at none, at the high one
@@ -42,23 +42,19 @@ class SimpleGoalProof(Proof):
     @cached_property
     def failing_outside(self) -> Fraction:
         """The exact area of the starts outside the pit that do not reach the goal."""
-        failing = [piece.starts for piece in self.pieces if piece.outcome != GOAL]
-        inside = [part.area() for starts in failing if (part := _in_pit(starts))]
-        return total([starts.area() for starts in failing]) - total(inside)
+        failing = [Piece(piece.starts) for piece in self.pieces if piece.outcome != GOAL]
+        parts = [part for piece in failing for part in within(piece, IN_PIT)]
+        return total([part.starts.area() for part, in_pit in parts if not in_pit])
 
     def polygons(self) -> list[np.ndarray]:
         """Return the corners of every piece (k, 2), as floats, for plots."""
-        return [np.array([(float(x), float(y)) for x, y in piece.starts.points()]) for piece in self.pieces]
-
-    @property
-    def longest(self) -> int:
-        """The number of steps of the longest episode."""
-        return max(len(piece.steps) for piece in self.pieces)
+        return [np.array(piece.starts.points()) for piece in self.pieces]
 
     @property
     def claim(self) -> dict:
         """The areas, as fractions, and the number of steps of the longest episode."""
-        return {**{name: str(area) for name, area in self.areas.items()}, "longest": self.longest}
+        areas = {name: str(area) for name, area in self.areas.items()}
+        return areas | {"longest": max(len(piece.steps) for piece in self.pieces)}
 
     def parts(self) -> list:
         """Return the itineraries as lines "end step step ...". A step such as "3+=--" gives the cell, the limit that
@@ -72,14 +68,6 @@ def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
     Raises ValueError for a policy of another task or class, or with the metric "chebyshev".
     """
     return SimpleGoalProof(policy, tuple(follow(policy)))
-
-
-def _in_pit(starts: Polygon) -> Polygon | None:
-    """Return the part of `starts` inside the pit."""
-    inside: Polygon | None = starts
-    for line in IN_PIT:
-        inside = inside and inside.cut(line)[1]
-    return inside
 
 
 def _itinerary(piece: Piece) -> str:

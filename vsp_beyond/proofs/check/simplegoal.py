@@ -11,6 +11,8 @@ from __future__ import annotations
 from fractions import Fraction
 from functools import cache
 
+import numpy as np
+
 from .refused import Refused
 
 SQUARE = [(Fraction(x), Fraction(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -101,8 +103,8 @@ class Policy:
             raise Refused(f"the metric is {metric!r}, expected 'euclidean' or 'manhattan'")
         self.metric, self.scale = metric, [Fraction(s) for s in scale]
         self.codewords = [[Fraction(number) for number in codeword] for codeword in codewords]
-        self.sizes = [float(s) for s in scale]
-        self.rough = [[number / s for number, s in zip(codeword, scale)] for codeword in codewords]
+        self.sizes = np.array(scale)
+        self.rough = np.array(codewords) / self.sizes
         self.maps = [[[Fraction(row[axis]) for row in rows] for axis in (0, 1)] for rows in coefficients]
 
     def step(self, polygons: list, step: str) -> list:
@@ -143,20 +145,13 @@ class Policy:
         In the Manhattan distance, each coordinate adds a monotone function to the difference, which is largest at an
         end.
         """
-        others = [other for other in range(len(self.codewords)) if other != number]
-        if self.metric == "euclidean":
-            return others
-        ends = [(min(values) / s, max(values) / s) for values, s in zip(zip(*(p[2] for p in polygon)), self.sizes)]
-        at_ends = [(abs(low - c), abs(high - c)) for (low, high), c in zip(ends, self.rough[number])]
-        rivals = []
-        for other in others:
-            most, doubt = 0.0, DOUBT
-            for (low, high), (at_low, at_high), d in zip(ends, at_ends, self.rough[other]):
-                most += max(at_low - abs(low - d), at_high - abs(high - d))
-                doubt += DOUBT * (at_low + at_high + abs(d))
-            if most >= -doubt:
-                rivals.append(other)
-        return rivals
+        far = np.zeros(len(self.codewords), dtype=bool)
+        if self.metric == "manhattan":
+            states = np.array([rough for _, _, rough in polygon]) / self.sizes
+            gaps = np.abs([states.min(axis=0) - self.rough, states.max(axis=0) - self.rough])  # (ends, k, axes)
+            most = (gaps[:, [number]] - gaps).max(axis=0).sum(axis=1)
+            far = most < -DOUBT * (1 + gaps.sum() + np.abs(self.rough).sum())
+        return [other for other in np.flatnonzero(~far).tolist() if other != number]
 
     def nearer(self, polygon: list, number: int, other: int) -> list:
         """Return the convex parts of `polygon` that are nearer to codeword `number` than to `other`."""
