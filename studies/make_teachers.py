@@ -10,6 +10,8 @@ from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 from vsp.run import command, listed
 from vsp.tasks.registry import get_task
 from vsp.teachers.actors import part_of
@@ -49,7 +51,7 @@ def export(task: str, checkpoints: dict[int, Path], folder: str | os.PathLike = 
     seed, snapshot = list(tried.items())[-1]
     if not reaches_bar(training.score(_teacher(snapshot, task), task, seed=training.SELECTION_SEED), task):
         return False
-    about = {"seeds_tried": [{"seed": s, **_chosen(snap)[1]} for s, snap in tried.items()]}
+    about = {"seeds_tried": [{"seed": s, **snap["kept"]["point"]} for s, snap in tried.items()]}
     about["earlier_trials"] = load_teacher(task).card["earlier_trials"]
     _write(task, snapshot, RECIPES[task], seed, Path(folder) / f"{task}.safetensors", ("actor.", "critic."), about)
     return True
@@ -67,22 +69,19 @@ def short_recipe(task: str) -> Recipe:
     return replace(RECIPES[task], steps=SHORT_STEPS[task])
 
 
-def _chosen(snapshot: dict) -> tuple[dict, dict]:
-    """Return the tensors to keep, the best or the last ones, and their point of the learning curve."""
-    if "best" in snapshot:
-        return snapshot["best"]["policy"], snapshot["best"]["point"]
-    return snapshot["policy"], snapshot["curve"][-1]
-
-
 def _teacher(snapshot: dict, task: str) -> Teacher:
-    return Teacher(part_of({name: tensor.numpy() for name, tensor in _chosen(snapshot)[0].items()}, "actor"), task)
+    return Teacher(part_of(_tensors(snapshot), "actor"), task)
+
+
+def _tensors(snapshot: dict) -> dict[str, np.ndarray]:
+    return {name: tensor.numpy() for name, tensor in snapshot["kept"]["policy"].items()}
 
 
 def _write(task: str, snapshot: dict, recipe: Recipe, seed: int, path: Path, parts: tuple, about: dict) -> None:
     """Write the tensors whose names begin with one of `parts`, and the card."""
     from safetensors.numpy import save
 
-    tensors = {name: tensor.numpy() for name, tensor in _chosen(snapshot)[0].items() if name.startswith(parts)}
+    tensors = {name: array for name, array in _tensors(snapshot).items() if name.startswith(parts)}
     card = {
         "task": task,
         "algorithm": "TD3 of Stable-Baselines3, MlpPolicy, layers [400, 300], ReLU, tanh output",
@@ -112,11 +111,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--cache", required=True, help="folder for checkpoints; training resumes from there")
     parser.add_argument("--out", default=SHIPPED, help="folder for the exported teachers")
-    parser.add_argument("--task", choices=list(RECIPES), action="append", help="only this task")
     parser.add_argument("--short", action="store_true", help="run the shorter trainings that a study compares")
     arguments = parser.parse_args()
-    known = SHORT_SEEDS if arguments.short else RECIPES
-    for task in [task for task in known if task in (arguments.task or known)]:
+    for task in SHORT_SEEDS if arguments.short else RECIPES:
         if arguments.short:
             for seed in SHORT_SEEDS[task]:
                 checkpoint = training.train(task, seed=seed, cache=arguments.cache, recipe=short_recipe(task))

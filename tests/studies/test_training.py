@@ -68,7 +68,7 @@ def short(monkeypatch):
 
 
 def weights(path):
-    return {name: t.numpy() for name, t in read_checkpoint(path)["policy"].items()}
+    return {name: t.numpy() for name, t in read_checkpoint(path)["parameters"]["policy"].items()}
 
 
 def same(a, b):
@@ -141,8 +141,8 @@ def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp
     monkeypatch.setattr(training, "_score", score)
     path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
     snapshot = read_checkpoint(path)
-    assert len(seen) == 3 and same({n: t.numpy() for n, t in snapshot["best"]["policy"].items()}, seen[1])
-    assert same({n: t.numpy() for n, t in snapshot["policy"].items()}, seen[2]) and not same(seen[1], seen[2])
+    assert len(seen) == 3 and same({n: t.numpy() for n, t in snapshot["kept"]["policy"].items()}, seen[1])
+    assert same(weights(path), seen[2]) and not same(seen[1], seen[2])
     assert export(SIMPLEGOAL, {0: path}, tmp_path / "out")
     teacher = load_teacher(tmp_path / "out" / f"{SIMPLEGOAL}.safetensors")
     assert np.array_equal(teacher.layers[0][0].T, seen[1]["actor.mu.0.weight"])
@@ -153,7 +153,7 @@ def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatc
     monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (1000.0, 0.0)})
     monkeypatch.setattr(make_teachers, "MOST_SEEDS", 2)
     out = tmp_path / "out"
-    monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out), "--task", SIMPLEGOAL])
+    monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out)])
     with pytest.raises(SystemExit, match="none of the seeds 0 to 1 met the requirements"):
         main()
     assert not out.exists() and len(list((tmp_path / "cache").iterdir())) == 2
