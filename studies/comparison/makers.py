@@ -21,7 +21,7 @@ from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling
+from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
 from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
@@ -29,7 +29,7 @@ from ..rivals.trees import LinearTree, ObliqueLinearTree
 from ..robots import Walking, imitate_pushed, search_one_map
 from ..robots.imitation import COOL
 from .global_fit import descend, global_cells, global_tree, greedy_cells
-from .tuning import Numbers, in_units, tuned
+from .tuning import TunableTree, tuned
 
 
 @dataclass(frozen=True)
@@ -147,20 +147,18 @@ def robot_tree(budget: Budget, size: int, seed: int) -> Policy:
     return imitate_pushed(budget.teacher, budget.task, budget.config, seed=seed, fit=fit)
 
 
-def trained_further(budget: Budget, size: int, seed: int, *, imitation: Callable[..., Policy]) -> Policy:
+def trained_further(
+    budget: Budget, size: int, seed: int, *, imitation: Callable[..., VoronoiPolicy | TunableTree]
+) -> Policy:
     """Continue the teacher's training with the policy of `imitation` as its actor."""
     from ..robots.further_training import train_further  # imported here, since it imports torch
 
     start, task = imitation(budget, size, seed), budget.task
+    if isinstance(start, TunableTree):
+        return train_further(start.frame, start, budget.teacher, budget.config, seed=seed)
     states = visited_states(budget.teacher, task, task.start(np.random.default_rng(seed), budget.config.n_episodes))
-    frame = Scaling.of(task, states)
-    numbers: Numbers | ScaledCells
-    if isinstance(start, VoronoiPolicy):  # including a single cell
-        frame = replace(frame, scale=start.scale)
-        numbers = frame.cells(start)
-    else:
-        frame, numbers = in_units(start, frame)
-    return train_further(frame, numbers, budget.teacher, budget.config, seed=seed)
+    frame = replace(Scaling.of(task, states), scale=start.scale)
+    return train_further(frame, frame.cells(start), budget.teacher, budget.config, seed=seed)
 
 
 def searched(budget: Budget, size: int, seed: int, **settings: int) -> Policy:

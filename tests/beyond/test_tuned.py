@@ -131,7 +131,7 @@ def test_failures_and_differing_from_the_teacher_cost_their_penalties():
 
 
 def test_the_first_of_the_best_candidates_is_kept():
-    candidates = Candidates(UNSCALED, np.array([[0.9, 0.05], [0.05, 0.9]]), Objective(1000.0))
+    candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.array([[0.9, 0.05], [0.05, 0.9]]), Objective(1000.0))
     still, home = (ScaledCells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
     for restart, cells in enumerate((still, home, ScaledCells(home.codewords + 1, home.coefficients))):
         candidates.add("fit", restart, cells)
@@ -144,7 +144,7 @@ def test_the_first_of_the_best_candidates_is_kept():
 def test_the_penalty_decides_between_a_higher_mean_and_fewer_failures(monkeypatch, penalty, best):
     results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
     monkeypatch.setattr("vsp_beyond.few_cells.tune.rollout", lambda *_: next(results))
-    candidates = Candidates(UNSCALED, np.zeros((2, 2)), Objective(penalty))
+    candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.zeros((2, 2)), Objective(penalty))
     for restart in range(2):
         candidates.add("fit", restart, SLOW)
     assert candidates.best_restart == best
@@ -157,7 +157,8 @@ def test_tuning_returns_more_and_stays_closer_where_errors_cost():
     labelled = LabelledStates(inputs, inputs @ SLOW.coefficients[0])
     config, errors = dataclasses.replace(SMALL, n_cells=1, n_generations=20, tuning_step=0.2), []
     for penalty in (1000.0, 10.0, 0.0):
-        snapshots = list(tune(UNSCALED, SLOW, config, Objective(0.0, penalty, labelled), np.random.default_rng(0)))
+        objective, rng = Objective(0.0, penalty, labelled), np.random.default_rng(0)
+        snapshots = list(tune(UNSCALED.policy, UNSCALED.task, SLOW, config, objective, rng))
         errors.append(squared_error(labelled, snapshots[-1]))
     assert 25 * errors[0] < 5 * errors[1] < errors[2] and len(snapshots) == SNAPSHOTS
     policies = map(UNSCALED.policy, (SLOW, snapshots[-1]))

@@ -6,7 +6,7 @@ import torch
 from support import PENDULUM
 
 from studies.comparison.makers import Budget, robot_tree, trained_further
-from studies.comparison.tuning import in_units
+from studies.comparison.tuning import of_tree
 from studies.rivals.trees import ObliqueLinearTree
 from studies.robots.further_training import train_further
 from studies.robots.imitation import LONGER
@@ -28,7 +28,8 @@ def pieces(kind):
         cells = local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 3, np.random.default_rng(1))
         return FRAME, cells, FRAME.policy(cells)
     tree = ObliqueLinearTree(STATES, TEACHER.predict(STATES)[0].astype(float), leaves=3, task=PENDULUM, seed=0)
-    return *in_units(tree, FRAME), tree
+    numbers = of_tree(tree)
+    return numbers.frame, numbers, tree
 
 
 @pytest.mark.parametrize("kind", ["cells", "tree"])

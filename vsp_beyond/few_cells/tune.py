@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from vsp.rollouts import Outcomes, rollout
+from vsp.rollouts import Outcomes, Policy, rollout
 from vsp.run.progress import steps
-from vsp.tasks.base import GOAL
+from vsp.tasks.base import GOAL, Task
 
 from .config import Tuned
 from .population import rollout_population
-from .units import LabelledStates, ScaledCells, Scaling, squared_error
+from .units import LabelledStates, ScaledCells, squared_error
 
 SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
+PolicyOf = Callable[[ScaledCells], Policy]  # such as `Scaling.policy`; or of other numbers with `vector` and `like`
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,14 @@ class Candidates:
 
     best: ScaledCells  # once there is a candidate
 
-    def __init__(self, scaling: Scaling, starts: np.ndarray, objective: Objective):
+    def __init__(self, policy_of: PolicyOf, task: Task, starts: np.ndarray, objective: Objective):
         self.rows, self.best_restart = list[dict](), 0
-        self._scaling, self._starts, self._objective, self._best_score = scaling, starts, objective, -np.inf
+        self._policy_of, self._task, self._starts = policy_of, task, starts
+        self._objective, self._best_score = objective, -np.inf
 
     def add(self, stage: str, restart: int, cells: ScaledCells) -> None:
         """Score `cells` from the validation starts."""
-        result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
+        result = rollout(self._policy_of(cells), self._task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
         self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
         if (value := self._objective.score(result, cells)) > self._best_score:
@@ -51,7 +53,7 @@ class Candidates:
 
 
 def tune(
-    scaling: Scaling, cells: ScaledCells, config: Tuned, objective: Objective, rng: np.random.Generator
+    policy_of: PolicyOf, task: Task, cells: ScaledCells, config: Tuned, objective: Objective, rng: np.random.Generator
 ) -> Iterator[ScaledCells]:
     """Run CMA-ES (Hansen 2016) on the score of `objective`; each generation rolls out its candidates from fresh starts.
 
@@ -59,10 +61,10 @@ def tune(
     """
     search = cma_es(cells.vector, config.tuning_step, rng)
     for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
-        starts = scaling.task.start(rng, config.n_tuning_episodes)
+        starts = task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
         candidates = [cells.like(vector) for vector in vectors]
-        results = rollout_population([scaling.policy(cells) for cells in candidates], scaling.task, starts)
+        results = rollout_population([policy_of(cells) for cells in candidates], task, starts)
         search.tell(vectors, [-objective.score(*pair) for pair in zip(results, candidates)])
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)

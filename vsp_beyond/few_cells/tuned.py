@@ -53,7 +53,7 @@ def distill_tuned(
     criticality = critics.criticality(states) if critics else None
     labelled = scaling.labelled(states, teacher.predict(states)[0], criticality)
     objective = Objective(config.failure_penalty, config.error_penalty, labelled)
-    candidates = Candidates(scaling, task.start(validation, config.n_validation), objective)
+    candidates = Candidates(scaling.policy, task, task.start(validation, config.n_validation), objective)
 
     first = linear_init(labelled, config.n_cells, init) if start is None else scaling.cells(start)
     candidates.add("line" if start is None else "start", 0, first)
@@ -68,7 +68,7 @@ def distill_tuned(
         labelled = labelled.with_more(scaling.labelled(states, teacher.predict(states)[0], criticality))
         cells = anneal(labelled, cells, warm(config), batches)
         candidates.add("correct", candidates.best_restart, cells)
-    for cells in tune(scaling, candidates.best, config, objective, search):
+    for cells in tune(scaling.policy, task, candidates.best, config, objective, search):
         candidates.add("tune", candidates.best_restart, cells)
     return scaling.policy(candidates.best), pd.DataFrame(candidates.rows)
 
