@@ -12,7 +12,6 @@ from studies import make_rows
 from studies.committed import RESULTS, keys, read_results
 from studies.comparison import beside, measure, rows
 from studies.comparison.beside import kept_jobs
-from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Entry, Table
 from studies.comparison.rows import Row, jobs_of, make_all
 from studies.comparison.summary import read_rows
@@ -110,7 +109,7 @@ def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
 def test_a_row_holds_what_is_measured(small):
     _, about = CART_3.make()
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
-    policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
+    policy = METHODS["CART"].make(teacher, task, dataclasses.replace(SMALL, n_cells=3), 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
     assert {*about} == {"row", "seconds"} and about["seconds"] > 0
 
@@ -159,7 +158,7 @@ def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     files = [results / "methods_SimpleGoal-v0.csv", results / "methods_seconds.csv"]
     before = [file.read_text() for file in files]
     shutil.rmtree(tmp_path / "build")
-    still = Entry(lambda budget, size, seed: Constant(0.5, 0.5), sizes=(1, 3))
+    still = Entry(lambda teacher, task, config, seed: Constant(0.5, 0.5), sizes=(1, 3))
     small.setitem(METHODS, "still", still)
     only(small, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "still", "teacher"), sizes=(0, 1, 3)))
     command(small, "--out", tmp_path)
