@@ -72,7 +72,7 @@ def beside(task: str, table: str) -> Iterator[Beside]:
         jobs = tuple(jobs_of(task, table))
         pairs = [(a, b) for a, b in combinations(jobs, 2) if a.size == b.size]
         today = [{**a.about(), "other": b.seed} for a, b in pairs]
-        yield Beside(f"same_{task}.csv", today, partial(_sameness, jobs), jobs)
+        yield Beside(f"same_{task}.csv", today, partial(_sameness, task, pairs, jobs), jobs)
     for name, job in kept_jobs(task, table).items():
         yield Beside(name, [job.provenance], lambda policy: policy, (job,))
         if task == CHEETAH:
@@ -99,13 +99,14 @@ def kept_jobs(task: str, table: str) -> dict[str, Row]:
     return {f"{table}_{task}{suffix}.policy": Row(task, about.keeps, size, 0) for suffix, size in sizes.items()}
 
 
-def _sameness(jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
-    """Compare policies of different seeds, one row per size and pair."""
-    tables, task = {}, jobs[0].task
-    for size in dict.fromkeys(job.size for job in jobs):
-        of_size = {job.seed: policy for job, policy in zip(jobs, policies) if job.size == size}
-        tables[size] = measure.sameness(of_size, load_teacher(task), get_task(task))
-    return pd.concat(tables, names=["size"]).reset_index("size").reset_index(drop=True)
+def _sameness(name: str, pairs: list[tuple[Row, Row]], jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
+    """Compare policies of different seeds on `common_states`, one row per pair."""
+    teacher, task, of_job, rows = load_teacher(name), get_task(name), dict(zip(jobs, policies)), []
+    states = measure.common_states(teacher, task)
+    for a, b in pairs:
+        about = {"size": a.size, "seed": a.seed, "other": b.seed}
+        rows.append(about | measure.sameness(of_job[a], of_job[b], teacher, task, states))
+    return pd.DataFrame(rows)
 
 
 def simplest(task: str) -> VoronoiPolicy:

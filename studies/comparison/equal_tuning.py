@@ -14,7 +14,7 @@ from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 
 from ..committed import read_results
-from .measure import ERROR_SEED, N_ERROR
+from .measure import ERROR_SEED, N_ERROR, in_half_ranges
 from .methods import LONG, TABLES
 from .summary import AS_GOOD, INTERVAL, OURS, TUNED, ahead, method_summary, read_rows, teacher_of
 
@@ -52,8 +52,7 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
     """
     teacher, about = load_teacher(task), get_task(task)
     states = visited_states(teacher, about, start_states(about, N_ERROR // about.slowness, ERROR_SEED))
-    half = 0.5 * (about.action_high - about.action_low)
-    constant = float(np.sqrt((np.asarray(teacher.predict(states)[0], dtype=np.float64) / half).var(axis=0).mean()))
+    constant = float(np.sqrt(in_half_ranges(teacher, about, states).var(axis=0).mean()))
     return frame.assign(r2=1.0 - np.square(frame["error_teacher"] / constant))
 
 
