@@ -32,13 +32,10 @@ def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd
 def main() -> None:
     """Write hub_teacher.csv and hub_teacher_ledger.csv, and print the second."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("agent", type=Path, nargs="?", help="a zip of Stable-Baselines3, trained for this task")
+    parser.add_argument("agent", type=Path, help="a zip of Stable-Baselines3, trained for this task")
     parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/results, runs to OUT/build/study")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     given = parser.parse_args()
-    if given.agent is None:
-        print("hub_teacher.csv is kept, because it needs the zoo's DDPG agent: make study AGENT=file.zip")
-        return
     try:
         rows, ledger = study(given.agent, given.out / "build" / "study", jobs=given.jobs)
     except ValueError as error:
