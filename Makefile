@@ -101,7 +101,7 @@ stale: venv ##- lists committed results of ours made with other settings, teache
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-proofs-teacher: begin venv ##- proofs for a network: an HOUR at most
+proofs-teacher: begin venv ##- proofs for a network: HALF AN HOUR
 	$(PY) -m studies.make_proofs --teacher --out="$$OUT"
 
 ## Study
