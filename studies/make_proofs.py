@@ -20,7 +20,8 @@ from vsp.rollouts import collect_episodes, rollout
 from vsp.run import command, listed
 from vsp.run.progress import progress
 from vsp.tasks import simplegoal
-from vsp_beyond import tuned_preset
+from vsp.teachers import Teacher
+from vsp_beyond import Tuned, simplify, tuned_preset
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.proofs import check, prove
 from vsp_beyond.proofs.mountaincar import prove_mountaincar
@@ -30,13 +31,13 @@ from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
 from .committed import BEYOND, RESULTS, read_results, write_results
-from .comparison.beside import simplest
 from .proofs.bounds import mean_return
 from .proofs.network import teacher_steps_to_goal
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
 MARGIN = 0.01  # margin for which simplegoal_margin is tuned: a tenth of a step
+LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
 TEACHER_GRIDS = (500, 1000, 2000, 4000)
 
 
@@ -67,7 +68,7 @@ def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
         "simplegoal_faithful": lambda: _kept("faithful", SIMPLEGOAL),
         "simplegoal_tuned": lambda: distill_tuned(teacher, task, config, seed=0)[0],
         "simplegoal_limit": lambda: _kept("limit", SIMPLEGOAL),
-        "simplegoal_simplified": lambda: simplest(SIMPLEGOAL),
+        "simplegoal_simplified": lambda: _simplified(teacher, config),
         "simplegoal_one_map": lambda: _one_map(teacher),
         "simplegoal_margin": lambda: _of_simplegoal(
             distill_tuned(teacher, spacious, replace(config, n_cells=3), seed=1)[0]
@@ -153,7 +154,13 @@ def _kept(table: str, task: str) -> VoronoiPolicy:
     return VoronoiPolicy.load(RESULTS / f"{table}_{task}.policy")
 
 
-def _one_map(teacher) -> VoronoiPolicy:
+def _simplified(teacher: Teacher, config: Tuned) -> VoronoiPolicy:
+    """Make the simplest policy that loses at most `LOSS` of the teacher's mean return."""
+    returns = rollout(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, config.n_validation, 0)).returns
+    return simplify(teacher, SIMPLEGOAL, config, tolerance=LOSS * abs(returns.mean()), seed=0)[0]
+
+
+def _one_map(teacher: Teacher) -> VoronoiPolicy:
     episodes = collect_episodes(teacher, SIMPLEGOAL, start_states(SIMPLEGOAL, 1000, 0))
     return linear_map(episodes.states, episodes.actions, SIMPLEGOAL)
 
