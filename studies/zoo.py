@@ -34,7 +34,7 @@ from vsp_beyond.few_cells import faithful_preset
 from vsp_beyond.few_cells.duration import expected_seconds
 from vsp_beyond.few_cells.faithful import distill_faithfully
 
-from .committed import BEYOND, RESULTS, read_results, write_results
+from .committed import BEYOND, RESULTS, keys, read_results, write_results
 from .comparison.methods import METHODS
 
 SIZES, SEEDS, ENOUGH = (1, 2, 4, 8), range(5), 0.95  # cells, distillations of each size, their mean R²
@@ -151,12 +151,24 @@ def by_the_paper_with(digest: str) -> dict:
     return provenance(settings, digest, VERSION)
 
 
-def today(name: str) -> list[dict]:
-    """Return what each row of a committed table is made with today. Rows with a reason are left out."""
+def current(name: str) -> tuple[pd.DataFrame, list[dict]]:
+    """Return the rows of a committed table, and what each is made with today. Rows with a reason are left out."""
     rows = read_results(name).dropna(subset=["settings"])
     if name == "agents":
-        return [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
-    return [{"seed": row.seed, **by_the_paper_with(row.teacher)} for row in rows.itertuples()]
+        return rows, [provenance_of(get_task(row.task), row.teacher) for row in rows.itertuples()]
+    return rows, [{"seed": row.seed, **by_the_paper_with(row.teacher)} for row in rows.itertuples()]
+
+
+def kept(checksum: str) -> tuple[dict, dict] | None:
+    """Return what `Study.make` returned of a zip, from committed files; None if today it would return another."""
+    tables = map(current, TABLES)
+    agents, papers = (rows[[then == now for then, now in zip(keys(rows), keys(today))]] for rows, today in tables)
+    for row in agents[agents["checksum"] == checksum].drop(columns=["zoo", "zoo_std"]).to_dict("records"):
+        mine = papers[papers["teacher"] == row["teacher"]].to_dict("records")
+        if mine or row["task"] != CAR:
+            policy, actions = (find(row["algorithm"], row["task"]) for find in (policy_of, actions_of))
+            return {part: getattr(policy, part) for part in PARTS} | {"actions": actions}, {"row": row, "papers": mine}
+    return None
 
 
 def by_the_paper(agent: Teacher) -> list[dict]:
@@ -229,7 +241,7 @@ def write(made: list[tuple[dict, dict]], out: Path) -> None:
 
 
 def main() -> None:
-    """Study the agents of the folder; write agents.csv, agents_paper.csv, policies and maps."""
+    """Study the agents of the folder that are not committed; write agents.csv, agents_paper.csv, policies and maps."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("agents", type=Path, help="a folder of zips")
     parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
@@ -238,9 +250,12 @@ def main() -> None:
     studies = [Study(*named, path) for named, path in agents_in(given.agents).items()]
     if not studies:
         raise command.CommandError(f"{given.agents}: no .zip below it, expected a folder of agents: AGENTS=folder")
+    made = {study: kept(atomic.sha256(study.zip)) for study in studies}
+    missing = [study for study, known in made.items() if known is None]
     folder = given.out / "build" / "agents"
-    job.make_all(studies, folder, "agents", jobs=given.jobs, unit="agents")
-    write([study.load(folder) for study in studies], given.out)
+    job.make_all(missing, folder, "agents", jobs=given.jobs, unit="agents")
+    made |= {study: study.load(folder) for study in missing}
+    write(list(made.values()), given.out)
 
 
 if __name__ == "__main__":

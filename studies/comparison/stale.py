@@ -44,7 +44,7 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
             for file in beside(task, table):
                 yield file.name, target, file.today
     for name in zoo.TABLES:
-        yield f"{name}.csv", "agents", zoo.today(name)
+        yield f"{name}.csv", "agents", zoo.current(name)[1]
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """`make agents` and `make hub-teacher`: agents in a folder, what is kept of them, and what is refused in one line."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from studies import zoo as agents
 from studies.committed import RESULTS
 from vsp.evaluation import likeness
 from vsp.paper.runs import Experiment
-from vsp.run import command
+from vsp.run import command, listed
 from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells import Faithful
 
@@ -67,14 +68,22 @@ def test_what_is_refused_or_slow_has_a_reason(small, monkeypatch, tmp_path):
 
 
 def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypatch, tmp_path):
+    """First from its files, then from the committed results: there only the agent that has none is left to do."""
     given = folder_of(tmp_path / "given", f"td3-{MOUNTAINCAR}.zip", "sac-Nothing-v0.zip")
     monkeypatch.setattr(sys, "argv", ["x", str(given), "--out", str(tmp_path), "--jobs", "1"])
     agents.main()
-    folder = tmp_path / "data" / "beyond"
+    folder, make, asked = tmp_path / "data" / "beyond", agents.Study.make, []
     written = [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
     monkeypatch.setattr(agents.Study, "make", None)  # nothing is left to do
     agents.main()
-    monkeypatch.setattr(agents, "RESULTS", folder)
+    for where in ("studies.zoo", "studies.committed"):
+        monkeypatch.setattr(f"{where}.RESULTS", folder)
+    shutil.copy(RESULTS / "zoo.csv", folder)
+    listed.list_folder(folder)
+    shutil.rmtree(tmp_path / "build")
+    monkeypatch.setattr(agents.Study, "make", lambda one: (asked.append(one.algorithm), make(one))[1])
+    agents.main()
+    assert asked == ["sac"]
     assert written == [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
     car, unknown = pd.read_csv(folder / "agents.csv").sort_values("task").to_dict("records")
     assert unknown["reason"].startswith("unknown task") and (car["zoo"], car["cells"]) == (93.483, 2)
