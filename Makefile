@@ -92,7 +92,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
 	$(PY) -m vsp.paper.make_runs --study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-	$(PY) -m studies.hub_teacher $${AGENT:+"$$AGENT"} --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	test -z "$$AGENT" || $(PY) -m studies.hub_teacher "$$AGENT" --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
 	$(PY) -m studies.hub_teacher "$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
 agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable
@@ -101,7 +101,7 @@ stale: venv ##- lists committed results of ours made with other settings, teache
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-proofs-teacher: begin venv ##- proofs for a network: an HOUR at most
+proofs-teacher: begin venv ##- proofs for a network: HALF AN HOUR
 	$(PY) -m studies.make_proofs --teacher --out="$$OUT"
 
 ## Study

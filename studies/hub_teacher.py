@@ -10,8 +10,6 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-import pandas as pd
-
 from vsp.paper.ledger import distinct_results, ledger_table
 from vsp.paper.results import write_results
 from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher_outcomes
@@ -21,29 +19,23 @@ from vsp.run import command
 from .zoo import CAR, read
 
 
-def study(agent: Path, runs: Path, *, jobs: int | str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Distil the agent as often as the paper does; return a row per run, and the ledger of the task's results."""
-    experiment = replace(paper_experiment(CAR), teacher=read(agent, CAR))
-    made = make_runs(experiment, range(N_RUNS[CAR]), runs=runs, jobs=jobs)
-    results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
-    return rows_of(experiment, agent.stem, made), distinct_results(ledger_table({CAR: results})).query("task == @CAR")
-
-
 def main() -> None:
-    """Write hub_teacher.csv and hub_teacher_ledger.csv, and print the second."""
+    """Distil the agent as often as the paper does. Write hub_teacher.csv, a row per run, and hub_teacher_ledger.csv,
+    the ledger of the task's results, and print the second."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("agent", type=Path, nargs="?", help="a zip of Stable-Baselines3, trained for this task")
+    parser.add_argument("agent", type=Path, help="a zip of Stable-Baselines3, trained for this task")
     parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/results, runs to OUT/build/study")
     parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
     given = parser.parse_args()
-    if given.agent is None:
-        print("hub_teacher.csv is kept, because it needs the zoo's DDPG agent: make study AGENT=file.zip")
-        return
     try:
-        rows, ledger = study(given.agent, given.out / "build" / "study", jobs=given.jobs)
+        experiment = replace(paper_experiment(CAR), teacher=read(given.agent, CAR))
     except ValueError as error:
         raise command.CommandError(error) from error
-    write_results(rows, "hub_teacher", out=given.out)
+    runs = given.out / "build" / "study"
+    made = make_runs(experiment, range(N_RUNS[CAR]), runs=runs, jobs=given.jobs)
+    results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+    ledger = distinct_results(ledger_table({CAR: results})).query("task == @CAR")
+    write_results(rows_of(experiment, given.agent.stem, made), "hub_teacher", out=given.out)
     write_results(ledger, "hub_teacher_ledger", out=given.out)
     print(ledger[["subject", "quantity", "paper", "here", "low", "high", "verdict"]].to_string(index=False))
 

@@ -54,8 +54,9 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
         point = _score(model, task)
         report(f"{task} seed {seed}: {point}")
         snapshot |= _snapshot(model) | {"curve": [*snapshot["curve"], point]}
-        if task in BEST_OF_CURVE and ("best" not in snapshot or point["mean"] > snapshot["best"]["point"]["mean"]):
-            snapshot["best"] = {"point": point, "policy": copy.deepcopy(snapshot["policy"])}
+        best = max(snapshot["curve"], key=lambda point: point["mean"])  # the first of equally good ones
+        if task not in BEST_OF_CURVE or point is best:
+            snapshot["kept"] = {"point": point, "policy": copy.deepcopy(snapshot["parameters"]["policy"])}
         torch.save(snapshot, content := io.BytesIO())
         sealed.write_sealed(path, content.getvalue())
     return path
@@ -98,9 +99,7 @@ def _snapshot(model) -> dict:
     buffer = model.replay_buffer
     n = buffer.buffer_size if buffer.full else buffer.pos
     return {
-        "policy": model.policy.state_dict(),
-        "actor_optimizer": model.actor.optimizer.state_dict(),
-        "critic_optimizer": model.critic.optimizer.state_dict(),
+        "parameters": model.get_parameters(),
         "buffer": {name: torch.from_numpy(getattr(buffer, name)[:n].copy()) for name in _BUFFER},
         "buffer_at": [buffer.pos, buffer.full],
         "counters": [model.num_timesteps, model._n_updates, model._episode_num],
@@ -109,9 +108,7 @@ def _snapshot(model) -> dict:
 
 def _restore(model, snapshot: dict) -> None:
     """Restore a snapshot into a new model."""
-    model.policy.load_state_dict(snapshot["policy"])
-    model.actor.optimizer.load_state_dict(snapshot["actor_optimizer"])
-    model.critic.optimizer.load_state_dict(snapshot["critic_optimizer"])
+    model.set_parameters(snapshot["parameters"])
     for name, rows in snapshot["buffer"].items():
         getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
     model.replay_buffer.pos, model.replay_buffer.full = snapshot["buffer_at"]

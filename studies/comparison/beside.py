@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -18,17 +18,15 @@ from vsp.rollouts import rollout
 from vsp.run import listed, sealed
 from vsp.run.progress import progress
 from vsp.tasks.base import GOAL
-from vsp_beyond import optimum, simplify
+from vsp_beyond import optimum
 from vsp_beyond.optimum.grid import GridPolicy
 
 from ..committed import BEYOND, RESULTS, differing, write_results
 from ..robots import record_gait
 from . import measure
-from .methods import CHEETAH, LANDER, METHODS, PRESETS, TABLES, TASKS
+from .methods import CHEETAH, METHODS, PRESETS, TABLES, TASKS
 from .rows import Row, jobs_of
 
-LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
-SIMPLIFY_VERSION = 1  # raise it when `simplify` returns a different policy
 GAIT, GAIT_VERSION = {"start": 0.0, "n_steps": 200}, 2  # raise the version when the same policy gives another gait
 OPTIMUM_VERSION = 1  # raise it when the best policies give different returns
 # Tasks, and how much finer the grid is; the difference between two returns of a task shows the grid's error
@@ -72,17 +70,13 @@ def beside(task: str, table: str) -> Iterator[Beside]:
         jobs = tuple(jobs_of(task, table))
         pairs = [(a, b) for a, b in combinations(jobs, 2) if a.size == b.size]
         today = [{**a.about(), "other": b.seed} for a, b in pairs]
-        yield Beside(f"same_{task}.csv", today, partial(_sameness, jobs), jobs)
+        yield Beside(f"same_{task}.csv", today, partial(_sameness, task, pairs, jobs), jobs)
     for name, job in kept_jobs(task, table).items():
         yield Beside(name, [job.provenance], lambda policy: policy, (job,))
         if task == CHEETAH:
             settings = {"policy": job.provenance, "table": "gait", **GAIT}
             today = [provenance(settings, job.provenance["teacher"], GAIT_VERSION)]
             yield Beside(f"gait_{task}.csv", today, partial(record_gait, task=task, **GAIT), (job,))
-    if (task, table) == (LANDER, "methods"):
-        settings = {"task": task, "loss": LOSS, **asdict(PRESETS["tuned"](task))}
-        today = [provenance(settings, load_teacher(task).digest, SIMPLIFY_VERSION)]
-        yield Beside(f"{table}_{task}.policy", today, partial(simplest, task))
     if (task, table) == (TASKS[0], "limit"):
         starts = [measure.REPORT_SEED, measure.N_REPORTED]
         ways = [{"task": name, "finer": finer, "starts": starts} for name, finer in WAYS]
@@ -102,21 +96,14 @@ def kept_jobs(task: str, table: str) -> dict[str, Row]:
     }
 
 
-def _sameness(jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
-    """Compare policies of different seeds, one row per size and pair."""
-    tables, task = {}, jobs[0].task
-    for size in dict.fromkeys(job.size for job in jobs):
-        of_size = {job.seed: policy for job, policy in zip(jobs, policies) if job.size == size}
-        tables[size] = measure.sameness(of_size, load_teacher(task), get_task(task))
-    return pd.concat(tables, names=["size"]).reset_index("size").reset_index(drop=True)
-
-
-def simplest(task: str) -> VoronoiPolicy:
-    """Make the simplest policy that loses at most `LOSS` of the teacher's mean return. Takes about ten minutes."""
-    teacher, config = load_teacher(task), PRESETS["tuned"](task)
-    starts = start_states(get_task(task), config.n_validation, 0)
-    of_teacher = rollout(teacher, get_task(task), starts).returns.mean()
-    return simplify(teacher, task, config, tolerance=LOSS * abs(of_teacher), seed=0)[0]
+def _sameness(name: str, pairs: list[tuple[Row, Row]], jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:
+    """Compare policies of different seeds on `common_states`, one row per pair."""
+    teacher, task, of_job, rows = load_teacher(name), get_task(name), dict(zip(jobs, policies)), []
+    states = measure.common_states(teacher, task)
+    for a, b in pairs:
+        about = {"size": a.size, "seed": a.seed, "other": b.seed}
+        rows.append(about | measure.sameness(of_job[a], of_job[b], teacher, task, states))
+    return pd.DataFrame(rows)
 
 
 def best_returns() -> pd.DataFrame:
@@ -125,18 +112,17 @@ def best_returns() -> pd.DataFrame:
     Columns: task, found (how: "closed form", or the points of the grid), mean, worst, failing (share of the episodes
     that miss the goal; NaN for a task without a goal), longest (steps). Takes about five minutes.
     """
-    return pd.DataFrame([_best(*way) for way in progress(WAYS, "optimum", total=len(WAYS), unit="policies")])
-
-
-def _best(name: str, finer: float) -> dict:
-    """Return the row of a task, from a grid with `finer` times the points in each variable."""
-    task = get_task(name)
-    policy, starts = optimum.best_policy(task, finer=finer), start_states(task, measure.N_REPORTED, measure.REPORT_SEED)
-    result = rollout(policy, task, starts)
-    if isinstance(policy, GridPolicy):
-        returns, how = result.returns, "{} × {} points".format(*policy.grid.shape)
-    else:
-        returns, how = optimum.best_returns(starts), "closed form"
-    failing = np.nan if name == "Pendulum-v1" else np.mean(result.outcomes != GOAL)  # nothing can fail there
-    row = {"task": name, "found": how, "mean": returns.mean(), "worst": returns.min(), "failing": failing}
-    return row | {"longest": result.lengths.max()}
+    rows = []
+    for name, finer in progress(WAYS, "optimum", total=len(WAYS), unit="policies"):
+        task = get_task(name)
+        policy = optimum.best_policy(task, finer=finer)
+        starts = start_states(task, measure.N_REPORTED, measure.REPORT_SEED)
+        result = rollout(policy, task, starts)
+        if isinstance(policy, GridPolicy):
+            returns, how = result.returns, "{} × {} points".format(*policy.grid.shape)
+        else:
+            returns, how = optimum.best_returns(starts), "closed form"
+        failing = np.nan if name == "Pendulum-v1" else np.mean(result.outcomes != GOAL)  # nothing can fail there
+        row = {"task": name, "found": how, "mean": returns.mean(), "worst": returns.min(), "failing": failing}
+        rows.append(row | {"longest": result.lengths.max()})
+    return pd.DataFrame(rows)

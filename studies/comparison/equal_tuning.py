@@ -14,7 +14,7 @@ from vsp_beyond import Faithful, Tuned, faithful_preset, tuned_preset
 from vsp_beyond.few_cells import faithful, tune
 
 from ..committed import read_results
-from .measure import ERROR_SEED, N_ERROR
+from .measure import ERROR_SEED, N_ERROR, in_half_ranges
 from .methods import LONG, TABLES
 from .summary import AS_GOOD, INTERVAL, OURS, TUNED, ahead, method_summary, read_rows, teacher_of
 
@@ -32,7 +32,7 @@ IMITATIONS = {
 ONE_MAP = "one linear map, tuned"
 SOURCES = ("methods", "tuned", "apart", "faithful", "demanded")  # tables that hold all methods of the shipped teacher
 SHOWN = (1, 2, 3, 4, 8, 13)  # sizes of the table
-COLUMNS = ("mean", "low", "high", "r2")
+COLUMNS = ["mean", "low", "high", "r2"]
 
 
 def all_rows(task: str) -> pd.DataFrame:
@@ -52,8 +52,7 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
     """
     teacher, about = load_teacher(task), get_task(task)
     states = visited_states(teacher, about, start_states(about, N_ERROR // about.slowness, ERROR_SEED))
-    half = 0.5 * (about.action_high - about.action_low)
-    constant = float(np.sqrt((np.asarray(teacher.predict(states)[0], dtype=np.float64) / half).var(axis=0).mean()))
+    constant = float(np.sqrt(in_half_ranges(teacher, about, states).var(axis=0).mean()))
     return frame.assign(r2=1.0 - np.square(frame["error_teacher"] / constant))
 
 
@@ -64,18 +63,15 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
     low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
     method of size 1 is one linear map. Sizes without rivals are left out.
     """
-    table, rows = method_summary(frame).set_index(["method", "size"]), []
-    r2 = frame.groupby(["method", "size"])["r2"].median()
+    r2, rows = frame.groupby(["method", "size"])["r2"].median(), []
+    table = method_summary(frame).set_index(["method", "size"]).join(r2)
     for size in SHOWN:
         for name, untuned in IMITATIONS.items():
             tuned, cells = f"{untuned}, tuned", 0 if name == "one linear map" else size
             if (size == 1) != (cells == 0) or (tuned, cells) not in table.index:
                 continue
-            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies"]]}
-            for prefix, method in (("", tuned), ("untuned ", untuned)):
-                scores = table.loc[method, cells].to_dict() | {"r2": r2[method, cells]}
-                row |= {prefix + column: scores[column] for column in COLUMNS}
-            rows.append(row)
+            row = {"size": size, "method": name, **table.loc[tuned, cells][["policies", *COLUMNS]]}
+            rows.append({**row, **table.loc[untuned, cells][COLUMNS].add_prefix("untuned ")})
     compared = pd.DataFrame(rows).groupby("size").filter(lambda part: set(part["method"]) != {OURS})
     return compared.sort_values(["size", "mean"], ascending=[True, False], kind="stable", ignore_index=True)
 
@@ -91,7 +87,7 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
     for size, rows in table[table["size"] > 1].groupby("size"):
         ours, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
         row = {"size": size, **ours[columns], "rival": others["method"].iloc[0]}
-        row |= {f"rival {column}": others[column].iloc[0] for column in columns}
+        row |= others[columns].iloc[0].add_prefix("rival ")
         compared.append(row | {"ahead": ahead(ours, others[["low", "high"]].max())})
     return pd.DataFrame(compared)
 

@@ -18,7 +18,7 @@ from vsp_beyond.few_cells import search
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, joined, spread, temperature_unit
 
 from ..rivals.trees import ObliqueLinearTree, Split
-from .tuning import TreeNumbers, Tunable, in_units
+from .tuning import TunableTree, of_tree
 
 N_RANDOM = 64  # random starts: divided by the size, but at least 8, since descents of few numbers are quick
 N_GREEDY = 4  # additional descents, which start from greedy trees
@@ -40,7 +40,7 @@ def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
 
 
 @threadpool_limits.wrap(limits=1)
-def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> Tunable:
+def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> TunableTree:
     """Return the oblique tree with the least error on states (n, d) and actions (n, m).
 
     The search is that of `search.least_error`. Descents from randomly split trees start at a high temperature. Greedy
@@ -50,15 +50,15 @@ def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, 
     rng, frame = np.random.default_rng(seed), Scaling.of(task, states)
     some = spread(states / frame.scale, search.FEW, rng)
 
-    def grown(kind: type[ObliqueLinearTree], n: int) -> list[Tunable]:
+    def grown(kind: type[ObliqueLinearTree], n: int) -> list[TunableTree]:
         seeds = rng.integers(2**31, size=n).tolist()
         trees = [kind(states, actions, leaves=size, task=task, seed=s, cuts=FEW_CUTS) for s in seeds]
-        return [Tunable(*in_units(tree, frame)) for tree in trees]
+        return [of_tree(tree) for tree in trees]
 
-    def error(tree: Tunable) -> float:
+    def error(tree: TunableTree) -> float:
         return action_error(tree, frame, states, actions)
 
-    def kept(trees: list[Tunable], rounds: tuple) -> list[Tunable]:
+    def kept(trees: list[TunableTree], rounds: tuple) -> list[TunableTree]:
         for stages, n_kept in rounds:
             ends = [descend(tree, states[some], actions[some], stages) for tree in trees]
             trees = sorted(ends, key=error)[:n_kept]
@@ -95,25 +95,26 @@ def action_error(policy: Policy, frame: Scaling, states: np.ndarray, actions: np
 
 
 def descend(
-    tree: Tunable, states: np.ndarray, actions: np.ndarray, stages: range, *, n_iterations: int = search.N_ITERATIONS
-) -> Tunable:
+    tree: TunableTree, states: np.ndarray, actions: np.ndarray, stages: range,
+    *, n_iterations: int = search.N_ITERATIONS,
+) -> TunableTree:  # fmt: skip
     """Fit `tree` by L-BFGS on the expected loss, stage by stage, as `search.descend` fits cells.
 
     The temperature is in units of half a cell's width. This makes a border as soft as one between two codewords.
     """
     labelled = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
-    numbers, unit = tree.numbers, 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
+    unit = 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
     for stage in stages:
-        numbers = _cooler(labelled, numbers, unit, stage, n_iterations)
-    return Tunable(tree.frame, numbers)
+        tree = _cooler(labelled, tree, unit, stage, n_iterations)
+    return tree
 
 
-def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int, n_iterations: int) -> TreeNumbers:
+def _cooler(labelled: LabelledStates, tree: TunableTree, unit: float, stage: int, n_iterations: int) -> TunableTree:
     temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
     bases = search.uncorrelated(labelled, shares(tree, labelled.inputs[:, :-1], temperature))
     vector, shape, cut = tree.vector, tree.maps.shape, tree.vector.size - tree.maps.size
 
-    def move(step: np.ndarray) -> TreeNumbers:
+    def move(step: np.ndarray) -> TunableTree:
         return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
@@ -125,7 +126,7 @@ def _cooler(labelled: LabelledStates, tree: TreeNumbers, unit: float, stage: int
     return move(minimize(loss, np.zeros(len(vector)), jac=True, method="L-BFGS-B", options=options).x)
 
 
-def shares(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
+def shares(tree: TunableTree, states: np.ndarray, temperature: float) -> np.ndarray:
     """Return the share of each of `states` (n, d) that belongs to each leaf: (leaves, n).
 
     As the temperature goes to 0, a state belongs wholly to its own leaf. A share is a product over the nodes on the
@@ -135,12 +136,12 @@ def shares(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndar
     return np.exp(_ways(tree) @ _turns(tree, states, temperature))
 
 
-def _ways(tree: TreeNumbers) -> np.ndarray:
+def _ways(tree: TunableTree) -> np.ndarray:
     """Return which turns lead to each leaf, first the left turns, then the right turns: (leaves, 2 nodes)."""
     return np.hstack([tree.sides < 0, tree.sides > 0]).astype(np.float64)
 
 
-def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndarray:
+def _turns(tree: TunableTree, states: np.ndarray, temperature: float) -> np.ndarray:
     """Return the log shares that turn left at each node, then those that turn right: (2 nodes, n)."""
     logits = np.clip((tree.directions @ states.T - tree.thresholds[:, None]) / temperature, -CERTAIN, CERTAIN)
     rest = np.log1p(np.exp(-np.abs(logits)))
@@ -148,7 +149,7 @@ def _turns(tree: TreeNumbers, states: np.ndarray, temperature: float) -> np.ndar
 
 
 def expected_loss(
-    tree: TreeNumbers, labelled: LabelledStates, temperature: float, clip_slope: float
+    tree: TunableTree, labelled: LabelledStates, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
     """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
 

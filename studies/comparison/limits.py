@@ -66,11 +66,15 @@ def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Data
     policies that are at the limit).
     """
     rows = read_rows(task, folder, table="limit")
-    by_size, is_near = rows.groupby("size"), rows["mean"] >= near(task, folder)
-    table = method_summary(rows).set_index("size").sort_index()[["policies", *INTERVAL]]
-    table = table.assign(least=by_size["mean"].min(), most=by_size["mean"].max())
-    table = table.assign(regret=best_mean(task, folder) - table["mean"], failing=by_size["failing"].max())
+    table, is_near = _with_extremes(rows, "size").sort_index(), rows["mean"] >= near(task, folder)
+    table.insert(table.columns.get_loc("failing"), "regret", best_mean(task, folder) - table["mean"])
     return table.assign(near=is_near.groupby(rows["size"]).mean()).reset_index()
+
+
+def _with_extremes(rows: pd.DataFrame, by: str) -> pd.DataFrame:
+    """Return policies, mean, low, high, least, most and failing (the highest of a seed) by the column `by`."""
+    table, groups = method_summary(rows).set_index(by)[["policies", *INTERVAL]], rows.groupby(by)
+    return table.assign(least=groups["mean"].min(), most=groups["mean"].max(), failing=groups["failing"].max())
 
 
 def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
@@ -81,10 +85,7 @@ def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.Dat
     """
     rows = pd.concat([read_rows(task, folder, table=table) for table in ("methods", "starts", "limit")])
     rows = rows[(rows["size"] == PRESETS["limit"](task).n_cells) & rows["method"].isin(SEARCHES)]
-    table, by_method = method_summary(rows).set_index("method")[["policies", *INTERVAL]], rows.groupby("method")
-    extremes = {"least": by_method["mean"].min(), "most": by_method["mean"].max()}
-    table = table.assign(**extremes, failing=by_method["failing"].max())
-    return table.loc[list(SEARCHES)].reset_index()
+    return _with_extremes(rows, "method").loc[list(SEARCHES)].reset_index()
 
 
 def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:

@@ -7,10 +7,7 @@ LunarLander, are measured from new starts. The longer search for one map was add
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
-import pandas as pd
 
 from vsp import Policy, Task, VoronoiPolicy, start_states
 from vsp.rollouts import rollout, visited_states
@@ -64,9 +61,14 @@ def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray
 
     It is in units of half the action range.
     """
-    states, half = visited_states(by, task, starts), 0.5 * (task.action_high - task.action_low)
-    gaps = (np.asarray(policy.predict(states)[0], dtype=np.float64) - teacher.predict(states)[0]) / half
-    return float(np.sqrt(np.square(gaps).mean()))
+    states = visited_states(by, task, starts)
+    return _rmse(in_half_ranges(policy, task, states), in_half_ranges(teacher, task, states))
+
+
+def in_half_ranges(policy: Policy, task: Task, states: np.ndarray) -> np.ndarray:
+    """Return the actions (n, m) of a policy in `states` (n, d), in units of half the action range."""
+    half = 0.5 * (task.action_high - task.action_low)
+    return np.asarray(policy.predict(states)[0], dtype=np.float64) / half
 
 
 def fidelity(policy: Policy, teacher: Policy, task: Task, states: np.ndarray | None = None) -> dict[str, float]:
@@ -76,9 +78,8 @@ def fidelity(policy: Policy, teacher: Policy, task: Task, states: np.ndarray | N
     states where an action is off by more than a tenth of its range).
     """
     states = common_states(teacher, task) if states is None else states
-    half = 0.5 * (task.action_high - task.action_low)
-    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
-    errors = np.square(policy.predict(states)[0] / half - wanted)
+    wanted = in_half_ranges(teacher, task, states)
+    errors = np.square(in_half_ranges(policy, task, states) - wanted)
     spread = np.square(wanted - wanted.mean(axis=0))
     varies = spread.any(axis=0)  # R² is not defined for a constant coordinate
     worst = (errors.mean(axis=0)[varies] / spread.mean(axis=0)[varies]).max()
@@ -93,27 +94,22 @@ def common_states(teacher: Policy, task: Task) -> np.ndarray:
     return states[np.random.default_rng(ERROR_SEED).permutation(len(states))[:N_COMMON]]
 
 
-def sameness(policies: dict[int, VoronoiPolicy], teacher: Policy, task: Task) -> pd.DataFrame:
-    """Compare every pair of `policies` (by seed) on `common_states`, one row per pair.
+def sameness(
+    one: VoronoiPolicy, other: VoronoiPolicy, teacher: Policy, task: Task, states: np.ndarray
+) -> dict[str, float]:
+    """Compare two policies on `states` (n, d).
 
-    Columns: seed, other; index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells,
-    about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their
-    actions, divided by that from the teacher's actions (mean over the two policies).
+    Keys: index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells, about 0 for
+    unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their actions,
+    divided by that from the teacher's actions (mean over the two policies).
     """
     from sklearn.metrics import adjusted_rand_score
 
-    states, half = common_states(teacher, task), 0.5 * (task.action_high - task.action_low)
-    wanted = np.asarray(teacher.predict(states)[0], dtype=np.float64) / half
-    cells = {seed: policy.cells(states) for seed, policy in policies.items()}
-    actions = {seed: policy.predict(states)[0] / half for seed, policy in policies.items()}
-    rows = []
-    for a, b in combinations(policies, 2):
-        one_cell = min(len(policies[a]), len(policies[b])) == 1
-        index = np.nan if one_cell else adjusted_rand_score(cells[a], cells[b])
-        to_teacher = 0.5 * (_rmse(actions[a], wanted) + _rmse(actions[b], wanted))
-        ratio = _rmse(actions[a], actions[b]) / to_teacher if to_teacher else np.nan
-        rows.append({"seed": a, "other": b, "index": index, "ratio": ratio})
-    return pd.DataFrame(rows)
+    first, second, wanted = (in_half_ranges(policy, task, states) for policy in (one, other, teacher))
+    one_cell = min(len(one), len(other)) == 1
+    index = np.nan if one_cell else adjusted_rand_score(one.cells(states), other.cells(states))
+    to_teacher = 0.5 * (_rmse(first, wanted) + _rmse(second, wanted))
+    return {"index": index, "ratio": _rmse(first, second) / to_teacher if to_teacher else np.nan}
 
 
 def _rmse(actions: np.ndarray, others: np.ndarray) -> float:

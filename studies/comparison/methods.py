@@ -52,7 +52,7 @@ TUNED_SIZES = (2, 3, 4, 8, 13)  # of other methods tuned as ours; "one linear ma
 
 @dataclass(frozen=True)
 class Entry:
-    """How a policy is made: `make(budget, size, seed, **settings)`."""
+    """How a policy is made: `make(teacher, task, config, seed, **settings)`, with the size in the config."""
 
     make: Callable[..., Policy]
     reads: tuple[str, ...] = ()  # settings of the preset that the policy depends on
@@ -225,6 +225,7 @@ def method(name: str, size: int) -> Method:
     entry = METHODS[name]
 
     def make(agent: Policy, task: Task, data: None, seed: int) -> Policy:
-        return entry.make(makers.Budget(agent, task, PRESETS[entry.preset](task)), size, seed, **entry.settings)
+        config = replace(PRESETS[entry.preset](task), n_cells=max(1, size))
+        return entry.make(agent, task, config, seed, **entry.settings)
 
     return Method(make, name=name, version=entry.version, settings=lambda task: {"size": size, **entry.read(task.name)})

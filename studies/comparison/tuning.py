@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +13,17 @@ from vsp.rollouts import visited_states
 from vsp.subpolicies import linear_outputs
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import Candidates, tune
-from vsp_beyond.few_cells.units import ScaledCells, Scaling, joined, parted
+from vsp_beyond.few_cells.units import Scaling, joined, parted
 
 from ..rivals.small_network import SmallNetwork
 from ..rivals.trees import LinearTree, ObliqueLinearTree
 
 
 @dataclass(frozen=True)
-class TreeNumbers:
-    """The splits and the maps of a tree. A tree with one leaf is one linear map."""
+class TunableTree:
+    """The splits and the maps of a tree, in the units of `frame`. A tree with one leaf is one linear map."""
 
+    frame: Scaling
     sides: np.ndarray  # (leaves, nodes): 1 where the path to a leaf turns right, -1 where it turns left, else 0
     directions: np.ndarray  # (nodes, d)
     thresholds: np.ndarray  # (nodes,) a state beyond its threshold turns right
@@ -43,7 +45,7 @@ class TreeNumbers:
         directions = [self.directions] if self.oblique else []
         return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
 
-    def like(self, vector: np.ndarray) -> TreeNumbers:
+    def like(self, vector: np.ndarray) -> TunableTree:
         """Return the same structure with the numbers of `vector`."""
         *directions, thresholds, maps = parted(vector, self.parts)
         if self.constant:
@@ -51,64 +53,35 @@ class TreeNumbers:
         new = {"directions": directions[0]} if directions else {}
         return replace(self, thresholds=thresholds, maps=maps, **new)
 
-    def outputs(self, inputs: np.ndarray) -> np.ndarray:
-        """Actions (n, m), not limited, for inputs (n, d + 1)."""
-        turns = np.where(inputs[:, :-1] @ self.directions.T > self.thresholds, 1.0, -1.0)
+    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
+        """Actions (n, m) for observations (n, d), limited to the action box."""
+        states = self.frame.inputs(obs)[:, :-1]
+        turns = np.where(states @ self.directions.T > self.thresholds, 1.0, -1.0)
         wrong = np.abs(self.sides).sum(axis=1) - turns @ self.sides.T  # 0 at the leaf that the state reaches
-        return linear_outputs(inputs[:, :-1], self.maps[wrong.argmin(axis=1)])
+        return self.frame.actions(linear_outputs(states, self.maps[wrong.argmin(axis=1)])), None
 
 
 @dataclass(frozen=True)
-class NetworkNumbers:
-    """The weights of a network with one hidden layer of tanh units."""
+class TunableNetwork:
+    """The weights of a network with one hidden layer of tanh units, in the units of `frame`."""
 
+    frame: Scaling
     hidden: np.ndarray  # (d + 1, units): weights, then biases
     output: np.ndarray  # (units + 1, m)
-
-    def __len__(self) -> int:  # it has no cells
-        return 0
 
     @property
     def vector(self) -> np.ndarray:
         """All tuned numbers, as one vector."""
         return joined([self.hidden, self.output])
 
-    def like(self, vector: np.ndarray) -> NetworkNumbers:
+    def like(self, vector: np.ndarray) -> TunableNetwork:
         """Return the same structure with the numbers of `vector`."""
-        return NetworkNumbers(*parted(vector, [self.hidden, self.output]))
-
-    def outputs(self, inputs: np.ndarray) -> np.ndarray:
-        """Actions (n, m), not limited, for inputs (n, d + 1)."""
-        return np.tanh(inputs @ self.hidden) @ self.output[:-1] + self.output[-1]
-
-
-Numbers = TreeNumbers | NetworkNumbers  # what is tuned, in the units of a `Scaling`: the structure is fixed
-
-
-@dataclass(frozen=True)
-class Tunable:
-    """The policy with `numbers` in the units of `frame`."""
-
-    frame: Scaling
-    numbers: Numbers
-
-    def __len__(self) -> int:
-        return len(self.numbers)
+        return TunableNetwork(self.frame, *parted(vector, [self.hidden, self.output]))
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
         """Actions (n, m) for observations (n, d), limited to the action box."""
-        return self.frame.actions(self.numbers.outputs(self.frame.inputs(obs))), None
-
-
-Fitted = VoronoiPolicy | Tree | LinearTree | SmallNetwork | Tunable  # what can be tuned
-
-
-class TunableFrame(Scaling):
-    """A `Scaling` for the numbers of a policy that is not made of Voronoi cells."""
-
-    def policy(self, cells: Numbers) -> Tunable:  # type: ignore[override]  # not of cells
-        """Return the numbers `cells` as a policy in the units of the task."""
-        return Tunable(self, cells)
+        outputs = np.tanh(self.frame.inputs(obs) @ self.hidden) @ self.output[:-1] + self.output[-1]
+        return self.frame.actions(outputs), None
 
 
 def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) -> Policy:
@@ -120,47 +93,53 @@ def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) 
     streams = np.random.SeedSequence(seed).spawn(5)  # as in `distill_tuned`
     starts, _, _, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
-    frame, numbers = in_units(start, Scaling.of(task, states))
-    candidates = Candidates(frame, task.start(validation, config.n_validation), config.failure_penalty)
-    candidates.add("fit", 0, numbers)
-    for snapshot in tune(frame, numbers, config, search):
+    frame = Scaling.of(task, states)
+    if isinstance(start, VoronoiPolicy) and len(start) > 1:
+        frame = replace(frame, scale=start.scale)  # the scale is part of its borders
+        first, policy_of = frame.cells(start), frame.policy
+    else:
+        first, policy_of = tunable(start, frame), _itself
+    candidates = Candidates(policy_of, task, task.start(validation, config.n_validation), config.failure_penalty)
+    candidates.add("fit", 0, first)
+    for snapshot in tune(policy_of, task, first, config, search):
         candidates.add("tune", 0, snapshot)
-    return frame.policy(candidates.best)
+    return policy_of(candidates.best)
 
 
-def in_units(policy: Fitted, frame: Scaling) -> tuple[Scaling, Numbers | ScaledCells]:
-    """Return a frame that turns numbers into policies, and the numbers of `policy` in it.
+def _itself(cells: Any) -> Any:
+    return cells
 
-    The frame has the policy's own scale, or that of `frame` if the policy has none.
+
+def tunable(policy: VoronoiPolicy | Tree | LinearTree | SmallNetwork, frame: Scaling) -> Any:
+    """Return one linear map or a tree as a `TunableTree`, and a network as a `TunableNetwork`.
+
+    It has the policy's own units, or those of `frame` if the policy has none.
     """
-    if isinstance(policy, Tunable):
-        return policy.frame, policy.numbers
-    if isinstance(policy, VoronoiPolicy) and len(policy) > 1:
-        scaled = replace(frame, scale=policy.scale)  # the scale is part of its borders
-        return scaled, scaled.cells(policy)
-    units = policy if isinstance(policy, LinearTree | SmallNetwork) else frame
-    tunable = TunableFrame(frame.task, units.centre, units.scale)
     if isinstance(policy, VoronoiPolicy):
-        maps, none, d = tunable.cells(policy).coefficients, np.zeros(0), len(frame.centre)
-        return tunable, TreeNumbers(none[None], np.zeros((0, d)), none, maps, oblique=False, constant=False)
+        maps, none, d = frame.cells(policy).coefficients, np.zeros(0), len(frame.centre)
+        return TunableTree(frame, none[None], np.zeros((0, d)), none, maps, oblique=False, constant=False)
     if isinstance(policy, Tree):
-        return tunable, _of_cart(policy.model.tree_, tunable)
+        return _of_cart(policy.model.tree_, frame)
     if isinstance(policy, LinearTree):
-        return tunable, _of_tree(policy, tunable)
+        return of_tree(policy)
+    own = Scaling(policy.task, policy.centre, policy.scale)
     hidden, output = (np.vstack(layer) for layer in policy.layers)
-    return tunable, NetworkNumbers(hidden, tunable.coefficients(output))
+    return TunableNetwork(own, hidden, own.coefficients(output))
 
 
-def _of_tree(tree: LinearTree, frame: Scaling) -> TreeNumbers:
+def of_tree(tree: LinearTree) -> TunableTree:
+    """Return a tree that can be tuned, in the units of `tree`."""
+    frame = Scaling(tree.task, tree.centre, tree.scale)
     inner, ends, sides = _ways([node.children for node in tree.nodes])
     splits = [tree.nodes[i].split for i in inner]
     directions = np.array([split.direction for split in splits]).reshape(len(inner), len(frame.centre))
     thresholds = np.array([split.threshold for split in splits])
     oblique = isinstance(tree, ObliqueLinearTree)
-    return TreeNumbers(sides, directions, thresholds, frame.coefficients(tree.maps[ends]), oblique, tree.constant)
+    maps = frame.coefficients(tree.maps[ends])
+    return TunableTree(frame, sides, directions, thresholds, maps, oblique, tree.constant)
 
 
-def _of_cart(tree, frame: Scaling) -> TreeNumbers:
+def _of_cart(tree, frame: Scaling) -> TunableTree:
     """Return the numbers of a tree that is given by scikit-learn's arrays."""
     pairs = zip(tree.children_left.tolist(), tree.children_right.tolist())
     inner, ends, sides = _ways([pair if pair[0] >= 0 else () for pair in pairs])
@@ -168,7 +147,7 @@ def _of_cart(tree, frame: Scaling) -> TreeNumbers:
     thresholds = (tree.threshold[inner] - frame.centre[axes]) / frame.scale[axes]
     maps = np.zeros((len(ends), d + 1, m))
     maps[:, -1] = frame.outputs(tree.value[ends, :, 0])
-    return TreeNumbers(sides, np.eye(d)[axes], thresholds, maps, oblique=False, constant=True)
+    return TunableTree(frame, sides, np.eye(d)[axes], thresholds, maps, oblique=False, constant=True)
 
 
 def _ways(children: list[tuple[int, ...]]) -> tuple[list[int], list[int], np.ndarray]:

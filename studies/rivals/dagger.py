@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vsp import Policy, Task, get_task
+from vsp import Policy, Task
 from vsp.rollouts import rollout, visited_states
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import score
@@ -14,13 +14,12 @@ from vsp_beyond.few_cells.tune import score
 Fit = Callable[[np.ndarray, np.ndarray], Policy]  # a policy from states (n, d) and actions (n, m)
 
 
-def dagger(fits: Sequence[Fit], teacher: Policy, task: str | Task, *, rounds: Tuned, seed: int) -> Policy:
+def dagger(fits: Sequence[Fit], teacher: Policy, task: Task, *, rounds: Tuned, seed: int) -> Policy:
     """Return the best of the policies fitted to the teacher's states, then also to states that fitted policies visit.
 
     `rounds` sets episodes, corrections and validation. All `fits` are tried in the first round, which helps if they
     differ in their random numbers; only the one with the best first policy is corrected.
     """
-    task = get_task(task)
     rng, validation_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
     validation = task.start(validation_rng, rounds.n_validation)
     policy, states = teacher, np.zeros((0, len(task.low)))

@@ -15,6 +15,8 @@ from vsp.rollouts import standard
 from vsp.subpolicies import linear_outputs
 
 CUTS = 255  # quantiles of a node at which a split may lie
+# Of oblique splits: states for comparing directions, and quantiles; directions per round; rounds
+_SEARCHED, _FEW_CUTS, _TRIED, _ROUNDS = 2000, 31, 12, 4
 
 
 @dataclass(frozen=True)
@@ -144,22 +146,14 @@ class ObliqueLinearTree(LinearTree):
         super().__init__(states, actions, leaves=leaves, task=task, constant=constant)
 
     def split(self, inputs: np.ndarray, actions: np.ndarray) -> Split:
-        """Find the best oblique split of a node, with a map on each side."""
-        return _oblique(inputs, actions, self._rng, cuts=self._cuts, constant=self.constant)
-
-
-# States for comparing directions, and quantiles; directions per round; rounds
-_SEARCHED, _FEW_CUTS, _TRIED, _ROUNDS = 2000, 31, 12, 4
-
-
-def _oblique(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator, *, cuts: int, constant: bool) -> Split:
-    """Find the best split among directions of several kinds; perturb the best one in rounds, by less in each."""
-    some, stump = rng.permutation(len(inputs))[:_SEARCHED], partial(_stump, cuts=_FEW_CUTS, constant=constant)
-    best = stump(inputs[some], actions[some], _directions(inputs[some], actions[some], rng))
-    for size in np.geomspace(1.0, 0.1, _ROUNDS):
-        moved = _unit(best.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
-        best = stump(inputs[some], actions[some], np.vstack([best.direction, moved]))
-    return _stump(inputs, actions, best.direction[None], cuts=cuts, constant=constant)
+        """Find the best split among directions of several kinds; perturb the best one in rounds, by less in each."""
+        rng, rows = self._rng, self._rng.permutation(len(inputs))[:_SEARCHED]
+        stump = partial(_stump, inputs[rows], actions[rows], cuts=_FEW_CUTS, constant=self.constant)
+        best = stump(_directions(inputs[rows], actions[rows], rng))
+        for size in np.geomspace(1.0, 0.1, _ROUNDS):
+            moved = _unit(best.direction + size * rng.normal(size=(_TRIED, inputs.shape[1])))
+            best = stump(np.vstack([best.direction, moved]))
+        return _stump(inputs, actions, best.direction[None], cuts=self._cuts, constant=self.constant)
 
 
 def _directions(inputs: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> np.ndarray:

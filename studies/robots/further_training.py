@@ -10,7 +10,7 @@ import numpy as np
 
 from vsp import Policy
 from vsp.teachers.teacher import Teacher
-from vsp_beyond.few_cells.units import Scaling
+from vsp_beyond.few_cells.units import ScaledCells, Scaling
 
 from .imitation import most_rewarding
 from .settings import Walking
@@ -24,19 +24,19 @@ def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *,
     """Return the most rewarding of the first policy and `N_CHOICES` policies during training. Same arguments, same
     policy.
 
-    `numbers`: `ScaledCells`, or other numbers that a `SoftActor` takes. Raises ValueError for a bad seed and for a
-    teacher without critics.
+    `numbers`: `ScaledCells`, or a tree in these units that a `SoftActor` takes. The teacher has critics.
     """
     import torch
 
+    policy_of = frame.policy if isinstance(numbers, ScaledCells) else lambda tree: tree
     start, noise = np.random.SeedSequence(seed).spawn(2)
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)  # Adam's moments of unused weights decay into denormal numbers, which are slow
     try:
-        model, tried = _model(frame, numbers, teacher, config, int(noise.generate_state(1)[0])), [frame.policy(numbers)]
+        model, tried = _model(frame, numbers, teacher, config, int(noise.generate_state(1)[0])), [policy_of(numbers)]
         for _ in range(N_CHOICES):
             model.learn(max(1, config.n_steps // N_CHOICES), reset_num_timesteps=False, log_interval=None)
-            tried.append(frame.policy(model.actor.mu.numbers))
+            tried.append(policy_of(model.actor.mu.numbers))
     finally:
         torch.set_flush_denormal(False)  # other code in this process may need them
     return most_rewarding(tried, frame.task, config.n_validation, np.random.default_rng(start))
@@ -68,8 +68,6 @@ def _model(frame: Scaling, numbers, teacher: Teacher, config: Walking, seed: int
                 for group in optimizer.param_groups:
                     group["lr"] = rate
 
-    if not teacher.critic:
-        raise ValueError(f"{type(teacher).__name__} has no critics, expected qf0.0.weight, ...: load one with them")
     critics = {name: torch.tensor(value) for name, value in teacher.critic.items()}
     biases = sorted(name for name in critics if name.startswith("qf0") and name.endswith("bias"))  # layer by layer
     hidden = [len(critics[name]) for name in biases[:-1]]

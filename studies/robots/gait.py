@@ -25,24 +25,22 @@ def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_step
     for step in range(min(n_steps, task.max_steps)):
         observed, env = task.observe(states), states[0].env.unwrapped
         row: dict[str, float] = {"step": step, "cell": int(policy.cells(observed)[0]), **_feet(env)}
-        for name, ends in _lines(env).items():
-            row |= {f"{name} {end}": round(float(value), DIGITS) for end, value in zip(("x0", "z0", "x1", "z1"), ends)}
-        inputs = zip(task.inputs, observed[0], strict=True)
-        rows.append(row | {f"input {name}": round(float(value), DIGITS) for name, value in inputs})
+        inputs = {f"input {name}": value for name, value in zip(task.inputs, observed[0], strict=True)}
+        rows.append(row | {name: round(float(value), DIGITS) for name, value in (_lines(env) | inputs).items()})
         states, _, outcomes = task.step(states, policy.predict(observed)[0])
         if outcomes[0] != RUNNING:
             break
     return pd.DataFrame(rows)
 
 
-def _lines(env) -> dict[str, np.ndarray]:
-    """Return the capsules of MuJoCo's model, each as x, z of both ends of its axis. (4,)"""
+def _lines(env) -> dict[str, float]:
+    """Return the capsules of MuJoCo's model, each as x, z of both ends of its axis."""
     lines = {}
     for i in range(env.model.ngeom):
         if (name := env.model.geom(i).name) != "floor":
             along = env.data.geom_xmat[i].reshape(3, 3)[:, 2] * env.model.geom_size[i, 1]
             start, end = env.data.geom_xpos[i] - along, env.data.geom_xpos[i] + along
-            lines[name] = np.array([start[0], start[2], end[0], end[2]])
+            lines |= {f"{name} x0": start[0], f"{name} z0": start[2], f"{name} x1": end[0], f"{name} z1": end[2]}
     return lines
 
 

@@ -128,7 +128,7 @@ def test_failures_cost_their_penalty():
 
 
 def test_the_first_of_the_best_candidates_is_kept():
-    candidates = Candidates(UNSCALED, np.array([[0.9, 0.05], [0.05, 0.9]]), 1000.0)
+    candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.array([[0.9, 0.05], [0.05, 0.9]]), 1000.0)
     still, home = (ScaledCells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
     for restart, cells in enumerate((still, home, ScaledCells(home.codewords + 1, home.coefficients))):
         candidates.add("fit", restart, cells)
@@ -141,7 +141,7 @@ def test_the_first_of_the_best_candidates_is_kept():
 def test_the_penalty_decides_between_a_higher_mean_and_fewer_failures(monkeypatch, penalty, best):
     results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
     monkeypatch.setattr("vsp_beyond.few_cells.tune.rollout", lambda *_: next(results))
-    candidates = Candidates(UNSCALED, np.zeros((2, 2)), penalty)
+    candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.zeros((2, 2)), penalty)
     for restart in range(2):
         candidates.add("fit", restart, SLOW)
     assert candidates.best_restart == best
@@ -150,7 +150,7 @@ def test_the_penalty_decides_between_a_higher_mean_and_fewer_failures(monkeypatc
 def test_tuning_returns_more():
     """It pays to be faster."""
     config = dataclasses.replace(SMALL, n_cells=1, n_generations=20, tuning_step=0.2, failure_penalty=0.0)
-    snapshots = list(tune(UNSCALED, SLOW, config, np.random.default_rng(0)))
+    snapshots = list(tune(UNSCALED.policy, UNSCALED.task, SLOW, config, np.random.default_rng(0)))
     assert len(snapshots) == SNAPSHOTS
     policies = map(UNSCALED.policy, (SLOW, snapshots[-1]))
     before, after = (rollout_from_seed(policy, SIMPLEGOAL, 500, seed=9).returns.mean() for policy in policies)

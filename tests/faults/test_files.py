@@ -87,7 +87,7 @@ def of_study(path: Path) -> object:
 KINDS = {
     "run": Kind(run, lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2])),
     "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
-    "policy": Kind(copied("beyond/methods_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
+    "policy": Kind(copied("beyond/limit_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
     "checkpoint of a training": Kind(checkpoint, training.read_checkpoint),
     "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
     "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),

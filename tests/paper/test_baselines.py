@@ -54,7 +54,7 @@ def test_dagger_labels_the_states_that_the_policy_visits():
         return Tree(states, actions, leaves=3)
 
     teacher = TEACHERS[SIMPLEGOAL]
-    dagger([fit], teacher, SIMPLEGOAL, rounds=ROUNDS, seed=0)
+    dagger([fit], teacher, get_task(SIMPLEGOAL), rounds=ROUNDS, seed=0)
     assert len(seen) == 3 and all(np.array_equal(a, teacher.predict(s)[0]) for s, a in seen)
     for (fewer, _), (more, _) in zip(seen, seen[1:]):
         assert np.array_equal(more[: len(fewer)], fewer) and len(more) > len(fewer) + 10
@@ -71,10 +71,12 @@ def test_dagger_keeps_the_best_on_the_validation_starts():
     def fit(states, actions):
         return VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [next(gains)], [0.0]]], task=MOUNTAINCAR)
 
-    kept = dagger([fit], TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0)
+    kept = dagger([fit], TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0)
     assert kept.coefficients[0, 1, 0] == 40.0
     gains = iter([12.0, -40.0, 40.0])
-    assert dagger([fit], TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0).coefficients[0, 1, 0] == 12.0
+    assert (
+        dagger([fit], TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0).coefficients[0, 1, 0] == 12.0
+    )
 
 
 def test_of_several_fits_the_one_with_the_best_first_policy_goes_on():
@@ -85,7 +87,7 @@ def test_of_several_fits_the_one_with_the_best_first_policy_goes_on():
         return VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [gain], [0.0]]], task=MOUNTAINCAR)
 
     fits = [functools.partial(fit, gain=gain) for gain in (-40.0, 40.0, 0.0)]
-    kept = dagger(fits, TEACHERS[MOUNTAINCAR], MOUNTAINCAR, rounds=ROUNDS, seed=0)
+    kept = dagger(fits, TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0)
     assert made == [-40.0, 40.0, 0.0, 40.0, 40.0] and kept.coefficients[0, 1, 0] == 40.0
 
 

@@ -1,4 +1,5 @@
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -8,7 +9,6 @@ from support import SIMPLEGOAL
 
 from studies.comparison import equal_tuning, measure
 from studies.comparison.equal_tuning import budgets, closest, equal_budget, leaders, with_r2
-from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS
 from vsp import get_task, load_teacher, start_states, visited_states
 from vsp_beyond import faithful_preset, tuned_preset
@@ -57,7 +57,7 @@ def test_a_size_without_rivals_is_left_out(rows):
 def test_r2_follows_from_the_action_error_and_from_the_states():
     """By two routes: from the error of a policy, and from its actions."""
     task, teacher = get_task(SIMPLEGOAL), load_teacher(SIMPLEGOAL)
-    policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 8, 0)
+    policy = METHODS["CART"].make(teacher, task, replace(SMALL, n_cells=8), 0)
     starts = start_states(task, measure.N_ERROR, measure.ERROR_SEED)
     frame = pd.DataFrame({"error_teacher": [measure.action_error(policy, teacher, task, starts, by=teacher), 0.0]})
     states = visited_states(teacher, task, starts)
@@ -90,7 +90,7 @@ def test_a_budget_is_what_is_played(monkeypatch, name):
         count = counting("teacher", module.visited_states, lambda policy: policy is teacher)
         monkeypatch.setattr(module, "visited_states", count)
     how = METHODS[name]
-    how.make(Budget(teacher, task, SMALL), 0 if how.sizes == (0,) else 2, 0, **how.settings)
+    how.make(teacher, task, SMALL, 0, **how.settings)
     counted = equal_tuning.episodes(name, SMALL, SIMPLEGOAL)
     assert {kind: counted[kind] for kind in played} == played
 

@@ -4,7 +4,7 @@ from support import SIMPLEGOAL, examples
 
 from studies.comparison import global_fit
 from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells
-from studies.comparison.tuning import Tunable, in_units
+from studies.comparison.tuning import of_tree
 from studies.rivals.trees import ObliqueLinearTree, Split
 from vsp import VoronoiPolicy, get_task
 from vsp_beyond.few_cells import search
@@ -29,11 +29,11 @@ def kinked(n=600, seed=0):
 
 
 def tree_of(leaves=4, seed=0, kind=RandomTree):
-    """A tree, its frame, its numbers and the labelled states."""
+    """A tree, as it is tuned, and the labelled states."""
     states, actions = examples(SIMPLEGOAL)
-    tree, frame = kind(states, actions, leaves=leaves, task=TASK, seed=seed), Scaling.of(TASK, states)
-    own, numbers = in_units(tree, frame)
-    return tree, own, numbers, LabelledStates(own.inputs(states), own.outputs(2 * actions))  # some beyond the limits
+    tree = kind(states, actions, leaves=leaves, task=TASK, seed=seed)
+    frame = Scaling.of(TASK, states)
+    return tree, of_tree(tree), LabelledStates(frame.inputs(states), frame.outputs(2 * actions))  # some beyond limits
 
 
 def error(policy, states, actions):
@@ -44,7 +44,7 @@ def error(policy, states, actions):
 
 
 def test_the_gradient_is_that_of_finite_differences():
-    _, _, numbers, seen = tree_of()
+    _, numbers, seen = tree_of()
     about = {"temperature": 0.3, "clip_slope": 0.1}
     vector = numbers.vector + 0.1 * np.random.default_rng(1).normal(size=numbers.vector.size)
     steps = 1e-6 * np.eye(len(vector))
@@ -54,12 +54,12 @@ def test_the_gradient_is_that_of_finite_differences():
 
 @pytest.mark.parametrize("leaves", [1, 2, 5])
 def test_in_the_cold_the_soft_tree_is_the_hard_one(leaves):
-    tree, frame, numbers, seen = tree_of(leaves)
+    _, numbers, seen = tree_of(leaves)
     soft = global_fit.shares(numbers, seen.inputs[:, :-1], 1e-7)
     assert np.allclose(soft.sum(axis=0), 1) and np.allclose(soft.max(axis=0), 1)
     loss, _ = expected_loss(numbers, seen, temperature=1e-7, clip_slope=0.0)
     states, _ = examples(SIMPLEGOAL)
-    outputs = frame.outputs(Tunable(frame, numbers).predict(states)[0])
+    outputs = numbers.frame.outputs(numbers.predict(states)[0])
     assert loss == pytest.approx(np.square(outputs - seen.actions).mean())
     assert global_fit.shares(numbers, seen.inputs[:, :-1], 0.5).sum(axis=0) == pytest.approx(1.0)
 
@@ -75,7 +75,7 @@ def test_a_random_tree_has_states_in_every_leaf():
 def test_a_descent_finds_a_planted_border():
     states, actions = kinked()
     start = ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=0)
-    begun = Tunable(*in_units(start, Scaling.of(TASK, states)))
+    begun = of_tree(start)
     ended = descend(begun, states, actions, range(10, search.N_STAGES))
     assert error(ended, states, actions) < 0.2 * error(begun, states, actions)
     assert len(ended) == 2

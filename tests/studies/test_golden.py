@@ -13,7 +13,6 @@ import pytest
 from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 
 from studies.comparison import beside, measure
-from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, OF_PRESET
 from studies.robots import Walking
 from vsp import algorithms, get_task
@@ -89,8 +88,8 @@ def by_method(name):
     method, found = METHODS[name], {"at length": AT_LENGTH.get(name, 0)}
     teachers = TEACHERS | ({SIMPLEGOAL: CriticalTeacher()} if method.table == "robots" else {})
     for task in method.tasks or (SIMPLEGOAL,):
-        budget = Budget(teachers.get(task), get_task(task), PRESETS[method.preset])
-        found[task] = actions(method.make(budget, 3, 0, **method.settings), task)
+        policy = method.make(teachers.get(task), get_task(task), PRESETS[method.preset], 0, **method.settings)
+        found[task] = actions(policy, task)
     return found
 
 
@@ -110,7 +109,7 @@ def beside_a_run():
 def by_measure():
     """Of a tree, by what is reported of it."""
     task, teacher = get_task(SIMPLEGOAL), TEACHERS[SIMPLEGOAL]
-    return measure.measure(METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 0), teacher, task)
+    return measure.measure(METHODS["CART"].make(teacher, task, SMALL, 0), teacher, task)
 
 
 def by_best_policies():
@@ -132,7 +131,7 @@ CASES = {
     for name, method in METHODS.items()
     if method.table != "demanded" and method.sizes != OF_PRESET and name not in UNGUARDED
 } | {
-    "simplest": (by_simplest, beside.SIMPLIFY_VERSION),
+    "simplest": (by_simplest, 1),
     "beside": (beside_a_run, simpler.VERSION),
     "measure": (by_measure, measure.VERSION),
     "best returns": (by_best_policies, beside.OPTIMUM_VERSION),

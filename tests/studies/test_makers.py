@@ -6,7 +6,7 @@ import small
 from support import SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import makers
-from studies.comparison.makers import Budget, corrected
+from studies.comparison.makers import corrected
 from studies.comparison.methods import FOUND, METHODS, methods_of
 from vsp import get_task
 from vsp.paper import printed
@@ -17,7 +17,8 @@ SIZED = [name for name, method in methods_of(SIMPLEGOAL, "methods").items() if m
 
 def make(name, size=3, seed=0, task=None):
     method = METHODS[name]
-    return method.make(Budget(small.Critic(), task or get_task(SIMPLEGOAL), SMALL), size, seed, **method.settings)
+    config = dataclasses.replace(SMALL, n_cells=size)
+    return method.make(small.Critic(), task or get_task(SIMPLEGOAL), config, seed, **method.settings)
 
 
 @pytest.mark.parametrize("name", SIZED)
@@ -49,8 +50,7 @@ def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_correct
         return printed.published_policy(SIMPLEGOAL)
 
     monkeypatch.setitem(makers.FITS, "published", fit)
-    budget = Budget(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL)
-    corrected(budget, 3, 5, fit="published", rounds=2, by_chance=by_chance)
+    corrected(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL, 5, fit="published", rounds=2, by_chance=by_chance)
     assert [seed for seed, _ in asked] == seeds
     *first, second, third = [size for _, size in asked]
     assert len(set(first)) == 1 and first[0] < second < third
@@ -68,5 +68,5 @@ def test_an_ablation_changes_one_setting(monkeypatch):
     monkeypatch.setattr(makers, "distill_tuned", lambda teacher, task, config, *, seed: (asked.append(config), seed))
     changed = [how for name, how in METHODS.items() if how.make is makers.our_cells and how.tasks]
     for how in changed:
-        how.make(Budget(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL), 3, 7, **how.settings)
-    assert asked == [dataclasses.replace(SMALL, n_cells=3, **how.settings) for how in changed] and len(asked) == 7
+        how.make(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL, 7, **how.settings)
+    assert asked == [dataclasses.replace(SMALL, **how.settings) for how in changed] and len(asked) == 7

@@ -23,7 +23,7 @@ def test_running_moments_are_those_of_all_states_at_once():
 def test_a_search_gains_and_repeats():
     task = get_task(PENDULUM)
     starts = task.start(np.random.default_rng(1), 200)
-    long, again, brief = (search_one_map(PENDULUM, one, seed=0) for one in (FEW, FEW, replace(FEW, n_random_steps=1)))
+    long, again, brief = (search_one_map(task, one, seed=0) for one in (FEW, FEW, replace(FEW, n_random_steps=1)))
     assert np.array_equal(long.coefficients, again.coefficients) and len(long) == 1
     gained = rollout(long, task, starts).returns.mean() - rollout(brief, task, starts).returns.mean()
     assert gained > 50

@@ -12,13 +12,12 @@ from studies import make_rows
 from studies.committed import RESULTS, keys, read_results
 from studies.comparison import beside, measure, rows
 from studies.comparison.beside import kept_jobs
-from studies.comparison.makers import Budget
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Entry, Table
 from studies.comparison.rows import Row, jobs_of, make_all
 from studies.comparison.summary import read_rows
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
-from vsp.run import atomic, sealed
+from vsp.run import atomic
 from vsp_beyond import Faithful
 
 CART, CART_3 = Row(SIMPLEGOAL, "CART", 1, 0), Row(SIMPLEGOAL, "CART", 3, 1)
@@ -113,7 +112,7 @@ def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
 def test_a_row_holds_what_is_measured(small):
     _, about = CART_3.make()
     teacher, task = load_teacher(SIMPLEGOAL), get_task(SIMPLEGOAL)
-    policy = METHODS["CART"].make(Budget(teacher, task, SMALL), 3, 1)
+    policy = METHODS["CART"].make(teacher, task, dataclasses.replace(SMALL, n_cells=3), 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
     assert {*about} == {"row", "seconds"} and about["seconds"] > 0
     tailed = dataclasses.replace(CART_3, tail=True).make()[1]["row"]
@@ -164,7 +163,7 @@ def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     files = [results / "methods_SimpleGoal-v0.csv", results / "methods_seconds.csv"]
     before = [file.read_text() for file in files]
     shutil.rmtree(tmp_path / "build")
-    still = Entry(lambda budget, size, seed: Constant(0.5, 0.5), sizes=(1, 3))
+    still = Entry(lambda teacher, task, config, seed: Constant(0.5, 0.5), sizes=(1, 3))
     small.setitem(METHODS, "still", still)
     only(small, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "still", "teacher"), sizes=(0, 1, 3)))
     command(small, "--out", tmp_path)
@@ -192,26 +191,6 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
     first = frame[(frame["size"] == 2) & (frame["seed"] == 0)].iloc[0]
     starts = start_states(get_task(SIMPLEGOAL), measure.N_REPORTED, measure.REPORT_SEED)
     assert rollout(kept, SIMPLEGOAL, starts).returns.mean() == pytest.approx(first["mean"], abs=1e-6)
-
-
-def test_the_long_command_keeps_a_simplified_policy(small, tmp_path):
-    small.setattr(make_rows, "LONG", (SIMPLEGOAL,))
-    small.setattr(beside, "LANDER", SIMPLEGOAL)
-    command(small, "--long", "--out", tmp_path)
-    results = tmp_path / "data" / "beyond"
-    _, about = sealed.load_arrays(results / "methods_SimpleGoal-v0.policy", kind="VoronoiPolicy")
-    assert 1 <= len(VoronoiPolicy.load(results / "methods_SimpleGoal-v0.policy")) <= SMALL.n_cells
-    (file,) = beside.beside(SIMPLEGOAL, "methods")
-    assert about.items() >= file.today[0].items()
-    assert len(pd.read_csv(results / "methods_seconds_long.csv")) == 5
-
-
-def test_the_simplified_policy_may_lose_its_share_of_the_teachers_return(small):
-    asked, starts = [], start_states(SIMPLEGOAL, SMALL.n_validation, 0)
-    small.setattr(beside, "simplify", lambda *given, **how: asked.append(how) or ("policy", None))
-    assert beside.simplest(SIMPLEGOAL) == "policy"
-    of_teacher = rollout(load_teacher(SIMPLEGOAL), SIMPLEGOAL, starts).returns.mean()
-    assert asked == [{"tolerance": pytest.approx(0.02 * of_teacher), "seed": 0}]
 
 
 def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):

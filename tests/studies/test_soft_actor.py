@@ -5,8 +5,8 @@ import pytest
 import torch
 from support import PENDULUM
 
-from studies.comparison.makers import Budget, robot_tree, trained_further
-from studies.comparison.tuning import in_units
+from studies.comparison.makers import robot_tree, trained_further
+from studies.comparison.tuning import of_tree
 from studies.rivals.trees import ObliqueLinearTree
 from studies.robots.further_training import train_further
 from studies.robots.imitation import LONGER
@@ -28,7 +28,8 @@ def pieces(kind):
         cells = local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 3, np.random.default_rng(1))
         return FRAME, cells, FRAME.policy(cells)
     tree = ObliqueLinearTree(STATES, TEACHER.predict(STATES)[0].astype(float), leaves=3, task=PENDULUM, seed=0)
-    return *in_units(tree, FRAME), tree
+    numbers = of_tree(tree)
+    return numbers.frame, numbers, tree
 
 
 @pytest.mark.parametrize("kind", ["cells", "tree"])
@@ -75,13 +76,12 @@ def test_nothing_learns_until_the_replay_buffer_is_filled():
 def test_a_single_cell_can_be_trained_further():
     one = FRAME.policy(local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 1, np.random.default_rng(1)))
     waits = replace(FEW, n_filling=FEW.n_steps)
-    found = trained_further(Budget(TEACHER, TASK, waits), 1, 0, imitation=lambda budget, size, seed: one)
+    found = trained_further(TEACHER, TASK, waits, 0, imitation=lambda *about: one)
     assert len(found) == 1 and np.allclose(found.coefficients, one.coefficients, atol=1e-5)
 
 
 def test_a_tree_is_fitted_like_cells_and_trained_further():
     waits = replace(FEW, n_filling=FEW.n_steps, n_episodes=3, n_corrections=1, n_correction_episodes=2, n_states=500)
-    budget = Budget(TEACHER, TASK, waits)
-    tree = robot_tree(budget, 3, 0)
-    found = trained_further(budget, 3, 0, imitation=lambda *about: tree)
+    tree = robot_tree(TEACHER, TASK, waits, 0)
+    found = trained_further(TEACHER, TASK, waits, 0, imitation=lambda *about: tree)
     assert len(found) == 3 and np.allclose(found.predict(STATES)[0], tree.predict(STATES)[0], atol=1e-3)

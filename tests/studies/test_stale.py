@@ -86,10 +86,8 @@ OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
         (lambda patch: patch.setattr(beside, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
         (lambda patch: patch.setattr(beside, "GAIT_VERSION", 9),
          [says(f"gait_{CHEETAH}.csv", "version", "beyond-long")]),
-        (lambda patch: patch.setattr(beside, "SIMPLIFY_VERSION", 2),
-         [says(f"methods_{LUNARLANDER}.policy", "version", "beyond-long")]),
     ],
-    ids=["CART", "optimum", "gait", "simplify"],
+    ids=["CART", "optimum", "gait"],
 )  # fmt: skip
 def test_results_of_another_version_are_stale(patch, change, expected):
     change(patch)

@@ -2,13 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, TASKS, TEACHERS, examples
+from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
 
-from studies.comparison.tuning import TreeNumbers, in_units, tuned
+from studies.comparison.tuning import TunableTree, tunable, tuned
 from studies.rivals.small_network import SmallNetwork
 from studies.rivals.trees import LinearTree, ObliqueLinearTree
 from vsp import get_task, rollout
-from vsp.paper.baselines import Tree, kmeans_cells, linear_map
+from vsp.paper.baselines import Tree, linear_map
 from vsp_beyond import Tuned
 from vsp_beyond.few_cells.units import Scaling
 
@@ -25,44 +25,43 @@ KINDS = {
     "linear tree": lambda x, y, task: LinearTree(x, y, leaves=6, task=task),
     "oblique tree": lambda x, y, task: ObliqueLinearTree(x, y, leaves=5, task=task, seed=0),
     "constant oblique tree": lambda x, y, task: ObliqueLinearTree(x, y, leaves=5, task=task, seed=0, constant=True),
-    "k-means": lambda x, y, task: kmeans_cells(x, y, cells=4, task=task, seed=0),
     "one map": lambda x, y, task: linear_map(x, y, task),
     "network": lambda x, y, task: SmallNetwork(x, y, units=4, task=task, seed=0),
 }
 
 
 def fitted(kind, task):
-    """The policy, its frame and its numbers."""
+    """The policy, and as it is tuned."""
     states, actions = examples(task)
     policy = KINDS[kind](states, actions, task)
-    return policy, *in_units(policy, Scaling.of(get_task(task), states))
+    return policy, tunable(policy, Scaling.of(get_task(task), states))
 
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_numbers_act_as_the_policy_they_are_of(kind, task):
-    policy, frame, numbers = fitted(kind, task)
+    policy, numbers = fitted(kind, task)
     other = examples(task, n=200, seed=1)[0]
-    expected = np.clip(policy.predict(other)[0], frame.task.action_low, frame.task.action_high)
-    same = frame.policy(numbers.like(numbers.vector))
+    expected = np.clip(policy.predict(other)[0], get_task(task).action_low, get_task(task).action_high)
+    same = numbers.like(numbers.vector)
     assert np.allclose(same.predict(other)[0], expected, atol=1e-6)  # CART's borders are those of float32
-    assert len(same) == (0 if kind == "network" else len(policy))
+    assert kind == "network" or len(same) == len(policy)
 
 
 @pytest.mark.parametrize(
     ("kind", "n"),
-    # 2 inputs, 2 actions; leaves with 2 or 6 numbers; cuts with 1 or 3; 4 codewords; 4 units
+    # 2 inputs, 2 actions; leaves with 2 or 6 numbers; cuts with 1 or 3; 4 units
     [("CART", 5 + 6 * 2), ("linear tree", 5 + 6 * 6), ("oblique tree", 4 * 3 + 5 * 6),
-     ("constant oblique tree", 4 * 3 + 5 * 2), ("k-means", 4 * 2 + 4 * 6), ("one map", 6), ("network", 4 * 3 + 5 * 2)],
+     ("constant oblique tree", 4 * 3 + 5 * 2), ("one map", 6), ("network", 4 * 3 + 5 * 2)],
 )  # fmt: skip
 def test_all_numbers_are_tuned_and_the_structure_is_not(kind, n):
-    policy, frame, numbers = fitted(kind, SIMPLEGOAL)
+    _, numbers = fitted(kind, SIMPLEGOAL)
     states = examples(SIMPLEGOAL, seed=1)[0]
     assert numbers.vector.shape == (n,)
     moved = numbers.like(numbers.vector + 0.3)
     assert np.allclose(moved.vector, numbers.vector + 0.3)
-    assert not np.allclose(frame.policy(moved).predict(states)[0], frame.policy(numbers).predict(states)[0])
-    if isinstance(numbers, TreeNumbers):
+    assert not np.allclose(moved.predict(states)[0], numbers.predict(states)[0])
+    if isinstance(numbers, TunableTree):
         assert np.array_equal(moved.sides, numbers.sides)
         assert np.array_equal(moved.directions, numbers.directions) != numbers.oblique
         assert not (numbers.constant and moved.maps[:, :-1].any())
@@ -72,11 +71,12 @@ def test_a_tree_by_hand():
     """Beyond 0.5 of the first input to the right; there, beyond 0.2 of the second one to the right again."""
     sides = np.array([[-1, 0], [1, -1], [1, 1]])
     maps = np.array([[[0.0], [0.0], [0.1]], [[1.0], [0.0], [0.0]], [[0.0], [3.0], [0.0]]])
-    tree = TreeNumbers(sides, np.eye(2), np.array([0.5, 0.2]), maps, oblique=False, constant=False)
-    inputs = np.array([[0.5, 0.9, 1.0], [0.6, 0.2, 1.0], [0.6, 0.3, 1.0]])
-    assert np.allclose(tree.outputs(inputs), [[0.1], [0.6], [0.9]])
+    frame = Scaling(get_task(MOUNTAINCAR), np.zeros(2), np.ones(2))
+    tree = TunableTree(frame, sides, np.eye(2), np.array([0.5, 0.2]), maps, oblique=False, constant=False)
+    states = np.array([[0.5, 0.9], [0.6, 0.2], [0.6, 0.3]])
+    assert np.allclose(tree.predict(states)[0], [[0.1], [0.6], [0.9]])
     moved = tree.like(np.append([0.5, 0.35], maps))  # the last state now turns left at the second cut
-    assert np.allclose(moved.outputs(inputs), [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
+    assert np.allclose(moved.predict(states)[0], [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
 
 
 @pytest.mark.parametrize("kind", ["linear tree", "one map"])

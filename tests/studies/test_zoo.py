@@ -135,10 +135,7 @@ def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp
     assert mean["here"] == pytest.approx(rows["mean"].mean(), abs=1e-6) and float(mean["paper"]) == 93.534
 
 
-def test_without_an_agent_its_rows_are_kept_and_another_task_is_refused(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(sys, "argv", ["x", "--out", str(tmp_path)])
-    hub_teacher.main()
-    assert capsys.readouterr().out.startswith("hub_teacher.csv is kept, because it needs the zoo's DDPG agent")
+def test_an_agent_of_another_task_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
     monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(PENDULUM, task))
     with pytest.raises(command.CommandError, match="load it for the task it was trained on"):

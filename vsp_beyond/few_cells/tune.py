@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from vsp.rollouts import Outcomes, rollout
+from vsp.rollouts import Outcomes, Policy, rollout
 from vsp.run.progress import steps
-from vsp.tasks.base import GOAL
+from vsp.tasks.base import GOAL, Task
 
 from .config import Tuned
 from .population import rollout_population
-from .units import ScaledCells, Scaling
+from .units import ScaledCells
 
 SNAPSHOTS = 10  # candidates that a tuning yields, evenly spread over its generations
+PolicyOf = Callable[[ScaledCells], Policy]  # such as `Scaling.policy`; or of other numbers with `vector` and `like`
 
 
 class Candidates:
@@ -22,29 +23,32 @@ class Candidates:
 
     best: ScaledCells  # once there is a candidate
 
-    def __init__(self, scaling: Scaling, starts: np.ndarray, failure_penalty: float):
+    def __init__(self, policy_of: PolicyOf, task: Task, starts: np.ndarray, failure_penalty: float):
         self.rows, self.best_restart = list[dict](), 0
-        self._scaling, self._starts, self._failure_penalty, self._best_score = scaling, starts, failure_penalty, -np.inf
+        self._policy_of, self._task, self._starts = policy_of, task, starts
+        self._failure_penalty, self._best_score = failure_penalty, -np.inf
 
     def add(self, stage: str, restart: int, cells: ScaledCells) -> None:
         """Score `cells` from the validation starts."""
-        result = rollout(self._scaling.policy(cells), self._scaling.task, self._starts)
+        result = rollout(self._policy_of(cells), self._task, self._starts)
         mean, failing = result.returns.mean(), np.mean(result.outcomes != GOAL)
         self.rows.append({"stage": stage, "restart": restart, "mean": mean, "failing": failing})
         if (value := score(result, self._failure_penalty)) > self._best_score:
             self._best_score, self.best, self.best_restart = value, cells, restart
 
 
-def tune(scaling: Scaling, cells: ScaledCells, config: Tuned, rng: np.random.Generator) -> Iterator[ScaledCells]:
+def tune(
+    policy_of: PolicyOf, task: Task, cells: ScaledCells, config: Tuned, rng: np.random.Generator
+) -> Iterator[ScaledCells]:
     """Run CMA-ES (Hansen 2016) on the `score`; each generation rolls out its candidates from fresh starts.
 
     Yields the current solution `SNAPSHOTS` times: a later one may fail from rare starts that no generation has drawn.
     """
     search = cma_es(cells.vector, config.tuning_step, rng)
     for i in steps(range(config.n_generations), "tuning", total=config.n_generations, unit="generations"):
-        starts = scaling.task.start(rng, config.n_tuning_episodes)
+        starts = task.start(rng, config.n_tuning_episodes)
         vectors = search.ask()
-        results = rollout_population([scaling.policy(cells.like(vector)) for vector in vectors], scaling.task, starts)
+        results = rollout_population([policy_of(cells.like(vector)) for vector in vectors], task, starts)
         search.tell(vectors, [-score(result, config.failure_penalty) for result in results])
         if is_snapshot(i, config.n_generations, SNAPSHOTS):
             yield cells.like(search.result.xfavorite)

@@ -51,7 +51,7 @@ def distill_tuned(
         scaling = replace(scaling, scale=start.scale)  # with another one the borders of `start` would move
     criticality = critics.criticality(states) if critics else None
     labelled = scaling.labelled(states, teacher.predict(states)[0], criticality)
-    candidates = Candidates(scaling, task.start(validation, config.n_validation), config.failure_penalty)
+    candidates = Candidates(scaling.policy, task, task.start(validation, config.n_validation), config.failure_penalty)
 
     first = linear_init(labelled, config.n_cells, init) if start is None else scaling.cells(start)
     candidates.add("line" if start is None else "start", 0, first)
@@ -66,7 +66,7 @@ def distill_tuned(
         labelled = labelled.with_more(scaling.labelled(states, teacher.predict(states)[0], criticality))
         cells = anneal(labelled, cells, warm(config), batches)
         candidates.add("correct", candidates.best_restart, cells)
-    for cells in tune(scaling, candidates.best, config, search):
+    for cells in tune(scaling.policy, task, candidates.best, config, search):
         candidates.add("tune", candidates.best_restart, cells)
     return scaling.policy(candidates.best), pd.DataFrame(candidates.rows)
 
