@@ -129,12 +129,11 @@ def _kept(policy: PiecewisePolicy) -> str:
 
 
 def _proof(path: Path) -> str:
-    said = f"Nothing is proved within {PROOF_SECONDS} s; vsp_beyond.prove(policy) may take minutes."
     try:  # in a process of its own, which can be stopped
         done = subprocess.run(
             [sys.executable, "-c", _PROVE, path], capture_output=True, text=True, timeout=PROOF_SECONDS
         )
         said = done.stdout or f"Nothing is proved: {done.stderr.strip().rpartition(': ')[2]}."
     except subprocess.TimeoutExpired:
-        pass
+        said = f"Nothing is proved within {PROOF_SECONDS} s; vsp_beyond.prove(policy) may take minutes."
     return f"<h2>What is certain?</h2><p>{html.escape(said)}</p>"

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from vsp.policy import Explanation, VoronoiPolicy
 from vsp.show import state_space
 from vsp.show.state_space import cells, codewords, image
 from vsp.show.style import CODEWORD, FORCE_MAP, OTHER, OURS
-
-if TYPE_CHECKING:
-    from vsp.policy import Explanation, VoronoiPolicy
 
 
 def whereabouts(ax: Axes, policy: VoronoiPolicy, state: np.ndarray) -> Axes:

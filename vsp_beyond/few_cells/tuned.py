@@ -23,7 +23,7 @@ from .anneal import anneal, linear_init, random_init, warm
 from .config import Tuned
 from .criticality import Critics
 from .tune import Candidates, tune
-from .units import METRIC, Scaling, warn_outside
+from .units import Scaling, warn_outside
 
 
 @threadpool_limits.wrap(limits=1)
@@ -34,20 +34,18 @@ def distill_tuned(
 
     Returns the policy and its history, one row per candidate: stage ("line", one linear map, or "start"; "fit",
     "correct", "tune"), restart, mean return and share of failed episodes from the validation starts. Distances are
-    Euclidean; the scale of a Euclidean `start` is kept. Raises ValueError as `distill` does, for a `start` of another
-    size or task, and for `criticality` with a teacher that has no critics.
+    Euclidean, also those of `start`, which is for the same task and has as many cells; its scale is kept. Raises
+    ValueError as `distill` does, and for `criticality` with a teacher that has no critics.
     """
     check_seed(seed)
     task = get_task(task)
-    if start is not None:
-        _check_start(start, task, config)
     critics = Critics(teacher) if config.criticality else None  # raises now, not after an hour
     streams = np.random.SeedSequence(seed).spawn(5)
     starts, init, batches, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
     warn_outside(task, states)
     scaling = Scaling.of(task, states)
-    if start is not None and start.metric == METRIC:
+    if start is not None:
         scaling = replace(scaling, scale=start.scale)  # with another one the borders of `start` would move
     criticality = critics.criticality(states) if critics else None
     labelled = scaling.labelled(states, teacher.predict(states)[0], criticality)
@@ -69,10 +67,3 @@ def distill_tuned(
     for cells in tune(scaling.policy, task, candidates.best, config, search):
         candidates.add("tune", candidates.best_restart, cells)
     return scaling.policy(candidates.best), pd.DataFrame(candidates.rows)
-
-
-def _check_start(start: VoronoiPolicy, task: Task, config: Tuned) -> None:
-    start.check_linear()
-    k, name = len(start), start.task.name
-    if (k, name) != (config.n_cells, task.name):
-        raise ValueError(f"start has {k} cells for {name}, expected n_cells = {config.n_cells} for {task.name}")

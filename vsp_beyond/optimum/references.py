@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from vsp.checks import check_array, check_number
+from vsp.checks import check_array, check_choice, check_number
 from vsp.rollouts import Policy
 from vsp.tasks.base import Task
 from vsp.tasks.registry import get_task
@@ -79,13 +79,12 @@ def best_policy(task: str | Task, *, finer: float = 1.0, price: float | None = N
     negative price.
     """
     task = get_task(task)
+    check_choice("the task", task.name, TASKS)
     check_number("finer", finer, least=0.1, most=10.0)
     if price is not None:
         check_number("price", price, least=0.0)
     if task.name == "SimpleGoal-v0":
         return Shortest()
-    if task.name not in _SOLVABLE:
-        raise ValueError(f"the best return of {task.name} is not known, expected one of {TASKS}")
     grid, state_of, least_price = _SOLVABLE[task.name]
     grid, actions = grid.finer(finer), np.linspace(task.action_low[0], task.action_high[0], N_ACTIONS)
     price = least_price if price is None else price

@@ -89,7 +89,9 @@ def _failed(policy: VoronoiPolicy, middles: np.ndarray, half: np.ndarray, good: 
     slopes[0, 0], slopes[1, 1] = half
     boxes, failed = Boxes(np.arange(m), middles, slopes, np.full((2, m), ROUNDING)), np.zeros(m, dtype=bool)
     for _ in range(HALF_WAY):
-        boxes = boxes.at(~_arrived(boxes, good))
+        angles, speeds = ([middle - width, middle + width] for middle, width in zip(boxes.centre, boxes.half))
+        arrived = rectangles_within(good, *boxes_between(angles, speeds, good.shape[1] - 1))
+        boxes = boxes.at(~arrived)
         lost = (boxes.half > WIDEST).any(axis=0) | (np.bincount(boxes.start, minlength=m) > MOST_WAYS)[boxes.start]
         failed[boxes.start[lost]] = True
         boxes = boxes.at(~failed[boxes.start])
@@ -132,10 +134,3 @@ def _touched(policy: VoronoiPolicy, cell: int, boxes: Boxes) -> np.ndarray:
     change = [np.abs(slope) * half[0] + half[0] ** 2 / 2 for slope in (observed[1], observed[0])]
     width = np.stack([*change, half[1]]) + SEEN * FASTEST
     return touches(policy, cell, observed - width, observed + width, REACH)
-
-
-def _arrived(boxes: Boxes, good: np.ndarray) -> np.ndarray:
-    """Return which boxes have all their states within proved boxes. (m,)"""
-    half = boxes.half
-    angles, speeds = ([middle - width, middle + width] for middle, width in zip(boxes.centre, half))
-    return rectangles_within(good, *boxes_between(angles, speeds, good.shape[1] - 1))

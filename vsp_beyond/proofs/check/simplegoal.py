@@ -111,25 +111,22 @@ class Policy:
         """Return the parts of `polygons` that make this step, such as "3+=--", with the states after it."""
         number, limits, moves, stops, walls = self.plan(step)
         parts = [part for polygon in polygons for part in self.cell(polygon, number)]
-        for limit in limits:
-            parts = limited(parts, *limit)
-        parts = [moved(part, moves) for part in parts]
-        for stop in stops:
-            parts = limited(parts, *stop)
+        parts = [moved(part, moves) for part in left_by(parts, limits)]
+        parts = left_by(parts, stops)
         return [moved(part, walls) for part in parts] if walls else parts
 
     @cache  # noqa: B019 - it lives as long as the check
     def plan(self, step: str) -> tuple:
-        """Return the cell of a step, the limits of the actions with their sides, the forms of the next state, the
-        limits at the walls with their sides, and the forms of the state at the walls (None: at no wall)."""
+        """Return the cell of a step, the cuts at the limits of the actions, the forms of the next state, the cuts at
+        the walls, and the forms of the state at the walls (None: at no wall)."""
         if step[:-4] not in map(str, range(len(self.maps))):  # a cell has one spelling, so no start is counted twice
             raise Refused(f"a step is {step!r}, expected one in a cell from 0 to {len(self.maps) - 1}")
         number, sides = int(step[:-4]), [SIDES[sign] for sign in step[-4:]]
         actions = [(0, 0, side) if side else form for form, side in zip(self.maps[number], sides)]
         moves = [Form(*(a + STRIDE * b for a, b in zip(axis, action))) for axis, action in zip(AXES, actions)]
         walls = [Form(0, 0, Fraction(side > 0)) if side else Form(*axis) for axis, side in zip(AXES, sides[2:])]
-        limits = [(*between(form, -1), side) for form, side in zip(self.maps[number], sides)]
-        stops = [(*between(axis, 0), side) for axis, side in zip(AXES, sides[2:])]
+        limits = [cut for form, side in zip(self.maps[number], sides) for cut in limit_cuts(form, -1, side)]
+        stops = [cut for axis, side in zip(AXES, sides[2:]) for cut in limit_cuts(axis, 0, side)]
         return number, limits, moves, stops, walls if any(sides[2:]) else None
 
     def cell(self, polygon: list, number: int) -> list:
@@ -189,18 +186,18 @@ class Policy:
         return Form(p, q, constant)
 
 
-def between(form, low: int) -> tuple[Form, Form]:
-    """Return two forms, which are positive above `low` and above 1."""
+def limit_cuts(form, low: int, side: int) -> list[tuple[Form, int]]:
+    """Return the cuts to where a form is below `low` (side -1), above 1 (side 1), or between (0). A cut is a form, and
+    which of the `halves` is meant."""
     p, q, r = form
-    return Form(p, q, r - low), Form(p, q, r - 1)
+    above_low, above_high = Form(p, q, r - low), Form(p, q, r - 1)
+    return {-1: [(above_low, 0)], 0: [(above_low, 1), (above_high, 0)], 1: [(above_high, 1)]}[side]
 
 
-def limited(polygons: list, above_low: Form, above_high: Form, side: int) -> list:
-    """Return the parts below both (side -1), above both (side 1), or between (0)."""
-    if side <= 0:
-        polygons = [part for polygon in polygons if (part := halves(polygon, above_low)[side + 1])]
-    if side >= 0:
-        polygons = [part for polygon in polygons if (part := halves(polygon, above_high)[side])]
+def left_by(polygons: list, cuts: list) -> list:
+    """Return the parts of `polygons` that are left by all cuts."""
+    for form, half in cuts:
+        polygons = [part for polygon in polygons if (part := halves(polygon, form)[half])]
     return polygons
 
 
