@@ -91,7 +91,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 	  (cd "$$OUT" && mkdir -p data/runs && find data/runs -name '*.run' > build/stamps/runs-made))
 
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
-	$(PY) -m vsp.paper.make_runs --study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+	$(PY) -m studies.make_study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 	test -z "$$AGENT" || $(PY) -m studies.hub_teacher "$$AGENT" --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
 	$(PY) -m studies.hub_teacher "$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"

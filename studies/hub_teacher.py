@@ -13,9 +13,9 @@ from pathlib import Path
 from vsp.paper.ledger import distinct_results, ledger_table
 from vsp.paper.results import write_results
 from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher_outcomes
-from vsp.paper.studies.teachers import rows_of
 from vsp.run import command
 
+from .reproduction.teachers import rows_of
 from .zoo import CAR, read
 
 

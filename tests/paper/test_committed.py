@@ -4,12 +4,12 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, TASKS
 
+from studies.reproduction import interpretations, simpler
+from studies.reproduction import teachers as teachers_study
+from studies.reproduction.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
+from studies.reproduction.teachers import SEEDS
 from vsp.paper.results import read_results, write_results
 from vsp.paper.runs import N_RUNS, paper_experiment
-from vsp.paper.studies import interpretations, simpler
-from vsp.paper.studies import teachers as teachers_study
-from vsp.paper.studies.interpretations import CHOOSING, CONFIRMING, N_CONFIRMED, distance, landmarks, ranking
-from vsp.paper.studies.teachers import SEEDS
 from vsp.protocol.job import PROVENANCE
 
 

@@ -14,10 +14,10 @@ from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 
 from studies.comparison import beside, measure
 from studies.comparison.methods import METHODS, OF_PRESET
+from studies.reproduction import simpler
 from studies.robots import Walking
 from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
-from vsp.paper.studies import simpler
 from vsp.run import kernels
 from vsp_beyond import Faithful, Tuned, simplify
 from vsp_beyond.few_cells import limit

@@ -8,18 +8,18 @@ from importlib.metadata import version
 import numpy as np
 import pandas as pd
 
-from ...algorithms import teacher_episodes
-from ...evaluation import rollout_from_seed
-from ...policy import VoronoiPolicy
-from ...protocol.intervals import crossed_interval
-from ...protocol.job import settings_id
-from ...rollouts import Outcomes
-from ...run import workers
-from ...tasks.base import GOAL
-from ...tasks.registry import get_task
-from .. import printed
-from ..baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from ..runs import EVALUATION_SEED, N_RUNS, Experiment, Results, Run, paper_results
+from vsp.algorithms import teacher_episodes
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import printed
+from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, Results, Run, paper_results
+from vsp.policy import VoronoiPolicy
+from vsp.protocol.intervals import crossed_interval
+from vsp.protocol.job import settings_id
+from vsp.rollouts import Outcomes
+from vsp.run import workers
+from vsp.tasks.base import GOAL
+from vsp.tasks.registry import get_task
 
 VERSION = 2  # raise it when the same runs give other results
 LEAVES = (13, 32)  # cells of the partitions that the paper prints

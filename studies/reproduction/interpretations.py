@@ -13,14 +13,14 @@ import os
 import numpy as np
 import pandas as pd
 
-from ...evaluation import rollout_from_seed
-from ...protocol.intervals import percentile_interval
-from ...protocol.job import settings_id
-from ...rollouts import Outcomes
-from .. import printed
-from ..readings import ALTERNATIVES, Readings
-from ..runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
-from ..statistics import quartiles_from_fences, resample, spread
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import printed
+from vsp.paper.readings import ALTERNATIVES, Readings
+from vsp.paper.runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
+from vsp.paper.statistics import quartiles_from_fences, resample, spread
+from vsp.protocol.intervals import percentile_interval
+from vsp.protocol.job import settings_id
+from vsp.rollouts import Outcomes
 
 VERSION = 1  # raise it when the same runs give other rows
 CHOOSING, CONFIRMING = range(1000, 1010), range(2000, 2060)  # seeds that rank the variants; seeds that check the first
@@ -171,31 +171,3 @@ def _with_interval(name: str, values: np.ndarray) -> dict[str, float]:
     """Return a measured value and the 95 % interval of its resamples; `values` holds it, then the resamples."""
     low, high = percentile_interval(values[1:])
     return {name: values[0], f"{name}_low": low, f"{name}_high": high}
-
-
-# Figures and tables of the notebook
-
-SHOWN = {  # the variants that change a result most, with their labels
-    "default": "default",
-    "R1 freeze last_n_split": "split to the end",
-    "R4 one_split": "one split per pass",
-    "R7 n_minibatches 5": "five minibatches",
-    "R7 learning_rate 0.01": "ten times the step size",
-    "R7 learning_rate 0.0003": "a third of the step size",
-    "R7 initial zeros": "maps start from zero",
-}
-LABELS = SHOWN | {  # and those that were run again
-    "R13 split_reset neighbours": "a split keeps the buffer of its cell",
-    "R13 split_neighbours new": "a split resets the new cell's neighbours",
-    "R7 batch_size 16": "minibatches of 16 states",
-    "R6 merge_visits_removed": "merging visits removed cells",
-    "R3 + R4 + R7 zeros": "Euclidean, one split per pass, from zero",
-}
-
-
-def shown_variants(frame: pd.DataFrame, task: str, phase: str = "choosing") -> pd.DataFrame:
-    """Return mean return (here, low, high), cells and failures per variant of `SHOWN`; NaN if not in `phase`."""
-    rows = frame[(frame["phase"] == phase) & (frame["task"] == task)].set_index("variant").reindex(SHOWN)
-    rows = rows.assign(failed=100 * (1 - rows["goal"])).rename(index=SHOWN)
-    names = {"mean": "here", "mean_low": "low", "mean_high": "high", "cells": "cells", "failed": "failed (%)"}
-    return rows[[*names]].rename(columns=names)

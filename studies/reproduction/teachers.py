@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...evaluation import rollout_from_seed
-from ...protocol.job import settings_id
-from ...teachers.teacher import SHIPPED, further_teachers, load_teacher
-from .. import printed
-from ..baselines import linear_map
-from ..runs import EVALUATION_SEED, SHARES, Experiment, Run, load_runs, make_all, paper_experiment
-from ..tables import run_summary
+from vsp.evaluation import rollout_from_seed
+from vsp.paper import printed
+from vsp.paper.baselines import linear_map
+from vsp.paper.runs import EVALUATION_SEED, SHARES, Experiment, Run, load_runs, make_all, paper_experiment
+from vsp.paper.tables import run_summary
+from vsp.protocol.job import settings_id
+from vsp.teachers.teacher import SHIPPED, further_teachers, load_teacher
+
 from .simpler import teacher_data
 
 VERSION = 1  # raise it when the same runs give other rows
@@ -73,11 +74,3 @@ def experiments(tasks=printed.TASKS) -> dict[tuple[str, str], Experiment]:
         for task in tasks
         for name, path in teachers(task).items()
     }
-
-
-def teacher_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per teacher: its own return, and the return, deviation, cells and failures over its runs."""
-    groups = frame.assign(failing=1 - frame["goal"]).groupby(["task", "teacher"], sort=False)
-    means = groups[["steps", "linear_error", "teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
-    means.insert(5, "deviation between runs", groups["mean"].std())
-    return means.reset_index()

@@ -5,6 +5,8 @@ import pandas as pd
 import pytest
 from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
 
+from studies.reproduction import interpretations, simpler, teachers
+from studies.reproduction.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
 from vsp.paper import make_runs as command
@@ -12,8 +14,6 @@ from vsp.paper import printed
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
-from vsp.paper.studies import interpretations, simpler, teachers
-from vsp.paper.studies.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp.partition import Partition
 from vsp.protocol import crossed_interval
 

@@ -1,0 +1,1 @@
+"""Experiments on the reproduction: open choices of the paper, other teachers, and cells beside simpler policies."""
