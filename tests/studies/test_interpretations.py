@@ -9,7 +9,7 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, CurvedTeacher, tiny
 
 from studies.reproduction import interpretations
-from studies.reproduction.interpretations import LABELS, SHOWN, distance, landmarks, ranking, shown_variants, study
+from studies.reproduction.interpretations import distance, landmarks, ranking, study
 from vsp.algorithms import distill
 from vsp.config import EXTENSIONS, Config, paper_preset
 from vsp.evaluation import fences, rollout_from_seed
@@ -18,6 +18,7 @@ from vsp.paper.readings import ALTERNATIVES, Readings, defaults
 from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, paper_experiment
 from vsp.paper.statistics import resample, spread
+from vsp.paper.summaries import LABELS, SHOWN, shown_variants
 from vsp.protocol import interval
 from vsp.tasks import base, get_task
 

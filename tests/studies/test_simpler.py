@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
 
+from studies import make_study
 from studies.reproduction import interpretations, simpler, teachers
 from studies.reproduction.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
-from vsp.paper import make_runs as command
 from vsp.paper import printed
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.results import read_results
@@ -92,8 +92,8 @@ def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tm
     asked, frame = [], pd.DataFrame({"a": [0.1 + 0.2]})
     for study in (interpretations, teachers, simpler):
         monkeypatch.setattr(study, "study", lambda runs, *, jobs: asked.append((runs, jobs)) or frame)
-    monkeypatch.setattr("sys.argv", ["make_runs", "--study", "--out", str(tmp_path), "--jobs", "3"])
-    command.main()
+    monkeypatch.setattr("sys.argv", ["make_study", "--out", str(tmp_path), "--jobs", "3"])
+    make_study.main()
     assert asked == [(tmp_path / "build/study", 3)] * 2 + [(tmp_path / "data/runs", 3)]
     folder = tmp_path / "data" / "results"
     written = [read_results(name, folder)["a"].item() for name in ("readings", "teachers", "simpler")]

@@ -7,10 +7,11 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, tiny
 from studies.make_teachers import SHORT_SEEDS
 from studies.reproduction import teachers as teachers_module
 from studies.reproduction.simpler import teacher_data
-from studies.reproduction.teachers import experiments, linear_error, study, teacher_summary, teachers
+from studies.reproduction.teachers import experiments, linear_error, study, teachers
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import runs
 from vsp.paper.runs import EVALUATION_SEED, Experiment, load_runs, paper_experiment
+from vsp.paper.summaries import teacher_summary
 from vsp.tasks import base
 from vsp.teachers.teacher import SHIPPED, load_teacher
 
