@@ -8,7 +8,7 @@ from support import SIMPLEGOAL, CurvedTeacher
 from studies.comparison import makers
 from studies.comparison.makers import Budget, corrected
 from studies.comparison.methods import FOUND, METHODS, methods_of
-from vsp import get_task
+from vsp import get_task, load_teacher
 from vsp.paper import printed
 
 SMALL = dataclasses.replace(small.SMALL, failure_penalty=100.0, n_validation=30)
@@ -16,8 +16,8 @@ SIZED = [name for name, method in methods_of(SIMPLEGOAL, "methods").items() if m
 
 
 def make(name, size=3, seed=0, task=None):
-    method = METHODS[name]
-    return method.make(Budget(small.Critic(), task or get_task(SIMPLEGOAL), SMALL), size, seed, **method.settings)
+    method, budget = METHODS[name], Budget(load_teacher(SIMPLEGOAL), task or get_task(SIMPLEGOAL), SMALL)
+    return method.make(budget, size, seed, **method.settings)
 
 
 @pytest.mark.parametrize("name", SIZED)
