@@ -1,6 +1,4 @@
-"""What tests of the studies share: little work, and a teacher with critics."""
-
-from support import CurvedTeacher
+"""What tests of the studies share: little work."""
 
 from vsp_beyond import Tuned
 
@@ -8,10 +6,3 @@ SMALL = Tuned(
     n_cells=2, n_episodes=20, n_restarts=2, n_steps=100, batch_size=64, n_corrections=2, n_correction_episodes=10,
     n_generations=1, n_tuning_episodes=10, n_validation=20,
 )  # fmt: skip
-
-
-class Critic(CurvedTeacher):
-    """A wrong action costs as much as x."""
-
-    def criticality(self, obs):
-        return obs[:, 0]

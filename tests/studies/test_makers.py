@@ -8,7 +8,7 @@ from support import SIMPLEGOAL, CurvedTeacher
 from studies.comparison import makers
 from studies.comparison.makers import corrected
 from studies.comparison.methods import FOUND, METHODS, methods_of
-from vsp import get_task
+from vsp import get_task, load_teacher
 from vsp.paper import printed
 
 SMALL = dataclasses.replace(small.SMALL, failure_penalty=100.0, n_validation=30)
@@ -18,7 +18,7 @@ SIZED = [name for name, method in methods_of(SIMPLEGOAL, "methods").items() if m
 def make(name, size=3, seed=0, task=None):
     method = METHODS[name]
     config = dataclasses.replace(SMALL, n_cells=size)
-    return method.make(small.Critic(), task or get_task(SIMPLEGOAL), config, seed, **method.settings)
+    return method.make(load_teacher(SIMPLEGOAL), task or get_task(SIMPLEGOAL), config, seed, **method.settings)
 
 
 @pytest.mark.parametrize("name", SIZED)
