@@ -90,8 +90,15 @@ def test_a_task_on_arrays_is_registered_and_compared(tmp_path):
         assert (backwards["mean"] < frame["mean"])[:2].all() and len([*tmp_path.glob("Cart-v0/*/*")]) == 4
     finally:
         _ADDED.pop("Cart-v0")
+    changed = dataclasses.replace(next_task.CART, step=against_the_wind)
+    frame = vsp.compare(methods, [changed], {"Cart-v0": PILOT}, seeds=[0], n_episodes=10, runs=tmp_path).frame
+    assert frame["failing"].isna().all()  # nobody arrives
     with pytest.raises(ValueError, match="one of vsp's own"):
         vsp.register(dataclasses.replace(next_task.CART, name=SIMPLEGOAL))
+
+
+def against_the_wind(states, actions):
+    return next_task.step(states, actions - 2)
 
 
 def test_a_comparison_makes_what_is_missing_alone(comparison, tmp_path, monkeypatch):
