@@ -64,7 +64,7 @@ class Experiment:
             "config": self.config.settings() | passes,
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
-            "versions": {name: job.library(name) for name in ("numpy", "scipy")},
+            "versions": {name: job.installed(name) for name in ("numpy", "scipy")},
         }
 
     @cached_property

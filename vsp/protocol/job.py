@@ -82,7 +82,7 @@ def provenance(settings: dict, digest: str, version: int | str) -> dict[str, str
 
 
 @cache
-def library(name: str) -> str:
+def installed(name: str) -> str:
     """Return the version of an installed package: it takes milliseconds to find, and each run needs it."""
     return version(name)
 
