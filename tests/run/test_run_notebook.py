@@ -93,8 +93,9 @@ def test_results_are_listed_beside_those_of_others(tmp_path):
 
 FAULTS = {
     "failing cell": (["1 / 0"], "code cell (1 / 0) failed: ZeroDivisionError"),
-    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: Kernel died"),
+    "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
     "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell (import sys) failed: SystemExit"),
+    "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
     "missing": (["2"], "did not make figures/c.pdf"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],
@@ -104,7 +105,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_fault_leaves_previous_figures(tmp_path, fault):
+def test_fault_leaves_previous_figures(tmp_path, monkeypatch, fault):
     cells, message = FAULTS[fault]
     (tmp_path / "figures" / "executed").mkdir(parents=True)
     for name in ("a.txt", "executed/story.ipynb"):
@@ -112,6 +113,7 @@ def test_fault_leaves_previous_figures(tmp_path, fault):
     notebook = write(tmp_path, DRAW, *cells)
     before = tree(tmp_path)
     expect = ["figures/a.txt"] + ["figures/c.pdf"] * (fault == "missing")
+    monkeypatch.setattr(run_notebook, "TIMEOUT", 1 if fault == "too slow" else 60)
     error = refused(notebook, "--out", tmp_path, "--expect", *expect)
     assert error.startswith("error: story.ipynb") and message in error
     assert fault != "failing cell" or "Traceback" in error

@@ -29,6 +29,7 @@ from .locks import folder_lock
 from .notebook import NotebookNode, nbformat
 
 KERNEL = "python3"
+TIMEOUT = 1800  # seconds per cell
 # Variables of the folder that a kernel writes to; the next run removes what a killed one left. IPYTHONDIR: without the
 # user's start-up files
 KERNEL_FOLDER = ("TMPDIR", "JOBLIB_TEMP_FOLDER", "IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "MPLCONFIGDIR")
@@ -83,21 +84,21 @@ def run_notebook(
 def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[NotebookNode]:
     """Run a copy of the notebook by papermill with the parameters `values`. Returns its code cells, up to an error."""
     import papermill
-    from nbclient.exceptions import DeadKernelError
+    from nbclient.exceptions import CellTimeoutError, DeadKernelError
 
     logging.getLogger("papermill").setLevel(logging.ERROR)  # no warning if a notebook has no use for `runs`
     copy = work / notebook.name
     # The folder as in JupyterLab
-    options = {"kernel_name": KERNEL, "language": "python", "cwd": notebook.parent}
+    options = {"kernel_name": KERNEL, "language": "python", "cwd": notebook.parent, "execution_timeout": TIMEOUT}
     quiet = {"progress_bar": False, "extra_arguments": ["--log-level=CRITICAL"]}  # no log messages on standard error
     try:
         with mock.patch.dict(os.environ, _environment(work / "tmp")):
             papermill.execute_notebook(notebook, copy, values, **options, **quiet)
     except papermill.PapermillExecutionError:
         pass  # `_check_cell` finds the error
-    except DeadKernelError as error:
+    except (CellTimeoutError, DeadKernelError) as error:
         begun = [cell for cell in _code_cells(copy) if cell.metadata.papermill.start_time]
-        raise CommandError(f"{_name(notebook, begun[-1])} did not end: {error}") from error
+        raise CommandError(f"{_name(notebook, begun[-1])} did not end: {type(error).__name__}: {error}") from error
     return [cell for cell in _code_cells(copy) if "injected-parameters" not in cell.metadata.tags]
 
 
