@@ -188,13 +188,14 @@ STORY_PARAMETERS = 'out = ".."\nruns = "../data/runs"\nquick = False'
 
 
 def write_story(folder: Path, *cells: str) -> Path:
-    """story.ipynb, a notebook of code cells."""
+    """story.ipynb, a notebook of code cells; a cell that begins with `# skip` never runs."""
     from vsp.run.notebook import nbformat  # which takes long, and few tests write notebooks
 
     notebook = nbformat.v4.new_notebook()
     notebook.metadata.kernelspec = {"name": "python3", "display_name": "Python 3", "language": "python"}
     for number, source in enumerate((STORY_PARAMETERS, *cells)):
         notebook.cells.append(nbformat.v4.new_code_cell(source, id=f"cell-{number}"))
+        notebook.cells[-1].metadata.tags = ["skip-execution"] if source.startswith("# skip") else []
     notebook.cells[0].metadata.tags = ["parameters"]
     path = folder / "story.ipynb"
     nbformat.write(notebook, path)

@@ -190,10 +190,14 @@ class PiecewisePolicy(Exportable):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of what a file of the policy holds: its identity as an agent."""
-        arrays, about = self._content()
-        numbers = b"".join(array.tobytes() for array in arrays.values())
-        return hashlib.sha256(json.dumps(about, sort_keys=True).encode() + numbers).hexdigest()
+        """SHA-256 of the cells, the maps and the action box: its identity as an agent.
+
+        Raises ValueError if a part from outside cannot be identified.
+        """
+        from .run.identity import identity  # here: few policies are agents
+
+        parts = [self.where, self.policy_class, self.coefficients, self.task.action_low, self.task.action_high]
+        return hashlib.sha256(json.dumps(identity(parts), sort_keys=True).encode()).hexdigest()
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the policy to one sealed file, atomically."""

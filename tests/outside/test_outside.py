@@ -72,6 +72,15 @@ def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path, monkey
     assert ("application/json" in made) == drawn and ("no explorer: " in made) == (not drawn)
 
 
+def test_a_policy_is_identified_by_what_its_parts_do():
+    """Not by their names alone."""
+    metrics = [vsp.Metric("mine", order) for order in (3, 4)]
+    maps = [dataclasses.replace(next_map.sines(vsp.get_task(SIMPLEGOAL)), features=one) for one in (np.sin, np.cos)]
+    policies = [vsp.VoronoiPolicy(np.eye(2), np.ones((2, 3, 2)), task=SIMPLEGOAL, metric=one) for one in metrics]
+    policies += [policies[0].with_maps(np.ones((2, 3, 2)), sub_policy=lambda task, made=one: made) for one in maps]
+    assert len({policy.digest for policy in policies}) == 4
+
+
 def test_a_page_is_about_cells_and_maps():
     with pytest.raises(ValueError, match="expected cells and maps"):
         vsp_beyond.report(PILOT, PILOT, SIMPLEGOAL)
@@ -93,6 +102,9 @@ def test_a_task_on_arrays_is_registered_and_compared(tmp_path):
     changed = dataclasses.replace(next_task.CART, step=against_the_wind)
     frame = vsp.compare(methods, [changed], {"Cart-v0": PILOT}, seeds=[0], n_episodes=10, runs=tmp_path).frame
     assert frame["failing"].isna().all()  # nobody arrives
+    vsp.protocol.comparison._PLAYED.clear()
+    again = vsp.compare(methods, [changed], {"Cart-v0": PILOT}, seeds=[0], n_episodes=10, runs=tmp_path / "again").frame
+    assert again["r2"].equals(frame["r2"])  # not on states of the other task
     with pytest.raises(ValueError, match="one of vsp's own"):
         vsp.register(dataclasses.replace(next_task.CART, name=SIMPLEGOAL))
 

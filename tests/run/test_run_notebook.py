@@ -96,6 +96,7 @@ FAULTS = {
     "killed kernel": (["import os\nos.kill(os.getpid(), 9)", "2"], "code cell (import os) did not end: DeadKernel"),
     "sys.exit(0)": (["import sys\nsys.exit(0)", "2"], "code cell (import sys) failed: SystemExit"),
     "too slow": (["import time; time.sleep(60)"], "code cell (import time; time.sleep(60)) did not end: CellTimeout"),
+    "skipped": (["# skip\n2"], "code cell (# skip) never ran"),
     "missing": (["2"], "did not make figures/c.pdf"),
     "shown, not raised": (
         ["try:\n    1 / 0\nexcept ZeroDivisionError:\n    get_ipython().showtraceback()", "2"],

@@ -23,7 +23,7 @@ from ..tasks import GOAL, Task, get_task
 from ..tasks.registry import is_own
 from ..teachers import agent, digest_of, load_teacher
 from .intervals import crossed_interval
-from .job import EVALUATION_SEED, N_EPISODES, Job, installed, make_all, provenance
+from .job import EVALUATION_SEED, N_EPISODES, Job, installed, make_all, provenance, settings_id
 from .method import Method
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ COLUMNS = ["task", "method", "policies", "mean", "low", "high", "failing", "cell
 AGENT, _ITSELF = "agent", Method(lambda agent, *_: agent, name="the agent itself", version=1)
 Make = Callable[[Policy, Task, Episodes | None, int], Policy]
 Returns = np.ndarray | Mapping[str, np.ndarray]  # (runs, episodes), or by name of the task
-_PLAYED: dict[tuple, tuple[Outcomes, Episodes]] = {}  # by agents, for the next run in the same process
+_PLAYED: dict[str, tuple[Outcomes, Episodes]] = {}  # by agents, for the next run in the same process
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Trial(Job):
         policy = self.method.make(agent, task, data, self.seed)
         seconds = time.perf_counter() - began
         starts = start_states(task, self.n_episodes, EVALUATION_SEED)
-        key = task.name, digest_of(agent), self.n_episodes
+        key = settings_id([_task_identity(task), digest_of(agent), self.n_episodes])
         if key not in _PLAYED:
             _PLAYED[key] = record(agent, task, starts)
         outcomes, seen = rollout(policy, task, starts), _PLAYED[key][1]
@@ -133,8 +133,8 @@ def compare(
     made elsewhere, (runs, episodes), where each run has the same starts; for several tasks, a dictionary by name.
     `agents`: by name of the task, as `vsp.agent` takes them; None: those shipped. Each trial is a file below `runs` and
     is made once; `jobs` as in `run.workers`. Episodes start from `start_states(task, n_episodes, 1)`, which no method
-    may train on; a task whose engine is slow plays fewer. Raises ValueError for a
-    method or an agent that cannot be identified, and for returns that do not fit.
+    may train on; a task whose engine is slow plays fewer. Raises ValueError for a method or an agent that cannot be
+    identified, and for returns that do not fit.
     """
     asked, seeds = {get_task(task).name: task for task in tasks}, list(seeds)
     made = {name: one if isinstance(one, Method) else Method(one) for name, one in methods.items() if callable(one)}

@@ -87,7 +87,7 @@ def installed(name: str) -> str:
     return version(name)
 
 
-def settings_id(settings: dict) -> str:
+def settings_id(settings: dict | list) -> str:
     """Return ten hexadecimal digits that identify JSON-able settings."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:10]
 

@@ -45,7 +45,7 @@ class Method:
     def identity(self, task: Task) -> dict[str, Any]:
         """Return what its policies for `task` depend on, apart from the agent and the seed."""
         make = {"name": self.name or self.make.__qualname__} if self.version is not None else identity(self.make)
-        return {"make": make, "version": self.version, "data": self.n_data, "settings": self.settings(task)}
+        return {"make": make, "version": self.version, "data": self.n_data, "settings": identity(self.settings(task))}
 
 
 def paper_method(

@@ -98,7 +98,8 @@ def _execute(notebook: Path, values: dict[str, object], work: Path) -> list[Note
         pass  # `_check_cell` finds the error
     except (CellTimeoutError, DeadKernelError) as error:
         begun = [cell for cell in _code_cells(copy) if cell.metadata.papermill.start_time]
-        raise CommandError(f"{_name(notebook, begun[-1])} did not end: {type(error).__name__}: {error}") from error
+        where = _name(notebook, begun[-1]) if begun else notebook.name
+        raise CommandError(f"{where} did not end: {type(error).__name__}: {error}") from error
     return [cell for cell in _code_cells(copy) if "injected-parameters" not in cell.metadata.tags]
 
 
@@ -121,7 +122,9 @@ def _name(notebook: Path, cell: NotebookNode) -> str:
 
 
 def _check_cell(notebook: Path, cell: NotebookNode) -> None:
-    """Raise CommandError if the cell failed, in one line if a user can fix it, such as a damaged file."""
+    """Raise CommandError if the cell failed, in one line if a user can fix it, such as a damaged file, or never ran."""
+    if cell.source.strip() and cell.execution_count is None:
+        raise CommandError(f"{_name(notebook, cell)} never ran")
     for output in cell.outputs:
         if output.output_type == "error":
             traceback = _COLOUR.sub("", "\n".join(["", *output.traceback]))
