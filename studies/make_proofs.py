@@ -1,8 +1,7 @@
-"""`make proofs` and `make proofs-teacher`: write certificates to data/beyond/proofs and results to data/beyond."""
+"""`make proofs`: write certificates to data/beyond/proofs and results to data/beyond."""
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,31 +29,21 @@ from vsp_beyond.proofs.pendulum_starts import PARTS, shares_of_starts
 from vsp_beyond.proofs.robust import largest_disturbance, outside_pit, steps_to_goal
 from vsp_beyond.proofs.simplegoal_proof import ENDS, SimpleGoalProof
 
+from .bounds import mean_return
 from .committed import BEYOND, RESULTS, read_results, write_results
-from .proofs.bounds import mean_return
-from .proofs.network import teacher_steps_to_goal
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 N_SAMPLED = 1_000_000  # episodes sampled for comparison with a proof
 MARGIN = 0.01  # margin for which simplegoal_margin is tuned: a tenth of a step
 LOSS = 0.02  # share of the teacher's mean return that the simplified policy may lose
-TEACHER_GRIDS = (500, 1000, 2000, 4000)
 
 
 def main() -> None:
     """Prove the policies that are not proved yet. Write a certificate of each to data/beyond/proofs/ and the results to
-    data/beyond/proofs.csv. After a new proof, also write that of Pendulum over smaller boxes to proofs_grid.csv. With
-    --teacher, write proofs_teacher.csv instead."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", default=".", help="tables go to OUT/data/beyond, certificates to proofs/ in it")
-    parser.add_argument("--teacher", action="store_true", help="prove SimpleGoal's teacher on finer and finer grids")
-    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
-    arguments = parser.parse_args()
-    if arguments.teacher:
-        write_results(of_teacher(), "proofs_teacher", out=arguments.out)
-        return
-    if certificates(Path(arguments.out), arguments.jobs):
-        write_results(smaller_boxes(), "proofs_grid", out=arguments.out, float_format="%.12g")
+    data/beyond/proofs.csv. After a new proof, also write that of Pendulum over smaller boxes to proofs_grid.csv."""
+    given = command.parser(main.__doc__, "tables go to OUT/data/beyond, certificates to proofs/ in it").parse_args()
+    if certificates(given.out, given.jobs):
+        write_results(smaller_boxes(), "proofs_grid", out=given.out, float_format="%.12g")
 
 
 def policies() -> dict[str, Callable[[], VoronoiPolicy]]:
@@ -136,18 +125,6 @@ def smaller_boxes() -> pd.DataFrame:
     shares = shares_of_starts(proof)
     boxes = [len(proof.steps) * PARTS**level for level in range(len(shares))]
     return pd.DataFrame({"boxes": boxes, "share": shares, "seconds": time.perf_counter() - began})
-
-
-def of_teacher() -> pd.DataFrame:
-    """Prove which share of SimpleGoal's starts outside the pit the teacher takes to the goal, by ever finer grids."""
-    rows = []
-    for n in TEACHER_GRIDS:
-        began = time.perf_counter()
-        steps = teacher_steps_to_goal(load_teacher(SIMPLEGOAL), n=n)
-        share = float((steps > 0)[outside_pit(steps)].mean())
-        rows.append({"n": n, "share": share, "longest": int(steps.max()), "seconds": time.perf_counter() - began})
-        print(f"{n} x {n} boxes: {share:.4%} proved", flush=True)
-    return pd.DataFrame(rows)
 
 
 def _kept(table: str, task: str) -> VoronoiPolicy:

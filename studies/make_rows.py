@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import pandas as pd
 
 from vsp.run import command
@@ -19,9 +16,7 @@ def main() -> None:
     """Make the rows that are not committed, and write all to data/beyond/<table>_<task>.csv, with what stands beside
     them. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks that take hours.
     """
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", type=Path, default=".", help="results go to OUT/data/beyond, rows to OUT/build/beyond")
-    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
+    parser = command.parser(main.__doc__, "results go to OUT/data/beyond, rows to OUT/build/beyond")
     parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
     arguments = parser.parse_args()
     out, folder = arguments.out, arguments.out / "build" / "beyond"

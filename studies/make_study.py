@@ -1,23 +1,28 @@
-"""`make study`: write the experiments on the reproduction to data/results/."""
+"""`make study`, `make hub-teacher`: write the experiments on the reproduction to data/results/."""
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from vsp.paper.results import write_results
 from vsp.run import command
 
-from .reproduction import interpretations, simpler, teachers
+from .reproduction import hub_teacher, interpretations, simpler, teachers
 
 
 def main() -> None:
-    """Make the missing runs of the experiments, and write readings.csv, teachers.csv and simpler.csv."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--out", type=Path, default=".", help="write to OUT/data/results and OUT/build/study")
-    parser.add_argument("--jobs", type=command.jobs, default=-1, help=command.JOBS)
+    """Make the missing runs of the experiments, and write readings.csv, teachers.csv and simpler.csv. With --agent,
+    write hub_teacher.csv and hub_teacher_ledger.csv instead, and print the second."""
+    parser = command.parser(main.__doc__, "write to OUT/data/results and OUT/build/study")
+    parser.add_argument("--agent", type=Path, help="a zip of Stable-Baselines3, trained for MountainCar")
     given = parser.parse_args()
     out, jobs, runs = given.out, given.jobs, given.out / "build" / "study"
+    if given.agent:
+        rows, ledger = hub_teacher.study(given.agent, runs, jobs=jobs)
+        write_results(rows, "hub_teacher", out=out)
+        write_results(ledger, "hub_teacher_ledger", out=out)
+        print(ledger[["subject", "quantity", "paper", "here", "low", "high", "verdict"]].to_string(index=False))
+        return
     write_results(interpretations.study(runs, jobs=jobs), "readings", out=out)
     write_results(teachers.study(runs, jobs=jobs), "teachers", out=out)
     write_results(simpler.study(out / "data" / "runs", jobs=jobs), "simpler", out=out, float_format=None)

@@ -7,7 +7,6 @@ reason. Those of MountainCar are distilled by the paper's method, too.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import time
 import warnings
@@ -242,10 +241,8 @@ def write(made: list[tuple[dict, dict]], out: Path) -> None:
 
 def main() -> None:
     """Study the agents of the folder that are not committed; write agents.csv, agents_paper.csv, policies and maps."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser = command.parser(main.__doc__, "results: OUT/data/beyond, files: OUT/build/agents")
     parser.add_argument("agents", type=Path, help="a folder of zips")
-    parser.add_argument("--out", type=Path, default=".", help="results: OUT/data/beyond, files: OUT/build/agents")
-    parser.add_argument("--jobs", type=command.jobs, default=-1, help="worker processes, -1 for one per core")
     given = parser.parse_args()
     studies = [Study(*named, path) for named, path in agents_in(given.agents).items()]
     if not studies:

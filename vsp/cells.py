@@ -29,14 +29,10 @@ class Cells(Protocol):
     d: int
     valid: str
     column: str
+    arrays: dict[str, np.ndarray]
+    options: dict[str, Any]
 
     def __len__(self) -> int: ...
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]: ...  # noqa: D102
-
-    @property
-    def options(self) -> dict[str, Any]: ...  # noqa: D102
 
     def locate(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (n, d). (n,)"""
@@ -82,19 +78,11 @@ class Nearest:
         self._scaled = self.codewords / self.scale
         for array in (self.codewords, self.scale):  # an edit would not reach the look-up
             array.setflags(write=False)
+        self.arrays = {"scale": self.scale, "codewords": self.codewords}
+        self.options = {"metric": self.metric.name}
 
     def __len__(self) -> int:
         return len(self.codewords)
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Scale and codewords."""
-        return {"scale": self.scale, "codewords": self.codewords}
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """The name of the metric."""
-        return {"metric": self.metric.name}
 
     def locate(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (n, d). (n,)"""
@@ -190,14 +178,10 @@ class Halfspaces:
             raise ValueError(f"children are {self.children.tolist()}, expected each later node and each cell once")
         if not self.normals.any(axis=1).all():
             raise ValueError("a normal is zero, expected hyperplanes")
+        self.arrays = {"normals": self.normals, "thresholds": self.thresholds, "children": self.children}
 
     def __len__(self) -> int:
         return self._k
-
-    @property
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Normals, thresholds and children."""
-        return {"normals": self.normals, "thresholds": self.thresholds, "children": self.children}
 
     def locate(self, states: np.ndarray) -> np.ndarray:
         """Cell of each state (n, d). (n,)"""

@@ -16,10 +16,10 @@ import pandas as pd
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
 from vsp.paper.readings import ALTERNATIVES, Readings
-from vsp.paper.runs import EVALUATION_SEED, Experiment, Run, load_runs, make_all, outcome_shares, paper_experiment
+from vsp.paper.runs import EVALUATION_SEED, Distillation, Experiment, Run, load_runs, outcome_shares, paper_experiment
 from vsp.paper.statistics import quartiles_from_fences, resample, spread
 from vsp.protocol.intervals import percentile_interval
-from vsp.protocol.job import settings_id
+from vsp.protocol.job import make_all, settings_id
 from vsp.rollouts import Outcomes
 
 VERSION = 1  # raise it when the same runs give other rows
@@ -45,19 +45,16 @@ AS_PRINTED = {
 def variants() -> dict[str, dict]:
     """Return the variants by name: the default, each reading alone, the algorithms as printed, all combinations."""
     tried: dict[str, dict] = {"default": {}}
-    tried |= {f"{number} {name_of(change)}": change for number, changes in ALTERNATIVES.items() for change in changes}
+    for number, changes in ALTERNATIVES.items():
+        for change in changes:
+            ((name, value),) = change.items()
+            tried[f"{number} {name}" if value is True else f"{number} {name} {value}"] = change
     tried["algorithms as printed"] = AS_PRINTED
     for size in range(2, len(FACTORS) + 1):
         for chosen in itertools.combinations(FACTORS, size):
             if not {"R2", "R4"} <= set(chosen):  # after one split a pass needs no second look-up
                 tried[" + ".join(chosen)] = {name: v for part in chosen for name, v in FACTORS[part].items()}
     return tried
-
-
-def name_of(change: dict) -> str:
-    """Return the name of a change of one field: "one_split", "learning_rate 0.01"."""
-    ((name, value),) = change.items()
-    return name if value is True else f"{name} {value}"
 
 
 def experiments(tried: dict[str, dict]) -> dict[tuple[str, str], Experiment]:
@@ -133,7 +130,8 @@ def ranking(frame: pd.DataFrame, task: str = "both") -> list[str]:
 
 def _phase(phase: str, tried: dict, seeds, runs, jobs: int | str) -> pd.DataFrame:
     work = experiments(tried)
-    make_all(list(itertools.product(work.values(), seeds)), runs=runs, jobs=jobs, label=f"readings, {phase}")
+    asked = itertools.starmap(Distillation, itertools.product(work.values(), seeds))
+    make_all(asked, runs, f"readings, {phase}", jobs=jobs)
     teachers = {task: work["default", task].teacher for task in printed.TASKS}
     own = {task: rollout_from_seed(teacher, task, seed=EVALUATION_SEED) for task, teacher in teachers.items()}
     rows, away = [], {}

@@ -13,9 +13,9 @@ import pandas as pd
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
 from vsp.paper.baselines import linear_map
-from vsp.paper.runs import EVALUATION_SEED, SHARES, Experiment, Run, load_runs, make_all, paper_experiment
+from vsp.paper.runs import EVALUATION_SEED, SHARES, Distillation, Experiment, Run, load_runs, paper_experiment
 from vsp.paper.tables import run_summary
-from vsp.protocol.job import settings_id
+from vsp.protocol.job import make_all, settings_id
 from vsp.teachers.teacher import SHIPPED, further_teachers, load_teacher
 
 from .simpler import teacher_data
@@ -35,7 +35,8 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1, tasks=printed.TASKS) 
     Column `teacher` is the name of the teacher; `checksum` is what other tables call `teacher`.
     """
     work = experiments(tasks)
-    make_all(list(itertools.product(work.values(), SEEDS)), runs=runs, jobs=jobs, label="teachers")
+    asked = itertools.starmap(Distillation, itertools.product(work.values(), SEEDS))
+    make_all(asked, runs, "teachers", jobs=jobs)
     parts = (rows_of(one, name, load_runs(one, SEEDS, runs=runs)) for (_, name), one in work.items())
     return pd.concat(parts, ignore_index=True)
 

@@ -74,8 +74,3 @@ def test_the_limit_refuses_before_it_searches():
 def test_only_linear_policies_are_proved(policy):
     with pytest.raises(ValueError, match="expected"):
         vsp_beyond.prove(policy)
-
-
-def test_rules_for_linear_policies_alone_refuse_others():
-    with pytest.raises(ValueError, match="sub_policy 'constant', expected 'linear'"):
-        RulePolicy(FLAT, [])

@@ -19,8 +19,9 @@ from vsp.paper import tables
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
 from vsp.paper.results import read_results
-from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, load_runs, make_all, make_runs, paper_results
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, load_runs, make_runs, paper_results
 from vsp.paper.statistics import spread
+from vsp.protocol import job
 from vsp.run import atomic
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
@@ -86,7 +87,7 @@ OTHER = dataclasses.replace(SMALL, config=dataclasses.replace(CONFIG, n_split=5)
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_runs_of_several_experiments_are_those_made_one_by_one(made, tmp_path, jobs):
     work = [(OTHER, 0), (SMALL, 2), (SMALL, 0), (OTHER, 3)]
-    assert make_all(iter(work), runs=tmp_path / "all", jobs=jobs, label="both") is None
+    job.make_all((Distillation(*one) for one in work), tmp_path / "all", "both", jobs=jobs)
     make_runs(OTHER, [3, 0], runs=tmp_path / "one")
     assert files(tmp_path / "all", OTHER) == files(tmp_path / "one", OTHER)
     before = files(made[0])

@@ -1,4 +1,4 @@
-"""What makes the tables of proofs: returns of pieces, the teacher over a grid, and the command."""
+"""What makes the tables of proofs: returns of pieces, and the command."""
 
 import numpy as np
 import pytest
@@ -7,10 +7,8 @@ from support import SIMPLEGOAL
 import vsp
 import vsp_beyond
 from studies import make_proofs
+from studies.bounds import mean_return
 from studies.committed import read_results, write_results
-from studies.proofs.bounds import mean_return
-from studies.proofs.network import affine_outputs, teacher_steps_to_goal
-from vsp.tasks import GOAL
 from vsp_beyond.proofs import check
 
 
@@ -32,28 +30,6 @@ def test_returns_are_those_of_the_pieces():
 def test_the_mean_return_where_nothing_moves():
     low, high = mean_return(vsp_beyond.prove(policy_of([[0.5, 0.5]], np.zeros((1, 3, 2)))).pieces, width=1e-4)
     assert low <= 10 * 0.01 - 10 * 0.04 <= high  # what starts in the goal and in the pit
-
-
-def test_units_are_within_their_bounds():
-    teacher, rng, half = vsp.load_teacher(SIMPLEGOAL), np.random.default_rng(0), 0.003
-    states = rng.uniform(size=(300, 2))
-    value, slopes, error = affine_outputs(teacher, states, half)
-    weights = [(w.astype(float), b.astype(float)) for w, b in teacher.layers]
-    for _ in range(10):
-        shift = rng.uniform(-half, half, size=(300, 2))
-        hidden = states + shift
-        for i, (w, b) in enumerate(weights):
-            hidden = hidden @ w + b if i == len(weights) - 1 else np.maximum(hidden @ w + b, 0.0)
-        assert (np.abs(hidden - value - np.einsum("nd,dnm->nm", shift, slopes)) <= error + 1e-9).all()
-
-
-def test_the_teacher_does_what_is_proved_of_it():
-    teacher, n = vsp.load_teacher(SIMPLEGOAL), 100
-    steps = teacher_steps_to_goal(teacher, n=n)
-    starts = np.random.default_rng(1).uniform(size=(20_000, 2))
-    promised, result = steps[tuple((starts * n).astype(int).T)], vsp.rollout(teacher, SIMPLEGOAL, starts)
-    assert (promised > 0).mean() > 0.9
-    assert (result.outcomes[promised > 0] == GOAL).all() and (result.lengths <= promised)[promised > 0].all()
 
 
 def test_missing_proofs_are_made_and_others_are_not(tmp_path, monkeypatch):

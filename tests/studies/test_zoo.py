@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, PENDULUM, tiny
 
-from studies import hub_teacher
+from studies import make_study
 from studies import zoo as agents
 from studies.committed import RESULTS
+from studies.reproduction import hub_teacher
 from vsp.evaluation import likeness
 from vsp.paper.runs import Experiment
 from vsp.run import command, listed
@@ -126,8 +127,8 @@ def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp
     monkeypatch.setattr(hub_teacher, "N_RUNS", {MOUNTAINCAR: 2})
     monkeypatch.setattr(hub_teacher, "paper_experiment", lambda task: Experiment(task, config, None, n_episodes=9))
     monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(task))
-    monkeypatch.setattr(sys, "argv", ["x", "an_agent.zip", "--out", str(tmp_path), "--jobs", "1"])
-    hub_teacher.main()
+    monkeypatch.setattr(sys, "argv", ["x", "--agent", "an_agent.zip", "--out", str(tmp_path), "--jobs", "1"])
+    make_study.main()
     folder = tmp_path / "data" / "results"
     rows, ledger = (pd.read_csv(folder / f"{name}.csv") for name in ("hub_teacher", "hub_teacher_ledger"))
     assert rows["teacher"].tolist() == ["an_agent"] * 2 and rows["seed"].tolist() == [0, 1]
@@ -136,8 +137,8 @@ def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp
 
 
 def test_an_agent_of_another_task_is_refused(monkeypatch, tmp_path):
-    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["x", "--agent", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
     monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(PENDULUM, task))
     with pytest.raises(command.CommandError, match="load it for the task it was trained on"):
-        hub_teacher.main()
+        make_study.main()
     assert not list(tmp_path.iterdir())

@@ -46,14 +46,9 @@ CELLS = {
     "^.._(?:drl|ours)_": "04, text-numbers", "_cell_": "05, replay", "": "05, ledger",
 }  # fmt: skip
 # The results that the notebook shows, in words
-SHOWN = {
-    "mean": "mean",
-    "std": "standard deviation",
-    "q1": "first quartile",
-    "median": "median",
-    "q3": "third quartile",
-}
-SHOWN = {f"spread_{who}_{name}": words for who in ("drl", "ours") for name, words in SHOWN.items()}
+_WORDS = {"mean": "mean", "std": "standard deviation", "q1": "first quartile"}
+_WORDS |= {"median": "median", "q3": "third quartile"}
+SHOWN = {f"spread_{who}_{name}": words for who in ("drl", "ours") for name, words in _WORDS.items()}
 SHOWN |= {"spread_ours_coverage": "share of non-outliers", "cells": "cells of the best"}
 COLUMNS = "id part task where quantity subject paper value here low high verdict cell".split()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -64,7 +63,7 @@ class Experiment:
             "config": self.config.settings() | passes,
             "n_episodes": self.n_episodes,
             "start_seeds": [EVALUATION_SEED, VALIDATION_SEED],
-            "versions": {name: job.installed(name) for name in ("numpy", "scipy")},
+            "versions": job.LIBRARIES,
         }
 
     @cached_property
@@ -129,14 +128,9 @@ def paper_experiment(task: str, *, quick: bool = False) -> Experiment:
 
 def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: int | str = 1) -> list[Run]:
     """Distil once per seed, skip existing runs, and return the runs in the order of `seeds`; `jobs` as in `workers`."""
-    seeds = list(seeds)
-    make_all([(experiment, seed) for seed in seeds], runs=runs, jobs=jobs, label=experiment.task)
-    return load_runs(experiment, seeds, runs=runs)
-
-
-def make_all(work: Iterable, *, runs: str | os.PathLike, jobs: int | str = 1, label: str) -> None:
-    """Make the runs (experiment, seed) of `work` that are missing in the folder `runs`; `jobs` as in `workers`."""
-    job.make_all((Distillation(*one) for one in work), runs, label, jobs=jobs)
+    made = [Distillation(experiment, seed) for seed in seeds]
+    job.make_all(made, runs, experiment.task, jobs=jobs)
+    return [one.run(runs) for one in made]
 
 
 def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:

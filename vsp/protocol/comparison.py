@@ -23,7 +23,7 @@ from ..tasks import GOAL, Task, get_task
 from ..tasks.registry import is_own
 from ..teachers import agent, digest_of, load_teacher
 from .intervals import crossed_interval
-from .job import EVALUATION_SEED, N_EPISODES, Job, installed, make_all, provenance, settings_id
+from .job import EVALUATION_SEED, LIBRARIES, N_EPISODES, Job, make_all, provenance, settings_id
 from .method import Method
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Trial(Job):
         """What identifies the trial: settings (an id), agent, version."""
         task = get_task(self.where)
         settings = {"task": _task_identity(task), "method": self.method.identity(task), "n": self.n_episodes}
-        settings |= {"start seed": EVALUATION_SEED, "versions": {name: installed(name) for name in ("numpy", "scipy")}}
+        settings |= {"start seed": EVALUATION_SEED, "versions": LIBRARIES}
         return provenance(settings, digest_of(self.agent), self.method.version or 0)
 
     def make(self) -> tuple[dict[str, np.ndarray], dict]:

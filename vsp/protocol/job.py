@@ -15,17 +15,17 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from ..run import atomic, sealed, workers
 
 N_EPISODES, EVALUATION_SEED = 1000, 1  # of every reported result, from the same start states for all
 PROVENANCE = ("settings", "teacher", "version")
+LIBRARIES = {"numpy": np.__version__, "scipy": scipy.__version__}  # a result may depend on them
 
 
 class Job:
@@ -79,12 +79,6 @@ def _make(job: Job) -> tuple[dict[str, np.ndarray], dict]:
 def provenance(settings: dict, digest: str, version: int | str) -> dict[str, str | int]:
     """Return the columns `PROVENANCE` of a result; `digest` is the checksum of the teacher's weights."""
     return {"settings": settings_id(settings), "teacher": digest[:10], "version": version}
-
-
-@cache
-def installed(name: str) -> str:
-    """Return the version of an installed package: it takes milliseconds to find, and each run needs it."""
-    return version(name)
 
 
 def settings_id(settings: dict | list) -> str:

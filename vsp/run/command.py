@@ -9,11 +9,9 @@ import re
 import signal
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 from .atomic import DamagedFile, MissingFile
-
-JOBS = "worker processes, -1 for one per core, or the address of a Dask scheduler"  # help text of --jobs
-
 
 # Errors of a disk: no space, no access, name in use
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
@@ -33,6 +31,16 @@ def jobs(text: str) -> int | str:
     raise argparse.ArgumentTypeError(
         f"{text!r}: expected a whole number from 1 on, -1 for one per core, or an address as in tcp://host:8786"
     )
+
+
+def parser(about: str | None, out: str) -> argparse.ArgumentParser:
+    """Return the parser of a command that makes results with the options --out, where `out` says what goes, and
+    --jobs."""
+    made = argparse.ArgumentParser(description=about)
+    made.add_argument("--out", type=Path, default=Path(), help=out)
+    how_many = "worker processes, -1 for one per core, or the address of a Dask scheduler"
+    made.add_argument("--jobs", type=jobs, default=-1, help=how_many)
+    return made
 
 
 @contextlib.contextmanager

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from vsp.checks import check_array
-from vsp.policy import VoronoiPolicy
-from vsp.subpolicies.base import linear_outputs, number
+from vsp.policy import PiecewisePolicy, VoronoiPolicy
+from vsp.subpolicies.base import number
 
 AGREEMENT = 0.95  # share of the states in which rules must agree with the look-up
 MOST = 200  # leaves of the largest tree to try
@@ -31,8 +31,8 @@ class Rule:
     high: np.ndarray  # (d,)
 
     def holds(self, states: np.ndarray) -> np.ndarray:
-        """Return which of the states (n, d) lie in the box. (n,) bool"""
-        return np.all((states > self.low) & (states <= self.high), axis=1)
+        """Return which of the states (n, d) lie in the box, or whether one (d,) does. (n,) bool, or one"""
+        return np.all((states > self.low) & (states <= self.high), axis=-1)
 
     def text(self, names: tuple[str, ...]) -> str:
         """Write the box in words, with the names of the d inputs; "always" if it has no border."""
@@ -92,22 +92,19 @@ def find_rules(policy: VoronoiPolicy, states: np.ndarray, unseen: np.ndarray) ->
     return rules, digits
 
 
-class RulePolicy:
-    """The maps of a `VoronoiPolicy` with rules in place of its look-up, to show what an occasional wrong cell costs.
+class RulePolicy(PiecewisePolicy):
+    """The maps of a policy with rules in place of its look-up, to show what an occasional wrong cell costs.
 
     A map is good in its own cell, but may be far off beyond the border. So rules that agree in 95 of 100 states can
     describe a policy, but may not be able to replace it.
     """
 
     def __init__(self, policy: VoronoiPolicy, rules: list[Rule]):
-        policy.check_linear()
-        self.policy, self.rules = policy, rules
+        super().__init__(policy.where, policy.coefficients, task=policy.task, sub_policy=policy.policy_class.name)
+        self.rules = rules
 
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d), limited to the action box."""
-        states, task = check_array("observations", obs, (-1, len(self.policy.task.low))), self.policy.task
-        raw = linear_outputs(states, self.policy.coefficients[apply(self.rules, states)])
-        return np.clip(raw, task.action_low, task.action_high), None
+    def _cells(self, states: np.ndarray) -> np.ndarray:
+        return apply(self.rules, states)
 
 
 def apply(rules: list[Rule], states: np.ndarray) -> np.ndarray:

@@ -70,13 +70,6 @@ def pendulum_table() -> pd.DataFrame:
     return read_results("proofs_grid", RESULTS)[["boxes", "share"]]
 
 
-def teacher_table() -> pd.DataFrame:
-    """Return what is proved of SimpleGoal's teacher. Columns: boxes (per axis), share of the starts outside the pit,
-    steps (at most), minutes (computing time)."""
-    rows = read_results("proofs_teacher", RESULTS).rename(columns={"n": "boxes", "longest": "steps"})
-    return rows.assign(minutes=rows["seconds"] / 60).drop(columns="seconds")
-
-
 def least_returns() -> tuple[np.ndarray, np.ndarray]:
     """Return MountainCar's starts, and the lowest return of the program from there. (n,) each"""
     blocks = load_certificate("mountaincar_limit")[1]["pieces"]

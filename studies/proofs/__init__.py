@@ -1,1 +1,0 @@
-"""Proofs that only make committed tables: of SimpleGoal's teacher, and the exact returns of its pieces."""
