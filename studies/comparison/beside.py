@@ -90,10 +90,7 @@ def kept_jobs(task: str, table: str) -> dict[str, Row]:
         return {}
     preset = PRESETS[METHODS[about.keeps].preset](task).n_cells
     sizes = {"": preset, **{f"_size_{size}": size for size in about.keeps_also}}
-    return {
-        f"{table}_{task}{suffix}.policy": Row(task, about.keeps, size, 0, tail=about.tail)
-        for suffix, size in sizes.items()
-    }
+    return {f"{table}_{task}{suffix}.policy": Row(task, about.keeps, size, 0) for suffix, size in sizes.items()}
 
 
 def _sameness(name: str, pairs: list[tuple[Row, Row]], jobs: tuple[Row, ...], *policies: VoronoiPolicy) -> pd.DataFrame:

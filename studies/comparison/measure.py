@@ -18,42 +18,30 @@ REPORT_SEED, ERROR_SEED = 21, 22  # seeds of the start states, for returns and f
 NEW_SEED, LIMIT_SEED = 23, 24  # seeds of start states for robots, and at the limit on LunarLander
 N_REPORTED, N_ERROR = 10_000, 100  # episodes
 N_COMMON = 10_000  # states on which actions and cells are compared
-TAIL = 0.01  # share of the episodes that count as the worst
 
 
-def settings(*, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED) -> dict:
+def settings(seed: int = REPORT_SEED) -> dict:
     """Return the settings that determine the numbers of a policy, as JSON-able values."""
-    about = {"starts": [seed, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
-    return about | ({"tail": TAIL} if tail else {}) | ({"whole": True} if whole else {})
+    return {"starts": [seed, ERROR_SEED], "episodes": [N_REPORTED, N_ERROR], "version": VERSION}
 
 
-def measure(
-    policy: Policy, teacher: Policy, task: Task, *, tail: bool = False, whole: bool = False, seed: int = REPORT_SEED
-) -> dict[str, float]:
-    """Measure a policy: returns, action errors and size.
+def measure(policy: Policy, teacher: Policy, task: Task, seed: int = REPORT_SEED) -> dict[str, float]:
+    """Measure a policy: returns, from the starts of `seed`, action errors and size.
 
     Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none); with
-    `tail`, worst (mean return of the worst episodes). Slow tasks are played from fewer starts; with
-    `whole`, their returns come from as many starts as those of other tasks. `seed`: that of the starts of the
-    returns.
+    teacher's states and in the policy's own), cells (or leaves; 0: none). Slow tasks are played from fewer starts; but
+    of those of `LIMIT_SEED` all are played.
     """
-    fewer = task.slowness
-    result = rollout(policy, task, start_states(task, N_REPORTED // (1 if whole else fewer), seed))
-    starts = start_states(task, N_ERROR // fewer, ERROR_SEED)
-    row = {
+    n = N_REPORTED if seed == LIMIT_SEED else N_REPORTED // task.slowness
+    result = rollout(policy, task, start_states(task, n, seed))
+    starts = start_states(task, N_ERROR // task.slowness, ERROR_SEED)
+    return {
         "mean": float(result.returns.mean()),
         "failing": float(np.mean(result.outcomes != GOAL)),
         "error_teacher": action_error(policy, teacher, task, starts, by=teacher),
         "error_own": action_error(policy, teacher, task, starts, by=policy),
         "cells": len(policy) if hasattr(policy, "__len__") else 0,
     }
-    return row | ({"worst": worst(result.returns)} if tail else {})
-
-
-def worst(returns: np.ndarray) -> float:
-    """Return the mean of the worst `TAIL` of the returns, at least of one: the conditional value at risk."""
-    return float(np.sort(returns)[: max(1, round(TAIL * len(returns)))].mean())
 
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:

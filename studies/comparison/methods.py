@@ -169,7 +169,6 @@ class Table:
     methods: tuple[str, ...] = ()  # empty: the methods whose table it is
     sizes: tuple[int, ...] = ()  # only these sizes; empty: all sizes of a method
     agents: tuple[int, ...] = (0,)  # teachers: 0 is the shipped one, the others are those of `further_teachers`
-    tail: bool = False  # measure the worst returns too
     keeps: str = ""  # the method whose policy of the preset's size and of the first seed is kept
     keeps_also: tuple[int, ...] = ()  # further sizes whose policy of the first seed is kept
 
@@ -195,11 +194,10 @@ TABLES = {
     TASKS[2]: _SMALL | {"limit": Table(range(10), range(3), sizes=(8, 12), keeps="at the limit")},
     LANDER: {
         "methods": Table(range(5)),
-        "tuned": Table(  # the first two again, so that their tail is measured too
-            range(3), methods=("teacher", "our cells, tuned", "CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP),
-            sizes=(0, 1, 2, 4, 8), tail=True,
+        "tuned": Table(
+            range(3), methods=("CART, linear leaves, DAgger, tuned", OBLIQUE, ONE_MAP), sizes=(0, 1, 2, 4, 8)
         ),
-        "faithful": Table(range(10), range(3), sizes=(0, 1, 2, 4, 8), tail=True, keeps="faithful"),
+        "faithful": Table(range(10), range(3), sizes=(0, 1, 2, 4, 8), keeps="faithful"),
         "limit": Table(range(2), sizes=(3,), keeps="at the limit"),
     },
     WALKER: {"robots": Table(range(3), keeps="cells, trained further")},

@@ -32,7 +32,6 @@ class Row(Job):
     size: int
     seed: int
     agent: int = 0  # which teacher: 0 is the shipped one, the others are those of `further_teachers`
-    tail: bool = False  # whether the worst returns are measured too
     kind = "Row"
 
     @property
@@ -41,16 +40,16 @@ class Row(Job):
         return METHODS[self.method]
 
     @property
-    def measured(self) -> dict:
-        """How its policy is measured, as arguments of `measure`.
+    def start_seed(self) -> int:
+        """The seed of the start states from which its returns are measured.
 
         At the limit small differences count, so a slow task is played from as many starts as others, and from new ones,
         as robots are.
         """
-        whole = get_task(self.task).slowness > 1 and self.how.preset == "limit"
-        new = measure.LIMIT_SEED if whole else measure.NEW_SEED
-        seed = new if whole or self.how.preset == "walking" else measure.REPORT_SEED
-        return {"tail": self.tail, "whole": whole, "seed": seed}
+        if self.how.preset == "walking":
+            return measure.NEW_SEED
+        slow = get_task(self.task).slowness > 1
+        return measure.LIMIT_SEED if slow and self.how.preset == "limit" else measure.REPORT_SEED
 
     @property
     def provenance(self) -> dict[str, str | int]:
@@ -58,7 +57,7 @@ class Row(Job):
         how = self.how
         about: dict = {"task": self.task, "method": self.method, "size": self.size}
         about["settings"] = how.read(self.task)
-        about["measure"] = measure.settings(**self.measured)
+        about["measure"] = measure.settings(self.start_seed)
         about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
         return provenance(about, _teacher(self.task, self.agent).digest, how.version)
 
@@ -68,17 +67,13 @@ class Row(Job):
         named: dict = {"task": self.task, "method": self.method, "size": self.size, "seed": self.seed}
         return named | ({"agent": self.agent} if self.agent else {})
 
-    def about(self) -> dict[str, str | int]:
-        """Return what the row's file says of the job; the settings include the tail."""
-        return self.named | self.provenance
-
     def make(self) -> tuple[dict, dict]:
         """Distil and measure a policy; return the arrays (of Voronoi cells only) and about of the row's file."""
         teacher, task = _teacher(self.task, self.agent), get_task(self.task)
         began = time.perf_counter()
         policy = method(self.method, self.size)(teacher, task, None, self.seed)
         seconds = time.perf_counter() - began
-        row = measure.measure(policy, teacher, task, **self.measured)
+        row = measure.measure(policy, teacher, task, self.start_seed)
         row |= measure.fidelity(policy, teacher, task) if self.how.preset in ALIKE else {}
         arrays = {}
         if isinstance(policy, VoronoiPolicy):
@@ -104,7 +99,7 @@ def jobs_of(task: str, table: str = "methods") -> list[Row]:
     """List all rows of a task in `table`, a key of `TABLES[task]`."""
     about = TABLES[task][table]
     return [
-        Row(task, name, size, seed, agent, about.tail)
+        Row(task, name, size, seed, agent)
         for name, method in methods_of(task, table).items()
         for size in sizes_of(task, method, about)
         for agent in about.agents

@@ -56,11 +56,6 @@ def test_the_action_error_by_hand():
     assert action_error(torque, still, get_task(PENDULUM), np.zeros((1, 2)), by=still) == pytest.approx(0.5)
 
 
-def test_the_tail_is_the_mean_of_the_worst_hundredth():
-    returns = np.arange(1000.0)[::-1]
-    assert measure_module.worst(returns) == np.mean(range(10)) and measure_module.worst(returns[:3]) == 997.0
-
-
 # Likeness
 
 

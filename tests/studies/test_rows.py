@@ -56,7 +56,6 @@ def test_a_table_differs_by_task_where_rows_take_long():
     assert {table: len({job.seed for job in jobs}) for table, jobs in lander.items()} == {
         "methods": 5, "tuned": 3, "faithful": 10, "limit": 2
     }  # fmt: skip
-    assert [table for table, jobs in lander.items() if jobs[0].tail] == ["tuned", "faithful"]
     assert {job.size for table in ("tuned", "faithful") for job in lander[table]} == {0, 1, 2, 4, 8}
 
 
@@ -66,11 +65,10 @@ def test_a_table_differs_by_task_where_rows_take_long():
 def test_other_arguments_settings_teachers_and_versions_are_other_rows(small):
     job, know = CART_3, lambda: tuple(job.about().values())
     known = know()
-    changes = ({"method": "teacher"}, {"size": 2}, {"seed": 0}, {"agent": 1}, {"tail": True})
+    changes = ({"method": "teacher"}, {"size": 2}, {"seed": 0}, {"agent": 1})
     others = [dataclasses.replace(job, **change) for change in changes]
-    assert len({known, *(tuple(other.about().values()) for other in others)}) == 6
-    other = others[3].about()
-    assert job.path("") != others[3].path("") and job.about() | {"teacher": "", "agent": 1} == other | {"teacher": ""}
+    assert len({known, *(tuple(other.about().values()) for other in others)}) == 5
+    assert job.path("") != others[3].path("")
     for change in ({"settings": {"depth": 3}}, {"version": 2}):
         with pytest.MonkeyPatch.context() as patch:
             patch.setitem(METHODS, "CART", dataclasses.replace(METHODS["CART"], **change))
@@ -98,12 +96,11 @@ def test_at_the_limit_a_slow_task_is_played_from_all_report_starts(small):
     small.setattr(rows, "get_task", lambda name: slow)
     policy, played = VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), []
     small.setattr(measure, "rollout", lambda *given: played.append(len(given[2])) or rollout(*given))
-    for name, whole in (("at the limit", True), ("CART", False)):
+    for name, seed in (("at the limit", measure.LIMIT_SEED), ("CART", measure.REPORT_SEED)):
         job = Row(SIMPLEGOAL, name, 3, 0)
-        assert job.measured["whole"] == whole
-        measure.measure(policy, policy, slow, whole=whole)
+        assert job.start_seed == seed
+        measure.measure(policy, policy, slow, seed)
     assert played == [measure.N_REPORTED, measure.N_REPORTED // 10]
-    assert measure.settings(whole=True) == measure.settings() | {"whole": True}
 
 
 # Rows
@@ -115,8 +112,6 @@ def test_a_row_holds_what_is_measured(small):
     policy = METHODS["CART"].make(teacher, task, dataclasses.replace(SMALL, n_cells=3), 1)
     assert about["row"] == measure.measure(policy, teacher, task) and about["row"]["cells"] == 3
     assert {*about} == {"row", "seconds"} and about["seconds"] > 0
-    tailed = dataclasses.replace(CART_3, tail=True).make()[1]["row"]
-    assert tailed.pop("worst") <= tailed["mean"] and tailed == about["row"]
 
 
 def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
