@@ -104,11 +104,12 @@ def load_teacher(
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
+    weights, text = listed.read_listed(path), listed.read_listed(path.with_suffix(".json"))
     try:
-        tensors = load(listed.read_listed(path))
+        tensors = load(weights)
     except SafetensorError as error:
         raise atomic.DamagedFile(f"{path}: its checksum is right, but it holds no tensors: {error!r:.300}") from error
-    card = json.loads(listed.read_listed(path.with_suffix(".json")))
+    card = json.loads(text)
     critic = part_of(tensors, "critic")
     named = str(card.get("task")).rpartition(":")[2]  # a file imports no module
     return Teacher(part_of(tensors, "actor"), task or named, card=card, critic=critic)
