@@ -100,6 +100,10 @@ def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
     said = capsys.readouterr().out.splitlines()
     assert [line.split(" for Tank-v0: some ")[0] for line in said] == ["distilling", "distilling", "searching"]
     assert all(policy.task.name == "Tank-v0" for policy in policies)
+    method, task = vsp_beyond.faithful_method(n_cells=2), vsp.get_task("Tank-v0")  # the same for `vsp.compare`
+    again = method(vsp.agent(own_tasks.tank_pilot), task, None, 0)
+    assert again.digest == policies[0].digest
+    assert method.identity(task) != vsp_beyond.faithful_method(n_cells=3).identity(task)
     with pytest.raises(ValueError, match="either these or a config"):
         vsp_beyond.faithful(own_tasks.tank_pilot, "Tank-v0", LITTLE, n_cells=2, seed=0)
 
