@@ -45,11 +45,11 @@ def drawn(seed=0):
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
     """The picture as it is shown, and its two files; the figure is closed."""
-    out = tmp_path_factory.mktemp("saved")
+    out, others = tmp_path_factory.mktemp("saved"), plt.get_fignums()  # another module may have left one open
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "0")
         picture = save_figure(drawn(), "cells_example", alt=ALT, out=out)
-    assert not plt.get_fignums()
+    assert plt.get_fignums() == others
     return picture, out / "figures" / "cells_example.pdf", out / "figures" / "cells_example.png"
 
 
