@@ -7,12 +7,18 @@ Rules:
    number, else "differs".
 3. A result is "reproduced" if the printed value, plus or minus half a unit of its last digit, lies in the rerun's 95 %
    interval; else it "differs". The interval is widened by the square root of 2, because the paper's value comes from a
-   sample of the same size. Intervals come from 10,000 resamples: of runs for distilled policies, of start states for
-   the one teacher.
-4. A return "cannot be told" if the printed value lies in an interval that, widened, is longer than the standard
-   deviation that the paper prints for these returns: such an interval contains nearly anything.
-5. A value that no rerun can show, or that is not measured here (the parameters of one run, the machine), "cannot be
+   sample of the same size. Intervals come from 1000 resamples of runs *and* start states; of start states alone for the
+   one teacher.
+4. A result "cannot be told" if the printed value lies in an interval that, widened, is longer than the standard
+   deviation of what is counted: for returns the printed one, for a share that of one episode, for cells that of a run.
+   Such an interval contains nearly anything.
+5. A lowest or highest value has no such interval. It "differs" if at least `BEYOND` of the rerun's runs, from as many
+   starts, go beyond the printed value: were the paper's runs of the same kind, none of theirs would go so far by chance
+   once in 2 ** `BEYOND` times. Else it "cannot be told".
+6. A value that no rerun can show, or that is not measured here (the parameters of one run, the machine), "cannot be
    checked".
+
+Each fact counts once (`FOLLOWS`). `studies.reproduction.verdicts` measures how often these rules are wrong.
 """
 
 from __future__ import annotations
@@ -23,6 +29,7 @@ import numpy as np
 import pandas as pd
 
 from ..config import paper_preset
+from ..evaluation import fences
 from ..protocol.intervals import interval, share_interval
 from ..tasks import base, mountaincar, registry, simplegoal
 from . import audit, printed
@@ -32,7 +39,13 @@ from .statistics import outlier_numbers, resample, spread
 VERDICTS = REPRODUCED, UNTOLD, DIFFERS, UNCHECKED, CONTRADICTED = (
     "reproduced", "cannot be told", "differs", "cannot be checked", "contradicts itself"
 )  # fmt: skip
-N_RESAMPLES = 10_000
+N_RESAMPLES = 1000
+BEYOND = 6
+EXTREME = "(?:^|_)(?:min|max)$"  # ids of lowest and highest values
+# Results that follow from others, or are printed again elsewhere: interquartile range, coverage, the share of the
+# outliers on the other side, the lowest outlier, and in the text the mean, deviation and extremes of the tables
+FOLLOWS = "_(?:iqr|coverage|outliers_above_share|outliers_min|caption_cells)$|^.._(?:drl|ours)_(?:mean|std|min|max)$"
+CHOSEN = "^sg_(?:spread_)?drl_"  # results of SimpleGoal's teacher, whose recipe was chosen with its return known
 # Parts of the paper by patterns of ids; the first match counts
 PARTS = {
     "_cell_": "coefficients",
@@ -50,7 +63,7 @@ _WORDS = {"mean": "mean", "std": "standard deviation", "q1": "first quartile"}
 _WORDS |= {"median": "median", "q3": "third quartile"}
 SHOWN = {f"spread_{who}_{name}": words for who in ("drl", "ours") for name, words in _WORDS.items()}
 SHOWN |= {"spread_ours_coverage": "share of non-outliers", "cells": "cells of the best"}
-COLUMNS = "id part task where quantity subject paper value here low high verdict cell".split()
+COLUMNS = "id part fact task where quantity subject paper value here low high verdict cell".split()
 
 
 def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
@@ -62,8 +75,9 @@ def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES)
     settings = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"])
     parts = [measured(task, result, n_resamples=n_resamples) for task, result in results.items()]
     frame = printed.printed_values().join(pd.concat([settings, *parts]), on="id")
-    frame["verdict"] = verdicts(frame, in_doubt=frame["id"].isin(audit.in_doubt()), wide=_wide(frame))
+    frame["verdict"] = verdicts(frame, in_doubt=frame["id"].isin(audit.in_doubt()))
     frame["part"] = _first_match(frame["id"], PARTS)
+    frame["fact"] = (frame["part"] == "results") & ~frame["id"].str.contains(FOLLOWS)
     frame["cell"] = _first_match(frame["id"], CELLS)
     return frame[COLUMNS]
 
@@ -72,29 +86,31 @@ def _first_match(ids: pd.Series, values: dict[str, str]) -> np.ndarray:
     return np.select([ids.str.contains(pattern) for pattern in values], list(values.values()), "")
 
 
-def _wide(frame: pd.DataFrame) -> pd.Series:
-    """Whether the widened interval of a return is longer than the printed standard deviation of these returns."""
-    printed_std = frame["task"].map(printed.PREFIX) + "_spread_" + frame["subject"].str.lower() + "_std"
-    length = np.sqrt(2) * (frame["high"] - frame["low"])
-    of_returns = ~frame["id"].str.contains("share|coverage|cells|outliers$")
-    return of_returns & (length > printed_std.map(frame.set_index("id")["value"]))
-
-
 def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
-    """Count the values of each part of the paper by verdict, and the results once more, each distinct value once."""
-    once = distinct_results(book).assign(part="results, each value once")
-    table = pd.concat([book, once]).groupby("part")["verdict"].value_counts().unstack()
-    parts = ["settings", "results", "results, each value once", "coefficients"]
-    return table.reindex(index=parts, columns=VERDICTS).fillna(0).astype(int).rename_axis(columns=None)
+    """Count settings and coefficients by verdict, and each fact once: of SimpleGoal's teacher, whose recipe was chosen
+    with its return known, of MountainCar's, and of the distilled policies."""
+    facts = book[book["fact"]]
+    of_teacher, chosen = facts["subject"] == "DRL", facts["id"].str.contains(CHOSEN)
+    groups = {
+        "distilled policies": facts[~of_teacher], "MountainCar's teacher": facts[of_teacher & ~chosen],
+        "SimpleGoal's teacher (chosen)": facts[chosen], "settings": book[book["part"] == "settings"],
+        "coefficients": book[book["part"] == "coefficients"],
+    }  # fmt: skip
+    table = pd.DataFrame({name: rows["verdict"].value_counts() for name, rows in groups.items()}).T
+    return table.reindex(columns=VERDICTS).fillna(0).astype(int).rename_axis("of").reset_index()
 
 
-def verdicts(rows: pd.DataFrame, *, in_doubt: pd.Series, wide: pd.Series) -> np.ndarray:
-    """Return the verdicts by this module's rules; `rows` have paper (as printed), value, here, low and high."""
+def verdicts(rows: pd.DataFrame, *, in_doubt: pd.Series) -> np.ndarray:
+    """Return the verdicts by this module's rules; `rows` have id, paper (as printed), value, here, low, high, beyond
+    (of extremes: how many runs go beyond the value) and unit (the standard deviation of what is counted)."""
     here, half = rows["here"], 0.5 * rows["paper"].map(last_digit)
     low, high = here - np.sqrt(2) * (here - rows["low"]), here + np.sqrt(2) * (rows["high"] - here)
-    same = rows["low"].isna() & np.isclose(here, rows["value"], rtol=1e-9)
+    extreme = rows["beyond"].notna()
+    same = rows["low"].isna() & ~extreme & np.isclose(here, rows["value"], rtol=1e-9)
     inside = rows["value"].between(low - half, high + half)  # false for settings, which have no interval
-    rules = {CONTRADICTED: in_doubt, UNCHECKED: here.isna(), REPRODUCED: same, DIFFERS: ~inside, UNTOLD: wide}
+    beyond = np.where(extreme, rows["beyond"] >= BEYOND, ~same & ~inside)
+    untold = extreme | (high - low > rows["unit"])
+    rules = {CONTRADICTED: in_doubt, UNCHECKED: here.isna(), DIFFERS: beyond, UNTOLD: untold}
     return np.select([*rules.values()], [*rules], REPRODUCED)  # the first that applies
 
 
@@ -104,26 +120,63 @@ def last_digit(printed: str) -> float:
 
 
 def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """Return the rerun's results under the ids of the paper's values: columns here, low, high (95 %)."""
-    rows, prefix = {}, printed.PREFIX[task]
-    for subject, returns in (("drl", result.teacher_returns[:, None]), ("ours", result.returns)):
-        here = outlier_numbers(returns) | spread(returns)
-        here["coverage"] *= 100
-        bounds = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975])
-        bounds["outliers"] = np.floor(bounds["outliers"].iloc[0]), np.ceil(bounds["outliers"].iloc[1])
-        for name in bounds:
-            row = here[name], *bounds[name]
-            row = row if row[0] == row[0] else (np.nan, np.nan, np.nan)  # an empty set of outliers has no mean
-            rows[f"{prefix}_{subject}_{name}"] = rows[printed.spread_id(task, subject, name)] = row
-    runs = np.array([(run.validation_mean, len(run.policy)) for run in result.runs])
-    ends = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1])  # the best of resampled runs
-    rows[f"{prefix}_cells"] = rows[f"{prefix}_caption_cells"] = len(result.best.policy), *ends
-    return pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high"])
+    """Return the rerun's results under the ids of the paper's values: the columns of `set_against`."""
+    values, prefix, parts = printed.printed_values().set_index("id")["value"], printed.PREFIX[task], []
+    for subject, returns in (("drl", result.teacher_returns[None]), ("ours", result.returns)):
+        here, std = of_returns(returns, n_resamples=n_resamples), values[f"{prefix}_spread_{subject}_std"]
+        for begin in (f"{prefix}_{subject}_", f"{prefix}_spread_{subject}_"):
+            own = values[values.index.str.startswith(begin)].rename(lambda id, begin=begin: id.removeprefix(begin))
+            parts.append(set_against(here, returns, own, std).rename(lambda name, begin=begin: begin + name))
+    cells = of_cells(np.array([(run.validation_mean, len(run.policy)) for run in result.runs]))
+    return pd.concat([*parts, cells.set_axis([f"{prefix}_cells"]), cells.set_axis([f"{prefix}_caption_cells"])])
+
+
+def of_cells(runs: np.ndarray, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """Return the cells of the best of some runs (p, 2), given as validation means and cells: one row "cells", with an
+    interval over runs. Its unit is the standard deviation of a run's cells."""
+    low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1], n_resamples=n_resamples)
+    row = {"here": runs[runs[:, 0].argmax(), 1], "low": low, "high": high, "unit": runs[:, 1].std(ddof=1)}
+    return pd.DataFrame(row, index=["cells"])
+
+
+def of_returns(returns: np.ndarray, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
+    """Return the statistics of returns (p, n), one row each: columns here, low and high (95 %; NaN for extremes)."""
+    here = outlier_numbers(returns) | spread(returns)
+    here["coverage"] *= 100
+    ends = resample(returns, n_resamples=n_resamples).quantile([0.025, 0.975]).T.set_axis(["low", "high"], axis=1)
+    ends.loc["outliers"] = np.floor(ends.at["outliers", "low"]), np.ceil(ends.at["outliers", "high"])
+    frame = pd.DataFrame({"here": here}).join(ends)
+    return frame.where(frame["here"].notna() & ~frame.index.str.contains(EXTREME), frame[["here"]])
+
+
+def set_against(found: pd.DataFrame, returns: np.ndarray, values: pd.Series, std: float) -> pd.DataFrame:
+    """Add to what `of_returns` found of `returns` (p, n) the columns beyond and unit, as `verdicts` needs them.
+
+    `values` are the paper's by name; `std` is its standard deviation of the returns.
+    """
+    frame = found.assign(beyond=np.nan, unit=std)
+    for name, value in values[values.index.isin(frame.index)].items():
+        if name.endswith(("share", "coverage")):
+            frame.loc[name, "unit"] = 100 * np.sqrt(value / 100 * (1 - value / 100))
+        elif name == "outliers":
+            frame.loc[name, "unit"] = np.sqrt(value * (returns.size - value))
+        elif f"_{name}".endswith(("_min", "_max")):
+            frame.loc[name, "beyond"] = _beyond(name, returns, value)
+    return frame
+
+
+def _beyond(name: str, returns: np.ndarray, value: float) -> int:
+    """Count the runs that go beyond the paper's lowest or highest value, or the starts if these are fewer or the policy
+    is one."""
+    low, high = fences(*np.quantile(returns, (0.25, 0.75)))
+    counted = (returns < low) | (returns > high) if name.startswith("outliers") else np.ones(returns.shape, bool)
+    beyond = counted & (returns < value if name.endswith("min") else returns > value)
+    return min(int(beyond.any(axis=axis).sum()) for axis in (0, 1) if axis == 0 or len(returns) > 1)
 
 
 def distinct_results(book: pd.DataFrame) -> pd.DataFrame:
-    """Return the results in the ledger `book`; of values that the paper prints twice, the row of its table."""
-    return book[book["part"] == "results"].drop_duplicates(["task", "subject", "value"], keep="last")
+    """Return the rows of the ledger that are facts: results that follow from no others."""
+    return book[book["fact"]]
 
 
 def ledger_gaps(book: pd.DataFrame, task: str) -> pd.DataFrame:

@@ -13,9 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..checks import check_finite
+from ..checks import check_finite, check_seed
 from ..evaluation import fences
-from ..protocol.intervals import bootstrap_draws
 
 
 def spread(returns: np.ndarray) -> dict[str, float]:
@@ -31,7 +30,7 @@ def spread(returns: np.ndarray) -> dict[str, float]:
         raise ValueError("no returns, expected at least one")
     q1, median, q3 = np.percentile(returns, [25, 50, 75])
     lower, upper = fences(q1, q3)
-    below, above, moments = returns < lower, returns > upper, _moments(returns)
+    below, above, moments = returns < lower, returns > upper, _moments(returns, np.ones(len(returns)))
     numbers = {name: moments[name] for name in ("min", "max", "mean", "std")}
     numbers |= {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1}
     numbers |= {"coverage": 1.0 - (below | above).mean(), "lower_fence": lower, "upper_fence": upper}
@@ -47,77 +46,66 @@ def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     lower, upper = facts["lower_fence"], facts["upper_fence"]
     numbers = {name: facts[name] for name in ("mean", "std", "min", "max")}
     numbers |= {"whisker_low": lower, "whisker_high": upper}
-    return numbers | _outliers(returns[returns < lower], returns[returns > upper])
+    return numbers | _outliers(
+        *((side, np.ones(len(side))) for side in (returns[returns < lower], returns[returns > upper]))
+    )
 
 
-def _outliers(below: np.ndarray, above: np.ndarray) -> dict[str, float]:
-    outside = np.concatenate([below, above])
-    numbers: dict[str, float] = {"outliers": len(outside)}
-    numbers |= {f"outliers_{name}": value for name, value in _moments(outside).items()}
-    for side, values in (("below", below), ("above", above)):
-        moments = _moments(values)
-        numbers[f"outliers_{side}_share"] = 100 * len(values) / len(outside) if len(outside) else np.nan
+def _outliers(*sides: tuple[np.ndarray, np.ndarray]) -> dict[str, float]:
+    """Describe the outliers below and above; of each side their values, and how many times each occurs."""
+    outside = tuple(np.concatenate(part) for part in zip(*sides))
+    numbers: dict[str, float] = {"outliers": int(outside[1].sum())}
+    numbers |= {f"outliers_{name}": value for name, value in _moments(*outside).items()}
+    for side, (values, times) in zip(("below", "above"), sides):
+        moments = _moments(values, times)
+        numbers[f"outliers_{side}_share"] = 100 * times.sum() / numbers["outliers"] if numbers["outliers"] else np.nan
         numbers |= {f"outliers_{side}_{name}": moments[name] for name in ("mean", "std")}
     return numbers
 
 
-def _moments(values: np.ndarray) -> dict[str, float]:
-    if not len(values):
+def _moments(values: np.ndarray, times: np.ndarray) -> dict[str, float]:
+    """Return mean, standard deviation and extremes of values that occur so many `times`."""
+    n, there = times.sum(), values[times > 0]
+    if not n:
         return dict.fromkeys(("mean", "std", "min", "max"), np.nan)
-    deviation = values.std(ddof=1) if len(values) > 1 else 0.0
-    return {"mean": values.mean(), "std": deviation, "min": values.min(), "max": values.max()}
+    mean = times @ values / n
+    deviation = math.sqrt(times @ np.square(values - mean) / max(1, n - 1))
+    return {"mean": mean, "std": deviation, "min": there.min(), "max": there.max()}
 
 
-def resample(returns: np.ndarray, *, n_resamples: int = 10_000, seed: int = 0) -> pd.DataFrame:
+def resample(returns: np.ndarray, *, n_resamples: int = 2000, seed: int = 0) -> pd.DataFrame:
     """Bootstrap the statistics of `spread` and `outlier_numbers`: one row per resample, one column per statistic.
 
-    Resamples the rows of `returns` (p, n), which are policies. Coverage and shares are in percent. A statistic of a set
-    that a resample leaves empty is NaN.
+    Resamples policies, the rows of `returns` (p, n), *and* start states, the columns; of a single policy the starts
+    alone. How often each is drawn is multinomial, and a return counts as often as its policy times as its start.
+    Coverage and shares are in percent. A statistic of a set that a resample leaves empty is NaN.
     """
-    p, n = returns.shape
-    draws = bootstrap_draws(p, n_resamples, seed)
-    counts = np.stack([np.bincount(draw, minlength=p) for draw in draws]).astype(np.int32)  # of each policy. (r, p)
+    check_seed(seed)
     order = np.argsort(returns, axis=None, kind="stable")
-    values, policy = returns.ravel()[order], order // n
-    q1, median, q3 = _quartiles(values, policy, counts)
+    values, places = returns.ravel()[order], np.divmod(order, returns.shape[1])
+    rng, rows = np.random.default_rng(seed), []
+    for _ in range(n_resamples):
+        drawn = (rng.multinomial(k, np.full(k, 1 / k)).astype(float) for k in returns.shape)
+        policies, starts = (times[place] for times, place in zip(drawn, places))
+        rows.append(_weighted(values, policies * starts))
+    return pd.DataFrame(rows)
+
+
+def _weighted(values: np.ndarray, times: np.ndarray) -> dict[str, float]:
+    """Return the statistics of a sample that contains each of the sorted `values` so many `times`."""
+    until = np.cumsum(times)
+    places = np.multiply((0.25, 0.5, 0.75), until[-1] - 1)
+    whole = places.astype(int)
+    first, second = (
+        values[until.searchsorted(rank, "right")] for rank in (whole, np.minimum(whole + 1, until[-1] - 1))
+    )
+    q1, median, q3 = first + (places - whole) * (second - first)
     lower, upper = fences(q1, q3)
-    ends = zip(counts, values.searchsorted(lower), values.searchsorted(upper, "right"))
-    outliers = [
-        _outliers(np.repeat(values[:low], times[policy[:low]]), np.repeat(values[high:], times[policy[high:]]))
-        for times, low, high in ends
-    ]
-    frame = pd.DataFrame(outliers).assign(q1=q1, median=median, q3=q3, iqr=q3 - q1)
-    frame = frame.assign(whisker_low=lower, whisker_high=upper, coverage=100 * (1 - frame["outliers"] / (p * n)))
-    means = returns.mean(axis=1)
-    mean = (counts * n * means).sum(axis=1) / (p * n)
-    within, between = np.square(returns - means[:, None]).sum(axis=1), n * np.square(means - mean[:, None])
-    squares = (counts * (within + between)).sum(axis=1)
-    lowest = np.where(counts, returns.min(axis=1), np.inf).min(axis=1)
-    highest = np.where(counts, returns.max(axis=1), -np.inf).max(axis=1)
-    return frame.assign(mean=mean, std=np.sqrt(squares / max(1, p * n - 1)), min=lowest, max=highest)
-
-
-def _quartiles(values: np.ndarray, policy: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Return the quartiles of each resample, as `np.percentile` does, without sorting it. (3, r)
-
-    A resample contains the returns of each policy as often as `counts` (r, p) says; `values` are all returns, sorted,
-    and `policy` says whose. Bisection finds the first value up to which enough returns of the resample lie.
-    """
-    whose = policy[:, None] == np.arange(counts.shape[1])
-    until = np.cumsum(whose, axis=0, dtype=np.int32)  # how many returns of each policy lie up to each value
-    quartiles = []
-    for place in np.multiply((0.25, 0.5, 0.75), len(values) - 1):
-        neighbours = []
-        for rank in (math.floor(place), math.ceil(place)):
-            low, high = np.zeros(len(counts), dtype=int), np.full(len(counts), len(values) - 1)
-            while (low < high).any():
-                middle = (low + high) // 2
-                enough = np.einsum("rp,rp->r", counts, until[middle]) > rank
-                low, high = np.where(enough, low, middle + 1), np.where(enough, middle, high)
-            neighbours.append(values[low])
-        below, above = neighbours
-        quartiles.append(below + (place - math.floor(place)) * (above - below))
-    return np.array(quartiles)
+    low, high = values.searchsorted(lower), values.searchsorted(upper, "right")
+    sides = (values[:low], times[:low]), (values[high:], times[high:])
+    numbers = {"q1": q1, "median": median, "q3": q3, "iqr": q3 - q1, **_moments(values, times)}
+    numbers |= {"whisker_low": lower, "whisker_high": upper, **_outliers(*sides)}
+    return numbers | {"coverage": 100 * (1 - numbers["outliers"] / until[-1])}
 
 
 Groups = Sequence[tuple[float, float, float]]  # (count, low, high): `count` values lie in [low, high]
