@@ -20,11 +20,13 @@ from vsp.algorithms import distill
 from vsp.evaluation import start_states
 from vsp.geometry import METRICS
 from vsp.paper import printed
+from vsp.paper.ledger import distinct_results, ledger_table
 from vsp.paper.readings import Readings
 from vsp.paper.results import read_results, write_results
-from vsp.paper.runs import Experiment, paper_experiment
+from vsp.paper.runs import N_RUNS, Experiment, Results, make_runs, paper_experiment, teacher_outcomes
 from vsp.paper.statistics import outlier_numbers, quartiles_from_fences, spread
 from vsp.policy import VoronoiPolicy
+from vsp.protocol import share_interval
 from vsp.protocol.job import PROVENANCE, settings_id
 from vsp.rollouts import Policy, rollout
 from vsp.run import workers
@@ -33,9 +35,12 @@ from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
 
 VERSION = 1  # raise it when the same settings give other rows
 N_SETTINGS, PRIOR_SEED = 4000, 777
+N_NEAR, N_NEAR_BOTH = N_SETTINGS // 10, N_SETTINGS // 20  # settings tried again: nearest of each task, and of both
+N_POSTERIOR, N_CONFIRMED = 100, 3  # the nearest of these, and the nearest that are confirmed
+CAP = 5.0  # one value counts at most so much, in deviations of a run
 SIMPLEGOAL, MOUNTAINCAR = printed.TASKS
-# Files of teachers, the shipped one first: for SimpleGoal two with shorter training, which fall into the pit now and then
-# as the printed one does; for MountainCar one with the printed mean, and the RL Zoo's DDPG agent, a sibling of the paper's
+# Files of teachers, the shipped one first. SimpleGoal: two with shorter training, which fall into the pit now and then,
+# as the printed one does. MountainCar: one with the printed mean, and the RL Zoo's DDPG agent, a sibling of the paper's
 TEACHERS = {
     SIMPLEGOAL: ("", "short/SimpleGoal-v0-2", "short/SimpleGoal-v0-3"),
     MOUNTAINCAR: ("", "short/MountainCarContinuous-v0-1", "zoo/ddpg-MountainCarContinuous-v0"),
@@ -52,12 +57,12 @@ PRIOR: dict[str, dict] = {
     "merge_reset": {"survivor_and_neighbours": 1, "neighbours": 1},
     "merge_visits_removed": {False: 2, True: 1},
     "batch_size": dict.fromkeys((16, 32, 64, 128, 256), 1),
-    "n_minibatches": {1: 8, 2: 6, 3: 5, 5: 5, 10: 4, 20: 1.5, 50: 0.5},
+    "n_minibatches": {1: 8, 2: 6, 3: 5, 5: 5, 10: 3, 20: 1, 50: 0.25},
     "learning_rate": dict.fromkeys((1e-4, 3e-4, 1e-3, 2e-3, 3e-3, 5e-3, 1e-2, 2e-2), 1),
     "initial": {"uniform": 1, "zeros": 1},
     "adam_on_reset": {"keep": 1, "restart": 1},
     "scale": {"raw": 3, "box": 1},
-    "neighbours": {"delaunay": 3, "lookup": 1},
+    "neighbours": {"delaunay": 4, "lookup": 1},
     "split_loss": {"raw": 1, "clipped": 1},
     "merge_parameters": {"all": 1, "weights": 1},
     "split_reset": {"cell_and_neighbours": 1, "neighbours": 1},
@@ -71,7 +76,8 @@ STAGES = {
     "variation": (range(5000, 5060), 31, 200), "screening": (range(3000, 3001), 31, 200),
     "near": (range(3001, 3005), 32, 400), "confirming": (range(4000, 4060), 33, 1000),
 }  # fmt: skip
-OF_RETURNS = {  # without values that follow from others, and without extremes, which depend on the number of episodes
+EXTREMES = ("min", "max")  # which depend on the number of episodes: recorded, but no part of the distance
+OF_RETURNS = {  # without values that follow from others
     SIMPLEGOAL: ("mean", "std", "q1", "median", "q3", "outliers", "outliers_mean", "outliers_std"),
     MOUNTAINCAR: ("mean", "std", "q1", "q3", "outliers", "outliers_below_share", "outliers_below_mean",
                   "outliers_below_std", "outliers_above_mean", "outliers_above_std"),
@@ -134,7 +140,7 @@ def facts(task: str, policies: Iterable[VoronoiPolicy], returns: np.ndarray) -> 
     """Return what the paper prints of distilled policies, measured on these and their returns (p, n)."""
     numbers = spread(returns) | outlier_numbers(returns)
     numbers["outliers"] *= 100 / returns.size  # in percent
-    return {name: numbers[name] for name in OF_RETURNS[task]} | of_partitions(policies)
+    return {name: numbers[name] for name in (*OF_RETURNS[task], *EXTREMES)} | of_partitions(policies)
 
 
 def printed_facts(task: str) -> dict[str, float]:
@@ -145,7 +151,8 @@ def printed_facts(task: str) -> dict[str, float]:
     values["outliers"] *= 100 / known[f"{prefix}_total_episodes"]
     if task == MOUNTAINCAR:
         values["q1"], values["q3"] = quartiles_from_fences(known["mc_ours_whisker_low"], known["mc_ours_whisker_high"])
-    return {name: values[name] for name in OF_RETURNS[task]} | of_partitions([printed.published_policy(task)])
+    shown = {name: values[name] for name in (*OF_RETURNS[task], *EXTREMES)}
+    return shown | of_partitions([printed.published_policy(task)])
 
 
 # The stages
@@ -194,3 +201,76 @@ def rows_of(task: str, stage: str, numbers: Iterable[int], out: Path, jobs: int 
             order = sorted(rows, key=lambda key: ([*STAGES].index(key[0]), key[1]))
             write_results(pd.DataFrame([rows[key] for key in order]), name, out=out, float_format="%.6g")
     return pd.DataFrame([rows[key] for key in made])
+
+
+# What is near
+
+
+def distances(task: str, rows: pd.DataFrame, variation: pd.DataFrame) -> pd.Series:
+    """Return how far each row is from the paper: the mean over all printed values but the extremes. Each counts in units
+    of the variation between single runs of the default, and at most `CAP`."""
+    wanted = pd.Series(printed_facts(task)).drop([*EXTREMES])
+    low, high = (variation[wanted.index].quantile(share) for share in (0.16, 0.84))
+    scale = np.maximum((high - low) / 2, 1e-3 * np.maximum(1.0, wanted.abs()))
+    away = ((rows.set_index("k")[wanted.index] - wanted).abs() / scale).clip(upper=CAP)
+    return away.fillna(CAP).mean(axis=1)
+
+
+def search(out: Path, jobs: int | str) -> None:
+    """Make all stages; write hidden_questions.csv, hidden_facts.csv and, as they come, the rows of each task."""
+    tasks, runs = printed.TASKS, out / "build" / "study"
+    spread = {task: rows_of(task, "variation", STAGES["variation"][0], out, jobs) for task in tasks}
+
+    def away(stage: str, numbers: dict[str, Iterable[int]]) -> dict[str, pd.Series]:
+        rows = {task: rows_of(task, stage, numbers[task], out, jobs) for task in tasks}
+        each = {task: distances(task, rows[task], spread[task]) for task in tasks}
+        return each | {"both": pd.DataFrame(each).mean(axis=1, skipna=False).dropna()}
+
+    screened = away("screening", dict.fromkeys(tasks, range(N_SETTINGS)))
+    both = screened["both"].nsmallest(N_NEAR_BOTH).index
+    near = away("near", {task: sorted({0, *screened[task].nsmallest(N_NEAR).index, *both}) for task in tasks})
+    first = sorted({0, *(k for each in near.values() for k in each.nsmallest(N_CONFIRMED).index)})
+    confirmed = away("confirming", dict.fromkeys(tasks, first))
+    write_results(questions(near), "hidden_questions", out=out)
+    chosen = {"default": 0} | {f"nearest, {who}": int(each.idxmin()) for who, each in confirmed.items()}
+    write_results(facts_of(chosen, runs, jobs), "hidden_facts", out=out)
+
+
+def questions(near: dict[str, pd.Series]) -> pd.DataFrame:
+    """Return what the nearest settings say of each open question: one row per answer.
+
+    Columns: question, answer, prior (its share), and for each task and both the share among the nearest `N_POSTERIOR`
+    (of both tasks: a quarter of these) with its 95 % interval.
+    """
+    rows = []
+    for name, weights in PRIOR.items():
+        for answer, weight in weights.items():
+            row = {"question": name, "answer": answer, "prior": weight / sum(weights.values())}
+            for who, each in near.items():
+                nearest = each.nsmallest(N_POSTERIOR if who != "both" else N_POSTERIOR // 4).index
+                count = sum(setting(k).get(name) == answer for k in nearest)
+                low, high = share_interval(count, len(nearest))
+                row |= {who: count / len(nearest), f"{who}_low": low, f"{who}_high": high}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def facts_of(chosen: dict[str, int], runs: Path, jobs: int | str) -> pd.DataFrame:
+    """Return the ledger's facts of distilled policies at the paper's scale, with the settings of each choice."""
+    tables = []
+    for name, k in chosen.items():
+        made = {}
+        for task in printed.TASKS:
+            one = experiment(setting(k), task)
+            distilled = make_runs(one, range(N_RUNS[task]), runs=runs, jobs=jobs)
+            made[task] = Results(one, distilled, teacher_outcomes(one, runs=runs))
+        book = distinct_results(ledger_table(made)).query("subject == 'Ours'")
+        columns = ["id", "task", "quantity", "paper", "here", "low", "high", "verdict"]
+        tables.append(book[columns].assign(choice=name, k=k, **{"settings in words": in_words(k)}))
+    return pd.concat(tables, ignore_index=True)
+
+
+def in_words(k: int) -> str:
+    """Return what setting k changes of the default, as "name value" after one another."""
+    usual = {name: next(iter(weights)) for name, weights in PRIOR.items()} | {"batch_size": 64, "learning_rate": 1e-3}
+    return ", ".join(f"{name} {value}" for name, value in setting(k).items() if value != usual[name])
