@@ -207,8 +207,8 @@ def rows_of(task: str, stage: str, numbers: Iterable[int], out: Path, jobs: int 
 
 
 def distances(task: str, rows: pd.DataFrame, variation: pd.DataFrame) -> pd.Series:
-    """Return how far each row is from the paper: the mean over all printed values but the extremes. Each counts in units
-    of the variation between single runs of the default, and at most `CAP`."""
+    """Return how far each row is from the paper: the mean over all printed values but the extremes, each in units of
+    the default's variation from run to run, and at most `CAP`."""
     wanted = pd.Series(printed_facts(task)).drop([*EXTREMES])
     low, high = (variation[wanted.index].quantile(share) for share in (0.16, 0.84))
     scale = np.maximum((high - low) / 2, 1e-3 * np.maximum(1.0, wanted.abs()))

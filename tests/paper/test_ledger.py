@@ -15,6 +15,7 @@ from vsp.paper import ledger, tables
 from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
+from vsp.paper.statistics import resample
 from vsp.policy import VoronoiPolicy
 from vsp.protocol import interval
 from vsp.rollouts import Outcomes
@@ -64,10 +65,12 @@ def test_every_printed_value_has_one_row_a_verdict_and_a_cell(book):
     assert set(book["verdict"]) <= set(VERDICTS) and book["cell"].str.strip().ne("").all()
     assert book.columns.tolist() == ledger.COLUMNS
     assert book["part"].eq("coefficients").equals(book["id"].str.contains("_cell_"))
-    counts = ledger.verdict_counts(book)
-    assert counts.index.tolist() == ["settings", "results", "results, each value once", "coefficients"]
-    assert counts.drop("results, each value once").sum().to_dict() == {
-        name: (book["verdict"] == name).sum() for name in VERDICTS
+    counts = ledger.verdict_counts(book).set_index("of")
+    counted = book[book["fact"] | book["part"].ne("results")]
+    assert counts.sum().to_dict() == {name: (counted["verdict"] == name).sum() for name in VERDICTS}
+    assert counts.sum(axis=1).to_dict() == {
+        "distilled policies": 28, "MountainCar's teacher": 8, "SimpleGoal's teacher (chosen)": 11, "settings": 78,
+        "coefficients": 262,
     }  # fmt: skip
 
 
@@ -81,11 +84,14 @@ def test_the_values_that_nothing_here_compares_with_are_these(book):
     assert set(book[book["id"].str.contains("_cell_")]["verdict"]) == {UNCHECKED}
 
 
-def test_a_result_that_is_printed_twice_counts_once(book):
+def test_a_result_that_follows_from_others_or_is_printed_twice_counts_once(book):
     once, results = ledger.distinct_results(book), book[book["part"] == "results"]
-    twice = results.loc[results.index.difference(once.index), "id"]
-    assert len(twice) == 16 + 3 and not twice.str.contains("_spread_").any()  # mean, std, min, max; 2 minima, 1 count
-    assert set(twice[~twice.str.contains("(?:mean|std|min|max)$")]) == {"sg_cells"}
+    again = results.loc[results.index.difference(once.index), "id"]
+    assert len(results) == 75 and len(again) == 16 + 4 + 4 + 4  # text: mean, std, min, max; iqr; coverage; four others
+    others = {id for id in again if not id.endswith(("_mean", "_std", "iqr", "coverage")) and "outliers" in id}
+    assert others == {"sg_drl_outliers_min", "sg_ours_outliers_min", "mc_ours_outliers_above_share"}
+    assert not {*again} & {f"{task}_spread_{who}_{name}" for task in ("sg", "mc") for who in ("drl", "ours")
+                           for name in ("mean", "std", "min", "max", "q1", "median", "q3")}  # fmt: skip
 
 
 def notebook_cells():
@@ -127,8 +133,8 @@ def row(paper, here, low=np.nan, high=np.nan, value=None):
     return pd.DataFrame({"paper": [paper], "value": value, "here": here, "low": low, "high": high})
 
 
-def verdict(row, *, in_doubt=False, wide=False):
-    return ledger.verdicts(row, in_doubt=pd.Series([in_doubt]), wide=pd.Series([wide])).item()
+def verdict(row, *, in_doubt=False, unit=np.inf, beyond=np.nan):
+    return ledger.verdicts(row.assign(unit=unit, beyond=beyond), in_doubt=pd.Series([in_doubt])).item()
 
 
 ROOT2 = np.sqrt(2)
@@ -154,8 +160,30 @@ ROOT2 = np.sqrt(2)
 )
 def test_verdicts_by_hand(row, expected):
     assert verdict(row) == expected
-    assert verdict(row, in_doubt=True, wide=True) == CONTRADICTED
-    assert verdict(row, wide=True) == {REPRODUCED: UNTOLD}.get(expected, expected) or row["low"].isna().all()
+    assert verdict(row, in_doubt=True, unit=0.0) == CONTRADICTED
+    width = ROOT2 * (row["high"] - row["low"]).item()
+    assert verdict(row, unit=width) == expected
+    wide = {REPRODUCED: UNTOLD}.get(expected, expected) if width > 0 else expected
+    assert verdict(row, unit=0.99 * width) == wide
+
+
+def test_extremes_differ_if_six_runs_go_beyond_from_six_starts():
+    for beyond, expected in ((0, UNTOLD), (5, UNTOLD), (6, DIFFERS)):
+        assert verdict(row("10.0", 4.0), beyond=beyond) == expected
+    returns = np.full((8, 30), 10.0) + np.linspace(0, 1, 30)
+    returns[:6, :6] = -1.0  # six runs from six starts
+    returns[:7, 6] = -3.0
+    assert [ledger._beyond("min", returns, value) for value in (-0.5, -2.0, -3.0)] == [7, 1, 0]
+    assert ledger._beyond("max", returns, 10.9) == 3 and ledger._beyond("min", returns[:1], -0.5) == 7
+    assert ledger._beyond("outliers_max", returns, -2.0) == 6 and ledger._beyond("outliers_max", returns, 0.0) == 0
+
+
+def test_what_is_counted_has_the_deviation_of_one():
+    returns = np.random.default_rng(0).normal(size=(4, 50))
+    values = pd.Series({"mean": 0.0, "coverage": 80.0, "outliers_below_share": 50.0, "outliers": 20.0, "max": 1.0})
+    unit = ledger.set_against(ledger.of_returns(returns, n_resamples=5), returns, values, 1.5)["unit"]
+    assert unit[["mean", "coverage", "outliers_below_share"]].tolist() == pytest.approx([1.5, 40.0, 50.0])
+    assert unit["outliers"] == pytest.approx(200 * 0.3)
 
 
 # Settings
@@ -216,14 +244,17 @@ def test_our_results_are_those_of_the_tables(book, by_id, results, task):
 def test_intervals_resample_runs_and_for_the_teacher_starts(results, task):
     frame = ledger.measured(task, results[task], n_resamples=300)
     result, prefix = results[task], PREFIX[task]
-    for subject, values in (("ours", result.returns), ("drl", result.teacher_returns[:, None])):
-        for name, statistic in (("mean", np.mean), ("median", np.median), ("min", np.min)):
+    for subject, values in (("ours", result.returns), ("drl", result.teacher_returns[None])):
+        drawn = resample(values, n_resamples=300)
+        for name in ("mean", "median"):
             row = frame.loc[spread_id(task, subject, name)]
-            assert (row["low"], row["high"]) == pytest.approx(interval(values, statistic, n_resamples=300))
+            assert (row["low"], row["high"]) == pytest.approx(tuple(drawn[name].quantile([0.025, 0.975])))
             assert row["low"] <= row["here"] <= row["high"]
-        covered = frame.loc[spread_id(task, subject, "coverage")]
+        covered, least = (frame.loc[spread_id(task, subject, name)] for name in ("coverage", "min"))
         assert 50 <= covered["low"] <= covered["high"] <= 100
-    assert frame.loc[f"{prefix}_ours_mean"].tolist() == frame.loc[f"{prefix}_spread_ours_mean"].tolist()
+        assert np.isnan(least["low"]) and np.isnan(least["high"]) and least["beyond"] >= 0
+    same = ["here", "low", "high", "unit"]
+    assert frame.loc[f"{prefix}_ours_mean", same].equals(frame.loc[f"{prefix}_spread_ours_mean", same])
 
 
 # Made by hand
@@ -267,7 +298,7 @@ def test_what_the_paper_leaves_out_by_hand():
         "interquartile mean of the runs": 4, "share of episodes: goal": 0.75, "share of episodes: pit": 0,
         "share of episodes: truncated": 0.25,
     }  # fmt: skip
-    best, low, high = ledger.measured(SIMPLEGOAL, BY_HAND, n_resamples=2).loc["sg_cells"]
+    best, low, high = ledger.measured(SIMPLEGOAL, BY_HAND).loc["sg_cells", ["here", "low", "high"]]
     assert best == 5 > low and high == 5  # runs 1, 2, 0, 3 in this order, of 5, 4, 3, 9 cells
 
 

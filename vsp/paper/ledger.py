@@ -159,7 +159,7 @@ def set_against(found: pd.DataFrame, returns: np.ndarray, values: pd.Series, std
         if name.endswith(("share", "coverage")):
             frame.loc[name, "unit"] = 100 * np.sqrt(value / 100 * (1 - value / 100))
         elif name == "outliers":
-            frame.loc[name, "unit"] = np.sqrt(value * (returns.size - value))
+            frame.loc[name, "unit"] = np.sqrt(value * max(0, returns.size - value))
         elif f"_{name}".endswith(("_min", "_max")):
             frame.loc[name, "beyond"] = _beyond(name, returns, value)
     return frame
