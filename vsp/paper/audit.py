@@ -7,11 +7,14 @@ only for the 24 outliers of SimpleGoal's teacher.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pandas as pd
 
-from ..evaluation import fences
+from ..evaluation import fences, start_states
+from ..rollouts import rollout
+from ..tasks import GOAL, PIT, simplegoal
 from ..tasks.simplegoal import GOAL_EDGE, STRIDE
 from . import printed, statistics
 from .printed import PREFIX, SHORT, printed_value, spread_id
@@ -207,6 +210,40 @@ def teacher_outliers() -> Finding:
     return Finding("SimpleGoal: what the teacher's outliers are", shown, text, len(sums) == 1 or None)
 
 
+def similar_spread() -> Finding:
+    """Compare what a caption says of SimpleGoal's spread with T5."""
+    drl, ours = (Column(SIMPLEGOAL, subject).values for subject in ("drl", "ours"))
+    text = f"standard deviation {drl['std']} and {ours['std']}, mean {drl['mean']} and {ours['mean']}"
+    shown = '"similar spread and performance in both settings" (caption of SimpleGoal\'s box plot)'
+    return Finding("SimpleGoal: the caption on spread and performance", shown, text, ours["std"] < 2 * drl["std"])
+
+
+def authors_environment() -> Finding:
+    """Replay the published policy in SimpleGoal as the paper's first author published it later.
+
+    In github.com/SenneDeproost/CM-GP, envs/simple_envs.py (commit 1cf9c35, March 2026), goal and pit replace the reward
+    of the step, as here; but to touch the border ends an episode with -10.
+    """
+
+    def bordered(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        moved, rewards, outcomes = simplegoal.step(states, actions)
+        hit = ((moved == 0) | (moved == 1)).any(axis=1) & (outcomes != GOAL)
+        return moved, np.where(hit, -10.0, rewards), np.where(hit, PIT, outcomes)
+
+    policy, starts = printed.published_policy(SIMPLEGOAL), start_states(SIMPLEGOAL, 1000, 1)
+    tasks = simplegoal.TASK, replace(simplegoal.TASK, step=bordered)
+    here, there = (100 * np.mean(rollout(policy, task, starts).outcomes == GOAL) for task in tasks)
+    coverage = spread_id(SIMPLEGOAL, "ours", "coverage")
+    text = (
+        f"the printed policy reaches the goal from {here:.1f} % of 1000 starts; from {there:.1f} % if the border ended "
+        "an episode, as in the first author's later file (CM-GP, envs/simple_envs.py, 1cf9c35), so the paper's experiment "
+        "had no such rule. There goal and pit replace the reward of the step; the text adds them. Its TD3 "
+        "(scripts/TD3.py) explores with noise and has layers of 256"
+    )
+    shown = quote("sg_goal_reward", "sg_pit_reward", coverage)
+    return Finding("SimpleGoal: the border, and what goal and pit pay", shown, text, None)
+
+
 # The printed policies: T3 and T4
 
 
@@ -237,8 +274,8 @@ def dimensions() -> Finding:
 
 
 CHECKS = (  # in the order in which the findings are shown
-    run_counts, simplegoal_coverage, mountaincar_quartiles, outlier_rules, teacher_outliers, printed_digits, dimensions,
-    frozen_iterations,
+    run_counts, simplegoal_coverage, similar_spread, mountaincar_quartiles, outlier_rules, teacher_outliers,
+    authors_environment, printed_digits, dimensions, frozen_iterations,
 )  # fmt: skip
 
 
