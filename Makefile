@@ -47,7 +47,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
-.PHONY: help list quick paper-figures beyond-figures all lab runs study hub-teacher agents proofs course article site test \
+.PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents proofs course article site test \
   test-js test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
@@ -93,6 +93,8 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
 	$(PY) -m studies.make_study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 	test -z "$$AGENT" || $(PY) -m studies.make_study --agent="$$AGENT" --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+hidden: begin venv ##- search for the settings that the paper does not print, into data/results/hidden_*.csv: 4 HOURS on two cores, resumable
+	$(PY) -m studies.make_study --hidden --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGENT=file.zip, into build/hub/: 1 to 2 minutes
 	$(PY) -m studies.make_study --agent="$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
 agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable

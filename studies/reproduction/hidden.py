@@ -22,12 +22,12 @@ from vsp.geometry import METRICS
 from vsp.paper import printed
 from vsp.paper.ledger import distinct_results, ledger_table
 from vsp.paper.readings import Readings
-from vsp.paper.results import read_results, write_results
+from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import N_RUNS, Experiment, Results, make_runs, paper_experiment, teacher_outcomes
 from vsp.paper.statistics import outlier_numbers, quartiles_from_fences, spread
 from vsp.policy import VoronoiPolicy
 from vsp.protocol import share_interval
-from vsp.protocol.job import PROVENANCE, settings_id
+from vsp.protocol.job import settings_id
 from vsp.rollouts import Policy, rollout
 from vsp.run import workers
 from vsp.tasks import get_task
@@ -184,23 +184,23 @@ def provenance_of(task: str, stage: str, k: int) -> dict[str, str | int]:
 
 
 def rows_of(task: str, stage: str, numbers: Iterable[int], out: Path, jobs: int | str) -> pd.DataFrame:
-    """Return the rows of some settings, those of today's settings that are committed or in OUT as they are."""
-    name, made = f"hidden_{task}", {(stage, k): provenance_of(task, stage, k) for k in numbers}
-    try:
-        kept = read_results(name, out / "data" / "results")
-    except FileNotFoundError:
-        kept = pd.DataFrame(columns=["stage", "k", *PROVENANCE])
-    rows = {(row["stage"], row["k"]): row for row in kept.to_dict("records")}
-    asked = [key for key, made_with in made.items() if {n: rows.get(key, {}).get(n) for n in made_with} != made_with]
-    work = [(task, *key) for key in asked]
-    for n, (i, row) in enumerate(
-        workers.results(tried, work, f"{task}, {stage}", jobs=jobs, total=len(made), unit="settings")
-    ):
-        rows[asked[i]] = {"stage": stage, "k": asked[i][1], **row, **made[asked[i]]}
-        if n % 50 == 49 or n == len(asked) - 1:  # an interrupted search goes on from here
+    """Return the rows of some settings: those in OUT, or else committed, that are made with today's settings, and those
+    that are missing, which are made."""
+    name, folders = f"hidden_{task}", (out / "data" / "results", RESULTS)
+    folder = next((folder for folder in folders if (folder / f"{name}.csv").exists()), None)
+    kept = read_results(name, folder).to_dict("records") if folder else []
+    rows = {(row["stage"], row["k"]): row for row in kept}
+    rows = {key: row for key, row in rows.items() if provenance_of(task, *key).items() <= row.items()}
+    asked = [(task, stage, k) for k in numbers if (stage, k) not in rows]
+    about: dict = {"jobs": jobs, "total": len(asked), "unit": "settings"}
+    for n, (i, row) in enumerate(workers.results(tried, asked, f"{task}, {stage}", **about), 1):
+        k = asked[i][2]
+        rows[stage, k] = {"stage": stage, "k": k, **row, **provenance_of(*asked[i])}
+        if n % 50 == 0 or n == len(asked):  # an interrupted search goes on from here
             order = sorted(rows, key=lambda key: ([*STAGES].index(key[0]), key[1]))
             write_results(pd.DataFrame([rows[key] for key in order]), name, out=out, float_format="%.6g")
-    return pd.DataFrame([rows[key] for key in made])
+    frame = read_results(name, folders[0] if asked else folder)  # rounded, also what was just made
+    return frame[(frame["stage"] == stage) & frame["k"].isin([*numbers])].reset_index(drop=True)
 
 
 # What is near

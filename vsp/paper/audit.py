@@ -236,7 +236,7 @@ def authors_environment() -> Finding:
     coverage = spread_id(SIMPLEGOAL, "ours", "coverage")
     text = (
         f"the printed policy reaches the goal from {here:.1f} % of 1000 starts; from {there:.1f} % if the border ended "
-        "an episode, as in the first author's later file (CM-GP, envs/simple_envs.py, 1cf9c35), so the paper's experiment "
+        "an episode, as in the first author's later file (CM-GP, envs/simple_envs.py, 1cf9c35): the paper's experiment "
         "had no such rule. There goal and pit replace the reward of the step; the text adds them. Its TD3 "
         "(scripts/TD3.py) explores with noise and has layers of 256"
     )
