@@ -11,9 +11,11 @@ from .reproduction import hidden, hub_teacher, interpretations, simpler, teacher
 
 
 def main() -> None:
-    """Make the missing runs of the experiments, and write readings.csv, teachers.csv, simpler.csv and verdicts.csv. With
-    --hidden, search for hidden settings instead. With --agent, write hub_teacher.csv and hub_teacher_ledger.csv instead,
-    and print the second."""
+    """Make the missing runs of the experiments, and write readings.csv, teachers.csv, simpler.csv and verdicts.csv.
+
+    With --hidden, search for hidden settings instead. With --agent, write hub_teacher.csv and hub_teacher_ledger.csv
+    instead, and print the second.
+    """
     parser = command.parser(main.__doc__, "write to OUT/data/results and OUT/build/study")
     parser.add_argument("--agent", type=Path, help="a zip of Stable-Baselines3, trained for MountainCar")
     parser.add_argument("--hidden", action="store_true", help="write hidden_*.csv")

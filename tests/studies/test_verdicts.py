@@ -1,0 +1,61 @@
+"""How often the ledger's rules are wrong, on runs that are made up, and the whole study with tiny runs."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from support import MOUNTAINCAR, TASKS
+
+from studies.reproduction import verdicts
+from studies.reproduction.verdicts import Pool, judged
+from vsp.paper import ledger
+
+
+@pytest.fixture
+def few(monkeypatch):
+    for name, value in (("N_PAIRS", 40), ("N_RESAMPLES", 100), ("N_STARTS", 300), ("N_EPISODES", 100)):
+        monkeypatch.setattr(verdicts, name, value)
+
+
+def pool(seed, runs, shift=0.0):
+    """Returns with an effect of the run, one of the start, and a few low ones; cells between 10 and 13."""
+    rng, starts = np.random.default_rng(seed), np.random.default_rng(0).normal(size=300)
+    returns = 10 + shift + 0.3 * rng.normal(size=(runs, 1)) + starts + 0.2 * rng.normal(size=(runs, 300))
+    returns -= 30 * (rng.random(returns.shape) < 0.05)
+    return Pool(returns, np.column_stack([rng.normal(size=runs), rng.integers(10, 14, size=runs)]))
+
+
+def test_runs_of_one_kind_rarely_differ_and_others_do(few):
+    same = judged({"task": "x"}, 20, pool(1, 40), None).set_index("name")
+    assert {"mean", "q1", "outliers_mean", "max", "cells", verdicts.MOVED} <= {*same.index}
+    assert (same[[*ledger.VERDICTS]].sum(axis=1) - 1).abs().max() < 1e-9 and (same["task"] == "x").all()
+    usual = same[same["kind"].isin(["mean", "deviation", "quartile", "outliers", "extreme"])]
+    assert (usual[ledger.DIFFERS] <= 0.2).all() and usual.loc["mean", ledger.REPRODUCED] > 0.8
+    assert same.loc[verdicts.MOVED, ledger.DIFFERS] == 1
+    other = judged({}, 20, pool(1, 40), pool(2, 20, shift=2.0)).set_index("name")[ledger.DIFFERS]
+    assert other["mean"] == 1 and other["median"] > 0.9 and other["cells"] < 0.5
+
+
+def test_a_single_policy_is_set_against_other_starts_of_its_own(few):
+    found = judged({}, 1, Pool(pool(3, 1).returns), None).set_index("name")
+    assert found.at["mean", ledger.DIFFERS] <= 0.2 and "cells" not in found.index
+
+
+def test_the_whole_study(few, monkeypatch, tmp_path):
+    usual = verdicts.experiments
+
+    def shorter(task):
+        def less(one):
+            return dataclasses.replace(
+                one, config=dataclasses.replace(one.config, n_epochs=40, n_freeze=5), n_episodes=9
+            )
+
+        return {name: less(one) for name, one in usual(task).items()}
+
+    monkeypatch.setattr(verdicts, "experiments", shorter)
+    monkeypatch.setattr(verdicts, "N_RUNS", dict.fromkeys(TASKS, 3))
+    monkeypatch.setattr(verdicts, "N_PAIRS", 2)
+    frame = verdicts.study(tmp_path)
+    assert [*frame["against"].unique()] == ["the same", "least squares", "another teacher"]
+    assert frame["subject"].value_counts().index.tolist() == ["distilled", "teacher"] and {*frame["task"]} == {*TASKS}
+    assert frame["teacher"][frame["task"] == MOUNTAINCAR].nunique() == 2 and frame["settings"].nunique() == 4
