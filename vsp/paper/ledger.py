@@ -9,9 +9,10 @@ Rules:
    interval; else it "differs". The interval is widened by the square root of 2, because the paper's value comes from a
    sample of the same size. Intervals come from 1000 resamples of runs *and* start states; of start states alone for the
    one teacher.
+   The cells of the best run are those of one run: they are set against the middle 95 % of the rerun's runs.
 4. A result "cannot be told" if the printed value lies in an interval that, widened, is longer than the standard
-   deviation of what is counted: for returns the printed one, for a share that of one episode, for cells that of a run.
-   Such an interval contains nearly anything.
+   deviation of what is counted: for returns the printed one, for a share that of one episode. Such an interval contains
+   nearly anything.
 5. A lowest or highest value has no such interval. It "differs" if at least `BEYOND` of the rerun's runs, from as many
    starts, go beyond the printed value: were the paper's runs of the same kind, none of theirs would go so far by chance
    once in 2 ** `BEYOND` times. Else it "cannot be told".
@@ -101,10 +102,12 @@ def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
 
 
 def verdicts(rows: pd.DataFrame, *, in_doubt: pd.Series) -> np.ndarray:
-    """Return the verdicts by this module's rules; `rows` have id, paper (as printed), value, here, low, high, beyond
-    (of extremes: how many runs go beyond the value) and unit (the standard deviation of what is counted)."""
+    """Return the verdicts by this module's rules; `rows` have paper (as printed), value, here, low, high, beyond (of
+    extremes: how many runs go beyond the value) and unit (the deviation of what is counted; NaN for one run's value).
+    """
     here, half = rows["here"], 0.5 * rows["paper"].map(last_digit)
-    low, high = here - np.sqrt(2) * (here - rows["low"]), here + np.sqrt(2) * (rows["high"] - here)
+    wider = np.where(rows["unit"].isna(), 1.0, np.sqrt(2))
+    low, high = here - wider * (here - rows["low"]), here + wider * (rows["high"] - here)
     extreme = rows["beyond"].notna()
     same = rows["low"].isna() & ~extreme & np.isclose(here, rows["value"], rtol=1e-9)
     inside = rows["value"].between(low - half, high + half)  # false for settings, which have no interval
@@ -131,12 +134,11 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
     return pd.concat([*parts, cells.set_axis([f"{prefix}_cells"]), cells.set_axis([f"{prefix}_caption_cells"])])
 
 
-def of_cells(runs: np.ndarray, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """Return the cells of the best of some runs (p, 2), given as validation means and cells: one row "cells", with an
-    interval over runs. Its unit is the standard deviation of a run's cells."""
-    low, high = interval(runs, lambda drawn: drawn[drawn[:, 0].argmax(), 1], n_resamples=n_resamples)
-    row = {"here": runs[runs[:, 0].argmax(), 1], "low": low, "high": high, "unit": runs[:, 1].std(ddof=1)}
-    return pd.DataFrame(row, index=["cells"])
+def of_cells(runs: np.ndarray) -> pd.DataFrame:
+    """Return the cells of the best of some runs (p, 2), given as validation means and cells: one row "cells", with the
+    middle 95 % of the runs, because the best is one of them; so it has no unit."""
+    low, high = np.quantile(runs[:, 1], [0.025, 0.975])
+    return pd.DataFrame({"here": runs[runs[:, 0].argmax(), 1], "low": low, "high": high}, index=["cells"])
 
 
 def of_returns(returns: np.ndarray, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
