@@ -3,12 +3,13 @@
 import dataclasses
 
 import numpy as np
+import pandas as pd
 import pytest
 from support import MOUNTAINCAR, TASKS
 
 from studies.reproduction import verdicts
 from studies.reproduction.verdicts import Pool, judged
-from vsp.paper import ledger
+from vsp.paper import ledger, summaries
 
 
 @pytest.fixture
@@ -26,19 +27,20 @@ def pool(seed, runs, shift=0.0):
 
 
 def test_runs_of_one_kind_rarely_differ_and_others_do(few):
-    same = judged({"task": "x"}, 20, pool(1, 40), None).set_index("name")
-    assert {"mean", "q1", "outliers_mean", "max", "cells", verdicts.MOVED} <= {*same.index}
+    found = judged({"task": "x", "against": "the same"}, 20, pool(1, 40), None)
+    moved, same = (found[found["against"].eq(verdicts.MOVED) == side].set_index("name") for side in (True, False))
+    assert {"mean", "q1", "outliers_mean", "max", "cells"} <= {*same.index}
     assert (same[[*ledger.VERDICTS[:-1]]].sum(axis=1) - 1).abs().max() < 1e-9 and (same["task"] == "x").all()
     usual = same[same["kind"].isin(["mean", "deviation", "quartile", "outliers", "extreme"])]
     assert (usual[ledger.DIFFERS] <= 0.2).all() and usual.loc["mean", ledger.REPRODUCED] > 0.8
-    assert same.loc[verdicts.MOVED, ledger.DIFFERS] == 1
-    other = judged({}, 20, pool(1, 40), pool(2, 20, shift=2.0)).set_index("name")[ledger.DIFFERS]
+    assert moved.at["mean", ledger.DIFFERS] == 1 and len(moved) == 1
+    other = judged({"against": "another"}, 20, pool(1, 40), pool(2, 20, shift=2.0)).set_index("name")[ledger.DIFFERS]
     assert other["mean"] == 1 and other["median"] > 0.9 and other["cells"] < 0.5
 
 
 def test_a_single_policy_is_set_against_other_starts_of_its_own(few):
-    found = judged({}, 1, Pool(pool(3, 1).returns), None).set_index("name")
-    assert found.at["mean", ledger.DIFFERS] <= 0.2 and "cells" not in found.index
+    found = judged({"against": "the same"}, 1, Pool(pool(3, 1).returns), None).set_index("name")
+    assert found[ledger.DIFFERS]["mean"].min() <= 0.2 and "cells" not in found.index
 
 
 def test_the_whole_study(few, monkeypatch, tmp_path):
@@ -56,6 +58,19 @@ def test_the_whole_study(few, monkeypatch, tmp_path):
     monkeypatch.setattr(verdicts, "N_RUNS", dict.fromkeys(TASKS, 3))
     monkeypatch.setattr(verdicts, "N_PAIRS", 2)
     frame = verdicts.study(tmp_path)
-    assert [*frame["against"].unique()] == ["the same", "least squares", "another teacher"]
+    assert {*frame["against"]} == {"the same", verdicts.MOVED, "least squares", "another teacher"}
     assert frame["subject"].value_counts().index.tolist() == ["distilled", "teacher"] and {*frame["task"]} == {*TASKS}
     assert frame["teacher"][frame["task"] == MOUNTAINCAR].nunique() == 2 and frame["settings"].nunique() == 4
+
+
+def test_wrong_verdicts_by_hand():
+    def row(kind, against, differs, unchecked=0.0):
+        return {"kind": kind, "against": against, ledger.DIFFERS: differs, ledger.UNCHECKED: unchecked}
+
+    frame = pd.DataFrame([
+        row("mean", "the same", 0.04), row("mean", "the same", 0.08), row("mean", "the same", 0.0, 1.0),
+        row("mean", "another", 0.5), row("mean", "another", 1.0), row("extreme", "the same", 0.01),
+    ])  # fmt: skip
+    found = summaries.wrong_verdicts(frame).set_index("kind")
+    assert found.loc["mean"].tolist() == pytest.approx([6.0, 8.0, 100.0])
+    assert found.loc["extreme"].tolist()[:2] == [1.0, 1.0] and found.columns.tolist()[2] == "another"

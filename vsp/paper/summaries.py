@@ -36,3 +36,17 @@ def teacher_summary(frame: pd.DataFrame) -> pd.DataFrame:
     means = groups[["steps", "linear_error", "teacher_mean", "teacher_std", "mean", "cells", "failing"]].mean()
     means.insert(5, "deviation between runs", groups["mean"].std())
     return means.reset_index()
+
+
+def wrong_verdicts(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return how often "differs" is the verdict, in percent of the pairs of samples: one row per kind of result.
+
+    Columns: kind; of the same runs the mean over the results of a kind, and the highest; for runs that are known to be
+    others, by what changed, the highest.
+    """
+    told = frame[frame["cannot be checked"] < 1].assign(differs=100 * frame["differs"])
+    same, others = (told[(told["against"] == "the same") == side] for side in (True, False))
+    shares = same.groupby("kind", sort=False)["differs"].agg(["mean", "max"])
+    names = {"mean": "the same runs, mean", "max": "the same runs, highest"}
+    highest = others.groupby(["kind", "against"])["differs"].max().unstack()
+    return shares.rename(columns=names).join(highest).rename_axis(columns=None).reset_index()
