@@ -20,7 +20,8 @@ outputs = $(call executed,$(1))/$(1).ipynb $(patsubst $(1):%,%,$(filter $(1):%,$
   $(if $(filter 03_evaluation,$(1)),$(SUMMARIES))
 inputs = notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml environment.lock vsp data/paper data/teachers \
   $(if $(filter $(1),$(BEYOND)),vsp_beyond studies data/beyond) \
-  $(if $(filter 05_ledger,$(1)),$(addprefix data/results/,readings.csv teachers.csv simpler.csv verdicts.csv))
+  $(if $(filter 05_ledger,$(1)),$(addprefix data/results/,readings.csv teachers.csv verdicts.csv)) \
+  $(if $(filter 02_% 04_% 05_%,$(1)),data/results/simpler.csv)
 
 # What a user may set is read from the environment ("$$OUT"), and MAKEOVERRIDES is empty, so that nothing expands it.
 OUT ?= .

@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..algorithms import VERSION, distill
+from ..checks import check_count
 from ..config import Config, paper_preset
 from ..evaluation import rollout_from_seed
 from ..policy import VoronoiPolicy
@@ -172,12 +173,16 @@ class Results:
         return max(self.runs, key=lambda run: (run.validation_mean, -run.seed))
 
 
-def paper_results(task: str, *, runs: str | os.PathLike, quick: bool = False, jobs: int | str = -1) -> Results:
-    """Return the paper's experiment on `task`; make the runs that are missing in the folder `runs`."""
-    experiment = paper_experiment(task, quick=quick)
-    n = QUICK_RUNS if quick else N_RUNS[experiment.task]
-    made = make_runs(experiment, range(n), runs=runs, jobs=jobs)
-    return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
+def paper_results(
+    task: str, *, runs: str | os.PathLike, n: int = 0, quick: bool = False, jobs: int | str = -1
+) -> Results:
+    """Return the paper's experiment on `task`; make the runs that are missing in the folder `runs`.
+
+    `n`: how many runs; 0: as many as in the paper, or a few if `quick`. Raises ValueError unless `n` is such a number.
+    """
+    one = paper_experiment(task, quick=quick)
+    check_count("n", n := n or (QUICK_RUNS if quick else N_RUNS[one.task]))
+    return Results(one, make_runs(one, range(n), runs=runs, jobs=jobs), teacher_outcomes(one, runs=runs))
 
 
 @threadpool_limits.wrap(limits=1)  # the same order of sums, also without the thread limit of `make`

@@ -21,7 +21,7 @@ from .returns import (
     run_means,
     ticks,
 )
-from .state_space import arrows, cells, codewords, error_map, force_bar, force_map, grid, square, trail
+from .state_space import actions, arrows, cells, codewords, error_map, force_bar, force_map, grid, plane, square, trail
 from .style import DISTILLED, FAILING, OTHER, OURS, TEACHER, Picture, legend_below, letter, panels, save_figure
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
-from ..rollouts import Episode
+from ..rollouts import Episode, Policy
 from ..tasks import simplegoal
 from ..tasks.base import Task
 from .style import BORDER, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
@@ -54,10 +54,26 @@ def square(ax: Axes) -> Axes:
     """Draw the unit square of SimpleGoal with goal and pit."""
     goal, pit = simplegoal.GOAL_EDGE, simplegoal.PIT_HIGH - simplegoal.PIT_LOW
     ax.add_patch(Rectangle((0, 0), goal, goal, color=GOAL, alpha=0.5, lw=0, zorder=1, label="goal"))
-    corner = (simplegoal.PIT_LOW, simplegoal.PIT_LOW)
-    ax.add_patch(Rectangle(corner, pit, pit, color=PIT, alpha=0.4, lw=0, zorder=1, label="pit"))
+    ax.add_patch(Rectangle((simplegoal.PIT_LOW,) * 2, pit, pit, color=PIT, alpha=0.4, lw=0, zorder=1, label="pit"))
     ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x", ylabel="y", aspect="equal", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
     return ax
+
+
+def plane(ax: Axes, task: Task) -> Axes:
+    """Prepare axes for the two state variables of `task`: the `square` of SimpleGoal, or the box of the states."""
+    if task.name == simplegoal.TASK.name:
+        return square(ax)
+    x, y = zip(task.low, task.high)
+    ax.set(xlim=x, ylim=y, xlabel=task.input_labels[0], ylabel=task.input_labels[1])
+    return ax
+
+
+def actions(ax: Axes, task: Task, policy: Policy, states: np.ndarray, *, color: str = TEACHER) -> None:
+    """Draw two actions as arrows at the `states` of a grid; a single one, a force, as a map of the whole plane."""
+    if len(task.outputs) == 2:
+        return arrows(plane(ax, task), states, policy.predict(states)[0], color=color)
+    x, y, states = grid(task.low, task.high, 201)
+    force_map(plane(ax, task), x, y, policy.predict(states)[0])
 
 
 def arrows(ax: Axes, states: np.ndarray, actions: np.ndarray, *, color: str = TEACHER) -> None:
