@@ -8,6 +8,7 @@ reason. Those of MountainCar are distilled by the paper's method, too.
 from __future__ import annotations
 
 import contextlib
+import os
 import time
 import warnings
 from dataclasses import dataclass, replace
@@ -28,7 +29,7 @@ from vsp.rollouts import visited_states
 from vsp.run import atomic, command, sealed
 from vsp.tasks import Task, get_task
 from vsp.teachers.normalization import statistics_beside
-from vsp.teachers.teacher import Teacher, load_teacher
+from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
 from vsp_beyond.few_cells import faithful_preset
 from vsp_beyond.few_cells.duration import expected_seconds
 from vsp_beyond.few_cells.faithful import distill_faithfully
@@ -64,6 +65,14 @@ def agents_in(folder: Path) -> dict[tuple[str, str], Path]:
 def read(path: Path, task: str | Task) -> Teacher:
     """Return the agent in the zip at `path`, with the statistics of observations that lie beside it."""
     return load_teacher(path, task, normalize=statistics_beside(path))
+
+
+def agent_of(algorithm: str, task: str, folder: str | os.PathLike = "") -> Teacher:
+    """Return an agent: from the zips below `folder`, else a kept one. Raises CommandError where there is none."""
+    agents = {path.stem.partition("-")[::2]: path for path in SHIPPED.glob("zoo/*.safetensors")}
+    agents |= agents_in(Path(folder)) if folder else {}
+    command.check_parameter(f"agent for {task}", algorithm, sorted(name for name, of in agents if of == task))
+    return read(agents[algorithm, task], task)
 
 
 @dataclass(frozen=True)

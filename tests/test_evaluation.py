@@ -36,6 +36,10 @@ def test_how_alike_by_hand():
     alike = likeness(TWO, PumpingTeacher(), MOUNTAINCAR, 20)
     theirs, ours = (one.predict(alike.states)[0] for one in (PumpingTeacher(), TWO))
     assert alike.r2 == pytest.approx(1 - np.mean((ours - theirs) ** 2) / theirs.var())
+    assert np.array_equal(alike.errors, np.abs(ours - theirs) / 2) and same.within.tolist() == [1]
+    gentle = likeness(vsp.agent(lambda obs: 0.8 * PumpingTeacher().predict(obs)[0]), PumpingTeacher(), MOUNTAINCAR, 20)
+    assert gentle.within == pytest.approx(np.mean(np.abs(theirs) <= 0.5)) and 0 < gentle.within < 1
+    assert f"within 5% of its range in {gentle.within[0]:.0%} of them" in str(gentle)
     assert np.array_equal(
         alike.returns["agent"], rollout(PumpingTeacher(), MOUNTAINCAR, start_states(MOUNTAINCAR, 20, 7)).returns
     )
@@ -48,7 +52,7 @@ def test_a_distillation_ends_with_a_remark_unless_nobody_reads_it(monkeypatch, c
     vsp.distill(PumpingTeacher(), MOUNTAINCAR, config, seed=0)
     first, last = re.fullmatch(r"(?s)(.*?)([^\n]*)\n", capsys.readouterr().err).groups()
     assert re.match(
-        r"(warning: )?R² -?[01]\.\d+ on [\d,]+ new states, return .* fail \(agent: 0\); closer: vsp_b", last
+        r"(warning: )?R² -?[01]\.\d+ on [\d,]+ new states, each action .* fail \(agent: 0\); closer: vsp_b", last
     )
     for progress_wanted, level in ((False, ""), (True, "1")):
         monkeypatch.setenv("MAKELEVEL", level) if level else None

@@ -18,6 +18,7 @@ from .tasks.registry import get_task
 if TYPE_CHECKING:
     import pandas as pd
 
+CLOSE = 0.05  # of its range, up to which an action is close to the agent's
 ALIKE = 0.9  # R² from which a policy acts much like its agent
 FAILING = 0.02  # share of the episodes in which it may fail more often without a warning
 
@@ -28,9 +29,14 @@ class Likeness:
 
     r2: float  # share of the variance of the agent's actions that the policy reproduces, on the agent's own states
     states: np.ndarray  # (t, d) these states
-    errors: np.ndarray  # (t,) distance of the actions there, in half ranges
+    errors: np.ndarray  # (t, m) how far each action is from the agent's there, in ranges of the action
     returns: dict[str, np.ndarray]  # by "policy" and "agent", (n,) from the same starts
     failures: dict[str, int | None]  # episodes that do not reach the goal; None where nobody reaches one
+
+    @property
+    def within(self) -> np.ndarray:
+        """Share of the states in which each action is within 5 % of its range of the agent's. (m,)"""
+        return (self.errors <= CLOSE).mean(axis=0)
 
     @property
     def poor(self) -> bool:
@@ -41,7 +47,9 @@ class Likeness:
     def __str__(self) -> str:
         ours, theirs = (self.returns[name].mean() for name in ("policy", "agent"))
         failed, n = self.failures, len(self.returns["policy"])
-        text = f"R² {self.r2:.3f} on {len(self.states):,} new states, return {ours:.5g} (agent: {theirs:.5g})"
+        close = ", ".join(f"{share:.0%}" for share in self.within)
+        text = f"R² {self.r2:.3f} on {len(self.states):,} new states, each action within {CLOSE:.0%} of its range in "
+        text += f"{close} of them, return {ours:.5g} (agent: {theirs:.5g})"
         ended = (
             "" if failed["policy"] is None else f", {failed['policy']} of {n} episodes fail (agent: {failed['agent']})"
         )
@@ -85,7 +93,7 @@ def likeness(policy: Policy, agent: Policy, task: str | Task, n: int = 1000, *, 
     nobody = all(count == len(starts) for count in failures.values())  # as in a task that has no goal
     ended: dict[str, int | None] = dict.fromkeys(both) if nobody else {**failures}
     returns = {name: one.returns for name, one in both.items()}
-    return Likeness(r_squared(ours, theirs), states, np.linalg.norm(ours - theirs, axis=1), returns, ended)
+    return Likeness(r_squared(ours, theirs), states, np.abs(ours - theirs) / 2, returns, ended)
 
 
 def r_squared(ours: np.ndarray, theirs: np.ndarray) -> float:

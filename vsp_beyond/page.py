@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from vsp import agent as as_agent
-from vsp.evaluation import Likeness, likeness
+from vsp.evaluation import CLOSE, Likeness, likeness
 from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
@@ -48,12 +48,13 @@ def report(policy: PiecewisePolicy, agent: Policy, task: str | Task, *, name: st
     parts = [
         f"<p>{html.escape(f'{name} on {task.name}, imitated by {policy.policy_class.name} maps in {cells}.')}</p>",
         "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in [*remarks.splitlines(), *warning]),
-        _numbers(alike), _cards(policy, alike), _explorer(policy, agent), _worst(policy, agent, alike), _kept(policy),
+        _numbers(policy, alike), _cards(policy, alike), _explorer(policy, agent), _worst(policy, agent, alike),
+        _kept(policy),
     ]  # fmt: skip
     return standalone(f"{task.name}: {name} in {cells}", "\n".join(parts), _STYLE)
 
 
-def _numbers(alike: Likeness) -> str:
+def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
     rows = ""
     for name, returns in alike.returns.items():
         low, high = interval(returns, np.mean, vectorized=True)
@@ -61,10 +62,13 @@ def _numbers(alike: Likeness) -> str:
         least, most = (0, 0) if failed is None else share_interval(failed, n)
         said = "not defined" if failed is None else f"{failed} of {n} ({least:.1%} to {most:.1%})"
         rows += f"<tr><td>{name}</td><td>{returns.mean():.2f} ({low:.2f} to {high:.2f})</td><td>{said}</td></tr>"
+    close = ", ".join(f"{name} in {share:.1%}" for name, share in zip(policy.task.outputs, alike.within))
     head = "<tr><th></th><th>mean return (95 %)</th><th>failed episodes (95 %)</th></tr>"
     return (
         f"<h2>How alike?</h2><p>The policy reproduces {alike.r2:.1%} of the variance of the agent's actions (R²), on "
-        f"{len(alike.states):,} states of the agent that no fit saw.</p><table>{head}{rows}</table>"
+        f"{len(alike.states):,} states of the agent that no fit saw. Each action is within {CLOSE:.0%} of its "
+        f"range of the agent's: {html.escape(close)} of these states. The cells below show where.</p>"
+        f"<table>{head}{rows}</table>"
     )
 
 
@@ -83,7 +87,9 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
                 for j, (output, rows) in enumerate(zip(policy.task.outputs, largest))
             )
         text = "<br>".join(html.escape(line) for line in lines)
-        cards += f"<div><b>Cell {cell}</b>, {np.mean(inside == cell):.0%} of the states<br>"
+        close = (alike.errors[inside == cell] <= CLOSE).all(axis=1)
+        said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
+        cards += f"<div><b>Cell {cell}</b>, {np.mean(inside == cell):.0%} of the states{said}<br>"
         cards += f"{html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
     about = policy.where.about(policy.task.inputs, 3) if len(policy) > 1 else ""
     return f'<h2>The policy</h2><p>{html.escape(about and f"{about}.")}</p><div class="cards">{cards}</div>'
@@ -99,7 +105,7 @@ def _explorer(policy: PiecewisePolicy, agent: Policy) -> str:
 
 def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     """Return the states in which the actions differ most, one per cell at most."""
-    worst, rows = np.argsort(-alike.errors), ""
+    worst, rows = np.argsort(-np.linalg.norm(alike.errors, axis=1)), ""
     firsts = np.unique(policy.cells(alike.states[worst]), return_index=True)[1]  # of each cell, the worst state
     for i in worst[np.sort(firsts)[:3]]:
         state = ", ".join(f"{name} {value:.3g}" for name, value in zip(policy.task.inputs, alike.states[i]))

@@ -80,15 +80,17 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
     """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1.
 
     Columns: size; mean, low, high and policies of our cells; rival (the name of the other method with the highest
-    mean), "rival mean" and so on; ahead: "ours" if our interval is above those of all others, "theirs" if one of theirs
-    is above ours, else "level".
+    mean), "rival mean" and so on; ahead: "theirs" if some other method is `ahead` of ours, else ours beside the rival;
+    behind, how many of the other methods ours are ahead of.
     """
     compared, columns = [], [*INTERVAL, "policies"]
     for size, rows in table[table["size"] > 1].groupby("size"):
         ours, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
         row = {"size": size, **ours[columns], "rival": others["method"].iloc[0]}
         row |= others[columns].iloc[0].add_prefix("rival ")
-        compared.append(row | {"ahead": ahead(ours, others[["low", "high"]].max())})
+        pairs = [ahead(ours, other) for _, other in others.iterrows()]
+        behind = f"{pairs.count('ours')} of {len(pairs)}"
+        compared.append(row | {"ahead": "theirs" if "theirs" in pairs else pairs[0], "behind": behind})
     return pd.DataFrame(compared)
 
 

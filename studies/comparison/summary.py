@@ -78,9 +78,15 @@ def mean_interval(values: np.ndarray) -> tuple[float, float]:
     return values.mean() - half, values.mean() + half
 
 
-def ahead(ours: pd.Series, other: dict | pd.Series) -> str:
-    """Return which is ahead: "ours" or "theirs" if the intervals from low to high do not overlap, else "level"."""
-    return "ours" if ours["low"] > other["high"] else "theirs" if other["low"] > ours["high"] else "level"
+def ahead(ours: pd.Series, other: pd.Series) -> str:
+    """Return which mean is higher, "ours" or "theirs", if Welch's t-test tells them apart (p < 0.05), else "cannot be
+    told". Both are rows of `method_summary`."""
+    sides = []
+    for row in (ours, other):
+        error = (row["high"] - row["mean"]) / stats.t.ppf(0.975, row["policies"] - 1)
+        sides += [row["mean"], error * np.sqrt(row["policies"]), row["policies"]]
+    told = stats.ttest_ind_from_stats(*sides, equal_var=False).pvalue < 0.05
+    return "cannot be told" if not told else "ours" if ours["mean"] > other["mean"] else "theirs"
 
 
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:

@@ -24,7 +24,7 @@ def row(method, size, seed, mean, r2=0.5):
 
 @pytest.fixture
 def rows():
-    """Two methods of two sizes, where ours leads at the first and is level at the second, and one linear map."""
+    """Two methods of two sizes, where ours leads at the first and none at the second, and one linear map."""
     found = []
     for seed in range(3):
         for size, ours, theirs in ((2, 9.0, 5.0), (4, 9.5, 9.5)):
@@ -46,7 +46,18 @@ def test_every_method_stands_beside_its_imitation(rows):
 def test_who_leads(rows):
     table = leaders(equal_budget(rows))
     assert set(table["rival"]) == {"axis tree, constants"}
-    assert table[["size", "ahead"]].to_numpy().tolist() == [[2, "ours"], [4, "level"]]
+    said = [[2, "ours", "1 of 1"], [4, "cannot be told", "0 of 1"]]
+    assert table[["size", "ahead", "behind"]].to_numpy().tolist() == said
+
+
+def test_a_worse_rival_with_few_certain_seeds_hides_no_lead(rows):
+    """The lead over the best rival counts, and one method ahead is enough to lose."""
+    means = {"CART, DAgger": (1.0, 9.2), "oblique tree, linear leaves, DAgger": (8.0, 8.1)}
+    more = [row(f"{name}{end}", 2, seed, mean) for name, both in means.items() for end in ("", ", tuned")
+            for seed, mean in enumerate(both)]  # fmt: skip
+    ours = rows[rows["method"].str.startswith("our cells")]
+    (two,) = leaders(equal_budget(pd.concat([ours, pd.DataFrame(more)]))).to_dict("records")
+    assert (two["rival"], two["ahead"], two["behind"]) == ("oblique tree, linear", "ours", "1 of 2")
 
 
 def test_a_size_without_rivals_is_left_out(rows):

@@ -107,6 +107,21 @@ def test_the_committed_agents_are_those_of_the_collection_and_within_what_was_pu
     assert "MIT License" in (RESULTS / "agents" / "LICENSE").read_text()
 
 
+@pytest.mark.parametrize("row", ROWS.itertuples(), ids=lambda row: f"{row.algorithm}-{row.task}")
+def test_kept_actors_are_those_of_the_rows(row):
+    agent = agents.agent_of(row.algorithm, row.task)
+    assert agent.digest[:10] == row.teacher and agent.card["checksum of the zip"] == row.checksum
+    assert np.abs(agent.predict(agents.plane(row.task)[2])[0] - agents.actions_of(row.algorithm, row.task)).max() < 1e-5
+
+
+def test_an_agent_that_nobody_has_is_one_line(tmp_path):
+    with pytest.raises(command.CommandError, match="^agent for Pendulum-v1 is 'td3', expected 'a2c', 'ars', 'ddpg', "):
+        agents.agent_of("td3", PENDULUM)
+    with pytest.raises(command.CommandError, match="cells is 2.0, expected a whole number from 1 to 16$") as caught:
+        command.check_parameter("cells", 2.0, range(1, 17))
+    assert caught.value._render_traceback_() == [f"error: {caught.value}"]  # what Jupyter shows
+
+
 @pytest.mark.skipif("VSP_AGENTS" not in os.environ, reason="VSP_AGENTS names no folder of agents")
 def test_the_committed_rows_are_those_of_the_zips():
     for (algorithm, task), path in agents.agents_in(Path(os.environ["VSP_AGENTS"])).items():

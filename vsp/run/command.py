@@ -8,7 +8,7 @@ import errno
 import re
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from .atomic import DamagedFile, MissingFile
@@ -19,7 +19,17 @@ _DISK |= {errno.EEXIST, errno.EISDIR, errno.ENOTDIR}
 
 
 class CommandError(RuntimeError):
-    """An error whose message is enough for the user of a command, without a traceback."""
+    """An error whose message is enough for the user of a command or of a notebook, without a traceback."""
+
+    def _render_traceback_(self) -> list[str]:  # what IPython shows
+        return [f"error: {self}"]
+
+
+def check_parameter(name: str, value: object, possible: Sequence) -> None:
+    """Raise CommandError unless the parameter of a notebook is among the possible values, such as a range."""
+    if isinstance(value, bool | float) or value not in possible:
+        whole = f"a whole number from {possible[0]} to {possible[-1]}" if isinstance(possible, range) else ""
+        raise CommandError(f"{name} is {value!r}, expected {whole or ', '.join(map(repr, possible))}")
 
 
 def jobs(text: str) -> int | str:

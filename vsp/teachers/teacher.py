@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..checks import check_observations
+from ..checks import check_choice, check_observations
 from ..run import atomic, listed
 from ..tasks.base import Task
 from ..tasks.registry import get_task, task_names
@@ -81,11 +81,12 @@ def load_teacher(
     """Load a teacher: the one shipped for a task, or one from a file.
 
     `source` is a task's name, a `.safetensors` file with its JSON card and their manifest beside it, or a `.zip` of an
-    agent that Stable-Baselines3 or sb3-contrib saved (`actors.POLICIES`); for a zip, `task` names the task. `normalize`
-    is the file of `VecNormalize` for an agent that was trained on normalised observations; False says that it was not.
-    Only numbers are read: no code from a file runs. Raises ValueError for an unknown task, an agent that does not fit
-    it or that says what is not modelled here, and without `normalize` where something shows that it is needed;
-    FileNotFoundError, and `run.atomic.DamagedFile`.
+    agent that Stable-Baselines3 or sb3-contrib saved (`actors.POLICIES`); for a zip, `task` names the task. Of an actor
+    other than TD3's, the card says in "acts" the settings of `Actor` and the "normalization". `normalize` is the file
+    of `VecNormalize` for an agent that was trained on normalised observations; False says that it was not. Only numbers
+    are read: no code from a file runs. Raises ValueError for an unknown task, an agent that does not fit it or that
+    says what is not modelled here, and without `normalize` where something shows that it is needed; FileNotFoundError,
+    and `run.atomic.DamagedFile`.
     """
     path = Path(source)
     if path.suffix.lower() == ".zip":
@@ -104,6 +105,8 @@ def load_teacher(
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
+    from .normalization import checked
+
     weights, text = listed.read_listed(path), listed.read_listed(path.with_suffix(".json"))
     try:
         tensors = load(weights)
@@ -112,7 +115,12 @@ def load_teacher(
     card = json.loads(text)
     critic = part_of(tensors, "critic")
     named = str(card.get("task")).rpartition(":")[2]  # a file imports no module
-    return Teacher(part_of(tensors, "actor"), task or named, card=card, critic=critic)
+    layers, acts = layers_of(part_of(tensors, "actor"), "mu"), {"activation": "ReLU"} | card.get("acts", {})
+    check_choice(f"{path}: activation", acts["activation"], actors.ACTIVATIONS)
+    *moments, epsilon, clip = acts.pop("normalization", (0, 0))
+    named_moments, d = dict(zip(("mean", "var"), moments)), len(layers[0][0])
+    statistics = checked(named_moments, epsilon, clip, d, f"{path}") if moments else None
+    return Teacher(Actor(layers, **acts), task or named, card=card, critic=critic, normalization=statistics)
 
 
 def _from_zip(path: Path, task: Task, normalize: str | os.PathLike | bool | None) -> Teacher:
