@@ -65,6 +65,7 @@ def test_statistics_are_used_as_the_library_does(changes, small, tmp_path):
     teacher, raw = (load_teacher(small, SIMPLEGOAL, normalize=n) for n in (str(tmp_path / "s.pkl"), False))
     assert np.abs(teacher.predict(OBS)[0] - raw.predict(env.normalize_obs(OBS))[0]).max() < 1e-6
     assert (teacher.normalization is not None) == env.norm_obs == (teacher.digest != raw.digest)
+    assert teacher.card["recipe"]["steps"] == raw.card["recipe"]["steps"] >= 0
 
 
 @pytest.mark.parametrize(

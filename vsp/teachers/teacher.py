@@ -146,7 +146,8 @@ def _from_zip(path: Path, task: Task, normalize: str | os.PathLike | bool | None
         )
     given = normalize if isinstance(normalize, str | os.PathLike) else None
     statistics = None if given is None else normalization.read_normalization(given, len(task.low))
-    return Teacher(actor, task, critic=part_of(saved.tensors, "critic"), normalization=statistics)
+    card = {"recipe": {"steps": saved.settings.get("num_timesteps")}}  # `studies` reads it
+    return Teacher(actor, task, card=card, critic=part_of(saved.tensors, "critic"), normalization=statistics)
 
 
 def further_teachers(task: str) -> dict[str, Path]:
