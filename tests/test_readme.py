@@ -148,9 +148,9 @@ def test_who_leads_is_that_of_the_table():
 
 
 TABLES = {  # a task stands for the summary of its rows
-    ("README.md", "## Results"): "simplegoal_spread what_cells_buy faithful",
+    ("README.md", "## Results"): "simplegoal_spread ledger what_cells_buy faithful",
     ("docs/results.md", "## Did it reproduce?"):
-        "simplegoal_spread what_cells_buy",
+        "simplegoal_spread ledger what_cells_buy",
     ("docs/results.md", "## A few equations that act like the teacher"):
         "faithful within SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1 LunarLanderContinuous-v3",
     ("docs/results.md", "## How good can a few cells be?"):
