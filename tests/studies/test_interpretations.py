@@ -19,7 +19,6 @@ from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, load_runs, paper_experiment
 from vsp.paper.statistics import resample, spread
 from vsp.paper.summaries import LABELS, SHOWN, shown_variants
-from vsp.protocol import interval
 from vsp.tasks import base, get_task
 
 CHOOSING, CONFIRMING = interpretations.CHOOSING, interpretations.CONFIRMING  # `small` makes them fewer
@@ -194,14 +193,13 @@ def test_a_row_says_what_its_runs_came_to(made, phase, seeds, task):
         facts = spread(returns)
         for name in ("mean", "std", "q1", "median", "q3"):
             assert row[name] == pytest.approx(facts[name])
-        low, high = interval(returns, np.mean, n_resamples=100)
-        assert (row["mean_low"], row["mean_high"]) == pytest.approx((low, high))
+        drawn = resample(returns, n_resamples=100)
+        assert (row["mean_low"], row["mean_high"]) == pytest.approx(tuple(drawn["mean"].quantile([0.025, 0.975])))
         assert row[["goal", "pit", "truncated"]].sum() == pytest.approx(1)
         assert row["pit"] == np.mean([run.outcomes.outcomes == base.PIT for run in found])
         assert row["runs_above_teacher"] == np.mean(returns.mean(axis=1) > own["mean"])
         assert row["distance"] == pytest.approx(distance(interpretations.standing(facts, own), landmarks(task)))
-        draws = np.random.default_rng(0).integers(len(returns), size=(100, len(returns)))
-        away = [distance(interpretations.standing(spread(returns[draw]), own), landmarks(task)) for draw in draws]
+        away = [distance(interpretations.standing(one, own), landmarks(task)) for one in drawn.to_dict("records")]
         assert (row["distance_low"], row["distance_high"]) == pytest.approx(np.percentile(away, [2.5, 97.5]))
 
 
