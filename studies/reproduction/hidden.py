@@ -1,9 +1,9 @@
 """`make hidden`: search for the settings that the paper does not print, by approximate Bayesian computation.
 
 Settings are drawn from a prior (`PRIOR`), the same for both tasks but for the teacher. Each is tried with one seed and
-few starts; the nearest tenth of each task, and of both together, again with four other seeds; the nearest of these with
-60 fresh ones. "Near" compares every value that the paper prints of distilled policies: returns, outliers, cells and
-coefficients. All stages write rows, so that an interrupted search goes on.
+few starts; the nearest tenth of each task, and the nearest twentieth of both together, again with four other seeds; the
+nearest of these with 60 fresh ones. "Near" compares every value that the paper prints of distilled policies: returns,
+outliers, cells and coefficients. All stages write rows, so that an interrupted search goes on.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vsp.algorithms import distill
 from vsp.evaluation import start_states
 from vsp.geometry import METRICS
 from vsp.paper import printed
-from vsp.paper.ledger import distinct_results, ledger_table
+from vsp.paper.ledger import ledger_table
 from vsp.paper.readings import Readings
 from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import N_RUNS, Experiment, Results, make_runs, paper_experiment, teacher_outcomes
@@ -264,7 +264,7 @@ def facts_of(chosen: dict[str, int], runs: Path, jobs: int | str) -> pd.DataFram
             one = experiment(setting(k), task)
             distilled = make_runs(one, range(N_RUNS[task]), runs=runs, jobs=jobs)
             made[task] = Results(one, distilled, teacher_outcomes(one, runs=runs))
-        book = distinct_results(ledger_table(made)).query("subject == 'Ours'")
+        book = ledger_table(made).query("fact and subject == 'Ours'")
         columns = ["id", "task", "quantity", "paper", "here", "low", "high", "verdict"]
         tables.append(book[columns].assign(choice=name, k=k, **{"settings in words": in_words(k)}))
     return pd.concat(tables, ignore_index=True)

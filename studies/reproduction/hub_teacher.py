@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from vsp.paper.ledger import distinct_results, ledger_table
+from vsp.paper.ledger import ledger_table
 from vsp.paper.runs import N_RUNS, Results, make_runs, paper_experiment, teacher_outcomes
 from vsp.run.command import CommandError
 
@@ -31,4 +31,4 @@ def study(agent: Path, runs: str | os.PathLike, *, jobs: int | str = 1) -> tuple
         raise CommandError(error) from error
     made = make_runs(experiment, range(N_RUNS[CAR]), runs=runs, jobs=jobs)
     results = Results(experiment, made, teacher_outcomes(experiment, runs=runs))
-    return rows_of(experiment, agent.stem, made), distinct_results(ledger_table({CAR: results})).query("task == @CAR")
+    return rows_of(experiment, agent.stem, made), ledger_table({CAR: results}).query("fact and task == @CAR")

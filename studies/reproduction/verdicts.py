@@ -16,7 +16,7 @@ import pandas as pd
 
 from vsp.evaluation import start_states
 from vsp.paper import ledger, printed
-from vsp.paper.runs import N_EPISODES, N_RUNS, Experiment, Run, make_runs, paper_experiment
+from vsp.paper.runs import N_EPISODES, N_RUNS, Experiment, make_runs, paper_experiment
 from vsp.paper.statistics import outlier_numbers, spread
 from vsp.protocol.job import settings_id
 from vsp.rollouts import Policy, rollout
@@ -58,7 +58,7 @@ def study(runs: str | os.PathLike, *, jobs: int | str = 1) -> pd.DataFrame:
             actors = [(actor, task, starts) for actor in (*(run.policy for run in made), one.teacher)]
             label = f"{task}, {against}"
             played = dict(workers.results(_played, actors, label, jobs=jobs, total=len(actors), unit="policies"))
-            pool = Pool(np.stack([played[i] for i in range(len(made))]), _bests(made))
+            pool = Pool(np.stack([played[i] for i in range(len(made))]), ledger.means_and_cells(made))
             about = {"task": task, "subject": "distilled", "against": against, **provenance_of(one)}
             if against == "the same":
                 usual = pool
@@ -105,7 +105,7 @@ def judged(about: dict, n: int, ours: Pool, other: Pool | None) -> pd.DataFrame:
             values["cells"] = ledger.of_cells(theirs.best[second])["here"].iloc[0]
         rows = pd.concat([found, moved]).assign(value=values, paper=values.map("{:.3f}".format))
         rows["here"] = rows["here"].where(rows["value"].notna())
-        verdicts.append(pd.Series(ledger.verdicts(rows, in_doubt=rows["value"] == np.inf), rows.index))
+        verdicts.append(pd.Series(ledger.verdicts(rows, in_doubt=pd.Series(False, rows.index)), rows.index))
     shares = pd.DataFrame(verdicts).apply(lambda column: column.value_counts(normalize=True)).T
     shares = shares.reindex(columns=ledger.VERDICTS[:-1]).fillna(0.0).rename_axis("name").reset_index()
     kinds = [next((kind for kind, names in KINDS.items() if re.search(names, name)), "") for name in shares["name"]]
@@ -113,7 +113,3 @@ def judged(about: dict, n: int, ours: Pool, other: Pool | None) -> pd.DataFrame:
     moved = table["name"] == MOVED
     table.loc[moved, ["name", "against"]] = "mean", MOVED
     return table[~moved | (about["against"] == "the same")]
-
-
-def _bests(made: list[Run]) -> np.ndarray:
-    return np.array([(run.validation_mean, len(run.policy)) for run in made])

@@ -85,7 +85,7 @@ def test_the_values_that_nothing_here_compares_with_are_these(book):
 
 
 def test_a_result_that_follows_from_others_or_is_printed_twice_counts_once(book):
-    once, results = ledger.distinct_results(book), book[book["part"] == "results"]
+    once, results = book[book["fact"]], book[book["part"] == "results"]
     again = results.loc[results.index.difference(once.index), "id"]
     assert len(results) == 75 and len(again) == 16 + 4 + 4 + 4  # text: mean, std, min, max; iqr; coverage; four others
     others = {id for id in again if not id.endswith(("_mean", "_std", "iqr", "coverage")) and "outliers" in id}

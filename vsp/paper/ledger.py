@@ -34,7 +34,7 @@ from ..evaluation import fences
 from ..protocol.intervals import interval, share_interval
 from ..tasks import base, mountaincar, registry, simplegoal
 from . import audit, printed
-from .runs import SHARES, Results
+from .runs import SHARES, Results, Run
 from .statistics import outlier_numbers, resample, spread
 
 VERDICTS = REPRODUCED, UNTOLD, DIFFERS, UNCHECKED, CONTRADICTED = (
@@ -130,13 +130,18 @@ def measured(task: str, result: Results, *, n_resamples: int = N_RESAMPLES) -> p
         for begin in (f"{prefix}_{subject}_", f"{prefix}_spread_{subject}_"):
             own = values[values.index.str.startswith(begin)].rename(lambda id, begin=begin: id.removeprefix(begin))
             parts.append(set_against(here, returns, own, std).rename(lambda name, begin=begin: begin + name))
-    cells = of_cells(np.array([(run.validation_mean, len(run.policy)) for run in result.runs]))
+    cells = of_cells(means_and_cells(result.runs))
     return pd.concat([*parts, cells.set_axis([f"{prefix}_cells"]), cells.set_axis([f"{prefix}_caption_cells"])])
 
 
+def means_and_cells(runs: list[Run]) -> np.ndarray:
+    """Return of each run the mean return on the validation starts, and the number of cells. (p, 2)"""
+    return np.array([(run.validation_mean, len(run.policy)) for run in runs])
+
+
 def of_cells(runs: np.ndarray) -> pd.DataFrame:
-    """Return the cells of the best of some runs (p, 2), given as validation means and cells: one row "cells", with the
-    middle 95 % of the runs, because the best is one of them; so it has no unit."""
+    """Return the cells of the best of some runs, given as `means_and_cells` (p, 2): one row "cells", with the middle
+    95 % of the runs, because the best is one of them; so it has no unit."""
     low, high = np.quantile(runs[:, 1], [0.025, 0.975])
     return pd.DataFrame({"here": runs[runs[:, 0].argmax(), 1], "low": low, "high": high}, index=["cells"])
 
@@ -174,11 +179,6 @@ def _beyond(name: str, returns: np.ndarray, value: float) -> int:
     counted = (returns < low) | (returns > high) if name.startswith("outliers") else np.ones(returns.shape, bool)
     beyond = counted & (returns < value if name.endswith("min") else returns > value)
     return min(int(beyond.any(axis=axis).sum()) for axis in (0, 1) if axis == 0 or len(returns) > 1)
-
-
-def distinct_results(book: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the ledger that are facts: results that follow from no others."""
-    return book[book["fact"]]
 
 
 def ledger_gaps(book: pd.DataFrame, task: str) -> pd.DataFrame:
