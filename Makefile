@@ -20,8 +20,8 @@ outputs = $(call executed,$(1))/$(1).ipynb $(patsubst $(1):%,%,$(filter $(1):%,$
   $(if $(filter 03_evaluation,$(1)),$(SUMMARIES))
 inputs = notebooks/$(1).ipynb notebooks/captions.toml notebooks/headings.toml environment.lock vsp data/paper data/teachers \
   $(if $(filter $(1),$(BEYOND)),vsp_beyond studies data/beyond) \
-  $(if $(filter 05_ledger,$(1)),$(addprefix data/results/,readings.csv teachers.csv verdicts.csv)) \
-  $(if $(filter 02_% 04_% 05_%,$(1)),data/results/simpler.csv)
+  $(if $(filter 05_ledger,$(1)),$(wildcard data/results/*_*.csv) data/results/verdicts.csv) \
+  $(if $(filter 02_% 04_% 06_%,$(1)),data/results/simpler.csv)
 
 # What a user may set is read from the environment ("$$OUT"), and MAKEOVERRIDES is empty, so that nothing expands it.
 OUT ?= .
@@ -91,7 +91,7 @@ runs: begin venv ## the 85 + 40 distillations and their evaluation, into data/ru
 	  $(PY) -m vsp.paper.make_runs --out="$$OUT" --jobs="$${DASK:-$$JOBS}" $${QUICK:+--quick} && \
 	  (cd "$$OUT" && mkdir -p data/runs && find data/runs -name '*.run' > build/stamps/runs-made))
 
-study: begin venv ##- studies of the readings, the teachers and simpler policies, into data/results/: 15 to 40 minutes, resumable
+study: begin venv ##- simpler policies, and how often verdicts are wrong, into data/results/: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_study --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 	test -z "$$AGENT" || $(PY) -m studies.make_study --agent="$$AGENT" --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
 hidden: begin venv ##- search for the settings that the paper does not print, into data/results/hidden_*.csv: 4 HOURS on two cores, resumable

@@ -7,14 +7,13 @@ from pathlib import Path
 from vsp.paper.results import write_results
 from vsp.run import command
 
-from .reproduction import hidden, hub_teacher, interpretations, simpler, teachers, verdicts
+from .reproduction import hidden, hub_teacher, simpler, verdicts
 
 
 def main() -> None:
-    """Make the missing runs of the experiments, and write readings.csv, teachers.csv, simpler.csv and verdicts.csv.
+    """Make the missing runs of the experiments, and write simpler.csv and verdicts.csv.
 
-    With --hidden, search for hidden settings instead. With --agent, write hub_teacher.csv and hub_teacher_ledger.csv
-    instead, and print the second.
+    With --hidden, search for hidden settings instead. With --agent, write hub_teacher_ledger.csv instead, and print it.
     """
     parser = command.parser(main.__doc__, "write to OUT/data/results and OUT/build/study")
     parser.add_argument("--agent", type=Path, help="a zip of Stable-Baselines3, trained for MountainCar")
@@ -22,16 +21,13 @@ def main() -> None:
     given = parser.parse_args()
     out, jobs, runs = given.out, given.jobs, given.out / "build" / "study"
     if given.agent:
-        rows, ledger = hub_teacher.study(given.agent, runs, jobs=jobs)
-        write_results(rows, "hub_teacher", out=out)
+        ledger = hub_teacher.study(given.agent, runs, jobs=jobs)
         write_results(ledger, "hub_teacher_ledger", out=out)
         print(ledger[["subject", "quantity", "paper", "here", "low", "high", "verdict"]].to_string(index=False))
         return
     if given.hidden:
         hidden.search(out, jobs)
         return
-    write_results(interpretations.study(runs, jobs=jobs), "readings", out=out)
-    write_results(teachers.study(runs, jobs=jobs), "teachers", out=out)
     write_results(simpler.study(out / "data" / "runs", jobs=jobs), "simpler", out=out, float_format=None)
     write_results(verdicts.study(runs, jobs=jobs), "verdicts", out=out)
 

@@ -23,7 +23,7 @@ from vsp.paper import printed
 from vsp.paper.ledger import ledger_table
 from vsp.paper.readings import Readings
 from vsp.paper.results import RESULTS, read_results, write_results
-from vsp.paper.runs import N_RUNS, Experiment, Results, make_runs, paper_experiment, teacher_outcomes
+from vsp.paper.runs import N_RUNS, Experiment, paper_experiment, results_of
 from vsp.paper.statistics import outlier_numbers, quartiles_from_fences, spread
 from vsp.policy import VoronoiPolicy
 from vsp.protocol import share_interval
@@ -31,7 +31,7 @@ from vsp.protocol.job import settings_id
 from vsp.rollouts import Policy, rollout
 from vsp.run import workers
 from vsp.tasks import get_task
-from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
+from vsp.teachers.teacher import SHIPPED, load_teacher
 
 VERSION = 1  # raise it when the same settings give other rows
 N_SETTINGS, PRIOR_SEED = 4000, 777
@@ -97,17 +97,12 @@ def experiment(change: dict, task: str) -> Experiment:
     usual, teacher = _usual(task), TEACHERS[task][change.get("teacher", 0)]
     passes = {name: value for name, value in change.items() if hasattr(Readings, name)}
     config = {name: value for name, value in change.items() if name not in passes and name != "teacher"}
-    other = {"teacher": _teacher(teacher)} if teacher else {}
+    other = {"teacher": _teacher(SHIPPED / f"{teacher}.safetensors")} if teacher else {}
     readings = Readings(**passes) if passes else None
     return replace(usual, config=replace(usual.config, **config), readings=readings, **other)
 
 
-_usual = cache(paper_experiment)
-
-
-@cache
-def _teacher(name: str) -> Teacher:
-    return load_teacher(SHIPPED / f"{name}.safetensors")
+_usual, _teacher = cache(paper_experiment), cache(load_teacher)
 
 
 class Remembering:
@@ -206,34 +201,61 @@ def rows_of(task: str, stage: str, numbers: Iterable[int], out: Path, jobs: int 
 # What is near
 
 
+def scales(task: str, variation: pd.DataFrame) -> pd.Series:
+    """Return how much each of `facts` varies from run to run of the default: half of the middle 68 %."""
+    low, high = (variation[[*printed_facts(task)]].quantile(share) for share in (0.16, 0.84))
+    return np.maximum((high - low) / 2, 1e-3 * np.maximum(1.0, pd.Series(printed_facts(task)).abs()))
+
+
 def distances(task: str, rows: pd.DataFrame, variation: pd.DataFrame) -> pd.Series:
     """Return how far each row is from the paper: the mean over all printed values but the extremes, each in units of
     the default's variation from run to run, and at most `CAP`."""
     wanted = pd.Series(printed_facts(task)).drop([*EXTREMES])
-    low, high = (variation[wanted.index].quantile(share) for share in (0.16, 0.84))
-    scale = np.maximum((high - low) / 2, 1e-3 * np.maximum(1.0, wanted.abs()))
-    away = ((rows.set_index("k")[wanted.index] - wanted).abs() / scale).clip(upper=CAP)
-    return away.fillna(CAP).mean(axis=1)
+    away = ((rows.set_index("k")[wanted.index] - wanted).abs() / scales(task, variation)).clip(upper=CAP)
+    return away[wanted.index].fillna(CAP).mean(axis=1)
 
 
 def search(out: Path, jobs: int | str) -> None:
-    """Make all stages; write hidden_questions.csv, hidden_facts.csv and, as they come, the rows of each task."""
-    tasks, runs = printed.TASKS, out / "build" / "study"
-    spread = {task: rows_of(task, "variation", STAGES["variation"][0], out, jobs) for task in tasks}
+    """Make all stages; write the rows of each task as they come, then hidden_questions, _reached and _facts.csv."""
+    tasks = printed.TASKS
 
-    def away(stage: str, numbers: dict[str, Iterable[int]]) -> dict[str, pd.Series]:
-        rows = {task: rows_of(task, stage, numbers[task], out, jobs) for task in tasks}
-        each = {task: distances(task, rows[task], spread[task]) for task in tasks}
+    def made(stage: str, numbers: dict[str, Iterable[int]]) -> dict[str, pd.DataFrame]:
+        return {task: rows_of(task, stage, numbers[task], out, jobs) for task in tasks}
+
+    def away(rows: dict[str, pd.DataFrame]) -> dict[str, pd.Series]:
+        each = {task: distances(task, rows[task], variation[task]) for task in tasks}
         return each | {"both": pd.DataFrame(each).mean(axis=1, skipna=False).dropna()}
 
-    screened = away("screening", dict.fromkeys(tasks, range(N_SETTINGS)))
+    variation = made("variation", dict.fromkeys(tasks, STAGES["variation"][0]))
+    every = made("screening", dict.fromkeys(tasks, range(N_SETTINGS)))
+    screened = away(every)
     both = screened["both"].nsmallest(N_NEAR_BOTH).index
-    near = away("near", {task: sorted({0, *screened[task].nsmallest(N_NEAR).index, *both}) for task in tasks})
-    first = sorted({0, *(k for each in near.values() for k in each.nsmallest(N_CONFIRMED).index)})
-    confirmed = away("confirming", dict.fromkeys(tasks, first))
-    write_results(questions(near), "hidden_questions", out=out)
-    chosen = {"default": 0} | {f"nearest, {who}": int(each.idxmin()) for who, each in confirmed.items()}
-    write_results(facts_of(chosen, runs, jobs), "hidden_facts", out=out)
+    near = made("near", {task: sorted({0, *screened[task].nsmallest(N_NEAR).index, *both}) for task in tasks})
+    nearest = away(near)
+    first = sorted({0, *(k for each in nearest.values() for k in each.nsmallest(N_CONFIRMED).index)})
+    confirmed = made("confirming", dict.fromkeys(tasks, first))
+    chosen = {"default": 0} | {f"nearest, {who}": int(each.idxmin()) for who, each in away(confirmed).items()}
+    write_results(questions(nearest), "hidden_questions", out=out)
+    parts = {}
+    for task in tasks:
+        best = near[task].set_index("k").loc[nearest[task].nsmallest(N_POSTERIOR).index]
+        fresh = confirmed[task].set_index("k").loc[[*chosen.values()]].set_axis([*chosen])
+        parts[task] = reached(task, every[task], best, fresh).assign(scale=scales(task, variation[task]))
+    write_results(pd.concat(parts, names=["task", "name"]).reset_index(), "hidden_reached", out=out)
+    write_results(facts_of(chosen, out / "build" / "study", jobs), "hidden_facts", out=out)
+
+
+def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.DataFrame) -> pd.DataFrame:
+    """Return which printed values the settings reach: one row per name of `facts`.
+
+    Columns: paper; of all settings that were screened least, low, high and most (low and high: the middle 95 %); low
+    and high of the nearest; and the values of each row of `fresh`, which are settings with fresh seeds.
+    """
+    paper = printed_facts(task)
+    table = pd.DataFrame({"paper": paper})
+    table[["least", "low", "high", "most"]] = every[[*paper]].quantile([0, 0.025, 0.975, 1]).T
+    table[["nearest low", "nearest high"]] = nearest[[*paper]].quantile([0.025, 0.975]).T
+    return table.join(fresh[[*paper]].T)
 
 
 def questions(near: dict[str, pd.Series]) -> pd.DataFrame:
@@ -259,11 +281,8 @@ def facts_of(chosen: dict[str, int], runs: Path, jobs: int | str) -> pd.DataFram
     """Return the ledger's facts of distilled policies at the paper's scale, with the settings of each choice."""
     tables = []
     for name, k in chosen.items():
-        made = {}
-        for task in printed.TASKS:
-            one = experiment(setting(k), task)
-            distilled = make_runs(one, range(N_RUNS[task]), runs=runs, jobs=jobs)
-            made[task] = Results(one, distilled, teacher_outcomes(one, runs=runs))
+        tried = {task: experiment(setting(k), task) for task in printed.TASKS}
+        made = {task: results_of(one, N_RUNS[task], runs=runs, jobs=jobs) for task, one in tried.items()}
         book = ledger_table(made).query("fact and subject == 'Ours'")
         columns = ["id", "task", "quantity", "paper", "here", "low", "high", "verdict"]
         tables.append(book[columns].assign(choice=name, k=k, **{"settings in words": in_words(k)}))

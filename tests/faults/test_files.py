@@ -91,7 +91,7 @@ KINDS = {
     "checkpoint of a training": Kind(checkpoint, training.read_checkpoint),
     "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
     "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
-    "results of a study": Kind(copied("results/readings.csv"), of_study),
+    "results of a study": Kind(copied("results/simpler.csv"), of_study),
     "what the course has made": Kind(course, read_sealed),
 }
 TALLY = {}  # kind: refused, tried

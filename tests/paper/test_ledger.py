@@ -2,12 +2,10 @@ import dataclasses
 import re
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import trim_mean
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from vsp.evaluation import rollout_from_seed
@@ -17,11 +15,10 @@ from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
 from vsp.paper.statistics import resample
 from vsp.policy import VoronoiPolicy
-from vsp.protocol import interval
 from vsp.rollouts import Outcomes
 from vsp.run.notebook import nbformat
 from vsp.tasks import registry, simplegoal
-from vsp.tasks.base import GOAL, PIT, TRUNCATED
+from vsp.tasks.base import GOAL
 from vsp.tasks.registry import _TASKS, get_task
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -269,54 +266,18 @@ def run(seed, returns, *, codes=None, cells=1, validation=0.0):
     return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0)
 
 
-TEACHER = Outcomes(np.array([5.0, 5.0, 5.0, 1.0]), np.ones(4, dtype=int), np.array([GOAL, GOAL, GOAL, TRUNCATED]))
-BY_HAND = Results(
-    SimpleNamespace(task=SIMPLEGOAL),
-    [
-        run(0, [6, 6, 6, 6], cells=3, validation=1.0),  # mean 6
-        run(1, [5, 5, 5, 2], cells=5, validation=3.0),  # mean 4.25: 1 of 4 beats the teacher
-        run(2, [4, 4, 4, 0], codes=[GOAL, PIT, PIT, TRUNCATED], cells=4, validation=2.0),  # mean 3: no episode
-        run(3, [9, 0, 9, 0], codes=[GOAL, PIT, GOAL, PIT], cells=9, validation=0.0),  # mean 4.5: 2 of 4
-    ],
-    TEACHER,
-)  # teacher: mean 4
+RUNS = [
+    run(0, [6, 6, 6, 6], cells=3, validation=1.0), run(1, [5, 5, 5, 2], cells=5, validation=3.0),
+    run(2, [4, 4, 4, 0], cells=4, validation=2.0), run(3, [9, 0, 9, 0], cells=9, validation=0.0),
+]  # fmt: skip
 
 
-def test_what_the_paper_leaves_out_by_hand():
-    frame = ledger.left_out_by_quartiles(BY_HAND, n_resamples=200)
-    here = frame["here"].to_dict()
-    assert here == pytest.approx({
-        "interquartile mean of the runs": (4.25 + 4.5) / 2,
-        "probability that a run beats its teacher": 3 / 4,
-        "probability that an episode beats the teacher's": (4 + 1 + 0 + 2) / 16,
-        "share of episodes: goal": (4 + 4 + 1 + 2) / 16,
-        "share of episodes: pit": (2 + 2) / 16,
-        "share of episodes: truncated": 1 / 16,
-    })  # fmt: skip
-    teacher = frame["teacher"].dropna().to_dict()
-    assert teacher == {
-        "interquartile mean of the runs": 4, "share of episodes: goal": 0.75, "share of episodes: pit": 0,
-        "share of episodes: truncated": 0.25,
-    }  # fmt: skip
-    best, low, high = ledger.measured(SIMPLEGOAL, BY_HAND).loc["sg_cells", ["here", "low", "high"]]
+def test_the_cells_of_the_best_run_are_set_against_those_of_single_runs():
+    best, low, high = ledger.of_cells(ledger.means_and_cells(RUNS)).loc["cells", ["here", "low", "high"]]
     assert (best, low, high) == (5, *np.quantile([3, 5, 4, 9], [0.025, 0.975]))
     assert [verdict(row(cells, best, low, high), unit=np.nan) for cells in ("9", "3", "10")] == [
         REPRODUCED, REPRODUCED, DIFFERS
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_what_the_paper_leaves_out_has_its_intervals(results, task):
-    frame, means = ledger.left_out_by_quartiles(results[task], n_resamples=500), results[task].returns.mean(axis=1)
-    assert (frame["low"] <= frame["here"] + 1e-12).all() and (frame["here"] <= frame["high"] + 1e-12).all()
-    shares = frame[frame.index.str.startswith("share of episodes")]
-    assert len(shares) == {SIMPLEGOAL: 3, MOUNTAINCAR: 2}[task]  # MountainCar has no pit
-    assert shares[["here", "teacher"]].sum().tolist() == pytest.approx([1, 1])
-    found = frame.loc["interquartile mean of the runs"]
-    expected = interval(means, lambda drawn: trim_mean(drawn, 0.25), n_resamples=500)
-    assert found[["here", "low", "high"]].tolist() == pytest.approx([trim_mean(means, 0.25), *expected])
-    fewer = ledger.left_out_by_quartiles(results[task], n_resamples=60)
-    assert fewer["here"].equals(frame["here"]) and not fewer[["low", "high"]].equals(frame[["low", "high"]])
 
 
 # Gaps
@@ -338,10 +299,3 @@ def test_gaps_by_hand():
         "teacher: mean": 0.5, "teacher: standard deviation": -3, "distilled: median": -1.79 / 0.0005,
     })  # fmt: skip
     assert found.loc["teacher: standard deviation"].tolist()[:2] == ["teacher", DIFFERS]
-
-
-def test_a_tie_beats_nobody():
-    same = dataclasses.replace(BY_HAND, runs=[run(i, BY_HAND.teacher_returns) for i in range(2)])
-    here = ledger.left_out_by_quartiles(same, n_resamples=5)["here"]
-    beats = here[["probability that a run beats its teacher", "probability that an episode beats the teacher's"]]
-    assert (beats == 0).all()

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from support import SIMPLEGOAL, CurvedTeacher, partition_of, same_arrays, tiny, walk
 
+from studies.reproduction.hidden import PRIOR
 from vsp.algorithms import distill, merge_regions, split_regions
-from vsp.paper.readings import ALTERNATIVES, Readings, defaults
+from vsp.paper.readings import Readings, defaults
 from vsp.rollouts import Episode
 from vsp.tasks.registry import get_task
 
@@ -83,7 +84,7 @@ def test_by_default_they_are_the_passes_of_the_algorithms(seed):
 
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(Readings)])
 def test_every_reading_acts_in_a_run_and_no_other_word_is_taken(name):
-    (alternative,) = [change[name] for changes in ALTERNATIVES.values() for change in changes if name in change]
+    (alternative,) = {*PRIOR[name]} - {getattr(Readings(), name)}
     config, task = tiny(max_pol_loss=0.005, min_pol_distance=0.1, n_freeze=20), get_task(SIMPLEGOAL)
     if name == "loss_after_split":
         config = tiny(max_pol_loss=0.2)

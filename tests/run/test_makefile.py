@@ -22,7 +22,7 @@ def checkout(tmp_path):
     folder = tmp_path / "größe und äpfel"
     shutil.copytree(ROOT / "notebooks", folder / "notebooks")
     copied = "Makefile environment.sh vsp/run/kernels.py data/paper/spread.csv data/teachers/MANIFEST.sha256"
-    studies = [f"data/results/{name}.csv" for name in ("readings", "teachers", "simpler", "verdicts")]
+    studies = [f"data/results/{name}.csv" for name in ("hub_teacher_ledger", "simpler", "verdicts")]
     for name in [*copied.split(), *studies]:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder / name)

@@ -18,7 +18,7 @@ from vsp.paper import ledger
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.show import state_space, style
-from vsp.show.returns import _VERDICTS, box_plot, boxes, by_group, intervals, ledger_gaps
+from vsp.show.returns import _VERDICTS, box_plot, boxes, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
 
@@ -264,9 +264,7 @@ def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     show.reference(ax, 7.0, "x")
     drawn = [np.column_stack(line.get_data()).tolist() for line in ax.lines]
     assert drawn == [[[0, 3], [1, 1]], [[1, 1], [2, 3]], [[0, 2.5], [1, 2.5]], [[7, 0], [7, 1]]]
-    show.again(ax, ROWS)
     show.margin(ax, ["1 %"], "fail")
-    assert ax.collections[-1].get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
     assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
 
 
@@ -286,20 +284,6 @@ def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
     assert whiskers == {(-3.5, 1), (4, 8.5), (0, 3), (5, 8)}  # 1.5 lengths of the box
     assert any((line == 2).all() for line in x) and any(np.isnan(line).all() for line in x)
     assert labels(ax) == ["paper", "here"] and ax.get_ylim()[0] > 1 > 0 > ax.get_ylim()[1]
-
-
-TEACHERS = pd.DataFrame({"teacher": ["shipped"] * 3 + ["seed 2"] * 2, "loss": [-1.0, -2.0, -6.0, 0.5, 1.5]})
-
-
-def test_groups_are_columns_of_dots_with_a_bar_at_their_mean(ax):
-    by_group(ax, TEACHERS, x="teacher", y="loss")
-    dots, bars = ax.collections[:2], ax.collections[2:]
-    assert [sorted(column.get_offsets()[:, 1]) for column in dots] == [[-6, -2, -1], [0.5, 1.5]]
-    assert all(np.abs(column.get_offsets()[:, 0] - k).max() < 0.3 for k, column in enumerate(dots))
-    (first,), (second,) = (bar.get_segments() for bar in bars)
-    assert [bar.get_label() for bar in bars if not bar.get_label().startswith("_")] == ["mean"]  # once in a legend
-    assert first.tolist() == [[-0.3, -3], [0.3, -3]] and second.tolist() == [[0.7, 1], [1.3, 1]]
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["shipped", "seed 2"]
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "figures").rglob("*.png")), ids=lambda path: path.stem)

@@ -1,6 +1,8 @@
 """The search for hidden settings: the prior, what is near, rows that are kept, and the whole search with tiny runs."""
 
 import dataclasses
+from functools import cache
+from typing import get_args, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -10,6 +12,9 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 from studies.reproduction import hidden
 from vsp import VoronoiPolicy
 from vsp.algorithms import distill
+from vsp.config import EXTENSIONS, Config, paper_preset
+from vsp.paper import printed
+from vsp.paper.readings import OPEN, Readings, defaults
 from vsp.paper.results import read_results
 from vsp.paper.runs import paper_experiment
 from vsp.tasks import get_task
@@ -33,6 +38,19 @@ def test_every_answer_of_the_prior_acts(monkeypatch):
             found = {tuple(hidden.experiment({name: answer}, task).provenance.values()) for answer in weights}
             assert len(found) == len(weights), name
     assert hidden.experiment({"teacher": 2}, MOUNTAINCAR).teacher.card["score"]["mean"] == 93.512
+
+
+def test_no_reading_is_forgotten():
+    """Every field that T2 does not settle is asked for, and each of its values can be drawn."""
+    settled = {*printed.printed_hyperparameters(SIMPLEGOAL), *EXTENSIONS} - {"one_split"}  # T2 prints it; R4 doubts it
+    asked = {}
+    for settings in (Config, Readings):
+        kinds = {name: kind for name, kind in get_type_hints(settings).items() if name not in settled}
+        asked |= {name: get_args(kind) or ((False, True) if kind is bool else ()) for name, kind in kinds.items()}
+    assert {*asked} == {*OPEN} == {*hidden.PRIOR} - {"teacher"}
+    assert all({*values} <= {*hidden.PRIOR[name]} for name, values in asked.items())
+    usual = defaults(paper_preset(SIMPLEGOAL))
+    assert all(usual[name] in hidden.PRIOR[name] and len(hidden.PRIOR[name]) > 1 for name in OPEN)
 
 
 def test_a_teacher_that_remembers_gives_the_same_run():
@@ -77,21 +95,32 @@ def test_a_distance_counts_each_value_in_variations_and_caps_it():
     assert found.to_dict() == pytest.approx({4: 0.0, 5: 1.0, 6: hidden.CAP, 7: hidden.CAP / n})
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """Twelve settings, runs of 60 iterations, few starts."""
+def test_what_is_reached_by_hand():
+    names = [*hidden.printed_facts(SIMPLEGOAL)]
+    every, best = (pd.DataFrame({name: np.arange(n + 1.0) for name in names}) for n in (200, 40))
+    fresh = pd.DataFrame([dict.fromkeys(names, 7.0)], index=["default"])
+    found = hidden.reached(SIMPLEGOAL, every, best, fresh).loc["cells"]
+    assert found.to_dict() == {
+        "paper": 13, "least": 0, "low": 5, "high": 195, "most": 200, "nearest low": 1, "nearest high": 39, "default": 7
+    }  # fmt: skip
 
+
+@pytest.fixture
+def small(monkeypatch, tmp_path):
+    """Twelve settings, runs of 60 iterations, few starts, no committed rows."""
+
+    @cache
     def shorter(task):
         one = paper_experiment(task)
         config = dataclasses.replace(one.config, n_epochs=60, n_freeze=10)
         return dataclasses.replace(one, config=config, n_episodes=20)
 
     sizes = {"N_SETTINGS": 12, "N_NEAR": 3, "N_NEAR_BOTH": 2, "N_POSTERIOR": 4, "N_CONFIRMED": 1, "_usual": shorter}
+    sizes |= {"RESULTS": tmp_path, "N_RUNS": dict.fromkeys(TASKS, 2)}
     sizes["STAGES"] = {
         "variation": (range(4), 31, 20), "screening": (range(5, 6), 31, 20), "near": (range(6, 8), 32, 20),
         "confirming": (range(8, 10), 33, 20),
     }  # fmt: skip
-    sizes["N_RUNS"] = dict.fromkeys(TASKS, 2)
     for name, value in sizes.items():
         monkeypatch.setattr(hidden, name, value)
 
@@ -106,6 +135,9 @@ def test_a_search_is_made_once_and_selects_on_other_seeds(small, tmp_path, monke
     questions, facts = (read_results(name, results) for name in ("hidden_questions", "hidden_facts"))
     assert len(questions) == sum(map(len, hidden.PRIOR.values()))
     assert questions.groupby("question")["prior"].sum().tolist() == pytest.approx([1.0] * len(hidden.PRIOR))
+    reached = read_results("hidden_reached", results).set_index(["task", "name"])
+    assert reached.at[(SIMPLEGOAL, "cells"), "paper"] == 13 and not (reached["scale"] <= 0).any()
+    assert reached.columns[-2] == "nearest, both"
     assert facts["choice"].unique().tolist()[0] == "default" and len(facts["choice"].unique()) == 4
     before = (results / f"hidden_{SIMPLEGOAL}.csv").read_bytes()
     monkeypatch.setattr(hidden, "tried", None)  # nothing is made again

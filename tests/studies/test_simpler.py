@@ -6,7 +6,7 @@ import pytest
 from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
 
 from studies import make_study
-from studies.reproduction import interpretations, simpler, teachers, verdicts
+from studies.reproduction import simpler, verdicts
 from studies.reproduction.simpler import LEAVES, compare_simpler, fit, teacher_data
 from vsp import algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
@@ -90,12 +90,12 @@ def test_every_kind_of_policy_has_its_row_by_hand(compared):
 
 def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tmp_path, monkeypatch):
     asked, frame = [], pd.DataFrame({"a": [0.1 + 0.2]})
-    for study in (interpretations, teachers, simpler, verdicts):
+    for study in (simpler, verdicts):
         monkeypatch.setattr(study, "study", lambda runs, *, jobs: asked.append((runs, jobs)) or frame)
     monkeypatch.setattr("sys.argv", ["make_study", "--out", str(tmp_path), "--jobs", "3"])
     make_study.main()
     runs = tmp_path / "build/study", 3
-    assert asked == [runs, runs, (tmp_path / "data/runs", 3), runs]
+    assert asked == [(tmp_path / "data/runs", 3), runs]
     folder = tmp_path / "data" / "results"
-    written = [read_results(name, folder)["a"].item() for name in ("readings", "teachers", "simpler")]
-    assert written == [0.3, 0.3, 0.1 + 0.2]
+    written = [read_results(name, folder)["a"].item() for name in ("simpler", "verdicts")]
+    assert written == [0.1 + 0.2, 0.3]

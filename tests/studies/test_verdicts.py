@@ -9,7 +9,7 @@ from support import MOUNTAINCAR, TASKS
 
 from studies.reproduction import verdicts
 from studies.reproduction.verdicts import Pool, judged
-from vsp.paper import ledger, summaries
+from vsp.paper import ledger
 
 
 @pytest.fixture
@@ -71,6 +71,6 @@ def test_wrong_verdicts_by_hand():
         row("mean", "the same", 0.04), row("mean", "the same", 0.08), row("mean", "the same", 0.0, 1.0),
         row("mean", "another", 0.5), row("mean", "another", 1.0), row("extreme", "the same", 0.01),
     ])  # fmt: skip
-    found = summaries.wrong_verdicts(frame).set_index("kind")
+    found = ledger.wrong_verdicts(frame).set_index("kind")
     assert found.loc["mean"].tolist() == pytest.approx([6.0, 8.0, 100.0])
     assert found.loc["extreme"].tolist()[:2] == [1.0, 1.0] and found.columns.tolist()[2] == "another"

@@ -4,7 +4,7 @@ from ..protocol.intervals import interval
 from ..protocol.job import EVALUATION_SEED, N_EPISODES
 from . import baselines
 from .audit import audit_findings, audit_table, mean_inside
-from .ledger import N_RESAMPLES, ledger_gaps, ledger_table, left_out_by_quartiles, verdict_counts
+from .ledger import N_RESAMPLES, ledger_gaps, ledger_table, verdict_counts, wrong_verdicts
 from .printed import (
     SHORT,
     SUBJECTS,

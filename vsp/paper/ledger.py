@@ -24,17 +24,14 @@ Each fact counts once (`FOLLOWS`). `studies.reproduction.verdicts` measures how 
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pandas as pd
 
 from ..config import paper_preset
 from ..evaluation import fences
-from ..protocol.intervals import interval, share_interval
 from ..tasks import base, mountaincar, registry, simplegoal
 from . import audit, printed
-from .runs import SHARES, Results, Run
+from .runs import Results, Run
 from .statistics import outlier_numbers, resample, spread
 
 VERDICTS = REPRODUCED, UNTOLD, DIFFERS, UNCHECKED, CONTRADICTED = (
@@ -99,6 +96,20 @@ def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
     }  # fmt: skip
     table = pd.DataFrame({name: rows["verdict"].value_counts() for name, rows in groups.items()}).T
     return table.reindex(columns=VERDICTS).fillna(0).astype(int).rename_axis("of").reset_index()
+
+
+def wrong_verdicts(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return how often "differs" is the verdict, in percent of the pairs of samples: one row per kind of result.
+
+    Columns: kind; of the same runs the mean over the results of a kind, and the highest; for runs that are known to be
+    others, by what changed, the highest.
+    """
+    told = frame[frame["cannot be checked"] < 1].assign(differs=100 * frame["differs"])
+    same, others = (told[(told["against"] == "the same") == side] for side in (True, False))
+    shares = same.groupby("kind", sort=False)["differs"].agg(["mean", "max"])
+    names = {"mean": "the same runs, mean", "max": "the same runs, highest"}
+    highest = others.groupby(["kind", "against"])["differs"].max().unstack()
+    return shares.rename(columns=names).join(highest).rename_axis(columns=None).reset_index()
 
 
 def verdicts(rows: pd.DataFrame, *, in_doubt: pd.Series) -> np.ndarray:
@@ -238,36 +249,3 @@ def _environments() -> dict[str, float]:
 
 def _reward(task: base.Task, state: list[float], action: list[float]) -> float:
     return float(task.step(np.array([state]), np.array([action]))[1][0])
-
-
-# What the paper leaves out
-
-
-def left_out_by_quartiles(result: Results, *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
-    """Return statistics that describe many runs better than mean and quartiles of all episodes do.
-
-    Columns: here, low, high, teacher. One row per statistic, with 95 % intervals from resampled runs. The
-    interquartile mean is the mean of the middle half of the runs' means (Agarwal et al. 2021). A run "beats" its
-    teacher if its mean return from the same starts is higher; an episode does if its return is higher. The interval for
-    runs is the exact one of Clopper and Pearson, which has a width even if all runs, or none, beat the teacher.
-    """
-    from scipy.stats import trim_mean  # here: it takes long to import
-
-    teacher, means = result.teacher_returns, result.returns.mean(axis=1)
-    measures: dict[str, tuple] = {
-        "interquartile mean of the runs": (means, partial(trim_mean, proportiontocut=0.25), teacher.mean()),
-        "probability that an episode beats the teacher's": ((result.returns > teacher).mean(axis=1), np.mean, np.nan),
-    }
-    for name, code in SHARES.items():
-        if name != "pit" or result.experiment.task == "SimpleGoal-v0":  # MountainCar has no pit
-            shares = (result.outcomes == code).mean(axis=1)
-            teachers = np.mean(result.teacher_outcomes.outcomes == code)
-            measures[f"share of episodes: {name}"] = shares, np.mean, teachers
-    rows = {
-        name: (statistic(values, axis=0), *interval(values, statistic, vectorized=True, n_resamples=n_resamples), value)
-        for name, (values, statistic, value) in measures.items()
-    }
-    beats, n = int(np.sum(means > teacher.mean())), len(means)
-    rows["probability that a run beats its teacher"] = (beats / n, *share_interval(beats, n), np.nan)
-    frame = pd.DataFrame.from_dict(rows, orient="index", columns=["here", "low", "high", "teacher"])
-    return frame.astype(float).rename_axis("statistic")

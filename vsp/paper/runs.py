@@ -182,7 +182,13 @@ def paper_results(
     """
     one = paper_experiment(task, quick=quick)
     check_count("n", n := n or (QUICK_RUNS if quick else N_RUNS[one.task]))
-    return Results(one, make_runs(one, range(n), runs=runs, jobs=jobs), teacher_outcomes(one, runs=runs))
+    return results_of(one, n, runs=runs, jobs=jobs)
+
+
+def results_of(experiment: Experiment, n: int, *, runs: str | os.PathLike, jobs: int | str = 1) -> Results:
+    """Return the results of an experiment with the seeds 0 to n - 1; make the missing runs."""
+    made = make_runs(experiment, range(n), runs=runs, jobs=jobs)
+    return Results(experiment, made, teacher_outcomes(experiment, runs=runs))
 
 
 @threadpool_limits.wrap(limits=1)  # the same order of sums, also without the thread limit of `make`

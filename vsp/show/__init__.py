@@ -7,10 +7,8 @@ import importlib
 
 from .captions import Caption, caption_of
 from .returns import (
-    again,
     box_plot,
     boxes,
-    by_group,
     histogram,
     intervals,
     ledger_gaps,

@@ -1,7 +1,4 @@
-"""Figures of returns: distributions, intervals, the ledger.
-
-seaborn is imported where it is used: the import takes a second, and most notebooks do not need it.
-"""
+"""Figures of returns: distributions, intervals, the ledger."""
 
 from __future__ import annotations
 
@@ -87,13 +84,6 @@ def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILL
     return ax
 
 
-def again(ax: Axes, frame: pd.DataFrame) -> None:
-    """Add a second measurement to the rows of `intervals`, as hollow dots; NaN where there is none."""
-    rows = np.arange(len(frame))
-    ax.hlines(rows, frame["low"], frame["high"], color="black", lw=0.6, zorder=4)
-    ax.scatter(frame["here"], rows, facecolor="white", edgecolor="black", s=10, lw=0.6, zorder=5)
-
-
 def margin(ax: Axes, texts: list[str], title: str) -> None:
     """Write a text beside each row of `intervals`, right of the axes, under a title."""
     for row, text in enumerate([title, *texts], start=-1):
@@ -142,12 +132,3 @@ def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours
     for line in drawn["medians"]:
         line.set(color="black")
     ax.set_ylim(len(stats) - 0.4, -0.6)
-
-
-def by_group(ax: Axes, frame: pd.DataFrame, *, x: str, y: str) -> None:
-    """Draw one dot per row of `frame`, in columns by `x`, with a bar at the mean of each column."""
-    import seaborn as sns
-
-    sns.swarmplot(frame, x=x, y=y, ax=ax, color=DISTILLED, size=3)
-    for place, mean in enumerate(frame.groupby(x, sort=False)[y].mean()):
-        ax.hlines(mean, place - 0.3, place + 0.3, color="black", lw=1.2, zorder=4, label="mean" if not place else None)
