@@ -22,18 +22,6 @@ README = PAGES[0].read_text("utf-8")
 RESULTS = (ROOT / "docs" / "results.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize(
-    ("page", "said"), [("README.md", "R² 0.98"), ("docs/use.md", "push east = -1.50")], ids=["README", "use"]
-)
-def test_python_example_runs(page, said, tmp_path, monkeypatch, capsys):
-    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text("utf-8"), flags=re.S)
-    monkeypatch.chdir(tmp_path)
-    example = example.replace("Dock-v0", "DockOfReadme-v0")  # other tests have a Dock-v0 of their own
-    exec(compile(example, page, "exec"), {})
-    assert said in capsys.readouterr().out and len(example.splitlines()) <= 40
-    assert (tmp_path / "my_policy.vsp").exists() == (page == "README.md")
-
-
 def test_the_readme_is_short():
     assert len(README.split()) <= 700
 

@@ -8,6 +8,7 @@ field: the paper's prose answers it, "this iteration's episode".
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -96,7 +97,7 @@ class Config:
     last reset. Least squares uses running sums and no buffer; the settings of minibatches and Adam have no effect."""
 
     def __post_init__(self) -> None:
-        for name, kind in get_type_hints(type(self)).items():
+        for name, kind in kinds_of(type(self)).items():
             check_field(name, getattr(self, name), kind)
         if self.n_freeze > self.n_epochs:
             raise ValueError(
@@ -120,6 +121,10 @@ class Config:
         """Return the same method with a tenth of the iterations: for a first look, not for results."""
         tenth = {name: max(1, getattr(self, name) // 10) for name in ("n_epochs", "n_freeze")}
         return dataclasses.replace(self, **tenth)
+
+
+# The kinds of the fields of a class, kept, because a table of results asks for them thousands of times
+kinds_of: Callable[[type], dict[str, Any]] = functools.cache(get_type_hints)
 
 
 def check_field(name: str, value: object, kind: object) -> None:

@@ -59,7 +59,7 @@ class Row(Job):
         about["settings"] = how.read(self.task)
         about["measure"] = measure.settings(self.start_seed)
         about["measure"] |= {"states": measure.N_COMMON} if how.preset in ALIKE else {}
-        return provenance(about, _teacher(self.task, self.agent).digest, how.version)
+        return provenance(about, _digest(self.task, self.agent), how.version)
 
     @property
     def named(self) -> dict[str, str | int]:
@@ -93,6 +93,11 @@ class Row(Job):
 @cache
 def _teacher(task: str, agent: int) -> Teacher:
     return load_teacher(list(further_teachers(task).values())[agent - 1] if agent else task)
+
+
+@cache
+def _digest(task: str, agent: int) -> str:
+    return _teacher(task, agent).digest
 
 
 def jobs_of(task: str, table: str = "methods") -> list[Row]:

@@ -1,1 +1,1 @@
-"""Experiments on the reproduction: open choices of the paper, other teachers, and cells beside simpler policies."""
+"""Experiments on the reproduction: the search for hidden settings, wrong verdicts, simpler policies."""

@@ -1,6 +1,7 @@
 """Commands as a user gives them, each in a process of its own."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -45,3 +46,15 @@ def test_commands_run_without_a_warning():
     said = [(*process.communicate(), process.returncode) for process in running]
     assert said[0] == ("", "", 0)  # nothing is stale
     assert all(out.startswith("usage:") and (err, code) == ("", 0) for out, err, code in said[1:])
+
+
+@pytest.mark.parametrize(
+    ("page", "said"), [("README.md", "R² 0.98"), ("docs/use.md", "push east = -1.50")], ids=["README", "use"]
+)
+def test_python_example_runs(page, said, tmp_path, monkeypatch, capsys):
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text("utf-8"), flags=re.S)
+    monkeypatch.chdir(tmp_path)
+    example = example.replace("Dock-v0", "DockOfReadme-v0")  # other tests have a Dock-v0 of their own
+    exec(compile(example, page, "exec"), {})
+    assert said in capsys.readouterr().out and len(example.splitlines()) <= 40
+    assert (tmp_path / "my_policy.vsp").exists() == (page == "README.md")

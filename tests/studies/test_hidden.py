@@ -1,7 +1,7 @@
 """The search for hidden settings: the prior, what is near, rows that are kept, and the whole search with tiny runs."""
 
 import dataclasses
-from functools import cache
+from functools import cache, partial
 from typing import get_args, get_type_hints
 
 import numpy as np
@@ -14,6 +14,7 @@ from vsp import VoronoiPolicy
 from vsp.algorithms import distill
 from vsp.config import EXTENSIONS, Config, paper_preset
 from vsp.paper import printed
+from vsp.paper.ledger import ledger_table
 from vsp.paper.readings import OPEN, Readings, defaults
 from vsp.paper.results import read_results
 from vsp.paper.runs import paper_experiment
@@ -107,16 +108,17 @@ def test_what_is_reached_by_hand():
 
 @pytest.fixture
 def small(monkeypatch, tmp_path):
-    """Twelve settings, runs of 60 iterations, few starts, no committed rows."""
+    """Nine settings, runs of 30 iterations, few starts, no committed rows."""
 
     @cache
     def shorter(task):
         one = paper_experiment(task)
-        config = dataclasses.replace(one.config, n_epochs=60, n_freeze=10)
+        config = dataclasses.replace(one.config, n_epochs=30, n_freeze=5)
         return dataclasses.replace(one, config=config, n_episodes=20)
 
-    sizes = {"N_SETTINGS": 12, "N_NEAR": 3, "N_NEAR_BOTH": 2, "N_POSTERIOR": 4, "N_CONFIRMED": 1, "_usual": shorter}
+    sizes = {"N_SETTINGS": 9, "N_NEAR": 3, "N_NEAR_BOTH": 2, "N_POSTERIOR": 4, "N_CONFIRMED": 1, "_usual": shorter}
     sizes |= {"RESULTS": tmp_path, "N_RUNS": dict.fromkeys(TASKS, 2)}
+    sizes["ledger_table"] = partial(ledger_table, n_resamples=20)
     sizes["STAGES"] = {
         "variation": (range(4), 31, 20), "screening": (range(5, 6), 31, 20), "near": (range(6, 8), 32, 20),
         "confirming": (range(8, 10), 33, 20),
@@ -130,7 +132,7 @@ def test_a_search_is_made_once_and_selects_on_other_seeds(small, tmp_path, monke
     results = tmp_path / "data" / "results"
     rows = {task: read_results(f"hidden_{task}", results) for task in TASKS}
     for frame in rows.values():
-        assert frame["stage"].value_counts()[["variation", "screening"]].tolist() == [4, 12]
+        assert frame["stage"].value_counts()[["variation", "screening"]].tolist() == [4, 9]
         assert 4 <= (frame["stage"] == "near").sum() <= 6 and frame["settings"].notna().all()
     questions, facts = (read_results(name, results) for name in ("hidden_questions", "hidden_facts"))
     assert len(questions) == sum(map(len, hidden.PRIOR.values()))

@@ -102,7 +102,7 @@ def test_results_of_another_preset_are_stale(patch):
 
 def test_all_results_of_another_teacher_are_stale(patch):
     other = SimpleNamespace(digest="f" * 64)
-    patch.setattr(rows, "_teacher", lambda task, agent: other)
+    patch.setattr(rows, "_digest", lambda task, agent: other.digest)
     patch.setattr(beside, "load_teacher", lambda task: other)
     named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
     assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents"))]

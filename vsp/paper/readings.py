@@ -6,11 +6,11 @@ The other open questions are fields of `Config`. With all defaults, the passes d
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Literal, get_type_hints
+from typing import Literal
 
 import numpy as np
 
-from ..config import Config, check_field
+from ..config import Config, check_field, kinds_of
 from ..history import Change
 from ..partition import Partition
 from ..rollouts import Episode
@@ -49,7 +49,7 @@ class Readings:
     the split already responds to the loss so far."""
 
     def __post_init__(self) -> None:
-        for name, kind in get_type_hints(type(self)).items():
+        for name, kind in kinds_of(type(self)).items():
             check_field(name, getattr(self, name), kind)
 
     def split(self, partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[Change]:

@@ -282,6 +282,6 @@ def teacher_beside_runs(results: Results) -> pd.DataFrame:
         "distilled": (runs.mean(), *interval(means, np.mean, vectorized=True)),
         "  as if all episodes were independent": (runs.mean(), runs.mean() - half, runs.mean() + half),
         "distilled minus teacher": (gap.mean(), *interval(gap, np.mean, vectorized=True)),
-        "median of the distilled": (np.median(means), np.nan, np.nan),
+        "median of the runs' means": (np.median(means), np.nan, np.nan),
     }
     return pd.DataFrame.from_dict(rows, orient="index", columns=["mean", "low", "high"])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import get_type_hints
 
 from vsp.checks import check_count, check_number
-from vsp.config import check_field
+from vsp.config import check_field, kinds_of
 from vsp.tasks import Task, get_task
 
 MOST_CELLS, MOST = 1000, 10**8  # largest plausible number of cells, and of anything else: a larger value is a mistake
@@ -56,7 +55,7 @@ class Tuned:
     """Episodes that decide between restarts, between rounds, and between the stages of tuning."""
 
     def __post_init__(self) -> None:
-        for name, kind in get_type_hints(type(self)).items():
+        for name, kind in kinds_of(type(self)).items():
             value = getattr(self, name)
             optional = name in ("n_corrections", "n_generations", "failure_penalty")
             off = optional and isinstance(value, int | kind) and not isinstance(value, bool) and value == 0
