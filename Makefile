@@ -49,7 +49,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
 .PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents proofs course article site test \
-  test-js test-long lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
+  test-js test-long test-tries lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
 # $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp was made with this QUICK, no file of INPUTS is newer,
@@ -133,6 +133,8 @@ test: venv-test-train-dask ## runs the tests: 2 to 5 minutes; FILES=tests/test_g
 
 test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 6 minutes
 	@$(PYTEST) tests/long
+test-tries: venv-test-train-dask ##- runs what the notebooks suggest to try, and other parameters, at full size: 2 to 10 minutes
+	@VSP_FULL=1 $(PYTEST) tests/long/test_tries.py tests/long/test_edits.py
 
 test-js: ##- tests the scripts of explorer, article and site without a browser, which needs Node.js 20.19: 3 s
 	@command -v node > /dev/null || { echo 'error: no node found: install Node.js 20.19 or newer' >&2; exit 1; }

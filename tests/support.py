@@ -32,6 +32,7 @@ def nearest_from(least, codewords, states, metric):
 
 nearest_brute, nearest_kdtree = (functools.partial(nearest_from, least) for least in (np.inf, 2))
 
+QUICK = "VSP_FULL" not in os.environ  # whether notebooks run quickly
 SIMPLEGOAL, MOUNTAINCAR = "SimpleGoal-v0", "MountainCarContinuous-v0"
 PENDULUM, LUNARLANDER = "Pendulum-v1", "LunarLanderContinuous-v3"
 WALKER, CHEETAH = "BipedalWalker-v3", "HalfCheetah-v5"

@@ -42,8 +42,8 @@ SIMPLEGOAL, MOUNTAINCAR = printed.TASKS
 # Files of teachers, the shipped one first. SimpleGoal: two with shorter training, which fall into the pit now and then,
 # as the printed one does. MountainCar: one with the printed mean, and the RL Zoo's DDPG agent, a sibling of the paper's
 TEACHERS = {
-    SIMPLEGOAL: ("", "short/SimpleGoal-v0-2", "short/SimpleGoal-v0-3"),
-    MOUNTAINCAR: ("", "short/MountainCarContinuous-v0-1", "zoo/ddpg-MountainCarContinuous-v0"),
+    SIMPLEGOAL: (SIMPLEGOAL, "short/SimpleGoal-v0-2", "short/SimpleGoal-v0-3"),
+    MOUNTAINCAR: (MOUNTAINCAR, "short/MountainCarContinuous-v0-1", "zoo/ddpg-MountainCarContinuous-v0"),
 }
 # Answers to each open question, with their weights. Long runs are rare, so that the search ends: 50 minibatches of 256
 # states are a pass over a buffer
@@ -94,12 +94,11 @@ def setting(k: int) -> dict:
 
 def experiment(change: dict, task: str) -> Experiment:
     """Return the paper's experiment with changed settings: fields of `Config` and `Readings`, and a teacher."""
-    usual, teacher = _usual(task), TEACHERS[task][change.get("teacher", 0)]
+    usual, teacher = _usual(task), _teacher(SHIPPED / f"{TEACHERS[task][change.get('teacher', 0)]}.safetensors")
     passes = {name: value for name, value in change.items() if hasattr(Readings, name)}
     config = {name: value for name, value in change.items() if name not in passes and name != "teacher"}
-    other = {"teacher": _teacher(SHIPPED / f"{teacher}.safetensors")} if teacher else {}
     readings = Readings(**passes) if passes else None
-    return replace(usual, config=replace(usual.config, **config), readings=readings, **other)
+    return replace(usual, config=replace(usual.config, **config), readings=readings, teacher=teacher)
 
 
 _usual, _teacher = cache(paper_experiment), cache(load_teacher)
@@ -251,11 +250,11 @@ def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.Dat
     Columns: paper; of all settings that were screened least, low, high and most (low and high: the middle 95 %); low
     and high of the nearest; and the values of each row of `fresh`, which are settings with fresh seeds.
     """
-    paper = printed_facts(task)
-    table = pd.DataFrame({"paper": paper})
-    table[["least", "low", "high", "most"]] = every[[*paper]].quantile([0, 0.025, 0.975, 1]).T
-    table[["nearest low", "nearest high"]] = nearest[[*paper]].quantile([0.025, 0.975]).T
-    return table.join(fresh[[*paper]].T)
+    paper = pd.Series(printed_facts(task))
+    every, nearest, fresh = (frame[paper.index] for frame in (every, nearest, fresh))
+    found = pd.concat([every.quantile([0, 0.025, 0.975, 1]), nearest.quantile([0.025, 0.975]), fresh]).T
+    columns = ["least", "low", "high", "most", "nearest low", "nearest high", *fresh.index]
+    return found.set_axis(columns, axis=1).assign(paper=paper)
 
 
 def questions(near: dict[str, pd.Series]) -> pd.DataFrame:

@@ -15,7 +15,7 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, distilled_elsewhere, threads
 import vsp
 from vsp import algorithms
 from vsp.paper.results import read_results
-from vsp.paper.runs import N_RUNS, load_runs, make_runs, paper_experiment
+from vsp.paper.runs import N_RUNS, make_runs, paper_experiment
 from vsp.paper.statistics import spread
 from vsp.rollouts import visited_states
 from vsp.run.atomic import ROOT
@@ -106,7 +106,7 @@ def test_runs_made_anew_on_an_old_processor(tmp_path, record):
     inside, names = [], ("mean", "std", "q1", "median", "q3")
     z = norm.isf(0.001 / 2 / (len(TASKS) * len(names)))
     for task in TASKS:
-        runs = load_runs(paper_experiment(task), range(N_RUNS[task]), runs=tmp_path / "data" / "runs")
+        runs = make_runs(paper_experiment(task), range(N_RUNS[task]), runs=tmp_path / "data" / "runs")
         made, committed = [spread(run.outcomes.returns) for run in runs], read_results(task)
         rng = np.random.default_rng(0)
         for name in names:

@@ -1,9 +1,10 @@
-"""What readers change in notebooks 06 to 11: their parameters and their *try*, with short runs, in this process."""
+"""What readers change in notebooks 06 to 11: parameters, and their *try*; quick, but with `make test-tries`."""
 
 import re
 
 import numpy as np
 import pytest
+from support import QUICK
 
 from vsp.run.atomic import ROOT
 from vsp.run.command import CommandError
@@ -27,7 +28,7 @@ def played(number, out, **changes):
             exec(compile(cell.source, f"{path.name}, {cell.id}", "exec"), names)
         if cell.id == "parameters":
             assert changes.keys() <= names.keys()
-            names.update(changes, out=str(out), quick=True)
+            names.update(changes, out=str(out), quick=QUICK)
         if cell.id == LAST[number]:
             return names
 

@@ -1,11 +1,12 @@
-"""What notebooks 01 to 04 suggest to try, and other edits of their parameters; quick but for seed 1."""
+"""What notebooks 01 to 05 suggest to try, and other edits of their parameters; quick, but with `make test-tries`."""
 
+import re
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import MOUNTAINCAR, PENDULUM, QUICK, SIMPLEGOAL
 
 import vsp
 from vsp import paper
@@ -21,7 +22,7 @@ def run(number, folder, **values):
         exec(cell.source if cell.cell_type == "code" else "", names)
         plt.close("all")
         if cell.id == "parameters":
-            names |= {"out": folder, "runs": folder, "quick": True, **values}
+            names |= {"out": folder, "runs": folder, "quick": QUICK, **values}
     return names
 
 
@@ -70,7 +71,7 @@ def test_what_02_says_of_seed_1_holds(tmp_path):
 
 @pytest.mark.parametrize("row", [0, 1])
 def test_what_03_and_04_let_try_changes_the_policy(row, tmp_path):
-    first, second = (paper.paper_results(task, n=2, runs=tmp_path, quick=True) for task in paper.TASKS)
+    first, second = (paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in paper.TASKS)
     of, start, maps = second.experiment, vsp.start_states(MOUNTAINCAR, 1, row), first.best.policy.coefficients.copy()
     boxed, _ = vsp.distill(of.teacher, of.task, replace(of.config, scale="box"), seed=row)
     assert not np.array_equal(boxed.codewords, second.runs[row].policy.codewords)
@@ -80,3 +81,14 @@ def test_what_03_and_04_let_try_changes_the_policy(row, tmp_path):
     changed = vsp.VoronoiPolicy(first.best.policy.codewords, maps, task=SIMPLEGOAL)
     returns = vsp.rollout_from_seed(changed, SIMPLEGOAL, 100, seed=1).returns
     assert not np.array_equal(returns, first.best.outcomes.returns)
+
+
+@pytest.mark.parametrize("n_minibatches", [3, 5])
+def test_05_judges_runs_of_ones_own(n_minibatches, tmp_path):
+    (path,) = (ROOT / "notebooks").glob("05_*.ipynb")
+    code = "\n".join(re.findall("^    (.*)", nbformat.read(path, as_version=4).cells[-1].source, flags=re.M))
+    results = {task: paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in paper.TASKS}
+    names = {"results": results, "runs": tmp_path, "paper": paper}
+    exec(code.replace("=5", f"={n_minibatches}").replace("range(10)", "range(2)" if QUICK else "range(10)"), names)
+    assert names["new"].experiment.config.n_minibatches == n_minibatches
+    assert not np.array_equal(names["new"].returns[:2], results[SIMPLEGOAL].returns)

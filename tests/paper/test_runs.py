@@ -19,7 +19,7 @@ from vsp.paper import tables
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
 from vsp.paper.results import read_results
-from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, load_runs, make_runs, paper_results
+from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, make_runs, paper_results
 from vsp.paper.statistics import spread
 from vsp.protocol import job
 from vsp.run import atomic
@@ -108,7 +108,7 @@ def test_runs_of_several_experiments_are_those_made_one_by_one(made, tmp_path, j
 def test_changed_settings_and_teachers_use_another_folder(made, other):
     assert other.provenance != SMALL.provenance and other.folder(made[0]) != SMALL.folder(made[0])
     with pytest.raises(FileNotFoundError, match="0000.run"):
-        load_runs(other, [0], runs=made[0])
+        Distillation(other, 0).run(made[0])
 
 
 OF_A_RUN = {
@@ -145,7 +145,7 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
         old = changed().folder(tmp_path)
     shutil.copytree(old, SMALL.folder(tmp_path))
     with pytest.raises(atomic.DamagedFile, match="0000.run: made with version 7, expected 1: delete it"):
-        load_runs(SMALL, [0], runs=tmp_path)
+        Distillation(SMALL, 0).run(tmp_path)
 
 
 def test_a_run_of_another_seed_is_refused_and_a_failing_one_keeps_the_others(tmp_path, monkeypatch):
@@ -156,7 +156,7 @@ def test_a_run_of_another_seed_is_refused_and_a_failing_one_keeps_the_others(tmp
     assert [*files(tmp_path)] == ["0000.run"]
     (SMALL.folder(tmp_path) / "0000.run").rename(SMALL.folder(tmp_path) / "0005.run")
     with pytest.raises(atomic.DamagedFile, match="0005.run: made with seed 0, expected 5"):
-        load_runs(SMALL, [5], runs=tmp_path)
+        Distillation(SMALL, 5).run(tmp_path)
 
 
 # What is made of runs

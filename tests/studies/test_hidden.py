@@ -139,7 +139,7 @@ def test_a_search_is_made_once_and_selects_on_other_seeds(small, tmp_path, monke
     assert questions.groupby("question")["prior"].sum().tolist() == pytest.approx([1.0] * len(hidden.PRIOR))
     reached = read_results("hidden_reached", results).set_index(["task", "name"])
     assert reached.at[(SIMPLEGOAL, "cells"), "paper"] == 13 and not (reached["scale"] <= 0).any()
-    assert reached.columns[-2] == "nearest, both"
+    assert reached.columns[-3] == "nearest, both"
     assert facts["choice"].unique().tolist()[0] == "default" and len(facts["choice"].unique()) == 4
     before = (results / f"hidden_{SIMPLEGOAL}.csv").read_bytes()
     monkeypatch.setattr(hidden, "tried", None)  # nothing is made again

@@ -13,9 +13,8 @@ from support import MOUNTAINCAR, PENDULUM, tiny
 from studies import make_study
 from studies import zoo as agents
 from studies.committed import RESULTS
-from studies.reproduction import hub_teacher
 from vsp.evaluation import likeness
-from vsp.paper.runs import Experiment, load_runs
+from vsp.paper.runs import Experiment, make_runs
 from vsp.run import command, listed
 from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells import Faithful
@@ -139,22 +138,22 @@ def test_the_committed_rows_are_those_of_the_zips():
 
 def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp_path):
     config = tiny(n_epochs=30, n_freeze=5)
-    monkeypatch.setattr(hub_teacher, "N_RUNS", {MOUNTAINCAR: 2})
-    monkeypatch.setattr(hub_teacher, "paper_experiment", lambda task: Experiment(task, config, None, n_episodes=9))
-    monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(task))
+    monkeypatch.setattr(make_study, "N_RUNS", {MOUNTAINCAR: 2})
+    monkeypatch.setattr(make_study, "paper_experiment", lambda task: Experiment(task, config, None, n_episodes=9))
+    monkeypatch.setattr(make_study, "read", lambda path, task: load_teacher(task))
     monkeypatch.setattr(sys, "argv", ["x", "--agent", "an_agent.zip", "--out", str(tmp_path), "--jobs", "1"])
     make_study.main()
     folder = tmp_path / "data" / "results"
     ledger = pd.read_csv(folder / "hub_teacher_ledger.csv")
     mean = ledger.set_index("id").loc["mc_spread_ours_mean"]
     one = Experiment(MOUNTAINCAR, config, load_teacher(MOUNTAINCAR), n_episodes=9)
-    returns = [run.outcomes.returns for run in load_runs(one, range(2), runs=tmp_path / "build" / "study")]
+    returns = [run.outcomes.returns for run in make_runs(one, range(2), runs=tmp_path / "build" / "study")]
     assert mean["here"] == pytest.approx(np.mean(returns), abs=1e-6) and float(mean["paper"]) == 93.534
 
 
 def test_an_agent_of_another_task_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["x", "--agent", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
-    monkeypatch.setattr(hub_teacher, "read", lambda path, task: load_teacher(PENDULUM, task))
+    monkeypatch.setattr(make_study, "read", lambda path, task: load_teacher(PENDULUM, task))
     with pytest.raises(command.CommandError, match="load it for the task it was trained on"):
         make_study.main()
     assert not list(tmp_path.iterdir())

@@ -134,16 +134,6 @@ def make_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike, jobs: i
     return [one.run(runs) for one in made]
 
 
-def load_runs(experiment: Experiment, seeds, *, runs: str | os.PathLike) -> list[Run]:
-    """Read the runs of these seeds. Raises as `Distillation.run` does."""
-    return [Distillation(experiment, seed).run(runs) for seed in seeds]
-
-
-def outcome_shares(outcomes: np.ndarray) -> dict[str, float]:
-    """Return the shares of the episodes that reached the goal, fell into the pit and were truncated, by name."""
-    return {name: np.mean(outcomes == code) for name, code in SHARES.items()}
-
-
 @dataclass(frozen=True)
 class Results:
     """The paper's experiment on one task, with everything that its figures and tables need."""

@@ -23,7 +23,7 @@ from ..show.captions import caption_of, file_of, headings
 from .printed import PREFIX, SHORT, check_task, printed_hyperparameters, printed_spread, printed_text_numbers
 from .readings import defaults
 from .results import write_results
-from .runs import Experiment, Results, Run, outcome_shares
+from .runs import SHARES, Experiment, Results, Run
 from .statistics import outlier_numbers, spread
 
 if TYPE_CHECKING:
@@ -253,7 +253,8 @@ def run_summary(runs: list[Run], experiment: Experiment) -> pd.DataFrame:
     for run in runs:
         counts = {"seed": run.seed, "cells": len(run.policy), "splits": run.splits, "merges": run.merges}
         scores = {"validation_mean": run.validation_mean, **spread(run.outcomes.returns)}
-        rows.append({**experiment.provenance, **counts, **scores, **outcome_shares(run.outcomes.outcomes)})
+        shares = {name: np.mean(run.outcomes.outcomes == code) for name, code in SHARES.items()}
+        rows.append({**experiment.provenance, **counts, **scores, **shares})
     return pd.DataFrame(rows)
 
 
