@@ -38,7 +38,7 @@ N_SETTINGS, PRIOR_SEED = 4000, 777
 N_NEAR, N_NEAR_BOTH = N_SETTINGS // 10, N_SETTINGS // 20  # settings tried again: nearest of each task, and of both
 N_POSTERIOR, N_CONFIRMED = 100, 3  # the nearest of these, and the nearest that are confirmed
 CAP = 5.0  # one value counts at most so much, in deviations of a run
-SIMPLEGOAL, MOUNTAINCAR = printed.TASKS
+SIMPLEGOAL, MOUNTAINCAR = TASKS = printed.TASKS
 # Files of teachers, the shipped one first. SimpleGoal: two with shorter training, which fall into the pit now and then,
 # as the printed one does. MountainCar: one with the printed mean, and the RL Zoo's DDPG agent, a sibling of the paper's
 TEACHERS = {
@@ -216,27 +216,27 @@ def distances(task: str, rows: pd.DataFrame, variation: pd.DataFrame) -> pd.Seri
 
 def search(out: Path, jobs: int | str) -> None:
     """Make all stages; write the rows of each task as they come, then hidden_questions, _reached and _facts.csv."""
-    tasks = printed.TASKS
 
     def made(stage: str, numbers: dict[str, Iterable[int]]) -> dict[str, pd.DataFrame]:
-        return {task: rows_of(task, stage, numbers[task], out, jobs) for task in tasks}
+        return {task: rows_of(task, stage, numbers[task], out, jobs) for task in TASKS}
 
     def away(rows: dict[str, pd.DataFrame]) -> dict[str, pd.Series]:
-        each = {task: distances(task, rows[task], variation[task]) for task in tasks}
+        each = {task: distances(task, rows[task], variation[task]) for task in TASKS}
         return each | {"both": pd.DataFrame(each).mean(axis=1, skipna=False).dropna()}
 
-    variation = made("variation", dict.fromkeys(tasks, STAGES["variation"][0]))
-    every = made("screening", dict.fromkeys(tasks, range(N_SETTINGS)))
+    variation = made("variation", dict.fromkeys(TASKS, STAGES["variation"][0]))
+    every = made("screening", dict.fromkeys(TASKS, range(N_SETTINGS)))
     screened = away(every)
     both = screened["both"].nsmallest(N_NEAR_BOTH).index
-    near = made("near", {task: sorted({0, *screened[task].nsmallest(N_NEAR).index, *both}) for task in tasks})
+    near = made("near", {task: sorted({0, *screened[task].nsmallest(N_NEAR).index, *both}) for task in TASKS})
     nearest = away(near)
     first = sorted({0, *(k for each in nearest.values() for k in each.nsmallest(N_CONFIRMED).index)})
-    confirmed = made("confirming", dict.fromkeys(tasks, first))
-    chosen = {"default": 0} | {f"nearest, {who}": int(each.idxmin()) for who, each in away(confirmed).items()}
+    confirmed = made("confirming", dict.fromkeys(TASKS, first))
+    first_of = {who: int(each.idxmin()) for who, each in away(confirmed).items()}
+    chosen = {"default": 0} | {f"nearest, {printed.SHORT.get(who, who)}": k for who, k in first_of.items()}
     write_results(questions(nearest), "hidden_questions", out=out)
     parts = {}
-    for task in tasks:
+    for task in TASKS:
         best = near[task].set_index("k").loc[nearest[task].nsmallest(N_POSTERIOR).index]
         fresh = confirmed[task].set_index("k").loc[[*chosen.values()]].set_axis([*chosen])
         parts[task] = reached(task, every[task], best, fresh).assign(scale=scales(task, variation[task]))
@@ -280,7 +280,7 @@ def facts_of(chosen: dict[str, int], runs: Path, jobs: int | str) -> pd.DataFram
     """Return the ledger's facts of distilled policies at the paper's scale, with the settings of each choice."""
     tables = []
     for name, k in chosen.items():
-        tried = {task: experiment(setting(k), task) for task in printed.TASKS}
+        tried = {task: experiment(setting(k), task) for task in TASKS}
         made = {task: results_of(one, N_RUNS[task], runs=runs, jobs=jobs) for task, one in tried.items()}
         book = ledger_table(made).query("fact and subject == 'Ours'")
         columns = ["id", "task", "quantity", "paper", "here", "low", "high", "verdict"]
