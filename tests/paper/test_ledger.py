@@ -280,6 +280,13 @@ def test_the_cells_of_the_best_run_are_set_against_those_of_single_runs():
     ]  # fmt: skip
 
 
+def test_a_count_has_an_interval_of_whole_numbers_around_its_quantiles():
+    returns = np.random.default_rng(0).standard_t(2, size=(6, 40))
+    low, high = ledger.of_returns(returns, n_resamples=30).loc["outliers", ["low", "high"]]
+    ends = resample(returns, n_resamples=30)["outliers"].quantile([0.025, 0.975])
+    assert (low, high) == (np.floor(ends.iloc[0]), np.ceil(ends.iloc[1])) and not float(ends.iloc[0]).is_integer()
+
+
 # Gaps
 
 

@@ -160,6 +160,30 @@ def test_an_interrupted_search_goes_on_and_other_settings_are_other_rows(small, 
     assert len(asked) == 7
 
 
+def test_rows_are_kept_from_time_to_time(small, tmp_path, monkeypatch):
+    known = hidden.printed_facts(SIMPLEGOAL)
+
+    def fails_late(task, stage, k):
+        if k == 57:
+            raise RuntimeError("stopped")
+        return known
+
+    monkeypatch.setattr(hidden, "tried", fails_late)
+    with pytest.raises(RuntimeError, match="stopped"):
+        hidden.rows_of(SIMPLEGOAL, "screening", range(60), tmp_path, 1)
+    assert len(read_results(f"hidden_{SIMPLEGOAL}", tmp_path / "data" / "results")) == 50
+
+
+def test_answers_are_counted_among_the_nearest(monkeypatch):
+    monkeypatch.setattr(hidden, "N_POSTERIOR", 8)
+    away = pd.Series(np.arange(20.0), index=np.arange(100, 120))
+    found = hidden.questions({SIMPLEGOAL: away, "both": away}).set_index(["question", "answer"]).loc["initial"]
+    zeros = [hidden.setting(k)["initial"] == "zeros" for k in away.index]
+    assert found[SIMPLEGOAL].tolist() == [1 - np.mean(zeros[:8]), np.mean(zeros[:8])]
+    assert found.at["zeros", "both"] == np.mean(zeros[:2])  # of both, a quarter
+    assert (found[f"{SIMPLEGOAL}_low"] <= found[SIMPLEGOAL]).all() and found["prior"].tolist() == [0.5, 0.5]
+
+
 def test_settings_in_words_are_those_that_are_not_the_default():
     assert hidden.in_words(0) == ""
     for k in range(1, 20):

@@ -38,9 +38,21 @@ def test_runs_of_one_kind_rarely_differ_and_others_do(few):
     assert other["mean"] == 1 and other["median"] > 0.9 and other["cells"] < 0.5
 
 
-def test_a_single_policy_is_set_against_other_starts_of_its_own(few):
+def test_a_single_policy_has_no_cells_to_compare(few):
     found = judged({"against": "the same"}, 1, Pool(pool(3, 1).returns), None).set_index("name")
     assert found[ledger.DIFFERS]["mean"].min() <= 0.2 and "cells" not in found.index
+
+
+def test_the_paper_gets_other_starts_and_other_runs(few, monkeypatch):
+    pairs, usual = [], ledger.set_against
+    monkeypatch.setattr(
+        ledger,
+        "set_against",
+        lambda found, here, values, std: pairs.append((here, values)) or usual(found, here, values, std),
+    )
+    judged({"against": "the same"}, 1, Pool(pool(3, 1).returns), None)
+    judged({"against": "the same"}, 3, Pool(np.arange(6.0)[:, None] * np.ones(300)), None)  # all starts alike
+    assert len(pairs) == 80 and all(here.mean() != values["mean"] for here, values in pairs)
 
 
 def test_the_whole_study(few, monkeypatch, tmp_path):
@@ -61,6 +73,9 @@ def test_the_whole_study(few, monkeypatch, tmp_path):
     assert {*frame["against"]} == {"the same", verdicts.MOVED, "least squares", "another teacher"}
     assert frame["subject"].value_counts().index.tolist() == ["distilled", "teacher"] and {*frame["task"]} == {*TASKS}
     assert frame["teacher"][frame["task"] == MOUNTAINCAR].nunique() == 2 and frame["settings"].nunique() == 4
+    for task in TASKS:
+        made = [len(list(one.folder(tmp_path).glob("[0-9]*"))) for one in verdicts.experiments(task).values()]
+        assert made == [6, 3, 3]
 
 
 def test_wrong_verdicts_by_hand():
