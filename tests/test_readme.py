@@ -95,6 +95,18 @@ def test_counts_and_the_mean_are_those_of_the_ledger():
     assert f"{begin} and {differ} differ; {untold} cannot be told" in results and interval in results
 
 
+def test_what_the_nearest_settings_reproduce_is_that_of_the_table():
+    facts = read_table("hidden_facts").query("verdict != 'contradicts itself'")
+    same = (facts["verdict"] == "reproduced").groupby([facts["choice"], facts["task"]]).agg(["sum", "size"])
+    goal, car = "SimpleGoal-v0", "MountainCarContinuous-v0"
+    first, second = same.loc[("nearest, SimpleGoal", goal)], same.loc[("nearest, MountainCar", car)]
+    usual, both = ([same.at[(choice, task), "sum"] for task in (goal, car)] for choice in ("default", "nearest, both"))
+    readme, results = (" ".join(text.split()) for text in (README, RESULTS))
+    assert "one reproduces {} of {} facts there, another {} of {} on MountainCar".format(*first, *second) in readme
+    said = "one reproduces {} of SimpleGoal's {} facts (the default {}), another {} of MountainCar's {} ({}); "
+    assert said.format(*first, usual[0], *second, usual[1]) + "the nearest to both, {} and {}.".format(*both) in results
+
+
 def test_lost_landings_are_those_of_the_tables():
     lost = table_of("LunarLanderContinuous-v3").set_index(["method", "size"])["failing"]
     faithful = read_table("beyond/faithful").set_index("task")["failing"]["LunarLander"]
@@ -136,9 +148,9 @@ def test_who_leads_is_that_of_the_table():
 
 
 TABLES = {  # a task stands for the summary of its rows
-    ("README.md", "## Results"): "simplegoal_spread ledger what_cells_buy faithful",
+    ("README.md", "## Results"): "simplegoal_spread ledger what_cells_buy faithful hidden_facts",
     ("docs/results.md", "## Did it reproduce?"):
-        "simplegoal_spread ledger what_cells_buy",
+        "simplegoal_spread ledger what_cells_buy hidden_facts",
     ("docs/results.md", "## A few equations that act like the teacher"):
         "faithful within SimpleGoal-v0 MountainCarContinuous-v0 Pendulum-v1 LunarLanderContinuous-v3",
     ("docs/results.md", "## How good can a few cells be?"):
