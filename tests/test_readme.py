@@ -102,7 +102,8 @@ def test_what_the_nearest_settings_reproduce_is_that_of_the_table():
     first, second = same.loc[("nearest, SimpleGoal", goal)], same.loc[("nearest, MountainCar", car)]
     usual, both = ([same.at[(choice, task), "sum"] for task in (goal, car)] for choice in ("default", "nearest, both"))
     readme, results = (" ".join(text.split()) for text in (README, RESULTS))
-    assert "the nearest reproduces {} of {} facts there, another {} of {} on MountainCar".format(*first, *second) in readme
+    said = "the nearest reproduces {} of {} facts there, another {} of {} on MountainCar"
+    assert said.format(*first, *second) in readme
     said = "the nearest reproduces {} of SimpleGoal's {} facts (the default {}), another {} of MountainCar's {} ({}); "
     assert said.format(*first, usual[0], *second, usual[1]) + "the nearest to both, {} and {}.".format(*both) in results
 
