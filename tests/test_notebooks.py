@@ -79,7 +79,7 @@ def test_every_saved_figure_and_table_has_its_caption_in_the_notebooks_order(pat
     source = nbformat.read(path, as_version=4)
     listed = list(saved(source))
     for cell in code_cells(source):  # a figure is shown where it is the cell's value
-        assert "save_figure" not in cell.source or "save_figure" in ast.unparse(ast.parse(cell.source).body[-1]), cell.id
+        assert "save_figure" not in cell.source.rpartition("\n")[0], cell.id
     for kind in ("figures", "tables"):
         assert list(book.get(kind, {})) == [name for saved_kind, name in listed if saved_kind == kind]
         for about in book.get(kind, {}).values():
