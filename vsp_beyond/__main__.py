@@ -31,15 +31,16 @@ def main() -> None:
         if given.out.exists() and not given.force:
             raise FileExistsError(f"{given.out} exists and is kept: name another file, or say --force")
         task = vsp.get_task(given.task)
-        agent = vsp.agent(given.agent, task, normalize=False if given.normalize == "no" else given.normalize)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", UserWarning)
+            agent = vsp.agent(given.agent, task, normalize=False if given.normalize == "no" else given.normalize)
             policy = faithful(agent, task, n_cells=given.cells, seed=given.seed)
         remarks = "\n".join(str(one.message) for one in said if issubclass(one.category, UserWarning))
         page = report(policy, agent, task, name=Path(given.agent).name, remarks=remarks)
         atomic.write_text(given.out, page)
     except (ValueError, FileNotFoundError, FileExistsError, gymnasium.error.Error, ImportError) as error:
-        sys.stderr.write(f"error: {str(error).splitlines()[0]}\n")
+        line = str(error).splitlines()[0].replace('normalize="vecnormalize.pkl"', "--normalize vecnormalize.pkl")
+        sys.stderr.write(f"error: {line.replace('normalize=False', '--normalize no')}\n")
         sys.exit(2)
     print(f"{given.out}: {len(page) / 1e6:.1f} MB; open it in a browser")
 

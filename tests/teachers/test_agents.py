@@ -1,5 +1,6 @@
 from types import SimpleNamespace
 
+import gymnasium
 import numpy as np
 import pytest
 from support import SIMPLEGOAL, CurvedTeacher, same_arrays, tiny
@@ -65,3 +66,29 @@ def test_a_model_is_identified_by_its_weights():
     assert digest_of(agent(model)) != before
     with pytest.raises(ValueError, match='vsp.agent.function, name="mine"'):
         digest_of(agent(predicting(straight)))
+
+
+def test_a_model_must_have_the_spaces_of_the_task():
+    model = made("SAC", gymnasium.wrappers.RescaleAction(gymnasium.make("Pendulum-v1"), -1.0, 1.0), net_arch=[8])
+    with pytest.raises(
+        ValueError, match=r"low of its action_space is .-1.0., Pendulum-v1 has .-2.0.: name the task"
+    ) as caught:
+        agent(model, "Pendulum-v1")
+    assert "vsp.agent" not in str(caught.value)
+    with pytest.raises(ValueError, match="its observation_space has 3 numbers, SimpleGoal-v0 has 2"):
+        vsp.distill(model, SIMPLEGOAL, tiny(), seed=0)
+    with pytest.raises(ValueError, match="NoSuch-v9"):
+        agent(made("SAC", net_arch=[8]), "NoSuch-v9")
+    with pytest.raises(ValueError, match="its action_space is Discrete, expected a Box"):
+        agent(made("DQN", "MountainCar-v0", net_arch=[8]), "MountainCarContinuous-v0")
+    assert agent(made("SAC", net_arch=[8]), SIMPLEGOAL).predict(STATES)[0].shape == (50, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("x.pt", "torch.as_tensor"), ("x.onnx", "session.run"), ("x.cleanrl_model", "torch")]
+)
+def test_files_of_other_libraries_are_refused_with_the_code_that_wraps_them(name, said):
+    with pytest.raises(
+        ValueError, match=rf"{name}: expected a .safetensors file, .*vsp.agent.lambda obs: .*{said}.*name='{name}'"
+    ):
+        agent(name, SIMPLEGOAL)

@@ -1,19 +1,22 @@
 """Every kind of agent that the libraries save acts here as there, and what is another kind is refused by name."""
 
+import io
 import os
 import pickle
 import pydoc
 import re
 import shutil
+import zipfile
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from support import SIMPLEGOAL
-from zips import CAR, Car, bomb, in_float64, made, retold
+from zips import CAR, Car, bomb, in_float64, made, retold, rewritten, saved
 
 from vsp import load_teacher, rollout_from_seed
+from vsp.teachers import agent_zip
 from vsp.teachers.agent_zip import read_zip
 
 SMALL, SDE = {"net_arch": [12, 8]}, {"use_sde": True}
@@ -98,12 +101,14 @@ SAYS = {
     "activation.PReLU, expected one of ReLU, Tanh": activation("activation\nPReLU"),
     "activation.Softplus, expected": activation("activation\nSoftplus"), "n.Tanh, e": activation("normalization\nTanh"),
     "policy class is one that": {"policy_class": pickle.dumps("TD3Policy")}, "not enough": {"policy_class": b"\x80"},
-    "RecurrentA": {"policy_class": b"\x80\x04csb3_contrib.common.recurrent.policies\nRecurrentActorCriticPolicy\n."},
+    "RecurrentActor.* keeps a memory between steps: train one without$": {
+        "policy_class": b"\x80\x04csb3_contrib.common.recurrent.policies\nRecurrentActorCriticPolicy\n."
+    },
     "action_space is missing": {"action_space": None}, "its action_space is .*Discrete, expected": space("action"),
     r"low of its action_space is .0.0, 0.0., SimpleGoal-v0 has .-1": space("action", 0, 1, 2),
     "high of its action_space": space("action", -1, 2, 2), "action_space is .-inf": space("action", -np.inf, 1, 2),
-    "low of its observ": space("observation", -1, 1, 2), "low of its obs.*0.0, 0.0, 0": space("observation", 0, 1, 3),
-    "low of its action_space is no": {"action_space": b"\x80\x04cgym.spaces.box\nBox\n)\x81}\x8c\x03low\x8c\x01ysb."},
+    "low of its observ": space("observation", -1, 1, 2), "observation_space has 3": space("observation", 0, 1, 3),
+    "limit of its action_space is no": {"action_space": b"\x80\x04cgym.spaces.box\nBox\n)\x81}\x8c\x03low\x8c\x01ysb."},
 }  # fmt: skip
 
 
@@ -132,6 +137,40 @@ def test_a_tensor_more_is_refused_by_name(name, tmp_path):
     made(algorithm, **SMALL).save(tmp_path / "sound.zip")
     with pytest.raises(ValueError, match=f"x.zip: .*({name.rpartition('.')[0] or name}|net_arch|clip_mean)"):
         load_teacher(retold(tmp_path / "sound.zip", tmp_path / "x.zip", lambda had: had | both), SIMPLEGOAL)
+
+
+@pytest.mark.parametrize("old", [False, True], ids=["zip", "old"])
+def test_a_storage_must_have_the_length_that_is_described(old, tmp_path):
+    """An array over an empty storage would read memory beyond it."""
+    import torch
+
+    made("SAC", **SMALL).save(tmp_path / "sound.zip")
+    retold(tmp_path / "sound.zip", tmp_path / "sac.zip", old=old)
+    with zipfile.ZipFile(tmp_path / "sac.zip") as archive:
+        policy = archive.read("policy.pth")
+    tensors = torch.load(io.BytesIO(policy))
+    cut = policy[: len(policy) // 2] if old else saved(tensors, **{"0": b""})
+    rewritten(tmp_path / "sac.zip", tmp_path / "cut.zip", policy_pth=cut)
+    with pytest.raises(ValueError, match=r"cut.zip: .*a storage of \d+ bytes, described with \d+ elements"):
+        load_teacher(tmp_path / "cut.zip", SIMPLEGOAL)
+
+
+@pytest.mark.parametrize("stride", [(9, 1), (1, 99)])
+def test_a_tensor_must_lie_in_its_storage(stride):
+    view = agent_zip._View(np.dtype("<f4"), "0", 8, 0, (2, 4), stride)
+    with pytest.raises(ValueError, match="a tensor ends at element"):
+        agent_zip._tensor(bytes(32), view)
+    inside = agent_zip._tensor(np.arange(8, dtype="<f4").tobytes(), view._replace(stride=(4, 1)))
+    assert inside.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7]]
+
+
+@pytest.mark.parametrize("units", [[8, 8, 8], [8]])
+def test_without_net_arch_a_network_has_the_layers_of_its_class(units, tmp_path):
+    made("SAC", net_arch=units).save(tmp_path / "told.zip")
+    load_teacher(tmp_path / "told.zip", SIMPLEGOAL)
+    untold = retold(tmp_path / "told.zip", tmp_path / "x.zip", policy_kwargs={})
+    with pytest.raises(ValueError, match="x.zip: its tensors make hidden layers of .8.* units, without net_arch"):
+        load_teacher(untold, SIMPLEGOAL)
 
 
 # Older zips

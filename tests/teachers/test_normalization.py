@@ -96,7 +96,17 @@ SIGNS = {
 NO_SIGNS = [f"n_envs: 4\nnormalize: {value}" for value in (
     "false", "False", "", "~", "'no'", "dict(norm_obs=False, norm_reward=True)", "{norm_obs: false}",
     '"{\'norm_obs\': False}"', f'"{" " * 500_000}x{" " * 100_000}norm_obs=False"')]  # fmt: skip
-NO_SIGNS += ["&a [*a, *a]", "normalise: true", "a: [", ": : :", "[" * 9999]
+NO_SIGNS += ["&a [*a, *a]", "normalise: true", "a: {normalise: true}"]
+UNREADABLE = [
+    b"a: [",
+    b": : :",
+    b"[" * 9999,
+    b"a:\n\tnormalize: true",
+    b"a: \xfc\nnormalize: true",
+    b"#" * 2**20 + b"\nnormalize: true",
+]
+HIDDEN = ["a: 1\n---\nnormalize: true", "hyperparams: {normalize: true}", "normalize: false\nnormalize: true",
+          "Normalize: true", "a: [[b, {normalize: dict(norm_obs=True)}]]"]  # fmt: skip
 
 
 @pytest.mark.usefixtures("no_collection")
@@ -107,13 +117,120 @@ def test_a_file_nearby_tells_of_a_normalisation(name, small, tmp_path):
     for text in NO_SIGNS if name == "config.yml" else ():
         (tmp_path / name).write_text(text)
         load_teacher(path, SIMPLEGOAL)
+    for content in [*UNREADABLE, *(text.encode() for text in HIDDEN)] if name == "config.yml" else ():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match=rf"x_5_steps.zip: .*{name} (may say so, but cannot be read|says so)"):
+            load_teacher(path, SIMPLEGOAL)
     (tmp_path / name).write_text(SIGNS[name])
     with pytest.raises(ValueError, match=rf"x_5_steps.zip: .*{name} .*Pass their statistics, normalize="):
         load_teacher(path, SIMPLEGOAL)
     load_teacher(path, SIMPLEGOAL, normalize=False)
 
 
+LAYOUTS = {  # of RL Zoo, and names that people give
+    "sac/Pendulum-v1_1/best_model.zip": "sac/Pendulum-v1_1/Pendulum-v1/vecnormalize.pkl",
+    "sac/Walker2d-v3_12/Walker2d-v3.zip": "sac/Walker2d-v3_12/Walker2d-v3/vecnormalize.pkl",
+    "best_model.zip": "best_vecnorm.pkl", "model.zip": "vecnorm.pkl", "a/model.zip": "a/VecNormalize.pkl",
+    "run_best.zip": "run_vecnormalize.pkl", "final.zip": "my_vec_normalize.pickle",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("zip_file", LAYOUTS)
+def test_statistics_are_found_wherever_people_keep_them(zip_file, small, tmp_path):
+    for name in (zip_file, LAYOUTS[zip_file]):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    path = shutil.copy(small, tmp_path / zip_file)
+    written(tmp_path / LAYOUTS[zip_file])
+    with pytest.raises(ValueError, match=f"{LAYOUTS[zip_file]} lies beside it"):
+        load_teacher(path, SIMPLEGOAL)
+
+
+def test_statistics_named_after_another_agent_are_that_agents(small, tmp_path):
+    for name in ("sac", "ppo", "ppo_best"):
+        shutil.copy(small, tmp_path / f"{name}.zip")
+    written(tmp_path / "ppo_vecnormalize.pkl")
+    load_teacher(tmp_path / "sac.zip", SIMPLEGOAL)
+    for name in ("ppo", "ppo_best"):  # the second may be a copy of the first
+        with pytest.raises(ValueError, match="ppo_vecnormalize.pkl lies beside it"):
+            load_teacher(tmp_path / f"{name}.zip", SIMPLEGOAL)
+
+
+def test_settings_in_the_folder_of_the_task_are_read(small, tmp_path):
+    folder = tmp_path / "Pendulum-v1_3" / "Pendulum-v1"
+    folder.mkdir(parents=True)
+    (folder / "config.yml").write_text("normalize: true")
+    path = shutil.copy(small, tmp_path / "Pendulum-v1_3" / "best_model.zip")
+    with pytest.raises(ValueError, match="Pendulum-v1.config.yml says so"):
+        load_teacher(path, SIMPLEGOAL)
+
+
+def test_another_version_of_the_environment_is_named(small, tmp_path):
+    path = shutil.copy(small, tmp_path / "x.zip")
+    (tmp_path / "args.yml").write_text("!!python/object/apply:collections.OrderedDict\n- - - env\n    - SimpleGoal-v9")
+    with pytest.warns(
+        UserWarning, match="x.zip was trained on SimpleGoal-v9, and acts on SimpleGoal-v0: they may differ"
+    ):
+        load_teacher(path, SIMPLEGOAL)
+    (tmp_path / "args.yml").write_text("env: SimpleGoal-v0")
+    load_teacher(path, SIMPLEGOAL)
+
+
+# What a user gives
+
+
+def normalising(obs):
+    return np.clip(np.tanh(obs[:, ::-1]), -1, 1)
+
+
+def test_statistics_may_be_an_object_or_two_arrays(trained, small):
+    folder, model, env = trained
+    alone, path = type(model).load(folder / "ppo.zip"), folder / "ppo.zip"
+    expected = model.predict(env.normalize_obs(OBS), deterministic=True)[0]
+    for source in (path, alone):
+        assert np.abs(vsp.agent(source, SIMPLEGOAL, normalize=env).predict(OBS)[0] - expected).max() < 1e-4
+    both = env.obs_rms.mean, env.obs_rms.var
+    plain = np.clip((OBS - both[0]) / np.sqrt(both[1] + 1e-8), -10, 10).astype(np.float32)
+    for source, raw in ((alone, alone.predict), (normalising, normalising)):
+        with pytest.warns(UserWarning, match="epsilon 1e-8, limit 10"):
+            teacher = vsp.agent(source, SIMPLEGOAL, name="mine", normalize=both)
+        answer = raw(plain, deterministic=True)[0] if raw != normalising else raw(plain)
+        assert np.abs(teacher.predict(OBS)[0] - answer).max() < 1e-6
+        assert (
+            teacher.digest != vsp.agent(source, SIMPLEGOAL, name="mine", normalize=False).digest or raw != normalising
+        )
+
+
+@pytest.mark.parametrize("given", [np.True_, {"mean": 0, "var": 1}, (np.zeros(2),), 1, np.zeros(2), open])
+def test_anything_else_is_refused(given, small):
+    for source in (small, made("SAC", net_arch=[8]), normalising):
+        with pytest.raises(ValueError, match="normalize is .*, expected a file of VecNormalize, this object"):
+            vsp.agent(source, SIMPLEGOAL, normalize=given)
+
+
+def test_statistics_of_numpy_are_refused_with_the_way_out(small, tmp_path):
+    np.savez(tmp_path / "s.npz", mean=np.zeros(2), var=np.ones(2))
+    with pytest.raises(ValueError, match="pass normalize=.mean, variance."):
+        load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.npz")
+
+
+def test_a_wrapper_that_normalises_is_seen(small, tmp_path):
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    env = gymnasium.wrappers.NormalizeObservation(gymnasium.make(SIMPLEGOAL), epsilon=0.1)
+    model = made("SAC", DummyVecEnv([lambda: gymnasium.wrappers.NormalizeReward(env)]), net_arch=[8])
+    env.obs_rms.mean, env.obs_rms.var = np.array([0.25, 0.5]), np.array([0.25, 0.1])
+    expected = model.predict(
+        ((OBS - env.obs_rms.mean) / np.sqrt(env.obs_rms.var + 0.1)).astype(np.float32), deterministic=True
+    )
+    with pytest.warns(UserWarning, match="NormalizeObservation changed them"):
+        teacher = vsp.agent(model, SIMPLEGOAL)
+    assert np.abs(teacher.predict(OBS)[0] - expected[0]).max() < 1e-6
+    model.save(tmp_path / "x.zip")
+    with pytest.warns(UserWarning, match="observations have no limits.*pass normalize=.mean, variance."):
+        load_teacher(tmp_path / "x.zip", SIMPLEGOAL)
+
+
 def test_what_has_no_normalisation_refuses_one(small):
-    for source in (SIMPLEGOAL, load_teacher(small, SIMPLEGOAL), lambda obs: obs):
+    for source in (SIMPLEGOAL, load_teacher(small, SIMPLEGOAL)):
         with pytest.raises(ValueError, match="normalize.*expected no"):
             vsp.agent(source, normalize="statistics.pkl")

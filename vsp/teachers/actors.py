@@ -7,15 +7,17 @@ a setting, a class or a tensor, is refused by name: it might act.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..checks import check_array, check_finite
-from .inert import Thing, Unknown, array
+from .inert import Thing, Unfit, Unknown, array
 
 if TYPE_CHECKING:
+    from ..tasks.base import Task
     from .agent_zip import Saved
 
 MOST_WEIGHT = 1e6  # largest absolute value in a tensor, so that 3 layers of 1000 units stay far below float32's 3e38
@@ -68,6 +70,7 @@ _SAC = Kind(("actor.latent_pi", "actor.mu"), "ReLU", True, r"critic\.|actor\.log
 _PPO = Kind(("mlp_extractor.shared_net", "mlp_extractor.policy_net", "action_net"), "Tanh", False,
             r"mlp_extractor\.value_net\.|value_net\.|log_std\b|sde_features_extractor\.")  # fmt: skip
 _ARS = Kind(("action_net",), "ReLU", True, r"$^")
+_LINEAR = _ARS._replace(squashed=False)
 POLICIES = {
     "stable_baselines3.td3.policies.TD3Policy": Kind(("actor.mu",), "ReLU", True, r"critic\."),  # also DDPG's
     "stable_baselines3.sac.policies.SACPolicy": _SAC,
@@ -75,7 +78,7 @@ POLICIES = {
     "sb3_contrib.crossq.policies.CrossQPolicy": _SAC,
     "stable_baselines3.common.policies.ActorCriticPolicy": _PPO,  # of PPO, A2C and TRPO
     "sb3_contrib.ars.policies.ARSPolicy": _ARS,
-    "sb3_contrib.ars.policies.ARSLinearPolicy": _ARS._replace(squashed=False),
+    "sb3_contrib.ars.policies.ARSLinearPolicy": _LINEAR,
 }
 # Settings of a policy that its tensors show, or that serve training or exploration only
 _HARMLESS = set(
@@ -90,8 +93,11 @@ def actor_of(saved: Saved) -> Actor:
     """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
     policy = saved.setting("policy_class")
     name = policy.name if isinstance(policy, Thing) and policy.given is None else "one that only its own code can build"
+    if "recurrent" in name.lower():
+        raise Unfit(f"its policy class is {name:.100}, which keeps a memory between steps: train one without")
     if name not in POLICIES:
-        raise Unknown(f"its policy class is {name:.100}, expected one of {', '.join(sorted(POLICIES))}")
+        known = sorted(known.rpartition(".")[2] for known in POLICIES)
+        raise Unknown(f"its policy class is {name:.100}, expected one of {', '.join(known)}")
     kind, settings = POLICIES[name], _policy_settings(saved)
     for name, value in settings.items():
         if name == "features_extractor_class" and isinstance(value, Thing) and value.name == _FLATTEN:
@@ -108,8 +114,9 @@ def actor_of(saved: Saved) -> Actor:
     activation = _activation(settings, kind)
     layers = layers_of(saved.tensors, *kind.networks, epsilon=epsilon, biased=biased)
     told, found = _units(settings.get("net_arch")), [len(bias) for _, bias in layers[:-1]]
-    if told is not None and told != found:
-        raise Unknown(f"its tensors make hidden layers of {str(found):.100} units, net_arch says otherwise")
+    told_of = "net_arch says otherwise" if told is not None else "without net_arch its class makes 2, a linear one none"
+    if told != found if told is not None else len(found) != 2 * (kind is not _LINEAR):
+        raise Unknown(f"its tensors make hidden layers of {str(found):.100} units, {told_of}")
     exploring = bool(_number(settings if "use_sde" in settings else saved.settings, "use_sde", False))
     squashed = bool(_number(settings, "squash_output", kind.squashed)) and (exploring or kind is not _PPO)
     clip = _number(settings, "clip_mean", 2.0) if kind is _SAC and exploring else 0.0
@@ -220,17 +227,37 @@ def _modules(tensors: dict[str, np.ndarray], network: str) -> list[tuple[str, di
     return found
 
 
-def check_box(saved: Saved, name: str, low: np.ndarray, high: np.ndarray, task: str) -> None:
-    """Raise Unknown unless the agent's "observation_space" or "action_space" is the box of the task.
+def check_spaces(found: Callable[[str], Any], task: Task) -> None:
+    """Raise Unfit unless an agent's "observation_space" and "action_space", which `found` returns as descriptions or
+    spaces, are the boxes of the task.
 
-    Older versions of some environments gave observations no limits; those fit any.
+    Observations without limits fit any, with a warning: some environments had none in older versions, but a wrapper
+    that changes observations may have taken the limits away, too.
     """
-    space = saved.setting(name)
-    if not isinstance(space, Thing) or not space.name.endswith("spaces.box.Box") or not isinstance(space.state, dict):
-        raise Unknown(f"its {name} is {space.name if isinstance(space, Thing) else 'missing'}, expected a Box")
-    for limit, ours in (("low", low), ("high", high)):
-        theirs = array(space.state.get(limit), f"{limit} of its {name}")
-        free = np.isinf(theirs) & (name == "observation_space")
-        if theirs.shape != ours.shape or not (np.isclose(theirs, ours, rtol=1e-5) | free).all():
-            text = f"{limit} of its {name} is {theirs.tolist()!s:.200}, {task} has {ours.tolist()}"
-            raise Unknown(f"{text}: name the task that it was trained for")
+    boxes = {"observation_space": (task.low, task.high), "action_space": (task.action_low, task.action_high)}
+    for name, ours in boxes.items():
+        space, free = found(name), name == "observation_space"
+        theirs = _limits(space, name)
+        if not theirs[0].shape == theirs[1].shape == ours[0].shape:
+            shapes = [" x ".join(map(str, limits.shape)) or "1" for limits in (theirs[0], ours[0])]
+            text = f"its {name} has {shapes[0]} numbers, {task.name} has {shapes[1]}"
+            raise Unfit(f"{text}: name the task that it was trained for")
+        for limit, of_it, of_task in zip(("low", "high"), theirs, ours):
+            if not (np.isclose(of_it, of_task, rtol=1e-5) | (np.isinf(of_it) & free)).all():
+                text = f"{limit} of its {name} is {of_it.tolist()!s:.200}, {task.name} has {of_task.tolist()!s:.200}"
+                raise Unfit(f"{text}: name the task that it was trained for")
+            if (np.isinf(of_it) & np.isfinite(of_task)).any():
+                text = f"the agent's observations have no limits, those of {task.name} have: if a wrapper such as "
+                warnings.warn(f"{text}NormalizeObservation changed them, pass normalize=(mean, variance)", stacklevel=4)
+
+
+def _limits(space: Any, name: str) -> list[np.ndarray]:
+    """Return low and high of a box, which a pickle describes or Gymnasium made. Raises Unfit for another space."""
+    described = isinstance(space, Thing)
+    kind = space.name.rpartition(".")[2] if described else type(space).__name__
+    parts = (space.state if described else vars(space)) if kind == "Box" else None
+    if not isinstance(parts, dict):
+        said = "missing" if space is None else f"{kind:.60}"
+        raise Unfit(f"its {name} is {said}, expected a Box: wrap the agent, vsp.agent(lambda obs: ..., name=...)")
+    limits = [parts.get(limit) for limit in ("low", "high")]
+    return [one if isinstance(one, np.ndarray) else array(one, f"a limit of its {name}") for one in limits]

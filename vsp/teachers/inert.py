@@ -26,6 +26,10 @@ class Unknown(ValueError):
     """A zip says something that is not modelled here; the message names it."""
 
 
+class Unfit(Unknown):
+    """An agent cannot act in the task, whoever loads it."""
+
+
 @dataclass(eq=False, repr=False)
 class Thing:
     """A class or function (`given` is None), or an object: what would be called, with which arguments and state."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from .normalization import Normalization
 
 SHIPPED = atomic.data_folder("teachers")
+_CALLS = {  # how to ask the model of a file for the actions at observations
+    ".pt": "model(torch.as_tensor(obs, dtype=torch.float32)).detach().numpy()",
+    ".onnx": "session.run(None, {session.get_inputs()[0].name: obs.astype('float32')})[0]",
+}
 
 
 class Teacher:
@@ -98,7 +103,8 @@ def load_teacher(
     if path.suffix and path.suffix != ".safetensors":
         raise ValueError(
             f"{path}: expected a .safetensors file, a .zip, or the name of a task, one of {task_names()} (a "
-            "distilled policy: vsp.VoronoiPolicy.load)"
+            "distilled policy: vsp.VoronoiPolicy.load). What another library loads is an agent as a function: "
+            f"vsp.agent(lambda obs: {_CALLS.get(path.suffix, _CALLS['.pt'])}, name={path.name!r})"
         )
     if not path.suffix:
         path = SHIPPED / f"{get_task(str(source)).name}.safetensors"
@@ -127,25 +133,27 @@ def _from_zip(path: Path, task: Task, normalize: str | os.PathLike | bool | None
     from . import agent_zip, normalization  # here: most teachers are no zips
 
     saved = agent_zip.read_zip(path)
+    advice = (
+        f". If its own library loads it: vsp.agent(PPO.load({path.name!r}), {task.name!r}), with the class of its "
+        "algorithm; where the zip names gym, with custom_objects={'observation_space': ..., 'action_space': ...}"
+    )
     try:
+        actors.check_spaces(saved.setting, task)
         actor = actors.actor_of(saved)
-        actors.check_box(saved, "observation_space", task.low, task.high, task.name)
-        actors.check_box(saved, "action_space", task.action_low, task.action_high, task.name)
     except actors.Unknown as error:
-        raise ValueError(
-            f"{path}: {error}. If its own library loads it: vsp.agent(PPO.load({path.name!r})), with the class of its "
-            "algorithm; where the zip names gym, with custom_objects={'observation_space': ..., 'action_space': ...}"
-        ) from error
+        raise ValueError(f"{path}: {error}{'' if isinstance(error, actors.Unfit) else advice}") from error
     except Exception as error:  # of any kind: the content is not trusted
         raise atomic.DamagedFile(f"{path}: its tensors make no network: {error!r:.300}") from error
     why = "normalize is True" if normalize is True else normalization.sign(path, saved) if normalize is None else ""
     if why:
         raise ValueError(
-            f"{path}: the agent was trained on normalised observations: {why}. Pass their statistics, "
+            f"{path}: trained on normalised observations, as it seems: {why}. Pass their statistics, "
             'normalize="vecnormalize.pkl", or normalize=False if there are none'
         )
-    given = normalize if isinstance(normalize, str | os.PathLike) else None
-    statistics = None if given is None else normalization.read_normalization(given, len(task.low))
+    if (other := normalization.trained_on(path)) not in ("", task.name):
+        warnings.warn(f"{path.name} was trained on {other}, and acts on {task.name}: they may differ", stacklevel=4)
+    given = not (normalize is None or isinstance(normalize, bool))
+    statistics = normalization.statistics_of(normalize, len(task.low)) if given else None
     card = {"recipe": {"steps": saved.settings.get("num_timesteps")}}  # `studies` reads it
     return Teacher(actor, task, card=card, critic=part_of(saved.tensors, "critic"), normalization=statistics)
 
