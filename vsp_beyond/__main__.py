@@ -16,6 +16,9 @@ from . import faithful
 from .page import report
 
 
+MOST_SAID = 500  # characters of an error
+
+
 def main() -> None:
     """Distil an agent to few cells that act like it, and write one page about both: equations, explorer, returns."""
     parser = argparse.ArgumentParser(prog="python -m vsp_beyond", description=main.__doc__)
@@ -30,6 +33,7 @@ def main() -> None:
     try:
         if given.out.exists() and not given.force:
             raise FileExistsError(f"{given.out} exists and is kept: name another file, or say --force")
+        atomic.begin(given.out).unlink()  # what would stop the page at the end stops it now
         task = vsp.get_task(given.task)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", UserWarning)
@@ -38,8 +42,12 @@ def main() -> None:
         remarks = "\n".join(str(one.message) for one in said if issubclass(one.category, UserWarning))
         page = report(policy, agent, task, name=Path(given.agent).name, remarks=remarks)
         atomic.write_text(given.out, page)
-    except (ValueError, FileNotFoundError, FileExistsError, gymnasium.error.Error, ImportError) as error:
-        line = str(error).splitlines()[0].replace('normalize="vecnormalize.pkl"', "--normalize vecnormalize.pkl")
+    except (ValueError, OSError, gymnasium.error.Error, ImportError, KeyboardInterrupt) as error:
+        line = (
+            (str(error) or "interrupted, nothing is written")
+            .splitlines()[0][:MOST_SAID]
+            .replace('normalize="vecnormalize.pkl"', "--normalize vecnormalize.pkl")
+        )
         sys.stderr.write(f"error: {line.replace('normalize=False', '--normalize no')}\n")
         sys.exit(2)
     print(f"{given.out}: {len(page) / 1e6:.1f} MB; open it in a browser")

@@ -1,4 +1,5 @@
 import base64
+import os
 import re
 import sys
 
@@ -58,3 +59,28 @@ def test_the_command_makes_a_page_once_and_says_in_one_line_why_not(monkeypatch,
         said = capsys.readouterr().err
         assert end.value.code == 2 and re.search(reason, said) and said.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html"]
+
+
+def interrupted(*given, **options):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [("fifo", "is a folder, a FIFO or a device, expected a file"), ("folder", "is a folder, a FIFO or a device"),
+     ("x" * 300, "File name too long"), ("file/report.html", "file"),
+     ("report.html", "interrupted, nothing is written")],
+)  # fmt: skip
+def test_what_would_stop_the_page_at_the_end_stops_it_at_once(out, said, monkeypatch, tmp_path, capsys):
+    """A FIFO stands for a device, which only root could make: neither is replaced by a file."""
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("x")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(command.vsp, "agent", interrupted)
+    monkeypatch.setattr(sys, "argv", ["x", "agent.zip", SIMPLEGOAL, "--force", "--out", str(tmp_path / out)])
+    with pytest.raises(SystemExit):
+        command.main()
+    line = capsys.readouterr().err
+    assert said in line and line.count("\n") == 1 and len(line) < 600
+    assert sorted(tmp_path.iterdir()) == before and (tmp_path / "fifo").is_fifo()

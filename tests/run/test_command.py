@@ -44,13 +44,10 @@ def full(handle):
 def test_a_full_or_occupied_place_is_named(tmp_path, monkeypatch):
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").write_text("before")
-    for path in (tmp_path / "folder", tmp_path / "file" / "x"):
-        with pytest.raises(
-            SystemExit,
-            match=f"error: work: .*{tmp_path}.*: free some space, make it writable, or name another folder: OUT=folder",
-        ):
-            with in_one_line("work"):
-                write_text(path, "new")
+    full_disk = f"error: work: .*{tmp_path}.*: free some space, make it writable, or name another folder: OUT=folder"
+    for path, said in ((tmp_path / "folder", "folder: is a folder, a FIFO"), (tmp_path / "file" / "x", full_disk)):
+        with pytest.raises(SystemExit, match=said), in_one_line("work"):
+            write_text(path, "new")
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(SystemExit, match=f"No space left on device: '{tmp_path / 'file'}': free some space, "):
         with in_one_line("work"):

@@ -9,6 +9,7 @@ import secrets
 import shlex
 from pathlib import Path
 
+_NO_FILE = "is a folder, a FIFO or a device, expected a file: move it away"
 ROOT = Path(__file__).resolve().parents[2]  # the checkout, or where vsp is installed
 
 
@@ -26,14 +27,26 @@ def data_folder(name: str) -> Path:
     return installed if installed.is_dir() else ROOT / "data" / name
 
 
+def begin(path: Path) -> Path:
+    """Begin to write to `path`: return a new, empty file beside it.
+
+    Raises `DamagedFile` if `path` is there and no regular file, and OSError where nothing can be written.
+    """
+    if path.exists() and not path.is_file():
+        raise DamagedFile(f"{path}: {_NO_FILE}")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
+    temporary.touch(exist_ok=False)
+    return temporary
+
+
 def write_bytes(path: str | os.PathLike, content: bytes) -> None:
     """Write `content` to `path` atomically, by way of a temporary file beside it.
 
     A reader (or a run after a crash) sees the old file or the complete new one, never a partial one.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
+    temporary = begin(path)
     try:
         with open(temporary, "wb") as file:
             file.write(content)
@@ -63,7 +76,7 @@ def read_bytes(path: str | os.PathLike, most: float = math.inf) -> bytes:
             raise DamagedFile(f"{path}: it has {size} bytes, expected at most {most}")
         return path.read_bytes()
     if path.exists():
-        raise DamagedFile(f"{path}: is a folder, a FIFO or a device, expected a file: move it away")
+        raise DamagedFile(f"{path}: {_NO_FILE}")
     raise MissingFile(fault(path, "no such file"))
 
 

@@ -15,7 +15,7 @@ from .atomic import DamagedFile, MissingFile
 
 # Errors of a disk: no space, no access, name in use
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM}
-_DISK |= {errno.EEXIST, errno.EISDIR, errno.ENOTDIR}
+_DISK |= {errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG}
 
 
 class CommandError(RuntimeError):
