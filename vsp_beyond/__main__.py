@@ -15,7 +15,6 @@ from vsp.run import atomic
 from . import faithful
 from .page import report
 
-
 MOST_SAID = 500  # characters of an error
 
 

@@ -29,15 +29,20 @@ NUDGE = 0.05  # move of a codeword that shows the curvature of the error, in dev
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> ScaledCells:
-    """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find."""
+def least_error(
+    labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator, *, ridge: float = 0.0
+) -> ScaledCells:
+    """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find.
+
+    `ridge` is the weight of squared slopes in the error of a descent.
+    """
     some = labelled.thinned(FEW, rng)
     live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
         tried = steps(live, f"fits with {n_cells} cells", total=len(live), unit="starts")
-        ends = [descend(some, cells, stages) for cells in tried]
+        ends = [descend(some, cells, stages, ridge=ridge) for cells in tried]
         live = sorted(ends, key=lambda cells: squared_error(labelled, cells))[:n_kept]
-    return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
+    return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST, ridge=ridge))
 
 
 def distinct(cells: ScaledCells) -> ScaledCells:
@@ -61,22 +66,30 @@ def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Sc
 
 
 def descend(
-    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS
-) -> ScaledCells:
+    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS,
+    ridge: float = 0.0,
+) -> ScaledCells:  # fmt: skip
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
     for stage in stages:
-        cells = _descend_at(stage, labelled, cells, n_iterations)
+        cells = _descend_at(stage, labelled, cells, n_iterations, ridge)
     return cells
 
 
-def _descend_at(stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int) -> ScaledCells:
+def _descend_at(
+    stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int, ridge: float
+) -> ScaledCells:
     temperature = temperature_unit(labelled, len(cells)) * TEMPERATURES[stage]
     bases = uncorrelated(labelled, cells.shares(labelled.states, temperature))
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = whole_loss(move(step), labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
+        moved = move(step)
+        value, gradient = whole_loss(moved, labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
+        if ridge:
+            slopes = moved.coefficients * (np.arange(moved.coefficients.shape[1]) < moved.codewords.shape[1])[:, None]
+            value, gradient = value + ridge * np.square(slopes).sum(), gradient.copy()
+            gradient[moved.codewords.size :] += 2 * ridge * slopes.ravel()
         return value, pull_back(gradient)
 
     options = {"maxiter": n_iterations, "maxcor": 20}
