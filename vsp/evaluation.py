@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CLOSE = 0.05  # of its range, up to which an action is close to the agent's
 ALIKE = 0.9  # R² from which a policy acts much like its agent
-FAILING = 0.02  # share of the episodes in which it may fail more often without a warning
+FAILING = 0.02  # share of the episodes in which it may fail more often, or of the return it may lose, unwarned
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,13 @@ class Likeness:
 
     @property
     def poor(self) -> bool:
-        """Whether the actions differ much, or the policy fails more often."""
+        """Whether the actions differ much, or the policy fails more often; or, where failures are not defined, returns
+        less by more than two standard errors and 2 %."""
         more = (self.failures["policy"] or 0) - (self.failures["agent"] or 0)
-        return self.r2 < ALIKE or more > FAILING * len(self.returns["policy"])
+        gap = self.returns["policy"] - self.returns["agent"]
+        allowed = max(2 * gap.std() / len(gap) ** 0.5, FAILING * abs(self.returns["agent"].mean()))
+        lost = self.failures["policy"] is None and gap.mean() < -allowed
+        return self.r2 < ALIKE or more > FAILING * len(gap) or bool(lost)
 
     def __str__(self) -> str:
         ours, theirs = (self.returns[name].mean() for name in ("policy", "agent"))

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import base64
 import html
+import math
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,39 +22,66 @@ from vsp.rollouts import Policy
 from vsp.show.explorer import explore, standalone
 from vsp.tasks import Task, get_task
 
+from .episodes import episodes
+from .few_cells.fewest import LOSS, SHARE, Tried
 from .proofs import PROVERS
 
-MOST_INPUTS = 8  # in an equation; of more, the five that contribute most
+MOST_INPUTS = 8  # in an equation; of more, the five that move the action most
 PROOF_SECONDS = 60
 _PROVE = "import sys, vsp, vsp_beyond; print(vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1])))"
 _STYLE = """body { line-height: 1.5 }
 table { border-collapse: collapse }
 td, th { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }
 .cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem }
-.cards > div { border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem; overflow-x: auto }
+.cards > div, .wide { overflow-x: auto }
+.cards > div { border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem }
 .vsp-explorer { margin-top: 1.5rem }
 """
 
 
-def report(policy: PiecewisePolicy, agent: Policy, task: str | Task, *, name: str = "agent", remarks: str = "") -> str:
-    """Return a page as HTML: equations, the explorer, how alike they act, where they differ most, what is proved, and
-    the policy as files to save. `name` and `remarks` stand on the page as text.
+def report(
+    policy: PiecewisePolicy, agent: Policy, task: str | Task, *, name: str = "agent", remarks: str = "",
+    tried: Sequence[Tried] = (), until: float = math.inf,
+) -> str:  # fmt: skip
+    """Return a page as HTML: what it says first, equations, sizes that were tried, episodes, the explorer, how alike
+    they act, where they differ most, what is proved, and the policy as files to save.
 
-    Raises ValueError unless the policy is cells and maps and both fit the task.
+    `name` and `remarks` stand on the page as text. `tried`: stages of `fewest`. `until`, a time of `time.monotonic`,
+    bounds the proof. Raises ValueError unless the policy is cells and maps and both fit the task.
     """
     task, agent = get_task(task), as_agent(agent)
     if not isinstance(policy, PiecewisePolicy):
         raise ValueError(f"the policy is {policy!r:.60}, expected cells and maps: a vsp.PiecewisePolicy")
-    alike = likeness(policy, agent, task)
-    warning = [str(alike)] if alike.poor else []
-    cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
+    known = [one.alike for one in tried if one.policy is policy]
+    alike = known[0] if known else likeness(policy, agent, task)
+    acts = "is imitated, but not closely, by" if alike.poor else "acts like"
+    what = f"{len(policy)} cells with a map each" if len(policy) > 1 else "one equation"
+    what = "one map: an equation for each action" if len(policy) == 1 < len(task.outputs) else what
+    lines = "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in remarks.splitlines())
     parts = [
-        f"<p>{html.escape(f'{name} on {task.name}, imitated by {policy.policy_class.name} maps in {cells}.')}</p>",
-        "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in [*remarks.splitlines(), *warning]),
-        _numbers(policy, alike), _cards(policy, alike), _explorer(policy, agent), _worst(policy, agent, alike),
-        _kept(policy),
+        f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(str(alike))}.</p>",
+        lines, _cards(policy, alike), _sizes(tried, policy), episodes(policy, agent, alike),
+        _explorer(policy, agent), _numbers(policy, alike), _worst(policy, agent, alike), _kept(policy, until),
     ]  # fmt: skip
-    return standalone(f"{task.name}: {name} in {cells}", "\n".join(parts), _STYLE)
+    return standalone(f"{task.name}: {name}", "\n".join(parts), _STYLE)
+
+
+def _sizes(tried: Sequence[Tried], policy: PiecewisePolicy) -> str:
+    """Return how much each number of cells acts like the agent, and which was chosen."""
+    rows = ""
+    for one in tried:
+        alike, failed = one.alike, one.alike.failures["policy"]
+        cells = [one.stage.name + " (chosen)" * (one.policy is policy), f"{alike.r2:.4f}", f"{alike.within.min():.1%}",
+                 f"{alike.returns['policy'].mean():.5g}", "not defined" if failed is None else f"{failed} of {len(alike.returns['policy'])}"]  # fmt: skip
+        bar = f'<meter value="{max(alike.r2, 0):.4f}"></meter>'
+        rows += f"<tr><td>{bar}</td>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    head = "".join(f"<th>{name}</th>" for name in ("", "cells", "R²", f"within {CLOSE:.0%}", "return", "failed"))
+    rule = (
+        f"The fewest cells are chosen whose R² is at most {LOSS} below the highest, and whose return falls short of the "
+        f"agent's by at most half of the paired 95 % interval, or {SHARE:.0%} of its distance to the best constant "
+        "action. “Within” counts the action that is close in the fewest states."
+    )
+    return f'<h2>How many cells?</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div><p>{rule}</p>' if rows else ""
 
 
 def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
@@ -67,40 +97,51 @@ def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
     return (
         f"<h2>How alike?</h2><p>The policy reproduces {alike.r2:.1%} of the variance of the agent's actions (R²), on "
         f"{len(alike.states):,} states of the agent that no fit saw. Each action is within {CLOSE:.0%} of its "
-        f"range of the agent's: {html.escape(close)} of these states. The cells below show where.</p>"
-        f"<table>{head}{rows}</table>"
+        f"range of the agent's: {html.escape(close)} of these states. The cells above show where.</p>"
+        f'<div class="wide"><table>{head}{rows}</table></div>'
     )
 
 
 def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
     """Return a card per cell: where it is, the share of the agent's states in it, and its equations."""
-    names, inside, cards = policy.policy_class.terms, policy.cells(alike.states), ""
-    typical = np.abs(policy.policy_class.features(alike.states)).mean(axis=0)
+    inside, cards = policy.cells(alike.states), ""
     for cell in range(len(policy)):
+        here = inside == cell
         where = policy.where.place(cell, policy.task.inputs, 3)
-        lines = policy.equations(cell)
-        if len(names) > MOST_INPUTS:
-            weights = policy.coefficients[cell, :-1]
-            largest = np.argsort(-np.abs(weights) * typical[:, None], axis=0)[:5].T
-            lines = tuple(
-                f"{output} = " + " ".join(f"{weights[i, j]:+.3f} {names[i]}" for i in rows) + " + ..."
-                for j, (output, rows) in enumerate(zip(policy.task.outputs, largest))
-            )
-        text = "<br>".join(html.escape(line) for line in lines)
-        close = (alike.errors[inside == cell] <= CLOSE).all(axis=1)
+        text = "<br>".join(html.escape(line) for line in _equations(policy, cell, alike.states[here]))
+        close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
-        cards += f"<div><b>Cell {cell}</b>, {np.mean(inside == cell):.0%} of the states{said}<br>"
-        cards += f"{html.escape(where)}<br>{text}</div>" if len(policy) > 1 else f"{text}</div>"
+        place = f"<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{html.escape(where)}<br>"
+        cards += f"<div>{place * (len(policy) > 1)}{text}</div>"
     about = policy.where.about(policy.task.inputs, 3) if len(policy) > 1 else ""
+    if len(policy.policy_class.terms) > MOST_INPUTS:
+        about += f"{'. ' * bool(about)}An equation shows the five inputs that move the action most, and the others at "
+        about += "their mean; in brackets, the share of the action's variance that this hides"
     return f'<h2>The policy</h2><p>{html.escape(about and f"{about}.")}</p><div class="cards">{cards}</div>'
 
 
+def _equations(policy: PiecewisePolicy, cell: int, states: np.ndarray) -> tuple[str, ...]:
+    """Return the equations of a cell; with many inputs, short ones over `states` (n, d) in the cell."""
+    names = policy.policy_class.terms
+    if len(names) <= MOST_INPUTS or not len(states):
+        return policy.equations(cell)
+    weights, lines = policy.coefficients[cell], []
+    for j, output in enumerate(policy.task.outputs):
+        terms = policy.policy_class.features(states) * weights[:-1, j]
+        order = np.argsort(-terms.std(axis=0), kind="stable")
+        shown, rest = order[:5], terms[:, order[5:]].sum(axis=1)
+        hidden = rest.var() / (terms.sum(axis=1).var() or 1.0)
+        text = " ".join(f"{weights[i, j]:+.3g} {names[i]}" for i in shown)
+        lines.append(f"{output} = {text} {weights[-1, j] + rest.mean():+.3g} (hides {hidden:.1%})")
+    return tuple(lines)
+
+
 def _explorer(policy: PiecewisePolicy, agent: Policy) -> str:
-    """Return the explorer, or why there is none."""
+    """Return the explorer, if the browser plays the task."""
     try:
-        return explore(policy, teacher=agent).element()
-    except ValueError as error:
-        return f"<p>This page has no explorer: {html.escape(str(error))}.</p>"
+        return f"<h2>Explore</h2>{explore(policy, teacher=agent).element()}"
+    except ValueError:
+        return ""
 
 
 def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
@@ -113,19 +154,18 @@ def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
             ", ".join(f"{a:.3g}" for a in np.ravel(one.predict(alike.states[i : i + 1])[0])) for one in (policy, agent)
         )
         rows += f"<tr><td>{html.escape(state)}</td>" + "".join(f"<td>{said}</td>" for said in actions) + "</tr>"
-    return (
-        f"<h2>Where do they differ most?</h2><table><tr><th>state</th><th>policy</th><th>agent</th></tr>{rows}</table>"
-    )
+    head = "<tr><th>state</th><th>policy</th><th>agent</th></tr>"
+    return f'<h2>Where do they differ most?</h2><div class="wide"><table>{head}{rows}</table></div>'
 
 
-def _kept(policy: PiecewisePolicy) -> str:
-    """Return what is proved, if the task has a prover and it is done within a minute, and the policy as files."""
+def _kept(policy: PiecewisePolicy, until: float) -> str:
+    """Return what is proved, if the task has a prover and it is done in time, and the policy as files."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.vsp"
         policy.save(path)
         saved = path.read_bytes()
         provable = isinstance(policy, VoronoiPolicy) and policy.task.name in PROVERS
-        proof = _proof(path) if provable else ""
+        proof = _proof(path, min(PROOF_SECONDS, max(1.0, until - time.monotonic()))) if provable else ""
     files = {"policy.vsp": saved, "policy.c": policy.to_c().encode(), "policy.py": policy.to_python().encode()}
     links = []
     for name, content in files.items():
@@ -134,12 +174,10 @@ def _kept(policy: PiecewisePolicy) -> str:
     return f"{proof}<h2>The policy as a file</h2><p>{', '.join(links)}</p>"
 
 
-def _proof(path: Path) -> str:
+def _proof(path: Path, seconds: float) -> str:
     try:  # in a process of its own, which can be stopped
-        done = subprocess.run(
-            [sys.executable, "-c", _PROVE, path], capture_output=True, text=True, timeout=PROOF_SECONDS
-        )
+        done = subprocess.run([sys.executable, "-c", _PROVE, path], capture_output=True, text=True, timeout=seconds)
         said = done.stdout or f"Nothing is proved: {done.stderr.strip().rpartition(': ')[2]}."
     except subprocess.TimeoutExpired:
-        said = f"Nothing is proved within {PROOF_SECONDS} s; vsp_beyond.prove(policy) may take minutes."
+        said = f"Nothing is proved within {seconds:.2g} s; vsp_beyond.prove(policy) may take minutes."
     return f"<h2>What is certain?</h2><p>{html.escape(said)}</p>"

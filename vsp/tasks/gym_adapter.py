@@ -154,4 +154,5 @@ def live_task(
     return Task(
         name, inputs, outputs, inputs, low, high, action_low, action_high, max_steps, _draw_seeds,
         partial(_step_live, outcome), _see_live, partial(begin_live, name), 1, at_once=AT_ONCE, end=end_live,
+        slowness=max(1, max_steps // 30),  # 30,000 steps for a thousand episodes
     )  # fmt: skip

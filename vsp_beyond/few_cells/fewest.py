@@ -1,8 +1,8 @@
 """`fewest`: as few cells as act like an agent and return as much, found in stages that a clock may end.
 
 1, 2, 4 and 8 cells are fitted to the agent's actions. On states that no fit saw, the smallest number is chosen whose R²
-is at most `LOSS` below the highest and whose return is level with the agent's. If none is level, the one of them with
-the highest return is tuned. Each finished stage is kept in a file, from which a longer call goes on.
+is at most `LOSS` below the highest and whose return is level with the agent's. If none is level, the best of them is
+tuned on the return. Finished stages are kept in files, from which a longer call goes on.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from vsp.evaluation import Likeness, likeness, start_states
@@ -31,15 +30,13 @@ from vsp.teachers.agents import digest_of
 from .config import Faithful, faithful_preset
 from .faithful import distill_faithfully
 from .search import least_error
-from .units import METRIC, LabelledStates, Scaling, spread
+from .units import METRIC, LabelledStates, Scaling, spread, warn_outside
 
 VERSION = 1  # raise it when the same arguments give another policy
 SIZES = (1, 2, 4, 8)
 LOSS = 0.01  # of R²: so much may fewer cells cost
 SHARE = 0.02  # of the distance to the best constant action: so much may the return fall short
-RIDGE = (
-    1e-6  # weight of squared slopes in the error, in units of the data: where an input hardly varies, they stay small
-)
+RIDGE = 1e-6  # weight of squared slopes in the error: they stay small where an input hardly varies
 
 
 class TimeUp(Exception):
@@ -60,9 +57,19 @@ class Seen:
         """States of the agent's episodes with its actions, in units in which one step size fits all."""
         starts, init = map(np.random.default_rng, np.random.SeedSequence(self.seed).spawn(2))
         states = visited_states(self.agent, self.task, self.task.start(starts, self.config.n_episodes))
+        warn_outside(self.task, states)
         scaling = Scaling.of(self.task, states)
         states = states[spread(states / scaling.scale, self.config.n_states, init)]
         return scaling, scaling.labelled(states, self.agent.predict(states)[0])
+
+    @cached_property
+    def best_constant(self) -> float:
+        """The highest mean return of the lowest, middle and highest action."""
+        task, zeros = self.task, np.zeros((1, len(self.task.low)))
+        starts = start_states(task, max(10, 200 // task.slowness), 7)
+        actions = [task.action_low, (task.action_low + task.action_high) / 2, task.action_high]
+        maps = [np.vstack([np.zeros((zeros.size, len(action))), action])[None] for action in actions]
+        return max(rollout(VoronoiPolicy(zeros, one, task=task), task, starts).returns.mean() for one in maps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,72 +111,67 @@ class Stage(Job):
         return {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}, {}
 
 
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A finished stage: its policy, how much it acts like the agent, and whether it returns as much."""
+
+    stage: Stage
+    policy: VoronoiPolicy
+    alike: Likeness
+    level: bool
+
+    @classmethod
+    def of(cls, stage: Stage, folder: str | os.PathLike) -> Tried:
+        """Make the stage, unless its file exists, and judge it.
+
+        It is level if it falls short by no more than half of the paired 95 % interval, or than `SHARE` of the agent's
+        distance to the best constant action.
+        """
+        make_all([stage], folder, stage.name)
+        arrays, task = stage.load(folder)[0], stage.seen.task
+        maps = arrays.pop("coefficients")
+        policy = VoronoiPolicy(arrays["codewords"], maps, task=task, metric=METRIC, scale=arrays["scale"])
+        alike = likeness(policy, stage.seen.agent, task)
+        agent = alike.returns["agent"]
+        gap = alike.returns["policy"] - agent
+        low, high = interval(gap, np.mean, vectorized=True)
+        short = max((high - low) / 2, SHARE * abs(agent.mean() - stage.seen.best_constant))
+        return cls(stage, policy, alike, bool(gap.mean() >= -short))
+
+
 def fewest(
     agent: Policy, task: Task, *, seed: int, folder: str | os.PathLike, until: float = math.inf,
     sizes: Sequence[int] = SIZES,
-) -> tuple[VoronoiPolicy, pd.DataFrame, list[str]]:  # fmt: skip
-    """Return the policy, one row per finished stage, and the stages that were left out because the time was over.
+) -> tuple[Tried, list[Tried], list[str]]:  # fmt: skip
+    """Return the chosen stage, all finished ones, and the names of those that were left out because the time was over.
 
-    Rows: cells, r2, within (of the action that is within 5 % of its range in the fewest states), policy and agent (mean
-    returns), failed, level, chosen. `until` is a time of `time.monotonic`; it decides only which stages are finished,
-    not what they give. Raises `TimeUp` if none is.
+    `until` is a time of `time.monotonic`; it decides only which stages are finished, not what they give. Raises
+    `TimeUp` if none is.
     """
-    seen, stages, tried = Seen(agent, task, replace(faithful_preset(task), margin=0.0), seed), [], {}
+    seen, tried = Seen(agent, task, replace(faithful_preset(task), margin=0.0), seed), list[Tried]()
     work = [Stage(seen, size, seed) for size in sizes]
-    for stage in work:  # which grows
+    for stage in work:  # which may grow
         try:
             with limited(until - time.monotonic()):
-                make_all([stage], folder, stage.name)
-                arrays, _ = stage.load(folder)
-                numbers = (arrays[name] for name in ("codewords", "coefficients"))
-                policy = VoronoiPolicy(*numbers, task=task, metric=METRIC, scale=arrays["scale"])
-                tried[stage.name] = policy, likeness(policy, agent, task)
-                level = {name: is_level(alike, task) for name, (_, alike) in tried.items()}
+                tried.append(Tried.of(stage, folder))
         except TimeUp:
             break
-        stages.append(stage)
-        if len(stages) == len(sizes) and not any(level[one.name] for one in alike_of(stages, tried)):
-            best = max(alike_of(stages, tried), key=lambda one: tried[one.name][1].returns["policy"].mean())
-            work.append(replace(best, tuned=True))
-    if not stages:
-        raise TimeUp("no stage was finished in time: allow more minutes")
-    good = [one for one in alike_of(stages, tried) if level[one.name]] or stages[-1:]
-    chosen = min(good, key=lambda one: (one.n_cells, one.tuned))
-    rows = [_row(one, tried[one.name][1]) | {"level": level[one.name], "chosen": one is chosen} for one in stages]
-    return tried[chosen.name][0], pd.DataFrame(rows), [one.name for one in work if one not in stages]
+        if len(tried) == len(sizes) and not any(one.level for one in close(tried)):
+            best = max(close(tried), key=lambda one: one.alike.returns["policy"].mean())
+            work.append(replace(best.stage, tuned=True))
+    if not tried:
+        raise TimeUp(f"{work[0].name}: not finished in time, allow more minutes")
+    good = [one for one in close(tried) if one.level]
+    chosen = min(good, key=lambda one: one.stage.n_cells) if good else max(
+        close(tried), key=lambda one: one.alike.returns["policy"].mean()
+    )
+    return chosen, tried, [stage.name for stage in work[len(tried) :]]
 
 
-def alike_of(stages: list[Stage], tried: dict[str, tuple[VoronoiPolicy, Likeness]]) -> list[Stage]:
-    """Return the stages whose R² is at most `LOSS` below the highest."""
-    highest = max(tried[one.name][1].r2 for one in stages)
-    return [one for one in stages if tried[one.name][1].r2 >= highest - LOSS]
-
-
-def is_level(alike: Likeness, task: Task) -> bool:
-    """Whether the policy's return falls short of the agent's by no more than half of the paired 95 % interval, or than
-    `SHARE` of the agent's distance to the best constant action."""
-    gap, agent = alike.returns["policy"] - alike.returns["agent"], alike.returns["agent"].mean()
-    low, high = interval(gap, np.mean, vectorized=True)
-    return bool(gap.mean() >= -max((high - low) / 2, SHARE * abs(agent - _best_constant(task, len(gap)))))
-
-
-def _best_constant(task: Task, n: int) -> float:
-    """Return the highest mean return of the lowest, middle and highest action, from n starts."""
-    starts, zeros = start_states(task, n, 7), np.zeros((1, len(task.low)))
-    actions = [task.action_low, (task.action_low + task.action_high) / 2, task.action_high]
-    maps = [np.vstack([np.zeros((len(task.low), len(action))), action])[None] for action in actions]
-    return max(rollout(VoronoiPolicy(zeros, one, task=task), task, starts).returns.mean() for one in maps)
-
-
-def _row(stage: Stage, alike: Likeness) -> dict:
-    means = {name: returns.mean() for name, returns in alike.returns.items()}
-    return {
-        "stage": stage.name,
-        "r2": alike.r2,
-        "within": alike.within.min(),
-        **means,
-        "failed": alike.failures["policy"],
-    }
+def close(tried: list[Tried]) -> list[Tried]:
+    """Return those whose R² is at most `LOSS` below the highest."""
+    highest = max(one.alike.r2 for one in tried)
+    return [one for one in tried if one.alike.r2 >= highest - LOSS]
 
 
 @contextlib.contextmanager

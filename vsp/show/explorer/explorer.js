@@ -3,6 +3,7 @@
 // episodes. It draws a scene, which scene.py describes. "Cell 3" here is cell 3 in Python.
 
 import { Player, button, choice, count, element, equations, row } from "./controls.js"
+import { Episodes } from "./episodes.js"
 import { act, clip, dynamics, ready, rollout } from "./model.js"
 import { Picture, drawAll, drawMap } from "./picture.js"
 import { answerOf, causeOf, episodeOf, legendOf, noteOf, resultOf } from "./texts.js"
@@ -391,6 +392,8 @@ async function reveal([{ isIntersecting, target }], watch) {
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
 export function mountAll() {
+  for (const found of document.querySelectorAll(".vsp-episodes > script"))
+    new Episodes(/** @type {HTMLElement} */ (found.parentElement), JSON.parse(found.textContent))
   const bare = ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])"
   for (const found of document.querySelectorAll(bare)) {
     const root = /** @type {HTMLElement} */ (found)

@@ -21,6 +21,8 @@ from .scripts import SCRIPT, STYLE
 
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline';
+script-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'">
 <title>{title}</title>
 <style>
 :root {{ color-scheme: light dark }}
@@ -39,7 +41,9 @@ mountAll()
 
 
 def standalone(title: str, body: str, style: str = "") -> str:
-    """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS."""
+    """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS.
+
+    A browser loads nothing from elsewhere for it."""
     return _PAGE.format(title=html.escape(title), body=body, style=STYLE + style, script=SCRIPT)
 
 

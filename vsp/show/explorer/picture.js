@@ -7,7 +7,7 @@ const ARROWS = 14 // along each axis
 const STRIPES = 50 // along each axis: where two codewords are equally near, both colours alternate
 const FLASH = 900 // milliseconds
 // Colours without a meaning of their own (vsp/show/style.py), as pale tints
-const CELLS = ["#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0"]
+export const CELLS = ["#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0"]
 const [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"] // the force maps of the figures
 
 /** @type {(colour: string) => number[]} */

@@ -36,11 +36,11 @@ def scene_of(
         raise ValueError(f"the browser plays {', '.join(PLANES)}, so {task.name} cannot be explored")
     (low, high, labels), starts = PLANES[task.name], starts_of(task)
     scene = {
-        "task": _task(task),
+        "task": task_of(task),
         "plane": {"low": low, "high": high, "labels": labels},
         "starts": starts.tolist(),
         "lost": [] if task.name == "Pendulum-v1" else [RUNNING, PIT],
-        "policies": [_numbers(policy, name) for name, policy in policies.items()],
+        "policies": [numbers_of(policy, name) for name, policy in policies.items()],
     }
     if history is not None:
         first = scene["policies"][0]
@@ -56,7 +56,8 @@ def to_json(scene: object) -> str:
     return json.dumps(scene, separators=(",", ":"), allow_nan=False)
 
 
-def _task(task: Task) -> dict:
+def task_of(task: Task) -> dict:
+    """Return the names and limits of a task."""
     names = {"name": task.name, "inputs": list(task.inputs), "outputs": list(task.outputs), "maxSteps": task.max_steps}
     return names | {"actionLow": task.action_low.tolist(), "actionHigh": task.action_high.tolist()}
 
@@ -70,7 +71,8 @@ def starts_of(task: Task) -> np.ndarray:
     return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes)).round(6)
 
 
-def _numbers(policy: VoronoiPolicy, name: str) -> dict:
+def numbers_of(policy: VoronoiPolicy, name: str) -> dict:
+    """Return the numbers of a policy, and how its distance is taken."""
     metric = policy.where.metric
     about = {"name": name, "metric": metric.name, "scale": policy.scale.tolist()}
     if METRICS.get(metric.name) != metric:  # the script knows these by name; JSON knows no infinity

@@ -36,6 +36,13 @@ type Scene = {
   policies: Policy[]
   teacher?: Results
 }
+type Seen = { name: string; every: number; states: Vector[]; agent: Vector[] }
+type EpisodeScene = {
+  task: Task
+  policies: Linear[]
+  episodes: Seen[]
+  curves: number[] // inputs to draw
+} & Omit<Scene, "policies" | "task">
 type StoredNetwork = { sizes: Vector; weights: string }
 
 // What model.js computes
