@@ -31,7 +31,7 @@ def main() -> None:
     parser.add_argument("--normalize", help="the file of VecNormalize, or no: observations were not normalised")
     parser.add_argument("--names", help='a JSON file that names the task\'s {"inputs": [...], "outputs": [...]}')
     parser.add_argument("--cells", type=int, help="the number of cells; without it, the fewest that act alike")
-    parser.add_argument("--minutes", type=float, default=5, help="for the whole command (%(default)s); a longer call goes on")
+    parser.add_argument("--minutes", type=float, default=5, help="for all (%(default)s); a longer call goes on")
     parser.add_argument("--seed", type=int, default=0, help="of the distillation (%(default)s)")
     parser.add_argument("--out", type=Path, default="report.html", help="the page (%(default)s)")
     parser.add_argument("--force", action="store_true", help="write over a page that exists")
@@ -53,7 +53,7 @@ def main() -> None:
             )  # fmt: skip
         remarks = list(dict.fromkeys(str(one.message) for one in said if issubclass(one.category, UserWarning)))
         if left:
-            remarks.append(f"Left out in {given.minutes:g} minutes: {', '.join(left)}. A call with more --minutes goes on.")
+            remarks.append(f"Left out, because the time was over: {', '.join(left)}. With more --minutes it goes on.")
         name = Path(given.agent).name
         page = report(chosen.policy, agent, task, name=name, remarks="\n".join(remarks), tried=tried, until=until)
         atomic.write_text(given.out, page)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import io
 from contextlib import suppress
+from typing import Any
 
 import gymnasium
 import numpy as np
 from PIL import Image
 
-from vsp.cells import Nearest
 from vsp.evaluation import Likeness, start_states
-from vsp.policy import PiecewisePolicy, VoronoiPolicy
+from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy, record
 from vsp.show.explorer.scene import numbers_of, task_of, to_json
 from vsp.show.style import embedded
+from vsp.tasks import Task
 
 MOMENTS = 400  # of an episode, evenly spaced if it has more steps
 WORST = 3  # episodes with the lowest returns
@@ -22,11 +23,10 @@ CURVES = 4  # inputs that are drawn
 FRAMES, PIXELS = 6, 160  # of the strip, and its width of one
 
 
-def episodes(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
-    """Return an element with the episode of median return and the worst ones, which the page's script shows."""
-    where = policy.where
-    if not isinstance(where, Nearest) or where.metric.order is None or policy.policy_class.name != "linear":
-        return "<p>This page shows no episode: that takes linear maps, and codewords with a Minkowski distance.</p>"
+def episodes(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
+    """Return an element with the episode of median return and the worst ones, which the page's script shows.
+
+    The maps are linear, and the distance is Minkowski's: others the script cannot compute."""
     task, returns = policy.task, alike.returns["policy"]
     order = np.argsort(returns, kind="stable")
     chosen = [order[len(order) // 2], *order[:WORST]]
@@ -37,33 +37,37 @@ def episodes(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
         every = -(-len(episode.states) // MOMENTS)
         states = episode.states[::every]
         begun = f"seed {start[0]:.0f}" if task.one_by_one else "start " + ", ".join(f"{x:.3g}" for x in start)
-        about = f"{'typical' if i == 0 else 'worst' if i == 1 else f'{i} from the worst'}: return {played.returns[i]:.5g}"
-        shown.append({"name": f"{about}, {begun}", "every": every, "states": _short(states),
-                      "agent": _short(np.asarray(agent.predict(states)[0], np.float64))})  # fmt: skip
+        name = f"{f'{i}. of the worst' if i else 'typical'}: return {played.returns[i]:.5g}, {begun}"
+        theirs = np.asarray(agent.predict(states)[0], np.float64)
+        shown.append({"name": name, "every": every, "states": _short(states), "agent": _short(theirs)})
     weights = np.abs(policy.coefficients[:, :-1]).max(axis=(0, 2))
     curves = np.sort(np.argsort(-weights * alike.states.std(axis=0), kind="stable")[:CURVES])
-    scene = {"task": task_of(task), "policies": [numbers_of(policy, "policy")], "episodes": shown, "curves": curves.tolist()}
-    text = to_json(scene).replace("<", "\\u003c")  # no tag ends here
-    strip = frames(policy, starts[0], played.lengths[0])
-    words = "Over time: the cell that acts (colours), inputs, and actions: the policy's thin, the agent's in the same states blue."
-    return f'<h2>Episodes</h2><p>{words} Touch a moment to ask why.</p><div class="vsp-episodes"><script type="application/json">{text}</script></div>{strip}'
+    scene = {"task": task_of(task), "policies": [numbers_of(policy, "policy")], "episodes": shown}
+    text = to_json(scene | {"curves": curves.tolist()}).replace("<", "\\u003c")  # no tag ends here
+    words = (
+        "Colours say which cell acts. Of the actions, the thin curve is the policy's, the blue one the agent's in the "
+    )
+    words += "same states. Touch a moment to ask why."
+    element = f'<div class="vsp-episodes"><script type="application/json">{text}</script></div>'
+    return f"<h2>Episodes</h2><p>{words}</p>{element}{frames(policy, task, starts[0], played.lengths[0])}"
 
 
 def _short(values: np.ndarray) -> list:
     return [[float(f"{value:.5g}") for value in row] for row in values.tolist()]
 
 
-def frames(policy: PiecewisePolicy, start: np.ndarray, length: int) -> str:
+def frames(policy: Policy, task: Task, start: np.ndarray, length: int) -> str:
     """Return a strip of frames of the episode from `start`, if the task is an environment that renders."""
-    if not policy.task.one_by_one:
+    if not task.one_by_one:
         return ""
     images, file, moments = [], io.BytesIO(), set(np.linspace(0, length - 1, FRAMES, dtype=int).tolist())
     with suppress(Exception):  # a renderer that fails never stops a page
-        env = gymnasium.make(policy.task.name, render_mode="rgb_array")
+        env = gymnasium.make(task.name, render_mode="rgb_array")
         seen = env.reset(seed=int(start[0]))[0]
         for t in range(length):
             if t in moments:
-                images.append(Image.fromarray(env.render()).reduce(-(-env.render().shape[1] // PIXELS)))
+                frame: Any = env.render()
+                images.append(frame[:: -(-frame.shape[1] // PIXELS), :: -(-frame.shape[1] // PIXELS)])
             seen = env.step(policy.predict(seen)[0].astype(env.action_space.dtype))[0]
         env.close()
         Image.fromarray(np.concatenate(images, axis=1)).save(file, "PNG")

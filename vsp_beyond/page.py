@@ -19,7 +19,7 @@ from vsp.evaluation import CLOSE, Likeness, likeness
 from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
-from vsp.show.explorer import explore, standalone
+from vsp.show.explorer import PLANES, explore, standalone
 from vsp.tasks import Task, get_task
 
 from .episodes import episodes
@@ -60,28 +60,30 @@ def report(
     lines = "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in remarks.splitlines())
     parts = [
         f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(str(alike))}.</p>",
-        lines, _cards(policy, alike), _sizes(tried, policy), episodes(policy, agent, alike),
-        _explorer(policy, agent), _numbers(policy, alike), _worst(policy, agent, alike), _kept(policy, until),
+        lines, _cards(policy, alike), _sizes(tried, policy), _played(policy, agent, alike), _numbers(policy, alike),
+        _worst(policy, agent, alike), _kept(policy, until),
     ]  # fmt: skip
     return standalone(f"{task.name}: {name}", "\n".join(parts), _STYLE)
 
 
 def _sizes(tried: Sequence[Tried], policy: PiecewisePolicy) -> str:
     """Return how much each number of cells acts like the agent, and which was chosen."""
+    if not tried:
+        return ""
     rows = ""
     for one in tried:
-        alike, failed = one.alike, one.alike.failures["policy"]
-        cells = [one.stage.name + " (chosen)" * (one.policy is policy), f"{alike.r2:.4f}", f"{alike.within.min():.1%}",
-                 f"{alike.returns['policy'].mean():.5g}", "not defined" if failed is None else f"{failed} of {len(alike.returns['policy'])}"]  # fmt: skip
-        bar = f'<meter value="{max(alike.r2, 0):.4f}"></meter>'
-        rows += f"<tr><td>{bar}</td>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        alike, returns, failed = one.alike, one.alike.returns["policy"], one.alike.failures["policy"]
+        said = "not defined" if failed is None else f"{failed} of {len(returns)}"
+        name, bar = one.stage.name + " (chosen)" * (one.policy is policy), f'<meter value="{max(alike.r2, 0):.4f}">'
+        cells = bar, name, f"{alike.r2:.4f}", f"{alike.within.min():.1%}", f"{returns.mean():.5g}", said
+        rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
     head = "".join(f"<th>{name}</th>" for name in ("", "cells", "R²", f"within {CLOSE:.0%}", "return", "failed"))
     rule = (
-        f"The fewest cells are chosen whose R² is at most {LOSS} below the highest, and whose return falls short of the "
-        f"agent's by at most half of the paired 95 % interval, or {SHARE:.0%} of its distance to the best constant "
+        f"The fewest cells are chosen whose R² is at most {LOSS} below the highest and whose return falls short of "
+        f"the agent's by at most half of the paired 95 % interval, or {SHARE:.0%} of its distance to the best constant "
         "action. “Within” counts the action that is close in the fewest states."
     )
-    return f'<h2>How many cells?</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div><p>{rule}</p>' if rows else ""
+    return f'<h2>How many cells?</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div><p>{rule}</p>'
 
 
 def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
@@ -136,12 +138,13 @@ def _equations(policy: PiecewisePolicy, cell: int, states: np.ndarray) -> tuple[
     return tuple(lines)
 
 
-def _explorer(policy: PiecewisePolicy, agent: Policy) -> str:
-    """Return the explorer, if the browser plays the task."""
-    try:
-        return f"<h2>Explore</h2>{explore(policy, teacher=agent).element()}"
-    except ValueError:
-        return ""
+def _played(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
+    """Return episodes to look at, and the explorer if the browser plays the task; or why there is neither."""
+    linear = policy.policy_class.name == "linear"
+    if not (linear and isinstance(policy, VoronoiPolicy) and policy.where.metric.order is not None):
+        return "<p>No episode is shown: that takes linear maps, and codewords with a Minkowski distance.</p>"
+    seen = episodes(policy, agent, alike)
+    return seen + (f"<h2>Explore</h2>{explore(policy, teacher=agent).element()}" if policy.task.name in PLANES else "")
 
 
 def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:

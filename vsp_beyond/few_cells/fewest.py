@@ -162,8 +162,10 @@ def fewest(
     if not tried:
         raise TimeUp(f"{work[0].name}: not finished in time, allow more minutes")
     good = [one for one in close(tried) if one.level]
-    chosen = min(good, key=lambda one: one.stage.n_cells) if good else max(
-        close(tried), key=lambda one: one.alike.returns["policy"].mean()
+    chosen = (
+        min(good, key=lambda one: one.stage.n_cells)
+        if good
+        else max(close(tried), key=lambda one: one.alike.returns["policy"].mean())
     )
     return chosen, tried, [stage.name for stage in work[len(tried) :]]
 
