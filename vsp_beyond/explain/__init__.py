@@ -1,3 +1,3 @@
-"""Explanations in addition to the equations: rules over the inputs, and figures of one state's explanation."""
+"""Explanations in addition to the equations: rules over the inputs."""
 
 from .rules import RulePolicy, describe_rules, find_rules
