@@ -139,7 +139,7 @@ static const double codewords[{k}][{d}] = {braces(self._scaled)};
 /* The index of the nearest codeword. */
 static int locate(const double *state) {{
     int nearest = 0;
-    double least = INFINITY;
+    double least = (double)INFINITY;
     for (int i = 0; i < {k}; i++) {{
         double distance = 0.0;
         for (int j = 0; j < {d}; j++) {{

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 CLOSE = 0.05  # of its range, up to which an action is close to the agent's
 ALIKE = 0.9  # R² from which a policy acts much like its agent
-FAILING = 0.02  # share of the episodes in which it may fail more often, or of the return it may lose, unwarned
+FAILING = 0.02  # share of the episodes in which it may fail more often without a warning
+LOST = 0.05  # share of the return that it may lose without one where failures are not defined
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,10 @@ class Likeness:
     @property
     def poor(self) -> bool:
         """Whether the actions differ much, or the policy fails more often; or, where failures are not defined, returns
-        less by more than two standard errors and 2 %."""
+        less by more than `LOST` and a standard error."""
         more = (self.failures["policy"] or 0) - (self.failures["agent"] or 0)
         gap = self.returns["policy"] - self.returns["agent"]
-        allowed = max(2 * gap.std() / len(gap) ** 0.5, FAILING * abs(self.returns["agent"].mean()))
+        allowed = max(gap.std() / len(gap) ** 0.5, LOST * abs(self.returns["agent"].mean()))
         lost = self.failures["policy"] is None and gap.mean() < -allowed
         return self.r2 < ALIKE or more > FAILING * len(gap) or bool(lost)
 
@@ -103,7 +104,7 @@ def likeness(policy: Policy, agent: Policy, task: str | Task, n: int = 1000, *, 
 def r_squared(ours: np.ndarray, theirs: np.ndarray) -> float:
     """Return the share of the variance of `theirs` (t, m) that `ours` reproduce."""
     spread = np.square(theirs - theirs.mean(axis=0)).sum()
-    return float(1 - np.square(ours - theirs).sum() / spread if spread else np.array_equal(ours, theirs))
+    return float(1 - np.square(ours - theirs).sum() / spread if spread else np.allclose(ours, theirs))
 
 
 @threadpool_limits.wrap(limits=1)  # the same text on any machine, as the distillation before it

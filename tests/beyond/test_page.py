@@ -1,4 +1,6 @@
 import base64
+import dataclasses
+import json
 import os
 import re
 import sys
@@ -9,8 +11,10 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant, Cu
 
 import vsp
 import vsp_beyond
+from vsp.tasks import get_task
 from vsp_beyond import __main__ as command
 from vsp_beyond import page
+from vsp_beyond.few_cells.fewest import Tried
 
 TWO = vsp.VoronoiPolicy([[-0.5, 0.01], [-0.5, -0.01]], [[[0], [0], [1]], [[0], [0], [-1]]], task=MOUNTAINCAR)
 
@@ -26,30 +30,37 @@ def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):
     assert vsp.VoronoiPolicy.load(tmp_path / "x.vsp").to_json() == TWO.to_json()
 
 
-def test_of_a_task_that_a_browser_cannot_play_it_says_so():
+def test_of_a_task_that_a_browser_cannot_play_it_shows_episodes():
     policy = vsp.VoronoiPolicy([np.zeros(8), np.ones(8)], np.zeros((2, 9, 2)), task=LUNARLANDER)
     made = vsp_beyond.report(policy, Constant(0.0, 0.0), LUNARLANDER)
-    assert "no explorer: the browser plays SimpleGoal" in made and "application/json" not in made
+    assert "<h2>Explore" not in made and made.count("application/json") == 1
     assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "<h2>Where do they differ", "Cell 0<"))
+    assert "of the worst: return" in made and "seed " in made and "Frames of the typical episode" in made
+    scene = json.loads(re.findall(r'application/json">(.*?)</script>', made)[0])
+    assert [len(scene["episodes"]), len(scene["curves"])] == [4, 4] and len(scene["episodes"][0]["states"]) <= 400
 
 
-def test_a_proof_that_takes_long_is_given_up(monkeypatch, tmp_path):
-    monkeypatch.setattr(page, "PROOF_SECONDS", 0.1)
+def test_a_proof_that_takes_long_is_given_up(tmp_path):
     TWO.save(tmp_path / "policy.vsp")
-    assert "Nothing is proved within 0.1 s" in page._proof(tmp_path / "policy.vsp")
+    assert "Nothing is proved within 0.1 s" in page._proof(tmp_path / "policy.vsp", 0.1)
 
 
 def test_the_command_makes_a_page_once_and_says_in_one_line_why_not(monkeypatch, tmp_path, capsys):
     quick = vsp.VoronoiPolicy([[0.5, 0.5]], np.zeros((1, 3, 2)), task=SIMPLEGOAL)
-    monkeypatch.setattr(command, "faithful", lambda agent, task, *, n_cells, seed: quick)
-    monkeypatch.setattr(command, "report", lambda *given, **named: f"page of {named['name']}")
+    chosen = Tried(None, quick, "alike", True)
+    monkeypatch.setattr(command, "fewest", lambda agent, task, **given: (chosen, [chosen], ["8 cells"]))
+    monkeypatch.setattr(command, "report", lambda *given, **named: f"page of {named['name']}, {named['remarks']}")
     monkeypatch.setattr(command.vsp, "agent", lambda source, task, **options: CurvedTeacher())
     out = tmp_path / "report.html"
     monkeypatch.setattr(sys, "argv", ["x", "agent.zip", SIMPLEGOAL, "--out", str(out)])
     command.main()
-    assert out.read_text() == "page of agent.zip" and "open it in a browser" in capsys.readouterr().out
+    assert (
+        out.read_text().startswith("page of agent.zip, Left out, because the time was over: 8 cells.")
+        and "open it in a browser" in capsys.readouterr().out
+    )
     for arguments, reason in (
         (["agent.zip", SIMPLEGOAL], "exists and is kept: name another file, or say --force"),
+        (["agent.zip", SIMPLEGOAL, "--minutes", "0"], "--minutes is 0, expected a number above 0"),
         (["agent.zip", "Pendulum-v9"], f"unknown task 'Pendulum-v9', .*did you mean '{PENDULUM}'"),
     ):
         place = out if "exists" in reason else tmp_path / "other.html"
@@ -84,3 +95,14 @@ def test_what_would_stop_the_page_at_the_end_stops_it_at_once(out, said, monkeyp
     line = capsys.readouterr().err
     assert said in line and line.count("\n") == 1 and len(line) < 600
     assert sorted(tmp_path.iterdir()) == before and (tmp_path / "fifo").is_fifo()
+
+
+def test_an_equation_of_many_inputs_shows_five_and_says_what_it_hides():
+    """By hand: of nine inputs of unit deviation, with weights 9 to 1, the last four hide 30 of 285."""
+    task = dataclasses.replace(get_task(SIMPLEGOAL), inputs=tuple("abcdefghi"), low=np.zeros(9), high=np.ones(9))
+    weights = np.append(np.arange(9.0, 0, -1), 2.0)
+    policy = vsp.VoronoiPolicy([np.zeros(9)], np.stack([weights, weights], axis=1)[None], task=task)
+    states = np.vstack([np.eye(9), -np.eye(9)]) * 3 / 2**0.5 + 1
+    (line, _) = page._equations(policy, 0, states)
+    assert line == "Δx = +9 a +8 b +7 c +6 d +5 e +12 (hides 10.5%)"
+    assert page._equations(TWO, 0, states[:, :2]) == TWO.equations(0)

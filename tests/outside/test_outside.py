@@ -69,7 +69,7 @@ def test_a_part_from_outside_goes_all_the_way(name, comparison, tmp_path, monkey
     made = vsp_beyond.report(back, agent, SIMPLEGOAL)
     assert ("\\sin(x)" in back.to_latex()) == (name == "sines")
     drawn = name in ("split", "minkowski")
-    assert ("application/json" in made) == drawn and ("no explorer: " in made) == (not drawn)
+    assert ("application/json" in made) == drawn and ("No episode is shown" in made) == (not drawn)
 
 
 def test_a_policy_is_identified_by_what_its_parts_do():
