@@ -9,6 +9,7 @@ import vsp
 from vsp.evaluation import Likeness
 from vsp.run.atomic import DamagedFile
 from vsp.tasks import get_task
+from vsp.tasks.gym_adapter import gymnasium_task
 from vsp_beyond.few_cells import fewest as module
 from vsp_beyond.few_cells.config import Faithful
 
@@ -105,4 +106,4 @@ def test_where_failures_are_not_defined_a_lost_return_warns(ours, poor):
 
 
 def test_an_engine_plays_fewer_episodes():
-    assert get_task("BipedalWalker-v3").slowness == 53 and get_task(LUNARLANDER).slowness == 10
+    assert gymnasium_task("BipedalWalker-v3").slowness == 53 and get_task(LUNARLANDER).slowness == 10

@@ -41,7 +41,7 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds.
- * @param {Explorer} view */
+ * @param {Asked} view */
 export function answerOf({ scene, policy, cell, cells, asked, task }) {
   if (policy.layers) return []
   const { inputs, outputs } = scene.task,

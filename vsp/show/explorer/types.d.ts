@@ -67,6 +67,9 @@ type Attribute = "class" | "type" | "scope" | "value" | "selected" | "min" | "st
 type Attributes = Listeners & {
   [name in Attribute | "role" | `aria-${string}`]?: string | number | boolean
 }
+type Asked = Pick<Explorer, "scene" | "policy" | "cell" | "cells" | "asked"> & {
+  task: Pick<Required<Rules>, "see">
+}
 type Said = [what: string, ...numbers: number[]]
 type Judged = Results & { played: number }
 type Hooks = {
