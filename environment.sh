@@ -2,6 +2,7 @@
 # `sh environment.sh draw train`: .venv with these parts of environment.lock. What is whole stays; what is stale, moved
 # or half made is made anew. PYTHON names the Python, else one is looked for; the settings of pip hold.
 set -eu
+unset PYTHONWARNINGS # "error" would stop pip
 
 note() { cksum < environment.lock; pwd -P; .venv/bin/python -V; "${PYTHON:-.venv/bin/python}" -V; }
 whole() ( # the lock, the folder, Python and the version of every package are as noted when the last set-up ended

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import warnings
 from collections.abc import Callable
 from types import ModuleType
 
@@ -60,6 +61,8 @@ def distill(
         config = preset(task)
     if not isinstance(config, Config):
         raise ValueError(f"config is {config!r:.40}, expected a Config, such as vsp.preset({task.name!r})")
+    if len(task.low) > 8 and config.neighbours == "delaunay":  # its time grows exponentially with the inputs
+        warnings.warn(f"neighbours='delaunay' is slow with {len(task.low)} inputs: 'lookup' is not", stacklevel=2)
     teacher = agent(teacher, task)
     with shown(progress):
         policy, history = algorithms.distill(teacher, task, config, seed=seed, split=split, merge=merge)

@@ -11,18 +11,14 @@ import re
 import numpy as np
 
 from .cells import Cells, Nearest, braces
-from .checks import check_array, check_count
+from .checks import check_count
 from .subpolicies.base import SHARED, PolicyClass, number
 from .tasks.base import Task
 
 # What LaTeX would take as a command
 _SPECIAL = {"\\": r"\backslash ", "^": r"\wedge ", "~": r"\sim "} | {one: f"\\{one}" for one in "%&#$_{}"}
 _SYMBOLS = {"Δ": r"\Delta ", "θ": r"\theta", "ω": r"\omega", "τ": r"\tau"}
-_CHECKED = """#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
-#error "compiled like this, a state that is not a number would not be seen"
-#endif
-"""
-_PROTOTYPES = """/* The index of the cell; -1 for a state that is not finite. */
+PROTOTYPES = """/* The index of the cell; -1 for a state that is not finite. */
 int vsp_cell(const double *state);
 void vsp_act(const double *state, double *action);
 """
@@ -80,7 +76,7 @@ class Exportable:
         numbers = {"LOW": task.action_low, "HIGH": task.action_high}
         numbers["COEFFICIENTS"] = self.coefficients.transpose(0, 2, 1)
         return "\n".join([
-            f'"""{_escaped(_headline(self))}"""',
+            f'"""{escaped(_headline(self))}"""',
             "",
             f"from math import {', '.join(SHARED)}, isfinite, nan  # noqa: F401",
             "",
@@ -108,26 +104,26 @@ class Exportable:
             "",
         ])  # fmt: skip
 
-    def to_c(self, *, real: str = "double", safe: np.ndarray | None = None, note: str = "") -> str:
-        """Return C99 code, with the prototypes of `to_header`. It needs only the standard library.
+    def to_c(self) -> str:
+        """Return C99 code: `int vsp_cell(const double *state)`, `void vsp_act(const double *state, double *action)`.
 
-        For a state that is not finite `vsp_cell` gives -1, and `vsp_act` the action `safe` (m,), by default NAN. With
-        `real` "float" all numbers are floats, so an action is right to about six digits. `note` stands in a comment.
-        Raises ValueError for features that are not plain arithmetic, for cells that cannot be written, for another
-        `real`, and for a safe action beyond the limits.
+        It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
+        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written.
         """
         (k, p, m), d, inputs = self.coefficients.shape, len(self.task.low), len(self.policy_class.code) + 1
-        if real not in ("double", "float"):
-            raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
-        rest = np.full(m, np.nan) if safe is None else check_array("safe", safe, (m,))
-        if ((rest < self.task.action_low) | (rest > self.task.action_high)).any():
-            raise ValueError(f"safe is {safe}, expected an action within the limits of {self.task.name}")
-        code = f"""
+        return f"""/* {escaped(_headline(self))}
+   state: {_names(self.task.inputs)}; action: {_names(self.task.outputs)}. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "compiled like this, a state that is not a number would not be seen"
+#endif
+#include <math.h>
+
+{PROTOTYPES}
 {self.where.c()}
 static const double coefficients[{k}][{m}][{p}] = {braces(self.coefficients.transpose(0, 2, 1))};
 static const double low[{m}] = {braces(self.task.action_low)};
 static const double high[{m}] = {braces(self.task.action_high)};
-static const double safe[{m}] = {braces(rest).replace("NaN", "(double)NAN")};
+static const double safe[{m}] = {{{", ".join(["(double)NAN"] * m)}}}; /* for a state that is not finite */
 
 int vsp_cell(const double *state) {{
     for (int j = 0; j < {d}; j++) if (!isfinite(state[j])) return -1;
@@ -149,18 +145,6 @@ void vsp_act(const double *state, double *action) {{
     }}
 }}
 """
-        if real == "float":
-            code = re.sub(r"(?<![\w.])(\d+(\.\d*)?e[-+]?\d+|\d+\.\d*)", r"\1f", code).replace("double", "float")
-        about, library = (
-            f"{_escaped(_headline(self) + note)}\n   {_ranges(self.task)}",
-            "tg" * (real == "float") + "math",
-        )
-        return f"/* {about} */\n{_CHECKED}#include <{library}.h>\n\n{_PROTOTYPES.replace('double', real)}{code}"
-
-    def to_header(self, *, real: str = "double") -> str:
-        """Return the header of `to_c`."""
-        about = f"/* {_ranges(self.task)} */\n{_PROTOTYPES.replace('double', real)}"
-        return f"#ifndef VSP_POLICY_H\n#define VSP_POLICY_H\n\n{about}\n#endif\n"
 
     def to_text(self, digits: int | None = 3) -> str:
         """Return the whole policy in words: the distance, if there is one, and place and equations of every cell."""
@@ -236,17 +220,9 @@ def _headline(policy: Exportable) -> str:
 
 
 def _names(symbols: tuple[str, ...]) -> str:
-    return _escaped(", ".join(symbols))
+    return escaped(", ".join(symbols))
 
 
-def _ranges(task: Task) -> str:
-    """Say once per step of the task what goes in and out, with units and limits."""
-    states = zip(task.input_labels, task.low, task.high)
-    actions = zip(task.outputs, task.action_low, task.action_high)
-    said = (", ".join(f"{name} from {low:g} to {high:g}" for name, low, high in some) for some in (states, actions))
-    return "\n   ".join(_escaped(f"{what}: {line}.") for what, line in zip(("state", "action"), said))
-
-
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
     """Escape `text` for a docstring and a C comment: a name can neither end them nor start a new line."""
     return json.dumps(text, ensure_ascii=False)[1:-1].replace("*/", "* /").replace("/*", "/ *")

@@ -227,8 +227,10 @@ class PiecewisePolicy(Exportable):
         except KeyError as error:
             what = f"the checksum is right, but the file lacks or names {error}, which may be an object for `known`"
             raise DamagedFile(f"{path}: {what}") from error
-        except (TypeError, ValueError) as error:
-            raise DamagedFile(f"{path}: the checksum is right, but the file holds no valid policy: {error}") from error
+        except (TypeError, ValueError, AttributeError, IndexError, RecursionError) as error:
+            raise DamagedFile(
+                f"{path}: the checksum is right, but the file holds no valid policy: {error!s:.300}"
+            ) from error
 
     def _cells(self, states: np.ndarray) -> np.ndarray:
         found = self.where.locate(states.reshape(-1, states.shape[-1]))

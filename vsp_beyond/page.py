@@ -22,6 +22,7 @@ from vsp.rollouts import Policy
 from vsp.show.explorer import PLANES, explore, standalone
 from vsp.tasks import Task, get_task
 
+from .device import to_c, to_header
 from .episodes import episodes
 from .few_cells.fewest import LOSS, SHARE, Tried
 from .proofs import PROVERS
@@ -61,7 +62,7 @@ def report(
     parts = [
         f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(str(alike))}.</p>",
         lines, _cards(policy, alike), _sizes(tried, policy), _played(policy, agent, alike), _numbers(policy, alike),
-        _worst(policy, agent, alike), _kept(policy, until),
+        _worst(policy, agent, alike), _kept(policy, alike.states, until),
     ]  # fmt: skip
     return standalone(f"{task.name}: {name}", "\n".join(parts), _STYLE)
 
@@ -161,7 +162,7 @@ def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     return f'<h2>Where do they differ most?</h2><div class="wide"><table>{head}{rows}</table></div>'
 
 
-def _kept(policy: PiecewisePolicy, until: float) -> str:
+def _kept(policy: PiecewisePolicy, states: np.ndarray, until: float) -> str:
     """Return what is proved, if the task has a prover and it is done in time, and the policy as files."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "policy.vsp"
@@ -169,7 +170,12 @@ def _kept(policy: PiecewisePolicy, until: float) -> str:
         saved = path.read_bytes()
         provable = isinstance(policy, VoronoiPolicy) and policy.task.name in PROVERS
         proof = _proof(path, min(PROOF_SECONDS, max(1.0, until - time.monotonic()))) if provable else ""
-    files = {"policy.vsp": saved, "policy.c": policy.to_c().encode(), "policy.py": policy.to_python().encode()}
+    files = {
+        "policy.vsp": saved,
+        "policy.c": to_c(policy, states=states).encode(),
+        "policy.h": to_header(policy).encode(),
+        "policy.py": policy.to_python().encode(),
+    }
     links = []
     for name, content in files.items():
         data = base64.b64encode(content).decode()

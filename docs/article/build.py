@@ -19,6 +19,7 @@ from vsp import VoronoiPolicy
 from vsp.run import atomic
 from vsp.show import style
 from vsp.show.explorer import STYLE
+from vsp.show.explorer.explorer import SECURITY
 
 FOLDER = Path(__file__).parent
 TITLE = "A network in a few equations"
@@ -26,6 +27,7 @@ LONGER = 45_000  # more iterations in section 4: with them ten times as many
 SCALE = 12, 17  # of the mean return, in section 7
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+{security}
 <title>{title}</title>
 <style>
 :root {{ color-scheme: light dark }}
@@ -87,7 +89,7 @@ def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
         for name, part in data.items()
     )
     look, script = ((FOLDER / f"article.{name}").read_text("utf-8") for name in ("css", "bundle.js"))
-    return PAGE.format(title=TITLE, style=STYLE + look, text=said, data=stored, script=script)
+    return PAGE.format(title=TITLE, style=STYLE + look, text=said, data=stored, script=script, security=SECURITY)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..algorithms import VERSION, distill
-from ..checks import check_count
+from ..checks import check_count, check_finite
 from ..config import Config, paper_preset
 from ..evaluation import rollout_from_seed
 from ..policy import VoronoiPolicy
@@ -116,6 +116,7 @@ class Distillation(job.Job):
         policy = VoronoiPolicy(
             codewords, coefficients, task=self.task, metric=config.metric, scale=scale, sub_policy=config.sub_policy
         )
+        check_finite(f"{self.path(folder)}: returns", arrays["returns"])
         counts = {name: about[name] for name in ("seed", "validation_mean", "splits", "merges")}
         return Run(policy=policy, cells=cells, outcomes=Outcomes(**arrays), **counts)
 

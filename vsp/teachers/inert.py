@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 LARGEST = 2**21  # bytes of a description; the tensors of an agent take some 150 each
+MOST = 100_000  # opcodes of one
 _VALUES = set(
     """NONE INT LONG LONG1 BININT BININT1 BININT2 FLOAT BINFLOAT UNICODE BINUNICODE SHORT_BINUNICODE BINBYTES
     SHORT_BINBYTES BINBYTES8 BYTEARRAY8""".split()
@@ -48,7 +49,9 @@ def described(source: bytes | BinaryIO) -> Any:
     marks: list[int] = []
     memo: dict[int, Any] = {}
     value: Any
-    for opcode, value, _ in pickletools.genops(source):
+    for done, (opcode, value, _) in enumerate(pickletools.genops(source)):
+        if done > MOST:
+            raise ValueError(f"a description of more than {MOST} opcodes")
         match opcode.name:
             case name if name in _VALUES:
                 stack.append(value)

@@ -19,10 +19,12 @@ from .. import page, state_space, style
 from .scene import scene_of, to_json
 from .scripts import SCRIPT, STYLE
 
+# A browser runs what a page contains, and loads nothing from another host
+SECURITY = """<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline';
+script-src 'unsafe-inline'; img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'">"""
 _PAGE = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline';
-script-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'">
+{security}
 <title>{title}</title>
 <style>
 :root {{ color-scheme: light dark }}
@@ -44,7 +46,8 @@ def standalone(title: str, body: str, style: str = "") -> str:
     """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS.
 
     A browser loads nothing from elsewhere for it."""
-    return _PAGE.format(title=html.escape(title), body=body, style=STYLE + style, script=SCRIPT)
+    style = STYLE + style
+    return _PAGE.format(title=html.escape(title), body=body, style=style, script=SCRIPT, security=SECURITY)
 
 
 class Explorer:

@@ -2,7 +2,10 @@
 
 import sys
 
-from . import Refused, check
+from . import Refused
+from .certificates import check_content, read
+
+SAMPLED = ["MountainCarContinuous-v0"]  # one start of each block is played; the proof itself takes minutes
 
 
 def main() -> None:
@@ -11,7 +14,8 @@ def main() -> None:
         sys.exit("expected one or more certificates, such as data/beyond/proofs/*.json")
     for name in sys.argv[1:]:
         try:
-            print(name, "proves", check(name))
+            claim = check_content(content := read(name))
+            print(name, "agrees, in a sample, with" if content["task"] in SAMPLED else "proves", claim)
         except (Refused, OSError) as refusal:
             sys.exit(f"{name}: {refusal}")
 

@@ -14,27 +14,31 @@ CHECKS = {"SimpleGoal-v0": simplegoal, "MountainCarContinuous-v0": mountaincar, 
 
 def check(path) -> dict:
     """Return the claim of the certificate in `path`. Raises `Refused` if it is not proved."""
+    return check_content(read(path))
+
+
+def read(path) -> dict:
+    """Return the content of the certificate in `path`. Raises `Refused` if it is damaged."""
     with open(path, "rb") as file:
         seal, _, payload = file.read().partition(b"\n")
     if hashlib.sha256(payload).hexdigest().encode() != seal:
         raise Refused(f"{path}: the checksum in its first line is not that of the rest")
     try:
-        content = json.loads(payload)
+        return json.loads(payload)
     except (ValueError, RecursionError) as error:
         raise Refused(f"{path}: no certificate: {error!r:.300}") from error
-    return check_content(content)
 
 
 def check_content(content: dict) -> dict:
     """Return the claim of a certificate that was read. Raises `Refused` if it is not proved."""
     task = content.get("task") if isinstance(content, dict) else None
     if not isinstance(task, str) or task not in CHECKS:
-        raise Refused(f"the task is {task!r}, expected one of {sorted(CHECKS)}")
+        raise Refused(f"the task is {task!r:.60}, expected one of {sorted(CHECKS)}")
     try:
         check_numbers(**content["policy"])
         return CHECKS[task].check_content(content)
-    except (ValueError, TypeError, LookupError, ArithmeticError) as error:
-        raise Refused(f"the certificate is malformed: {error!r}") from error
+    except (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError) as error:
+        raise Refused(f"the certificate is malformed: {error!r:.300}") from error
 
 
 def check_numbers(codewords: list, coefficients: list, scale: list, metric: str) -> None:
