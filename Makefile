@@ -1,6 +1,6 @@
 # Everything that this project makes, with GNU make 3.81 or newer: `make help` shows the main targets, `make list` the rest.
 #
-# A notebook runs again when an input is newer than its stamp in build/stamps, or when an output is missing. Committed
+# A notebook runs again when an input is newer than its stamp in build/stamps, or when an output is not as made. Committed
 # files have the times of the checkout, so outputs are never compared with inputs: a fresh clone makes everything.
 
 # In an order in which no core waits
@@ -29,9 +29,9 @@ OUT ?= .
 JOBS := $(or $(value JOBS),$(shell getconf _NPROCESSORS_ONLN || echo 1))
 $(if $(strip $(value OUT)),,$(error OUT is empty, expected a folder, as in OUT=scratch))
 override OUT := $(if $(filter /% .%,$(firstword $(value OUT))),,./)$(value OUT)
-$(foreach v,JOBS DASK PYTHON QUICK AGENT AGENTS FILES,$(eval override $(v) := $$(value $(v))))
+$(foreach v,JOBS DASK PYTHON QUICK FORCE AGENT AGENTS FILES,$(eval override $(v) := $$(value $(v))))
 STAMPS := $(OUT)/build/stamps
-export OUT JOBS DASK PYTHON QUICK STAMPS AGENT AGENTS FILES
+export OUT JOBS DASK PYTHON QUICK FORCE STAMPS AGENT AGENTS FILES
 MAKEOVERRIDES :=
 PY := .venv/bin/python
 
@@ -53,16 +53,22 @@ ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train ve
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
 # $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp was made with this QUICK, no file of INPUTS is newer,
-# and no output is missing. The stamp has the time at which COMMAND began.
-once = stamp="$$STAMPS/$(1)"; test "$$(cat "$$stamp" 2> /dev/null)" = "quick=$$QUICK" \
-  && test -z "$$(find $(2) -type f ! -path '*__pycache__*' -newer "$$stamp" 2>&1 | head -n 1)" \
-  && (cd "$$OUT" && ls $(3)) > /dev/null 2>&1 || { echo "quick=$$QUICK" > "$$stamp.new" && $(4) && mv "$$stamp.new" "$$stamp"; }
+# and the checksums of OUTPUTS are those in the stamp, which has the time at which COMMAND began. What somebody edited or
+# damaged since, and git does not hold, is named and stays, or is made anew with FORCE=1.
+once = stamp="$$STAMPS/$(1)"; now() { echo "quick=$$QUICK"; (cd "$$OUT" && cksum $(3) 2>&1); }; found="$$(now)"; \
+  test "$$found" = "$$(cat "$$stamp" 2> /dev/null)" \
+  && test -z "$$(find $(2) -type f ! -path '*__pycache__*' -newer "$$stamp" 2>&1 | head -n 1)" || { \
+  for f in $$(test ! -f "$$stamp" || echo "$$found" | grep -vxFf "$$stamp" | sed -n 's/^[0-9]* [0-9]* //p'); do \
+    (cd "$$OUT" && git diff --quiet HEAD -- "$$f" && git ls-files --error-unmatch "$$f") > /dev/null 2>&1 && continue; \
+    test "$$FORCE" && rm "$$OUT/$$f" && continue; \
+    echo "error: $$OUT/$$f was edited or damaged since make made it: keep a copy; FORCE=1 makes it anew" >&2; exit 1; done; \
+  : > "$$stamp.new" && $(4) && now > "$$stamp.made" && touch -r "$$stamp.new" "$$stamp.made" && mv "$$stamp.made" "$$stamp"; }
 
 targets = awk -F ':.*\#\#$(1) ' '/^\#\# /{title = "\n" substr($$0, 4) "\n"} \
   /^[a-z-]+:.*\#\#$(1) /{printf "%s  %-15s %s\n", title, $$1, $$2; title = ""}' Makefile
 
 help:
-	@echo 'make TARGET [OUT=folder] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
+	@echo 'make TARGET [OUT=folder] [FORCE=1] [JOBS=processes] [DASK=tcp://scheduler:8786] [PYTHON=/path/to/python3.11]'
 	@echo 'Times are for 2 cores. The first target also sets up .venv (1 to 3 minutes, and 0.2 GB of downloads).'
 	@$(call targets,)
 
