@@ -3,8 +3,7 @@
 # A notebook runs again when an input is newer than its stamp in build/stamps, or when an output is not as made. Committed
 # files have the times of the checkout, so outputs are never compared with inputs: a fresh clone makes everything.
 
-# In an order in which no core waits
-PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables
+PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables # in an order in which no core waits
 BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents
 NOTEBOOKS := $(sort $(PAPER) $(BEYOND))
 USE_RUNS := 03_evaluation 04_appendix_tables 05_ledger
@@ -52,10 +51,9 @@ ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train ve
   test-js test-long test-tries lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
-# $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp was made with this QUICK, no file of INPUTS is newer,
-# and the checksums of OUTPUTS are those in the stamp, which has the time at which COMMAND began. What somebody edited or
-# damaged since, and git does not hold, is named and stays, or is made anew with FORCE=1.
-once = stamp="$$STAMPS/$(1)"; now() { echo "quick=$$QUICK"; (cd "$$OUT" && cksum $(3) 2>&1); }; found="$$(now)"; \
+# $(call once,NAME,INPUTS,OUTPUTS,COMMAND): COMMAND, unless its stamp, of the time at which it began, has this QUICK and the
+# checksums of OUTPUTS, and no file of INPUTS is newer. What was edited since, and git does not hold, stays without FORCE=1.
+once = stamp="$$STAMPS/$(1)"; now() { echo "quick=$$QUICK"; (cd "$$OUT" && cksum $(3) 2>&1 < /dev/null); }; found="$$(now)"; \
   test "$$found" = "$$(cat "$$stamp" 2> /dev/null)" \
   && test -z "$$(find $(2) -type f ! -path '*__pycache__*' -newer "$$stamp" 2>&1 | head -n 1)" || { \
   for f in $$(test ! -f "$$stamp" || echo "$$found" | grep -vxFf "$$stamp" | sed -n 's/^[0-9]* [0-9]* //p'); do \

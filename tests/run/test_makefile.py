@@ -32,7 +32,7 @@ def checkout(tmp_path):
 
 
 def start(checkout, *arguments, env=None):
-    of_make = ("MAKE", "MFLAGS", "OUT", "JOBS", "DASK", "QUICK", "FILES")  # of the make that runs the tests
+    of_make = ("MAKE", "MFLAGS", "OUT", "JOBS", "DASK", "QUICK", "FILES", "FORCE")  # of the make that runs the tests
     environ = {name: value for name, value in os.environ.items() if not name.startswith(of_make)}
     environ |= {"FAKE_REAL": sys.executable} | (env or {})
     command = ["make", f"PYTHON={checkout.parent / 'python'}", *arguments]
@@ -231,11 +231,20 @@ PAPER = ["01_teacher", "02_distillation", "03_evaluation", "04_appendix_tables",
 
 
 def test_a_notebook_runs_again_when_what_it_reads_is_newer_or_what_it_makes_is_missing(checkout, ran):
-    """Anybody's changed figure stays: outputs are not compared with inputs, whatever their times."""
+    """What somebody altered, or emptied, is named and stays, until FORCE=1."""
     assert ran("paper-figures") == PAPER and ran("paper-figures") == []
     figure = checkout / "figures" / "environments.pdf"
-    figure.write_text("altered")
-    assert ran("01_teacher") == ran("figures/environments.pdf") == []
+    for altered in ("altered", ""):
+        figure.write_text(altered)
+        said, status = make(checkout, "01_teacher")
+        assert status and "environments.pdf was edited or damaged since make made it" in said
+        assert figure.read_text() == altered and ran("01_teacher", "FORCE=1") == ["01_teacher"]
+    subprocess.run(
+        "git init -q; git add figures; git -c user.name=a -c user.email=a commit -qm a", shell=True, cwd=checkout
+    )
+    figure.write_text("pulled")
+    subprocess.run("git -c user.name=a -c user.email=a commit -qam b", shell=True, cwd=checkout)
+    assert ran("figures/environments.pdf") == ["01_teacher"] and ran("01_teacher") == []
     for name in ("notebooks/01_teacher.ipynb", "vsp/run/kernels.py", "data/paper/spread.csv", "environment.lock"):
         with open(checkout / name, "a") as file:
             file.write("# edited\n")
