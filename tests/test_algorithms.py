@@ -363,3 +363,17 @@ def test_golden_history(request):
     if run["cells"] == kept["cells"]:
         assert np.allclose(run["codewords"], kept["codewords"], atol=1e-6)
         assert np.allclose(run["coefficients"], kept["coefficients"], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("neighbours", "d", "slow"), [("delaunay", 9, True), ("lookup", 9, False), ("delaunay", 8, False)]
+)
+def test_many_inputs_warn_of_a_slow_triangulation(neighbours, d, slow, monkeypatch, recwarn):
+    task = dataclasses.replace(get_task(SIMPLEGOAL), low=np.zeros(d), inputs=tuple("abcdefghi"[:d]))
+    monkeypatch.setattr(vsp.algorithms, "distill", lambda *given, **named: (None, None))
+    config = dataclasses.replace(vsp.preset(SIMPLEGOAL), neighbours=neighbours)
+    monkeypatch.setattr(vsp, "agent", lambda teacher, task: teacher)
+    distill(CurvedTeacher(), task, config, seed=0, progress=False)
+    assert [str(one.message) for one in recwarn] == [
+        f"neighbours='delaunay' is slow with {d} inputs: 'lookup' is not"
+    ] * slow

@@ -262,14 +262,14 @@ def test_the_names_of_a_saved_policy_win_and_it_acts_even_if_its_task_is_not_reg
     "change",
     [
         {"codewords": np.zeros((6, 2))}, {"other": np.zeros(1)}, {"sub_policy": "spline"}, {"low": np.zeros(3)},
-        {"low": np.full(2, -9.0)}, {"inputs": "x, y"},
+        {"low": np.full(2, -9.0)}, {"inputs": "x, y"}, {"task": None}, {"sub_policy": []}, {"metric": {}},
     ],
 )  # fmt: skip
 def test_a_sealed_file_that_holds_no_policy_is_refused(change, tmp_path):
     random_policy().save(tmp_path / "p.vsp")
     arrays, about = sealed.load_arrays(tmp_path / "p.vsp", kind="VoronoiPolicy")
     for name, value in change.items():
-        (about if isinstance(value, str) else arrays)[name] = value
+        (arrays if isinstance(value, np.ndarray) else about)[name] = value
     sealed.save_arrays(tmp_path / "p.vsp", arrays, about)
     with pytest.raises(DamagedFile, match="p.vsp: the checksum is right, but the file (holds no|lacks or names)"):
         VoronoiPolicy.load(tmp_path / "p.vsp")

@@ -1,6 +1,7 @@
 import copy
 import ctypes
 import math
+import runpy
 import shutil
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ import vsp
 from studies import comparison
 from vsp_beyond.proofs import check, load_certificate, mountaincar
 from vsp_beyond.proofs.mountaincar import MountainCarProof, Program, first_steps, prove_mountaincar, run_block
+from vsp_beyond.proofs.proof import CERTIFICATES
 
 edge = check.mountaincar.edge
 
@@ -213,6 +215,12 @@ MUTANTS = {
     "end": no_end, "one": one_block, "left": more_left, "stuck": stuck, "nan": not_a_number, "mean": better_mean,
     "policy": other_policy,
 }  # fmt: skip
+
+
+def test_a_sample_is_not_called_a_proof(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["check", str(CERTIFICATES / "mountaincar_limit.json")])
+    runpy.run_module("vsp_beyond.proofs.check", run_name="__main__")
+    assert ".json agrees, in a sample, with {" in capsys.readouterr().out
 
 
 def test_the_checker_refuses_every_mutant():

@@ -306,10 +306,25 @@ def seal(path, payload):
 
 
 @pytest.mark.usefixtures("no_collection")
-@pytest.mark.parametrize("payload", [b"no JSON", b'{"task": []}', b"[" * 10**6])
+@pytest.mark.parametrize("payload", [b"no JSON", b'{"task": []}', b'{"task": "%s"}' % (b"x" * 9999), b"[" * 10**6])
 def test_a_sealed_file_that_is_no_certificate_is_refused(tmp_path, payload):
-    with pytest.raises(check.Refused):
+    with pytest.raises(check.Refused) as refused:
         check.check(seal(tmp_path / "x.json", payload))
+    assert len(str(refused.value)) < 1000
+
+
+@pytest.mark.parametrize("name", ["simplegoal_best_run", "mountaincar_limit", "pendulum_faithful"])
+@pytest.mark.parametrize("wrong", [None, [], "x", {"a": 1}, 10**400, [{"a": []}]], ids=repr)
+def test_a_certificate_with_wrong_types_is_refused(name, wrong):
+    certificate = load_certificate(name)[1]
+    policy = certificate["policy"]
+    parts = [(where, part) for where in (certificate, policy) for part in where]
+    for where, part in [*parts, (certificate["pieces"], 0), (policy["coefficients"][0], 0)]:
+        kept, where[part] = where[part], wrong
+        with pytest.raises(check.Refused) as refused:
+            check.check_content(certificate)
+        assert len(str(refused.value)) < 1000
+        where[part] = kept
 
 
 def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path, monkeypatch, capsys):

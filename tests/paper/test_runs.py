@@ -22,7 +22,7 @@ from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, make_runs, paper_results
 from vsp.paper.statistics import spread
 from vsp.protocol import job
-from vsp.run import atomic
+from vsp.run import atomic, sealed
 from vsp.tasks.base import GOAL, PIT, TRUNCATED
 
 CONFIG = support.tiny(n_epochs=30, n_freeze=5)
@@ -136,6 +136,16 @@ def test_a_file_of_another_experiment_is_refused(tmp_path, name, other, why):
         OF_A_RUN[name](SMALL, tmp_path)
     own.unlink()
     OF_A_RUN[name](SMALL, tmp_path)
+
+
+def test_a_run_whose_returns_are_no_numbers_is_refused(tmp_path):
+    make_runs(SMALL, [0], runs=tmp_path)
+    one = Distillation(SMALL, 0)
+    arrays, about = one.load(tmp_path)
+    arrays["returns"][3] = np.nan
+    sealed.save_arrays(one.path(tmp_path), arrays, about)
+    with pytest.raises(ValueError, match="0000.run: returns"):
+        one.run(tmp_path)
 
 
 def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):

@@ -154,7 +154,17 @@ def statistics(mark, sound):
     state = b"\x80\x04cstable_baselines3.common.vec_env.vec_normalize\nVecNormalize\n)\x81}\x8c\x07obs_rms"
     nested = bomb(lambda tuples: {"mean": tuples, "var": tuples})[11:-1]  # without its beginning and end
     system, claim = b"cposix\nsystem\n(Vtouch " + bytes(mark) + b"\ntR.", b"\x80\x04B\xff\xff\xff\x3fxxx"
-    return [pickle.dumps(Payload(mark)), system, bomb(), sound[:-40], b"]" * 2**24, claim, state + nested + b"sb."]
+    slow = b"\x80\x04N" + b"\x94" * 2**20 + b"."  # remembers the same value a million times
+    return [
+        pickle.dumps(Payload(mark)),
+        system,
+        bomb(),
+        sound[:-40],
+        b"]" * 2**24,
+        claim,
+        state + nested + b"sb.",
+        slow,
+    ]
 
 
 def test_crafted_files_are_refused_within_memory_and_time(small, tmp_path):
