@@ -20,9 +20,8 @@ from vsp.tasks import Task, get_task
 
 from .few_cells import Faithful, Tuned, faithful_preset, limit_preset, simplify, tuned_preset
 from .few_cells.config import check_kind
-from .few_cells.duration import expected_time
 from .few_cells.faithful import VERSION, distill_faithfully
-from .few_cells.limit import search_limit, whole_search
+from .few_cells.limit import search_limit
 from .few_cells.tuned import distill_tuned
 from .proofs import prove
 
@@ -31,7 +30,7 @@ def faithful(
     agent: Policy, task: str | Task, config: Faithful | None = None, *,
     n_cells: int | None = None, min_r2: float | None = None, seed: int, progress: bool = True,
 ) -> VoronoiPolicy:  # fmt: skip
-    """Distil `agent` to few cells that act like it and return as much, in any task. Prints how long it will take.
+    """Distil `agent` to few cells that act like it and return as much, in any task.
 
     `config` defaults to `faithful_preset(task)`. `n_cells` is the largest number of cells. Given `min_r2`, the policy
     has the highest return among those whose actions have at least this R² against the agent's. The same arguments give
@@ -44,7 +43,6 @@ def faithful(
     elif (n_cells, min_r2) != (None, None):
         raise ValueError("n_cells and min_r2 are settings of config, expected either these or a config")
     check_kind(config, Faithful)
-    print(f"distilling for {task.name}: {expected_time(task, config)}")
     with shown(progress):
         policy = distill_faithfully(agent, task, config, seed=seed)[0]
         played = config.n_episodes + 2 * config.n_validation
@@ -64,8 +62,7 @@ def faithful_method(**options) -> Method:
 def tuned(
     agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int, progress: bool = True
 ) -> VoronoiPolicy:
-    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it. Prints how long it will
-    take.
+    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it.
 
     `config` defaults to `tuned_preset(task)`. The same arguments give the same policy. Raises ValueError if the agent
     does not fit the task.
@@ -74,7 +71,6 @@ def tuned(
     config = tuned_preset(task) if config is None else config
     check_kind(config, Tuned)
     agent = agent if config.criticality else as_agent(agent)  # which would hide the critics
-    print(f"distilling for {task.name}: {expected_time(task, config)}")
     with shown(progress):
         return distill_tuned(agent, task, config, seed=seed)[0]
 
@@ -82,7 +78,7 @@ def tuned(
 def at_the_limit(
     task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None, progress: bool = True
 ) -> VoronoiPolicy:
-    """Search for at most `config.n_cells` cells whose return is as high as possible. Prints how long it will take.
+    """Search for at most `config.n_cells` cells whose return is as high as possible.
 
     `config` defaults to `limit_preset(task)`. `teacher` defaults to the best policy if it is known, else to the shipped
     teacher; for other tasks it is needed. For a task with a physics engine, which is played in fewer episodes, two
@@ -92,7 +88,6 @@ def at_the_limit(
     task = get_task(task)
     config = limit_preset(task) if config is None else config
     check_kind(config, Tuned)
-    print(f"searching for {task.name}: {expected_time(task, whole_search(task, config))}")
     with shown(progress):
         return search_limit(task, config, seed=seed, teacher=None if teacher is None else as_agent(teacher))
 

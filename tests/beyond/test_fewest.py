@@ -91,8 +91,9 @@ def test_an_input_that_hardly_varies_gets_no_large_weight(tmp_path):
     labelled = module.Scaling(None, states.mean(axis=0), np.append(states.std(axis=0)[:2], 1.0))
     task = dataclasses.replace(get_task(PENDULUM), action_low=-np.ones(1), action_high=np.ones(1))
     labelled = dataclasses.replace(labelled, task=task).labelled(states, actions)
+    labelled = dataclasses.replace(labelled, ridge=module.RIDGE)
     for k in (1, 2):
-        cells = module.least_error(labelled, k, 2, np.random.default_rng(0), ridge=module.RIDGE)
+        cells = module.least_error(labelled, k, 2, np.random.default_rng(0))
         assert np.abs(cells.coefficients[:, 1]).max() < 0.1 and np.abs(cells.coefficients[:, 2]).max() < 1e-9
 
 

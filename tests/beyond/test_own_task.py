@@ -97,8 +97,6 @@ def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
     policies = [vsp_beyond.faithful(own_tasks.tank_pilot, "Tank-v0", n_cells=2, seed=0),
                 vsp_beyond.tuned(own_tasks.tank_pilot, "Tank-v0", seed=0),
                 vsp_beyond.at_the_limit("Tank-v0", seed=0, teacher=own_tasks.tank_pilot)]  # fmt: skip
-    said = capsys.readouterr().out.splitlines()
-    assert [line.split(" for Tank-v0: some ")[0] for line in said] == ["distilling", "distilling", "searching"]
     assert all(policy.task.name == "Tank-v0" for policy in policies)
     method, task = vsp_beyond.faithful_method(n_cells=2), vsp.get_task("Tank-v0")  # the same for `vsp.compare`
     again = method(vsp.agent(own_tasks.tank_pilot), task, None, 0)

@@ -2,16 +2,12 @@ import ast
 import dataclasses
 import inspect
 
-import pandas as pd
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
-from studies.comparison import RESULTS
 from vsp.config import Config
 from vsp_beyond import Faithful, Tuned, faithful_preset, limit_preset, tuned_preset
-from vsp_beyond.few_cells import duration
-from vsp_beyond.few_cells.limit import whole_search
 
 TRIED = (SIMPLEGOAL, MOUNTAINCAR, PENDULUM, LUNARLANDER)
 
@@ -58,20 +54,3 @@ def test_every_field_says_what_it_is(kind):
         if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
     }
     assert documented == {field.name for field in dataclasses.fields(kind)}
-
-
-# How long it will take
-
-
-@pytest.mark.parametrize("table", ["faithful_seconds", "faithful_seconds_long", "limit_seconds", "limit_seconds_long"])
-def test_committed_searches_took_as_long_as_is_said(table):
-    for row in pd.read_csv(RESULTS / f"{table}.csv").itertuples():
-        task = vsp.get_task(row.task)
-        preset = faithful_preset(task) if "faithful" in table else whole_search(task, limit_preset(task))
-        low, high = duration.expected_seconds(task, dataclasses.replace(preset, n_cells=row.size))
-        assert low < row.seconds < high, row
-
-
-def test_a_time_in_words():
-    words = [duration.in_words(seconds) for seconds in (0.3, 18.0, 89.0, 100.0, 7200.0)]
-    assert words == ["2 seconds", "18 seconds", "89 seconds", "2 minutes", "2 hours"]

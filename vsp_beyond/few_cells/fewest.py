@@ -60,7 +60,7 @@ class Seen:
         warn_outside(self.task, states)
         scaling = Scaling.of(self.task, states)
         states = states[spread(states / scaling.scale, self.config.n_states, init)]
-        return scaling, scaling.labelled(states, self.agent.predict(states)[0])
+        return scaling, replace(scaling.labelled(states, self.agent.predict(states)[0]), ridge=RIDGE)
 
     @cached_property
     def best_constant(self) -> float:
@@ -106,7 +106,7 @@ class Stage(Job):
             policy = distill_faithfully(self.seen.agent, self.seen.task, config, seed=self.seed)[0]
         else:
             (scaling, labelled), rng = self.seen.labelled, np.random.default_rng([self.seed, self.n_cells])
-            cells = least_error(labelled, self.n_cells, self.seen.config.n_restarts, rng, ridge=RIDGE)
+            cells = least_error(labelled, self.n_cells, self.seen.config.n_restarts, rng)
             policy = scaling.policy(cells.among(labelled.states).by_visits(labelled.states))
         return {"codewords": policy.codewords, "coefficients": policy.coefficients, "scale": policy.scale}, {}
 

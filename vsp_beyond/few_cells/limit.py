@@ -53,7 +53,7 @@ def limit_preset(task: str | Task) -> Tuned:
 
 
 def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy | None = None) -> VoronoiPolicy:
-    """Do what `vsp_beyond.at_the_limit` does, without a word about the time."""
+    """Do what `vsp_beyond.at_the_limit` does."""
     check_seed(seed)
     task = get_task(task)
     teacher = _best_teacher(task) if teacher is None else teacher
@@ -68,13 +68,6 @@ def search_limit(task: str | Task, config: Tuned, *, seed: int, teacher: Policy 
     for further in seeds[n_starts:] if task.one_by_one else ():
         best = _tuned(best, teacher, task, again, further)
     return best
-
-
-def whole_search(task: Task, config: Tuned) -> Tuned:
-    """Return settings of one search that takes as long as all of `search_limit`, for `expected_time`."""
-    n_starts, n_again = (N_SLOW, N_AGAIN) if task.one_by_one else (N_STARTS, 0)
-    n_generations = round((1 + SCREENING * n_starts + AGAIN * n_again) * config.n_generations)
-    return replace(config, n_generations=n_generations, n_restarts=config.n_restarts * n_starts)
 
 
 def _best_teacher(task: Task) -> Policy:

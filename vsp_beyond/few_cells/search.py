@@ -29,20 +29,15 @@ NUDGE = 0.05  # move of a codeword that shows the curvature of the error, in dev
 RIDGE = 1e-4  # ridge of `uncorrelated`: states of unit size added per state
 
 
-def least_error(
-    labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator, *, ridge: float = 0.0
-) -> ScaledCells:
-    """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find.
-
-    `ridge` is the weight of squared slopes in the error of a descent.
-    """
+def least_error(labelled: LabelledStates, n_cells: int, n_starts: int, rng: np.random.Generator) -> ScaledCells:
+    """Return the cells with the least `squared_error` on `labelled` that `n_starts` descents find."""
     some = labelled.thinned(FEW, rng)
     live = [local_init(some, n_cells, rng) for _ in range(n_starts)]
     for stages, n_kept in ROUNDS:
         tried = steps(live, f"fits with {n_cells} cells", total=len(live), unit="starts")
-        ends = [descend(some, cells, stages, ridge=ridge) for cells in tried]
+        ends = [descend(some, cells, stages) for cells in tried]
         live = sorted(ends, key=lambda cells: squared_error(labelled, cells))[:n_kept]
-    return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST, ridge=ridge))
+    return distinct(descend(labelled, live[0], LAST, n_iterations=N_LAST))
 
 
 def distinct(cells: ScaledCells) -> ScaledCells:
@@ -66,30 +61,22 @@ def local_init(labelled: LabelledStates, k: int, rng: np.random.Generator) -> Sc
 
 
 def descend(
-    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS,
-    ridge: float = 0.0,
-) -> ScaledCells:  # fmt: skip
+    labelled: LabelledStates, cells: ScaledCells, stages: range, *, n_iterations: int = N_ITERATIONS
+) -> ScaledCells:
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
     for stage in stages:
-        cells = _descend_at(stage, labelled, cells, n_iterations, ridge)
+        cells = _descend_at(stage, labelled, cells, n_iterations)
     return cells
 
 
-def _descend_at(
-    stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int, ridge: float
-) -> ScaledCells:
+def _descend_at(stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int) -> ScaledCells:
     temperature = temperature_unit(labelled, len(cells)) * TEMPERATURES[stage]
     bases = uncorrelated(labelled, cells.shares(labelled.states, temperature))
     move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
 
     def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        moved = move(step)
-        value, gradient = whole_loss(moved, labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
-        if ridge:
-            slopes = moved.coefficients * (np.arange(moved.coefficients.shape[1]) < moved.codewords.shape[1])[:, None]
-            value, gradient = value + ridge * np.square(slopes).sum(), gradient.copy()
-            gradient[moved.codewords.size :] += 2 * ridge * slopes.ravel()
+        value, gradient = whole_loss(move(step), labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
         return value, pull_back(gradient)
 
     options = {"maxiter": n_iterations, "maxcor": 20}
@@ -97,13 +84,18 @@ def _descend_at(
 
 
 def whole_loss(cells: ScaledCells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
-    """Compute `expected_loss` of all states, some at a time."""
+    """Compute `expected_loss` of all states, some at a time, and the ridge."""
     n, value, gradient = len(labelled.inputs), 0.0, np.zeros(cells.vector.size)
     step = max(1, AT_ONCE // (len(cells) * labelled.actions.shape[1]))
     for i in range(0, n, step):
         inputs, actions = labelled.inputs[i : i + step], labelled.actions[i : i + step]
         part, its_gradient = expected_loss(cells, inputs, actions, **about)
         value, gradient = value + len(inputs) / n * part, gradient + len(inputs) / n * its_gradient
+    if labelled.ridge:
+        slopes = cells.coefficients.copy()
+        slopes[:, -1] = 0.0  # the bias is free
+        value += labelled.ridge * np.square(slopes).sum()
+        gradient[cells.codewords.size :] += 2 * labelled.ridge * slopes.ravel()
     return value, gradient
 
 

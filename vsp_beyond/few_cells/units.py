@@ -170,6 +170,7 @@ class LabelledStates:
     inputs: np.ndarray  # (n, d + 1), the last column ones
     actions: np.ndarray  # (n, m)
     criticality: np.ndarray | None = None  # (n,) what a wrong action costs there; None: the same everywhere
+    ridge: float = 0.0  # weight of squared slopes in the error of a descent
 
     @property
     def states(self) -> np.ndarray:
@@ -179,13 +180,13 @@ class LabelledStates:
     def thinned(self, n: int, rng: np.random.Generator) -> LabelledStates:
         """Return n of these states, as dense as all of them (`spread`)."""
         rows = spread(self.states, n, rng)
-        parts: list = [part if part is None else part[rows] for part in vars(self).values()]
-        return LabelledStates(*parts)
+        weights = None if self.criticality is None else self.criticality[rows]
+        return LabelledStates(self.inputs[rows], self.actions[rows], weights, self.ridge)
 
     def with_more(self, other: LabelledStates) -> LabelledStates:
         """Return these states, then those of `other`."""
         pairs = zip(vars(self).values(), vars(other).values())
-        parts: list = [one if one is None else np.concatenate([one, two]) for one, two in pairs]
+        parts: list = [np.concatenate([one, two]) if isinstance(one, np.ndarray) else one for one, two in pairs]
         return LabelledStates(*parts)
 
     def draw(self, size: int, rng: np.random.Generator) -> Callable[[], np.ndarray]:
