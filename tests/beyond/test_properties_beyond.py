@@ -9,7 +9,6 @@ from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, tiny
 
 import vsp
 import vsp_beyond
-from vsp_beyond.explain import RulePolicy, describe_rules, find_rules
 from vsp_beyond.optimum import best_policy, best_returns
 from vsp_beyond.proofs import largest_disturbance, steps_to_goal
 
@@ -26,7 +25,6 @@ faithful = Argument(FAITHFUL, [3, "faithful", tiny(), TUNED, {}, np.nan])
 tuned = Argument(TUNED, [3, "tuned", tiny(), FAITHFUL, {}, np.nan])
 STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
 TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
-of_rules = {"states": array(STATES, nonempty=True), "unseen": array(STATES, nonempty=True)}
 FLAT = vsp.VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 1, 1)), task=MOUNTAINCAR, sub_policy="constant")
 
 CASES = {
@@ -40,9 +38,6 @@ CASES = {
         vsp_beyond.simplify,
         {"teacher": teacher, "task": task, "config": tuned, "tolerance": number(1.0, least=0), "seed": seed},
     ),
-    "explain.find_rules": (functools.partial(find_rules, TWO), of_rules),
-    "explain.describe_rules": (functools.partial(describe_rules, TWO), of_rules),
-    "explain.RulePolicy.predict": (RulePolicy(TWO, find_rules(TWO, STATES, STATES)[0]).predict, {"obs": array(STATES)}),
     "optimum.best_returns": (best_returns, {"starts": array(STATES)}),
     "optimum.best_policy": (
         best_policy,

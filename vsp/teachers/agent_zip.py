@@ -156,7 +156,6 @@ def _tensor(storage: bytes, view: _View) -> np.ndarray:
     """Return a tensor that owns its memory. Raises ValueError unless it lies in a storage of the length described."""
     last = view.offset + sum((n - 1) * step for n, step in zip(view.size, view.stride, strict=True))
     if len(storage) != view.elements * view.dtype.itemsize or (last >= view.elements and 0 not in view.size):
-        text = f"a storage of {len(storage)} bytes, described with {view.elements} elements"
-        raise ValueError(f"a tensor ends at element {last} of {text}")
+        raise ValueError(f"a tensor ends at element {last}, of {view.elements} in {len(storage)} bytes")
     strides = [step * view.dtype.itemsize for step in view.stride]
     return np.ndarray(view.size, view.dtype, storage, view.offset * view.dtype.itemsize, strides).copy()

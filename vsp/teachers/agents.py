@@ -73,9 +73,7 @@ def agent(
         raise ValueError(f"the agent is {source!r}, expected a file, something with `predict`, or a function")
     if isinstance(source, Agent | Teacher | PiecewisePolicy):
         if normalize is not None:
-            raise ValueError(
-                f"normalize for {type(source).__name__}, expected none: it belongs to a model or a function"
-            )
+            raise ValueError(f"normalize for {type(source).__name__}, expected none: it belongs to a model or function")
         return source
     from . import normalization  # here: most teachers are shipped
 

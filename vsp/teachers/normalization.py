@@ -115,9 +115,7 @@ def _wrappers(model: Any) -> list[Any]:
         env = inner
     elsewhere = None if hasattr(env, "envs") else getattr(env, "has_attr", None)
     if elsewhere and elsewhere("obs_rms"):
-        raise ValueError(
-            "the model's environments normalise observations elsewhere: expected normalize=(mean, variance)"
-        )
+        raise ValueError("the model's environments normalise elsewhere: expected normalize=(mean, variance)")
     env = next(iter(getattr(env, "envs", ())), None)
     while env is not None:
         found += [env] if "obs_rms" in vars(env) else []
@@ -131,9 +129,8 @@ def checked(moments: dict, epsilon: float, clip: float, d: int, where: str) -> N
         raise ValueError(f"{where}: statistics of a dictionary of observations, expected those of one array of {d}")
     mean, variance = (check_array(f"{where}: {name}", moments[name], (d,)) for name in ("mean", "var"))
     if (variance < 0).any() or not 0 <= epsilon < np.inf or not (variance + epsilon > 0).all() or not clip > 0:
-        raise ValueError(
-            f"{where}: variance {variance.tolist()}, epsilon {epsilon}, clip {clip}, expected positive ones"
-        )
+        said = f"variance {variance.tolist()}, epsilon {epsilon}, clip {clip}"
+        raise ValueError(f"{where}: {said}, expected positive ones")
     return Normalization(mean, variance, epsilon, clip)
 
 
