@@ -37,19 +37,19 @@ def episodes(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
         every = -(-len(episode.states) // MOMENTS)
         states = episode.states[::every]
         begun = f"seed {start[0]:.0f}" if task.one_by_one else "start " + ", ".join(f"{x:.3g}" for x in start)
-        name = f"{f'{i}. of the worst' if i else 'typical'}: return {played.returns[i]:.5g}, {begun}"
+        name = f"{f'{i}. of the worst' if i else 'median'}: return {played.returns[i]:.5g} "
+        name += f"(agent: {alike.returns['agent'][chosen[i]]:.5g}), {begun}{f', each {every} steps' * (every > 1)}"
         theirs = np.asarray(agent.predict(states)[0], np.float64)
         shown.append({"name": name, "every": every, "states": _short(states), "agent": _short(theirs)})
     weights = np.abs(policy.coefficients[:, :-1]).max(axis=(0, 2))
     curves = np.sort(np.argsort(-weights * alike.states.std(axis=0), kind="stable")[:CURVES])
     scene = {"task": task_of(task), "policies": [numbers_of(policy, "policy")], "episodes": shown}
     text = to_json(scene | {"curves": curves.tolist()}).replace("<", "\\u003c")  # no tag ends here
-    words = (
-        "Colours say which cell acts. Of the actions, the thin curve is the policy's, the blue one the agent's in the "
-    )
-    words += "same states. Touch a moment to ask why."
+    words = "The policy plays. The strip has the colours of the cells that act. Of the actions, the thin curve is the "
+    words += "policy's, the blue one the agent's in the same states. Touch a moment to ask why."
     element = f'<div class="vsp-episodes"><script type="application/json">{text}</script></div>'
-    return f"<h2>Episodes</h2><p>{words}</p>{element}{frames(policy, task, starts[0], played.lengths[0])}"
+    strip = frames(policy, task, starts[0], played.lengths[0])
+    return f"<h2>Episodes</h2><p>{words}</p>{element}{strip and f'<p>The median episode:</p>{strip}'}"
 
 
 def _short(values: np.ndarray) -> list:
@@ -71,5 +71,5 @@ def frames(policy: Policy, task: Task, start: np.ndarray, length: int) -> str:
             seen = env.step(policy.predict(seen)[0].astype(env.action_space.dtype))[0]
         env.close()
         Image.fromarray(np.concatenate(images, axis=1)).save(file, "PNG")
-        return embedded(file.getvalue(), "Frames of the typical episode, evenly spaced in time.", width=FRAMES * PIXELS)
+        return embedded(file.getvalue(), "Frames of the median episode, evenly spaced in time.", width=FRAMES * PIXELS)
     return ""

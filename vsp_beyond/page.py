@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import html
+import json
 import math
+import re
 import subprocess
 import sys
 import tempfile
@@ -19,7 +21,7 @@ from vsp.evaluation import CLOSE, Likeness, likeness
 from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
-from vsp.show.explorer import PLANES, explore, standalone
+from vsp.show.explorer import PLANES, SCRIPT, explore, standalone
 from vsp.tasks import Task, get_task
 
 from .device import to_c, to_header
@@ -29,6 +31,7 @@ from .proofs import PROVERS
 
 MOST_INPUTS = 8  # in an equation; of more, the five that move the action most
 PROOF_SECONDS = 60
+TINTS = json.loads(re.findall(r"CELLS = (\[.*?\])", SCRIPT)[0])  # colours of cells
 _PROVE = "import sys, vsp, vsp_beyond; print(vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1])))"
 _STYLE = """body { line-height: 1.5 }
 table { border-collapse: collapse }
@@ -58,9 +61,10 @@ def report(
     acts = "is imitated, but not closely, by" if alike.poor else "acts like"
     what = f"{len(policy)} cells with a map each" if len(policy) > 1 else "one equation"
     what = "one map: an equation for each action" if len(policy) == 1 < len(task.outputs) else what
-    lines = "".join(f"<p><strong>{html.escape(line)}</strong></p>" for line in remarks.splitlines())
+    lines = "".join(f"<p>Note: {html.escape(line)}</p>" for line in remarks.splitlines())
+    undefined = "; failures are not defined" * (alike.failures["policy"] is None)
     parts = [
-        f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(str(alike))}.</p>",
+        f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(f'{alike}{undefined}')}.</p>",
         lines, _cards(policy, alike), _sizes(tried, policy), _played(policy, agent, alike), _numbers(policy, alike),
         _worst(policy, agent, alike), _kept(policy, alike.states, until),
     ]  # fmt: skip
@@ -114,9 +118,10 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
         text = "<br>".join(html.escape(line) for line in _equations(policy, cell, alike.states[here]))
         close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
-        place = f"<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{html.escape(where)}<br>"
+        mark = f'<i class="vsp-mark" style="border-radius: 0; background: {TINTS[cell % len(TINTS)]}"></i>'
+        place = f"{mark}<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{html.escape(where)}<br>"
         cards += f"<div>{place * (len(policy) > 1)}{text}</div>"
-    about = policy.where.about(policy.task.inputs, 3) if len(policy) > 1 else ""
+    about = f"In each state one cell acts. {policy.where.about(policy.task.inputs, 3)}" if len(policy) > 1 else ""
     if len(policy.policy_class.terms) > MOST_INPUTS:
         about += f"{'. ' * bool(about)}An equation shows the five inputs that move the action most, and the others at "
         about += "their mean; in brackets, the share of the action's variance that this hides"
@@ -131,12 +136,18 @@ def _equations(policy: PiecewisePolicy, cell: int, states: np.ndarray) -> tuple[
     weights, lines = policy.coefficients[cell], []
     for j, output in enumerate(policy.task.outputs):
         terms = policy.policy_class.features(states) * weights[:-1, j]
-        order = np.argsort(-terms.std(axis=0), kind="stable")
-        shown, rest = order[:5], terms[:, order[5:]].sum(axis=1)
-        hidden = rest.var() / (terms.sum(axis=1).var() or 1.0)
-        text = " ".join(f"{weights[i, j]:+.3g} {names[i]}" for i in shown)
-        lines.append(f"{output} = {text} {weights[-1, j] + rest.mean():+.3g} (hides {hidden:.1%})")
+        rest, text = terms.sum(axis=1), ""
+        whole, left = rest.var() or 1.0, list(range(terms.shape[1]))
+        for _ in range(5):  # each time the one without which the rest varies least
+            best = np.argmin([(rest - terms[:, i]).var() for i in left])
+            i = left.pop(int(best))
+            rest, text = rest - terms[:, i], f"{text}{_signed(weights[i, j])} · {names[i]} "
+        lines.append(f"{output} = {text}{_signed(weights[-1, j] + rest.mean())} (hides {rest.var() / whole:.1%})")
     return tuple(lines)
+
+
+def _signed(value: float) -> str:
+    return f"{'−' if value < 0 else '+'} {abs(value):.3g}"
 
 
 def _played(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:

@@ -23,7 +23,7 @@ def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):
     monkeypatch.setattr(page, "_PROVE", "print('a theorem <b>')")
     made = vsp_beyond.report(TWO, PumpingTeacher(), MOUNTAINCAR, name="<script>alert(1)</script>", remarks="few <i>")
     assert "F = 0.000 x + 0.000 v + 1.000" in made and "a theorem &lt;b&gt;" in made and "few &lt;i&gt;" in made
-    assert "<script>alert" not in made and "<p>Manhattan distances.</p>" in made
+    assert "<script>alert" not in made and "<p>In each state one cell acts. Manhattan distances.</p>" in made
     assert not re.search(r"(src|href)=\"(?!data:)", made) and len(made) < 2_000_000
     (code,) = re.findall(r'download="policy.vsp" href="data:[^,]*,([^"]*)"', made)
     (tmp_path / "x.vsp").write_bytes(base64.b64decode(code))
@@ -35,7 +35,7 @@ def test_of_a_task_that_a_browser_cannot_play_it_shows_episodes():
     made = vsp_beyond.report(policy, Constant(0.0, 0.0), LUNARLANDER)
     assert "<h2>Explore" not in made and made.count("application/json") == 1
     assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "<h2>Where do they differ", "Cell 0<"))
-    assert "of the worst: return" in made and "seed " in made and "Frames of the typical episode" in made
+    assert "of the worst: return" in made and "seed " in made and "The median episode:" in made
     scene = json.loads(re.findall(r'application/json">(.*?)</script>', made)[0])
     assert [len(scene["episodes"]), len(scene["curves"])] == [4, 4] and len(scene["episodes"][0]["states"]) <= 400
 
@@ -104,5 +104,5 @@ def test_an_equation_of_many_inputs_shows_five_and_says_what_it_hides():
     policy = vsp.VoronoiPolicy([np.zeros(9)], np.stack([weights, weights], axis=1)[None], task=task)
     states = np.vstack([np.eye(9), -np.eye(9)]) * 3 / 2**0.5 + 1
     (line, _) = page._equations(policy, 0, states)
-    assert line == "Δx = +9 a +8 b +7 c +6 d +5 e +12 (hides 10.5%)"
+    assert line == "Δx = + 9 · a + 8 · b + 7 · c + 6 · d + 5 · e + 12 (hides 10.5%)"
     assert page._equations(TWO, 0, states[:, :2]) == TWO.equations(0)

@@ -152,7 +152,7 @@ def test_a_storage_must_have_the_length_that_is_described(old, tmp_path):
     size = sum(4 * tensor.numel() for tensor in tensors.values())
     cut = policy[: 4 - size] if old else saved(tensors, **{"0": b""})
     rewritten(tmp_path / "sac.zip", tmp_path / "cut.zip", policy_pth=cut)
-    with pytest.raises(ValueError, match=r"cut.zip: .*a storage of \d+ bytes, described with \d+ elements"):
+    with pytest.raises(ValueError, match=r"cut.zip: .*a tensor ends at element \d+, of \d+ in \d+ bytes"):
         load_teacher(tmp_path / "cut.zip", SIMPLEGOAL)
 
 

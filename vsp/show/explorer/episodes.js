@@ -9,6 +9,7 @@ import { answerOf } from "./texts.js"
 
 const [BAND, ROW, TEXT] = [14, 72, 26] // pixels: the band of the cells, a curve, its name
 const STEPS = 150 // tried on each side of an input, up to its range in the episodes
+const CLOSE = 0.05 // of an action's range
 const CHANGES = 3 // inputs that are named in a sentence
 
 /** What one sees and asks at a moment of one of `scene.episodes`. */
@@ -26,10 +27,7 @@ export class Episodes {
     this.scene = scene
     this.policy = ready(policies[0])
     const all = episodes.flatMap(({ states }) => states)
-    this.ranges = task.inputs.map((_, i) => {
-      const [least, most] = ends(all.map(state => state[i]))
-      return most - least
-    })
+    this.ranges = task.inputs.map((_, i) => ends(all.map(state => state[i])))
     const input = () => this.show(+this.slider.value)
     this.slider = element("input", { type: "range", min: 0, "aria-label": "moment", input })
     const touch = (/** @type {PointerEvent} */ { clientX, buttons, type }) => {
@@ -102,14 +100,17 @@ export class Episodes {
   }
 
   /** The smallest changes of a single input for which `changed` holds, as found on a grid.
-   * @param {Vector} state @param {(seen: Vector) => boolean} changed */
+   * @param {Vector} state @param {(seen: Vector) => string | boolean} changed may add words */
   changes(state, changed) {
     const found = this.scene.task.inputs.map((name, i) => {
-      for (let n = 1; n <= STEPS && this.ranges[i]; n++)
-        for (const sign of ["+", "−"]) {
-          const by = (n / STEPS) * this.ranges[i],
-            there = state.with(i, state[i] + (sign === "+" ? by : -by))
-          if (changed(there)) return { n, words: `${name} ${sign} ${digits(by)}` }
+      const [low, high] = this.ranges[i]
+      for (let n = 1; n <= STEPS && low < high; n++)
+        for (const way of ["more", "less"]) {
+          const by = (n / STEPS) * (high - low),
+            there = state.with(i, state[i] + (way === "more" ? by : -by)),
+            said = there[i] >= low && there[i] <= high && changed(there)
+          const words = `${name} were ${digits(by)} ${way}${said === true ? "" : said}`
+          if (said) return { n, words }
         }
       return { n: 0, words: "" }
     })
@@ -128,14 +129,21 @@ export class Episodes {
     /** @type {(what: string, told: string) => Node} */
     const line = (what, told) => element("p", {}, element("b", {}, `${what}: `), `${told}.`)
     const why = answerOf({ scene, policy, cell, cells, asked: state, task: { see: seen => seen } })
-    const lines = [line(`Step ${at * episode.every}`, `the agent's action is ${theirs}`), ...why],
-      moved = (/** @type {Vector} */ seen) => then(seen).cell !== cell
-    if (cells > 1) lines.push(line("Another cell if", this.changes(state, moved)))
+    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`),
+      lines = [step, ...why],
+      cellAt = (/** @type {Vector} */ seen) => then(seen).cell,
+      moved = (/** @type {Vector} */ seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`,
+      apart = (/** @type {number} */ k) => Math.abs(action[k] - episode.agent[at][k]),
+      differ = outputs.filter((_, k) => apart(k) > CLOSE * (actionHigh[k] - actionLow[k]))
+    const only = `${differ.join(", ")} differ, so what follows explains the policy alone`
+    if (differ.length) lines.splice(1, 0, line("Not as the agent", only))
+    if (cells > 1) lines.push(line("Another cell would act if", this.changes(state, moved)))
     outputs.forEach((name, k) => {
       const middle = (actionLow[k] + actionHigh[k]) / 2,
         above = action[k] >= middle,
         other = this.changes(state, seen => then(seen).action[k] >= middle !== above)
-      lines.push(line(`${name} ${above ? "below" : "above"} ${minus(String(middle))} if`, other))
+      const side = `${above ? "below" : "above"} ${minus(String(middle))}`
+      lines.push(line(`${name} would be ${side} if`, other))
     })
     return lines
   }
