@@ -19,12 +19,13 @@ from .names import named
 from .page import report
 
 MOST_SAID = 500  # characters of an error
-PAGE_SECONDS = 10  # kept for the page, at most a third of all
+PAGE_SECONDS = 10  # kept for the page and its proof, at most a third of all
+END_SECONDS = 3  # kept for what follows the proof
 
 
 def main() -> None:
     """Distil an agent to as few cells as act like it, and write one page about both: equations, episodes, returns."""
-    begun = time.monotonic()
+    begun = time.monotonic() - time.process_time()  # importing takes seconds, too
     parser = argparse.ArgumentParser(prog="python -m vsp_beyond", description=main.__doc__)
     parser.add_argument("agent", help="a zip of Stable-Baselines3 or sb3-contrib, or the name of a shipped teacher")
     parser.add_argument("task", help="a task of vsp or of Gymnasium's registry, also as module:Name-v0")
@@ -42,7 +43,7 @@ def main() -> None:
         if not 0 < given.minutes <= 1e6:
             raise ValueError(f"--minutes is {given.minutes:g}, expected a number above 0")
         atomic.begin(given.out).unlink()  # what would stop the page at the end stops it now
-        task, until = named(vsp.get_task(given.task), given.names), begun + 60 * given.minutes
+        task, until = named(vsp.get_task(given.task), given.names), begun + 60 * given.minutes - END_SECONDS
         with warnings.catch_warnings(record=True) as said, shown():
             warnings.simplefilter("always", UserWarning)
             agent = vsp.agent(given.agent, task, normalize=False if given.normalize == "no" else given.normalize)

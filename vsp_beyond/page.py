@@ -156,7 +156,7 @@ def _played(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     if not (linear and isinstance(policy, VoronoiPolicy) and policy.where.metric.order is not None):
         return "<p>No episode is shown: that takes linear maps, and codewords with a Minkowski distance.</p>"
     seen = episodes(policy, agent, alike)
-    return seen + (f"<h2>Explore</h2>{explore(policy, teacher=agent).element()}" if policy.task.name in PLANES else "")
+    return seen + (f"<h2>Explore</h2>{explore(policy).element()}" if policy.task.name in PLANES else "")
 
 
 def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:

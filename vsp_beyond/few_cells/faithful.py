@@ -128,8 +128,9 @@ class _Candidates:
         if min_r2 is not None and best["r2"] < min_r2:
             return f"no policy of {k} cells with R² {min_r2:g} was found: the closest is kept, R² {best['r2']:.3f}"
         if min_r2 is None and best["gap"] < self.least_gap:
-            what = f"{best['gap']:+.4g} to the teacher's return less penalties, expected {self.least_gap:+.4g} or more"
-            return f"no policy of {k} cells that acts like the teacher returns enough: the best has a gap of {what}"
+            each = f" ({cost:g} less for each that fails)" if (cost := self.config.failure_penalty) else ""
+            what = f"{best['gap']:+.4g} an episode{each}, expected {self.least_gap:+.4g} or more"
+            return f"no policy of {k} cells acts like the agent and returns as much: the best differs by {what}"
         return None
 
     def history(self) -> pd.DataFrame:

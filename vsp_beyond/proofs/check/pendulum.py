@@ -32,8 +32,8 @@ def check_content(content: dict) -> dict:
     proved = {"n": n, "proved": int((starts != 0).sum()), "starts": starts.size, "longest": int(numbers.max())}
     if claim != proved:
         raise Refused(f"the boxes prove {proved}, but the claim is {claim}")
-    angles = np.abs(np.pi * (2 * (np.arange(n) + 0.5) / n - 1))
-    if (numbers[angles > 0.5] == -1).any():
+    farthest = np.pi * (np.abs(2 * np.arange(n) + 1 - n) + 1) / n  # angle of each row's end, from upright
+    if (numbers[farthest > 0.5] == -1).any():
         raise Refused("a box of the set is more than 0.5 rad from upright")
     worst = np.tile(np.where(numbers == 0, N_STEPS + 1, np.maximum(numbers, 0)), (2, 1))
     with np.errstate(over="raise", invalid="raise"):
