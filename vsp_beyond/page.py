@@ -114,18 +114,31 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
     inside, cards = policy.cells(alike.states), ""
     for cell in range(len(policy)):
         here = inside == cell
-        where = policy.where.place(cell, policy.task.inputs, 3)
-        text = "<br>".join(html.escape(line) for line in _equations(policy, cell, alike.states[here]))
+        where = html.escape(policy.where.place(cell, policy.task.inputs, 3))
+        if len(policy.task.inputs) > MOST_INPUTS:
+            typical = html.escape(_typical(policy, alike.states, here))
+            where = f"{typical}<details><summary>where exactly</summary>{where}</details>"
+        text = "".join(f"<p>{html.escape(line)}</p>" for line in _equations(policy, cell, alike.states[here]))
         close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
         mark = f'<i class="vsp-mark" style="border-radius: 0; background: {TINTS[cell % len(TINTS)]}"></i>'
-        place = f"{mark}<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{html.escape(where)}<br>"
+        place = f"{mark}<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{where}"
         cards += f"<div>{place * (len(policy) > 1)}{text}</div>"
     about = f"In each state one cell acts. {policy.where.about(policy.task.inputs, 3)}" if len(policy) > 1 else ""
     if len(policy.policy_class.terms) > MOST_INPUTS:
         about += f"{'. ' * bool(about)}An equation shows the five inputs that move the action most, and the others at "
         about += "their mean; in brackets, the share of the action's variance that this hides"
     return f'<h2>The policy</h2><p>{html.escape(about and f"{about}.")}</p><div class="cards">{cards}</div>'
+
+
+def _typical(policy: PiecewisePolicy, states: np.ndarray, here: np.ndarray) -> str:
+    """Say by which inputs the states (n, d) in a cell differ most from all, in standard deviations."""
+    if not here.any():
+        return ""
+    mean, ours = states.mean(axis=0), states[here].mean(axis=0)
+    apart = np.abs(ours - mean) / (states.std(axis=0) + 1e-12)
+    said = [f"{policy.task.inputs[i]} {ours[i]:.3g} ({mean[i]:.3g})" for i in np.argsort(-apart)[:3]]
+    return f"on average (in all cells): {', '.join(said)}"
 
 
 def _equations(policy: PiecewisePolicy, cell: int, states: np.ndarray) -> tuple[str, ...]:
@@ -142,7 +155,8 @@ def _equations(policy: PiecewisePolicy, cell: int, states: np.ndarray) -> tuple[
             best = np.argmin([(rest - terms[:, i]).var() for i in left])
             i = left.pop(int(best))
             rest, text = rest - terms[:, i], f"{text}{_signed(weights[i, j])} · {names[i]} "
-        lines.append(f"{output} = {text}{_signed(weights[-1, j] + rest.mean())} (hides {rest.var() / whole:.1%})")
+        text += f"{_signed(weights[-1, j] + rest.mean())} (hides {rest.var() / whole:.1%})"
+        lines.append(f"{output} = {text.removeprefix('+ ')}")
     return tuple(lines)
 
 

@@ -71,6 +71,7 @@ export class Episodes {
     this.canvas.style.height = `${high}px`
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0)
     ctx.font = `13px ${style.fontFamily}`
+    ctx.lineJoin = "round" // else sharp turns reach into the names
     this.done.forEach(({ cell }, t) => {
       ctx.fillStyle = CELLS[cell % CELLS.length]
       ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND)
