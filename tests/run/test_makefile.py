@@ -62,7 +62,7 @@ def packages(checkout):
 
 
 def test_parts_are_added_when_they_are_asked_for_and_what_is_whole_is_left(checkout):
-    said, status = make(checkout, "venv")
+    said, status = make(checkout, "venv", PYTHONWARNINGS="error")
     assert status == 0 and packages(checkout) == {"numpy-2.0.dist-info"} and "to draw (1 MB of downloads)" in said
     assert "--require-hashes" in asked(checkout)
     assert make(checkout, "venv") == ("", 0) and asked(checkout) == ""
