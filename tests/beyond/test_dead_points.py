@@ -8,7 +8,7 @@ import vsp
 from studies import comparison
 from vsp.paper.baselines import rule_of_thumb
 from vsp.tasks import GOAL, mountaincar
-from vsp_beyond.proofs import at_rest, tables
+from vsp_beyond.proofs import at_rest, dead_points, tables
 from vsp_beyond.proofs.dead_points import acceleration
 
 
@@ -35,6 +35,11 @@ DOWNHILL = [[0, 0, 0.1], [0, 0, -0.1]]  # with the slope, on both sides of the b
 )  # fmt: skip
 def test_borders_and_strong_pushes_remove_dead_points(policy, dead):
     assert at_rest(policy)["dead"].tolist() == dead
+
+
+def test_without_a_pull_every_place_without_a_push_is_dead(monkeypatch):
+    monkeypatch.setattr(dead_points, "PULL", 0.0)
+    assert at_rest(policy_of([[0, 0]], [[1, 0, 0.4]]))["dead"].tolist() == [True]
 
 
 def test_a_car_at_its_dead_point_stays_there():

@@ -1,3 +1,4 @@
+import dataclasses
 import shutil
 import subprocess
 
@@ -6,6 +7,7 @@ import pytest
 from support import SIMPLEGOAL
 
 from vsp.paper import published_policy
+from vsp.tasks import get_task
 from vsp_beyond import device
 
 WARNINGS = "-std=c99 -Wall -Wextra -pedantic -Werror -Wmissing-prototypes -Wdouble-promotion -Wconversion -O2".split()
@@ -63,9 +65,18 @@ def test_by_hand_what_a_device_is_told():
     assert "state[1]: y, 0 to 1\n   action[0]: Δx, -1 to 1" in device.to_header(POLICY)
     maps = [[1, 0], [1, 0], [0, 0]], [[0, 0], [0, 0], [0.1, 1]]
     two = POLICY.__class__([[0.25, 0], [0.75, 0]], maps, task=SIMPLEGOAL)
-    states = np.array([[0.3, 0.2], [0.7, 0.2], [0.6, 0.1], [0.4, 0.1]])
+    states = np.array([[0.3, 0.2], [0.9, 0.2], [0.6, 0.1], [0.4, 0.1]])
     assert device.largest_jump(two, states) == pytest.approx([0.6, 1.0])
     assert "jumps by at most 0.6, 1, as found around 4 states" in device.to_c(two, states=states)
-    for wrong, said in (({"real": "half"}, "expected 'double' or 'float'"), ({"safe": [2, 0]}, "within the limits")):
+    for wrong, said in (
+        ({"real": "half"}, "expected 'double' or 'float'"), ({"safe": [2, 0]}, "within the limits"),
+        ({"safe": [-2, 0]}, "within the limits"),
+    ):  # fmt: skip
         with pytest.raises(ValueError, match=said):
             device.to_c(POLICY, **wrong)
+
+
+def test_all_numbers_are_floats_and_no_name_ends_the_comment():
+    task = dataclasses.replace(get_task(SIMPLEGOAL), outputs=("*/ int x;", "b"))
+    small = POLICY.__class__([[0.5, 0.5]], np.full((1, 3, 2), 2.5e-7), task=task)
+    assert "2.5e-07f" in device.to_c(small, real="float") and "*/ int x" not in device.to_header(small)

@@ -2,14 +2,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher
+from support import PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher
 
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
+from vsp.tasks import GOAL
 from vsp.tasks.registry import get_task
+from vsp_beyond.few_cells import faithful as module
 from vsp_beyond.few_cells.config import Faithful
 from vsp_beyond.few_cells.faithful import distill_faithfully, kept
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, needed_only, squared_error
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, needed_only, squared_error, warn_outside
 
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
@@ -79,6 +81,11 @@ def test_a_shortfall_is_said_and_the_closest_imitation_kept():
     missed = 5.0 - 0.01 * rollout(CurvedTeacher(), SIMPLEGOAL, starts).returns.mean()
     with pytest.warns(UserWarning, match=rf"expected \+{missed:.4g} or more"):  # half of 2 % of the teacher's return
         distilled_by(n_generations=0, margin=5.0, tolerance=None)
+    starts = get_task(PENDULUM).start(np.random.default_rng(np.random.SeedSequence(1).spawn(4)[2]), 20)
+    missed = 1e4 - 0.01 * abs(rollout(Constant(1.0), PENDULUM, starts).returns.mean())  # which are negative
+    config = Faithful(n_cells=1, n_episodes=5, n_states=500, n_restarts=1, n_generations=0, n_validation=20, margin=1e4)
+    with pytest.warns(UserWarning, match=rf"expected \+{missed:.4g} or more"):
+        distill_faithfully(Constant(1.0), PENDULUM, config, seed=1)
 
 
 def test_a_lower_r2_buys_return(distilled):
@@ -91,6 +98,57 @@ def test_a_lower_r2_buys_return(distilled):
 def test_nothing_is_tuned_where_the_closest_cells_return_enough():
     assert distilled_by(tolerance=1000.0)[1]["stage"].tolist() == ["fit"]
     assert "tune" in distilled_by(tolerance=1000.0, min_r2=0.5)[1]["stage"].tolist()  # for the highest return
+
+
+def test_the_cost_by_hand():
+    """A return above the teacher's earns nothing; with a least R², an error below it does not either."""
+    cost = module._cost(np.array([0.1, 0.1]), np.array([-5.0, 2.0]), 1.0, None)
+    assert cost == pytest.approx([0.1, 0.1 + 2 * module.PRICE])
+    cost = module._cost(np.array([0.25, 0.5]), np.zeros(2), 1.0, 0.7)
+    assert cost == pytest.approx([0.0, 0.2 / module.BEYOND])
+
+
+def test_the_goals_of_a_tuning_are_the_teachers_returns_less_its_failures_and_the_margin(monkeypatch):
+    class Often(CurvedTeacher):
+        def predict(self, obs):
+            return np.column_stack([-np.ones(len(obs)), -0.5 * np.asarray(obs)[:, 1]]), None
+
+    asked, missed, tune = [], [], module._tune
+    monkeypatch.setattr(module, "_cost", lambda errors, those, *_: missed.append(those) or errors)
+    monkeypatch.setattr(module, "_tune", lambda *given: asked.append(given[3:5]) or tune(*given))
+    config = dataclasses.replace(SMALL, failure_penalty=100.0, min_r2=0.5, n_generations=1, margin=1000.0)
+    distill_faithfully(Often(), SIMPLEGOAL, config, seed=1)
+    pool, goals = asked[0]
+    result = rollout(Often(), SIMPLEGOAL, pool)
+    assert goals == pytest.approx(result.returns - 100 * (result.outcomes != GOAL)) and missed[0].min() > 800
+    assert (result.outcomes != GOAL).any()
+
+
+def test_a_candidate_pays_for_its_failures_and_need_not_return_more_than_the_best(monkeypatch):
+    unscaled = Scaling(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
+    still = ScaledCells(np.zeros((1, 2)), np.zeros((1, 3, 2)))
+    of = lambda penalty: module._Candidates(  # noqa: E731
+        dataclasses.replace(SMALL, failure_penalty=penalty),
+        unscaled,
+        None,
+        np.array([[0.9, 0.9], [0.05, 0.05]]),
+        0,
+        0.1,
+    )
+    assert of(1000.0)._gap(still) == pytest.approx(of(0.0)._gap(still) - 500)
+    monkeypatch.setattr(module._Candidates, "_gap", lambda *_: -5.0)
+    those = of(0.0)
+    those.rows.append({"cells": None, "r2": 0.9, "gap": -5.0})
+    assert those.returns_enough(still)
+
+
+def test_observations_beyond_the_declared_box_are_counted():
+    start, low = lambda rng, n: rng.uniform(0.5, 1.0, size=(n, 2)), np.array([0.2, 0.0])
+    narrow = dataclasses.replace(get_task(SIMPLEGOAL), start=start, low=low)
+    with pytest.warns(UserWarning, match=r"[\d,]+ of [\d,]+ observations leave the box of SimpleGoal-v0, such as x = "):
+        distill_faithfully(CurvedTeacher(), narrow, dataclasses.replace(UNTUNED, n_restarts=1), seed=0)
+    with pytest.warns(UserWarning, match="1 of 2 observations leave the box"):
+        warn_outside(get_task(SIMPLEGOAL), np.array([[0.5, 0.5], [1.001, 0.5]]))
 
 
 # What is made of the cells at the end
@@ -125,10 +183,11 @@ def test_of_neighbours_with_one_map_one_is_left(codewords, values, needed):
     assert left.codewords.ravel().tolist() == needed and squared_error(labelled, left) == 0.0
 
 
-def test_two_codewords_come_among_the_states_and_draw_the_same_border():
+@pytest.mark.parametrize("sign", [1, -1])
+def test_two_codewords_come_among_the_states_and_draw_the_same_border(sign):
     rng = np.random.default_rng(0)
     states = rng.normal(size=(500, 3))
-    cells = ScaledCells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]]), np.zeros((2, 4, 1)))
+    cells = ScaledCells(np.array([[9.0, -7.0, 3.0], [-8.5, 7.5, -3.2]])[::sign], np.zeros((2, 4, 1)))
     moved = cells.among(states)
     assert (moved.nearest(states) == cells.nearest(states)).all() and len(set(cells.nearest(states).tolist())) == 2
     shift, across = moved.codewords.mean(axis=0) - cells.codewords.mean(axis=0), cells.codewords[1] - cells.codewords[0]

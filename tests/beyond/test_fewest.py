@@ -1,4 +1,5 @@
 import dataclasses
+import signal
 import time
 
 import numpy as np
@@ -81,6 +82,49 @@ def test_by_hand_the_fewest_that_are_alike_and_level_else_the_best_is_tuned(monk
     found[4, True] = 0.99, 8.9, True
     chosen = module.fewest(PumpingTeacher(), get_task(MOUNTAINCAR), seed=0, folder=tmp_path)[0]
     assert chosen.stage.name == "4 cells, tuned"
+
+
+def test_by_hand_a_return_is_level_within_a_share_of_the_distance_to_the_best_constant(monkeypatch, tmp_path):
+    seen = module.Seen(None, get_task(MOUNTAINCAR), QUICK, 0)
+    assert seen.best_constant == 0.0  # that of no push
+    vars(seen)["best_constant"] = 60.0
+    arrays = {"codewords": [[0, 0]], "coefficients": np.zeros((1, 3, 1)), "scale": np.ones(2)}
+    monkeypatch.setattr(module, "make_all", lambda *_: None)
+    monkeypatch.setattr(module.Stage, "load", lambda *_: (dict(arrays), {}))
+    for ours, level in ((99.3, True), (99.1, False)):
+        alike = judged(1.0, [ours] * 4, [100.0] * 4, 1, None).alike
+        monkeypatch.setattr(module, "likeness", lambda *_, alike=alike: alike)
+        assert module.Tried.of(module.Stage(seen, 1, 0), tmp_path).level == level
+
+
+def test_a_stage_of_another_agent_size_or_way_has_a_file_of_its_own(tmp_path):
+    agents = CurvedTeacher(), vsp.agent(lambda obs: 0 * obs, name="still")
+    one, other = (module.Stage(module.Seen(agent, get_task(SIMPLEGOAL), QUICK, 0), 2, 0) for agent in agents)
+    stages = one, other, dataclasses.replace(one, tuned=True), dataclasses.replace(one, n_cells=4)
+    assert len({stage.path(tmp_path) for stage in stages}) == 4
+
+
+def test_a_tuning_asks_for_the_cells_of_its_stage_and_for_no_margin(monkeypatch):
+    asked = []
+    monkeypatch.setattr(module, "faithful_preset", lambda task: dataclasses.replace(QUICK, margin=3.0))
+    monkeypatch.setattr(module, "distill_faithfully", lambda agent, task, config, seed: asked.append(config) or 1 / 0)
+    monkeypatch.setattr(module.Tried, "of", lambda stage, folder: dataclasses.replace(stage, tuned=True).make())
+    with pytest.raises(ZeroDivisionError):
+        module.fewest(PumpingTeacher(), get_task(MOUNTAINCAR), seed=0, folder="", sizes=(2,))
+    assert (asked[0].n_cells, asked[0].margin) == (2, 0.0)
+
+
+def test_no_alarm_is_left_after_what_was_in_time():
+    with module.limited(60.0):
+        pass
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_states_are_spread_in_units_of_their_deviations(monkeypatch):
+    points = []
+    monkeypatch.setattr(module, "spread", lambda those, n, rng: points.append(those) or np.arange(5))
+    assert module.Seen(PumpingTeacher(), get_task(MOUNTAINCAR), QUICK, 0).labelled
+    assert points[0].std(axis=0) == pytest.approx(1.0)
 
 
 def test_an_input_that_hardly_varies_gets_no_large_weight(tmp_path):

@@ -10,7 +10,7 @@ from support import PENDULUM, SIMPLEGOAL
 
 import vsp
 from studies import comparison
-from vsp_beyond.proofs import check, pendulum_starts
+from vsp_beyond.proofs import check, pendulum, pendulum_starts
 from vsp_beyond.proofs.grid import Way, around, invariant, steps_into
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
@@ -122,6 +122,21 @@ def test_a_step_of_small_boxes_holds_all_that_happens(seed, half):
         assert (gap <= after.rest)[:, inside].all()
 
 
+def test_a_step_from_a_large_box_stays_within_its_bounds(monkeypatch):
+    """From its corners, sides and middle."""
+    rng, n, ends = np.random.default_rng(0), 16, []
+    kept = lambda *given: ends.extend(given[:2]) or np.zeros((2, 2, n * n), dtype=int)  # noqa: E731
+    monkeypatch.setattr(pendulum, "boxes_between", kept)
+    policy = vsp.VoronoiPolicy([[0, 0, 0]], rng.normal(size=(1, 4, 1)) * [[4], [4], [2], [1]], task=PENDULUM)
+    pendulum._way(policy, 0, n)
+    box, at = rng.integers(n * n, size=100_000), rng.choice([0.0, 0.5, 1.0], size=(2, 100_000))
+    states = [(2 * (box // n + at[0]) / n - 1) * np.pi, (2 * (box % n + at[1]) / n - 1) * 8]
+    angle, speed = stepped_by(policy, np.stack(states, axis=1)).T
+    (left, right), (low, high) = np.array(ends)[:, :, box]
+    assert ((angle - left + 1e-9) % (2 * np.pi) <= right - left + 2e-9).all()
+    assert ((low - 1e-9 <= speed) & (speed <= high + 1e-9)).all()
+
+
 def test_small_boxes_prove_more_and_episodes_agree(proof, monkeypatch):
     monkeypatch.setattr(pendulum_starts, "LEVELS", 1)
     before, share = shares_of_starts(proof)
@@ -172,10 +187,14 @@ def test_the_checker_agrees_and_refuses_every_mutant(proof):
             pytest.fail(f"accepted a mutant: {kind}")
 
 
-def all_kept(content):
-    """All boxes together are never left, whatever the policy does."""
-    claim = {**content["claim"], "proved": content["claim"]["starts"], "longest": -1}
-    content |= {"pieces": [[-1, 16]] * 16, "claim": claim}
+def all_are(number):
+    """All boxes get one number: together they are never left, or all lead to others, whatever the policy does."""
+
+    def alter(content):
+        claim = {**content["claim"], "proved": content["claim"]["starts"], "longest": number}
+        content |= {"pieces": [[number, 16]] * 16, "claim": claim}
+
+    return alter
 
 
 @pytest.mark.parametrize(
@@ -184,7 +203,8 @@ def all_kept(content):
      (lambda c: c["pieces"].__setitem__(0, [201, 16]), "numbers are 0 to 201"),
      (lambda c: c["policy"]["codewords"].__setitem__(0, [1e200] * 3), "malformed"),
      (lambda c: c["policy"]["coefficients"].pop(), "1 codewords, but 0 maps"),
-     (all_kept, "more than 0.5 rad from upright")],
+     (lambda c: c["policy"]["coefficients"][0].__setitem__(1, [200.0]), "too steep"),
+     (all_are(5), "may lead to one with 5"), (all_are(-1), "more than 0.5 rad from upright")],
 )  # fmt: skip
 def test_a_forged_certificate_is_refused(alter, match):
     alter(forged := copy.deepcopy(prove_pendulum(STILL, n=16).certificate()))

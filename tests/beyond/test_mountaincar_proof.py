@@ -62,17 +62,30 @@ def test_the_step_is_gymnasiums_bit_for_bit(env):
     assert 0.03 < differ.mean() < 0.06  # "about 4 %" in notebook 08
 
 
+def listed(policy, first, n):
+    """The states after the first step from n observations, their owners and returns, and the ends of the starts."""
+    edges = np.array([edge(first + i, -1) for i in range(n + 1)])
+    observed = mountaincar._floats(mountaincar._numbers(np.float32(-0.6)) + np.arange(first, first + n))
+    states, owner, returns = first_steps(Program(policy), observed, edges[:-1], edges[1:])
+    return set(map(tuple, states.tolist())), owner, returns, edges[[0, -1]]
+
+
 @pytest.mark.parametrize("first", [0, 2_500_000, 5_033_166 - 300])
 def test_all_first_steps_are_among_those_listed(policy, env, first):
-    edges = np.array([edge(first + i, -1) for i in range(301)])
-    observed = mountaincar._floats(mountaincar._numbers(np.float32(-0.6)) + np.arange(first, first + 300))
-    states, owner, returns = first_steps(Program(policy), observed, edges[:-1], edges[1:])
-    listed, played = {tuple(state) for state in states.tolist()}, set()
-    for start in np.random.default_rng(1).uniform(edges[0], edges[-1], size=3000):
+    (states, owner, returns, ends), played = listed(policy, first, 300), set()
+    for start in np.random.default_rng(1).uniform(*ends, size=3000):
         action = policy.predict(np.array([start, 0.0], dtype=np.float32))[0][0]
         played.add(tuple(map(float, stepped(env, np.array([start, 0.0]), action)[:2])))
-    assert played <= listed and len(listed) < 3 * len(played)
+    assert played <= states and len(states) < 3 * len(played)
     assert set(owner) == set(range(300)) and (returns <= 0).all()
+
+
+@pytest.mark.parametrize(("doubt", "size", "most"), [("SUMS", 1e-4, 2), ("COSINE", 1e-7, 1)])
+def test_the_doubtful_steps_are_listed_too(policy, monkeypatch, doubt, size, most):
+    exact = listed(policy, 100_000, 50)[0]
+    monkeypatch.setattr(mountaincar, doubt, size)
+    doubtful = listed(policy, 100_000, 50)[0]
+    assert exact <= doubtful and len(doubtful) > most * len(exact)
 
 
 @pytest.mark.parametrize("push", [1.0, 40.0, -40.0])  # at the limits; up to the wall; never there
@@ -101,11 +114,19 @@ def test_a_block_is_what_the_checker_plays(policy):
 
 
 def test_on_a_border_both_ways_are_followed():
-    """At rest both codewords are as near."""
-    pushing = policy_of([[-0.5, -0.01], [-0.5, 0.01]], [[[0], [0], [-1]], [[0], [0], [1]]])
+    """At rest both codewords are as near, but for rounding."""
+    pushing = policy_of([[-0.5, -0.01], [-0.5, 0.01 + 1e-13]], [[[0], [0], [-1]], [[0], [0], [1]]])
     ways = [run_block(policy_of([[0, 0]], [[[0], [0], [side]]]), 0, 100).n_states for side in (-1, 1)]
     block = run_block(pushing, 0, 100)
     assert block.n_states == sum(ways) and block.n_left == 0
+    assert block.width == pytest.approx((edge(100, -1) + 0.6) / 0.2)  # no start is below -0.6
+
+
+def test_the_mean_lies_between_the_lowest_and_the_highest_returns(monkeypatch):
+    ends = lambda self, states, returns: np.array([(1.0, 2.0, 9, 0, 1)] * len(states), mountaincar.ENDS)  # noqa: E731
+    monkeypatch.setattr(Program, "play", ends)
+    block = run_block(policy_of([[0, 0]], [[[0], [0], [1]]]), 0, 20)
+    assert (block.mean_low, block.mean_high) == pytest.approx((1.0, 2.0))
 
 
 def test_a_car_that_does_not_move_is_not_run():
@@ -181,6 +202,11 @@ def more_left(blocks, claim, policy):
     blocks[3]["n_left"], blocks[4]["n_left"] = 5, -5
 
 
+def perfect(blocks, claim, policy):
+    """Something else is claimed, too."""
+    claim["share"] = 1.0
+
+
 def not_a_number(blocks, claim, policy):
     """No comparison with it is true."""
     blocks[0]["least"], claim["least"] = math.nan, 150.0
@@ -213,7 +239,7 @@ MUTANTS = {
     "metric": lambda blocks, claim, policy: policy.update(metric="manhattan"),
     "least": too_good("least", 0.1, max), "longest": too_good("longest", -50, min),
     "end": no_end, "one": one_block, "left": more_left, "stuck": stuck, "nan": not_a_number, "mean": better_mean,
-    "policy": other_policy,
+    "policy": other_policy, "more": perfect,
 }  # fmt: skip
 
 

@@ -14,7 +14,8 @@ from vsp_beyond.names import BIPEDAL, named
 def test_names_of_gymnasium_are_those_it_documents_and_own_ones_stay(monkeypatch):
     monkeypatch.setattr(names, "task_names", lambda: [LUNARLANDER])  # studies name the walker themselves
     walker = named(gymnasium_task("BipedalWalker-v3"))
-    assert (list(walker.inputs), list(walker.outputs)) == BIPEDAL and walker.inputs[8:10] == ("contact 1", "hip 2")
+    assert list(walker.inputs) == BIPEDAL[0] and walker.inputs[8:10] == ("contact 1", "hip 2")
+    assert walker.outputs == ("hip 1 torque", "knee 1 torque", "hip 2 torque", "knee 2 torque")
     assert named(get_task(LUNARLANDER)) is get_task(LUNARLANDER)
 
 
@@ -38,6 +39,8 @@ def test_mujocos_names_come_from_its_model(monkeypatch):
     assert task.inputs[-2:] == ("root turn z speed", "elbow speed") and task.outputs == ("elbow torque",)
     monkeypatch.setattr(Arm, "observation_structure", {"qpos": 3})
     assert named(get_task("Arm-v0")).inputs[0] == "s0"
+    ball = [types.SimpleNamespace(name="b", type=[1])]
+    assert list(names._numbers(ball, names.PLACES)) == ["b.w", "b.x", "b.y", "b.z"]
 
 
 @pytest.mark.parametrize(

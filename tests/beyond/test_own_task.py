@@ -106,26 +106,6 @@ def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
         vsp_beyond.faithful(own_tasks.tank_pilot, "Tank-v0", LITTLE, n_cells=2, seed=0)
 
 
-def test_observations_beyond_the_declared_box_are_counted():
-    class Overfull(own_tasks.Tank):
-        observation_space = gymnasium.spaces.Box(0.0, 1.0, (2,), np.float64)  # but it fills beyond
-
-        def reset(self, *, seed=None, options=None):
-            super().reset(seed=seed)
-            self.state = np.array([0.9, 0.95])
-            return self.state.copy(), {}
-
-        def step(self, action):
-            return super().step([1.0])
-
-    gymnasium.register("Overfull-v0", entry_point=Overfull, max_episode_steps=60)
-    try:
-        with pytest.warns(UserWarning, match=r"[\d,]+ of 900 observations leave the box of Overfull-v0, such as s0 = "):
-            vsp_beyond.faithful(vsp.agent(own_tasks.tank_pilot), "Overfull-v0", LITTLE, seed=0)
-    finally:
-        del gymnasium.registry["Overfull-v0"]
-
-
 # What does not fit
 
 

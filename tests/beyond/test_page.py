@@ -8,9 +8,11 @@ import sys
 import numpy as np
 import pytest
 from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher, PumpingTeacher
+from test_fewest import judged
 
 import vsp
 import vsp_beyond
+from vsp.evaluation import Likeness, likeness
 from vsp.tasks import get_task
 from vsp_beyond import __main__ as command
 from vsp_beyond import page
@@ -25,9 +27,14 @@ def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):
     assert "F = 0.000 x + 0.000 v + 1.000" in made and "a theorem &lt;b&gt;" in made and "few &lt;i&gt;" in made
     assert "<script>alert" not in made and "<p>In each state one cell acts. Manhattan distances.</p>" in made
     assert not re.search(r"(src|href)=\"(?!data:)", made) and len(made) < 2_000_000
-    (code,) = re.findall(r'download="policy.vsp" href="data:[^,]*,([^"]*)"', made)
-    (tmp_path / "x.vsp").write_bytes(base64.b64decode(code))
+    files = dict(re.findall(r'download="policy.(\w+)" href="data:[^,]*,([^"]*)"', made))
+    assert "jumps by at most 2, as found around" in base64.b64decode(files["c"]).decode()
+    (tmp_path / "x.vsp").write_bytes(base64.b64decode(files["vsp"]))
     assert vsp.VoronoiPolicy.load(tmp_path / "x.vsp").to_json() == TWO.to_json()
+
+
+def scene_of(made):
+    return json.loads(re.findall(r'application/json">(.*?)</script>', made)[0])
 
 
 def test_of_a_task_that_a_browser_cannot_play_it_shows_episodes():
@@ -36,13 +43,54 @@ def test_of_a_task_that_a_browser_cannot_play_it_shows_episodes():
     assert "<h2>Explore" not in made and made.count("application/json") == 1
     assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "<h2>Where do they differ", "Cell 0<"))
     assert "of the worst: return" in made and "seed " in made and "The median episode:" in made
-    scene = json.loads(re.findall(r'application/json">(.*?)</script>', made)[0])
+    scene = scene_of(made)
     assert [len(scene["episodes"]), len(scene["curves"])] == [4, 4] and len(scene["episodes"][0]["states"]) <= 400
 
 
-def test_a_proof_that_takes_long_is_given_up(tmp_path):
+def test_the_worst_episodes_are_shown_with_the_agents_actions_and_no_name_ends_the_script():
+    task, agent = dataclasses.replace(get_task(SIMPLEGOAL), inputs=("</script>", "y")), CurvedTeacher()
+    policy = vsp.VoronoiPolicy([[0.5, 0.5]], [[[-1, 0.2], [0, -1], [0, -0.1]]], task=task)
+    alike = likeness(policy, agent, task, 50)
+    made = page.episodes(policy, agent, alike)
+    first, *worst = scene_of(made)["episodes"]
+    returned = [float(re.search(r"return (\S+) ", one["name"])[1]) for one in worst]
+    assert returned == pytest.approx(np.sort(alike.returns["policy"])[:3], rel=1e-4) and made.count("</script>") == 1
+    assert first["agent"] == pytest.approx(agent.predict(first["states"])[0], abs=1e-3)
+
+
+def test_curves_are_of_the_inputs_that_move_the_action_most():
+    weights = np.zeros((1, 9, 2))
+    weights[0, :, 0] = [0, 3, 0, 4, 5, 0, 0, 6, 0]
+    policy, agent = vsp.VoronoiPolicy([np.zeros(8)], weights, task=LUNARLANDER), Constant(0.0, 0.0)
+    alike = likeness(policy, agent, LUNARLANDER)
+    alike = dataclasses.replace(alike, states=np.random.default_rng(0).normal(size=(100, 8)))
+    assert scene_of(page.episodes(policy, agent, alike))["curves"] == [1, 3, 4, 7]
+
+
+def of_two(states, errors):
+    returns = {"policy": np.ones(4), "agent": np.ones(4)}
+    return Likeness(0.99, np.array(states), np.array(errors), returns, dict.fromkeys(returns, 0))
+
+
+def test_by_hand_what_a_page_says_of_cells_states_and_sizes():
+    two = vsp.VoronoiPolicy([[0.2, 0.2], [0.8, 0.8]], np.zeros((2, 3, 2)), task=SIMPLEGOAL)
+    said = page._cards(two, of_two([[0.2, 0.2], [0.2, 0.3]], [[0.0, 0.9], [0.0, 0.0]]))
+    assert "all actions within 5% in 50% of these" in said
+    said = page._worst(TWO, PumpingTeacher(), of_two([[-0.5, 0.01], [-0.5, 0.02]], [[0.1], [0.9]]))
+    assert "v 0.02" in said and "v 0.01" not in said
+    tried = judged(0.9, [1], [1], 1, True), judged(0.8, [1], [1], 2, True)
+    said = page._sizes([dataclasses.replace(tried[0], policy=TWO), tried[1]], TWO)
+    assert "1 cell (chosen)" in said and "2 cells (chosen)" not in said
+
+
+def test_a_proof_that_takes_long_is_given_up(monkeypatch, tmp_path):
     TWO.save(tmp_path / "policy.vsp")
     assert "Nothing is proved within 0.1 s" in page._proof(tmp_path / "policy.vsp", 0.1)
+    asked = []
+    monkeypatch.setattr(page, "_proof", lambda path, seconds: asked.append(seconds) or "")
+    for until in (0.0, page.time.monotonic() + 10, float("inf")):
+        page._kept(TWO, np.zeros((2, 2)), until)
+    assert asked == pytest.approx([1.0, 10.0, 60.0], abs=0.5)
 
 
 def test_the_command_makes_a_page_once_and_says_in_one_line_why_not(monkeypatch, tmp_path, capsys):
@@ -104,5 +152,5 @@ def test_an_equation_of_many_inputs_shows_five_and_says_what_it_hides():
     policy = vsp.VoronoiPolicy([np.zeros(9)], np.stack([weights, weights], axis=1)[None], task=task)
     states = np.vstack([np.eye(9), -np.eye(9)]) * 3 / 2**0.5 + 1
     (line, _) = page._equations(policy, 0, states)
-    assert line == "Δx = + 9 · a + 8 · b + 7 · c + 6 · d + 5 · e + 12 (hides 10.5%)"
+    assert line == "Δx = 9 · a + 8 · b + 7 · c + 6 · d + 5 · e + 12 (hides 10.5%)"
     assert page._equations(TWO, 0, states[:, :2]) == TWO.equations(0)

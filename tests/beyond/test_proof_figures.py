@@ -19,4 +19,4 @@ def test_upright_has_a_colour_for_each_kind_of_box(ax):
     colours = figures.upright(ax, numbers, most=10)
     pixels = ax.images[0].get_array()  # rows are angular velocities
     assert np.allclose(pixels[1, 0], to_rgba(KEPT)) and np.allclose(pixels[3, 2], colours.to_rgba(7.0))
-    assert np.allclose(pixels[0, 0], 1.0)
+    assert np.allclose(pixels[0, 0], 1.0) and np.allclose(ax.images[0].get_extent(), [-np.pi, np.pi, -8, 8])

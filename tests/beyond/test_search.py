@@ -1,8 +1,10 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
-from vsp_beyond.few_cells import search
-from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, uncorrelated
+from vsp_beyond.few_cells import search, units
+from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, uncorrelated, whole_loss
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, expected_loss, spread, squared_error
 
 
@@ -32,11 +34,19 @@ def test_a_descent_lowers_the_error_and_stays_at_the_best():
     assert squared_error(labelled, descend(labelled, cells, range(N_STAGES - 2, N_STAGES))) < 1e-4
 
 
+def test_rounds_see_few_states_and_the_last_descent_all(monkeypatch):
+    seen, (_, labelled) = [], planted(n=300)
+    monkeypatch.setattr(search, "FEW", 50)
+    monkeypatch.setattr(search, "descend", lambda those, cells, *_, **__: seen.append(len(those.inputs)) or cells)
+    least_error(labelled, 2, 3, np.random.default_rng(0))
+    assert seen[0] == 50 and seen[-1] == 300
+
+
 def test_the_loss_in_parts_is_that_of_all(monkeypatch):
     cells, labelled = planted(n=1000)
     about = {"temperature": 0.2, "clip_slope": 0.1}
     monkeypatch.setattr(search, "AT_ONCE", 300)  # the last part is smaller
-    value, gradient = search.whole_loss(cells, labelled, **about)
+    value, gradient = whole_loss(cells, labelled, **about)
     whole = expected_loss(cells, labelled.inputs, labelled.actions, **about)
     assert value == pytest.approx(whole[0], rel=1e-12) and gradient == pytest.approx(whole[1], abs=1e-12)
 
@@ -74,15 +84,29 @@ def test_a_unit_step_changes_the_outputs_by_one():
 
 def test_a_step_and_its_gradient_by_finite_differences():
     cells, labelled = planted(n=200)
+    labelled = dataclasses.replace(labelled, ridge=0.5)
     bases = uncorrelated(labelled, np.ones((3, 200)) / 3)
     move, pull_back = moves(cells, bases, 0.3)
     about = {"temperature": 0.2, "clip_slope": 0.1}
     step = 0.1 * np.random.default_rng(1).normal(size=cells.vector.size)
     at = [move(step + sign * 1e-6 * unit) for unit in np.eye(len(step)) for sign in (1, -1)]
-    values = np.array([expected_loss(one, labelled.inputs, labelled.actions, **about)[0] for one in at]).reshape(-1, 2)
-    gradient = pull_back(expected_loss(move(step), labelled.inputs, labelled.actions, **about)[1])
+    values = np.array([whole_loss(one, labelled, **about)[0] for one in at]).reshape(-1, 2)
+    gradient = pull_back(whole_loss(move(step), labelled, **about)[1])
     assert gradient == pytest.approx((values[:, 0] - values[:, 1]) / 2e-6, abs=1e-6)
     assert np.array_equal(move(np.zeros(len(step))).vector, cells.vector)
+
+
+def test_a_codeword_that_no_state_is_near_may_move_far():
+    cells, labelled = planted()
+    far = ScaledCells(np.vstack([cells.codewords, [[99, 99]]]), np.vstack([cells.coefficients, cells.coefficients[:1]]))
+    moved = search.even_moves(labelled, far)(np.ones(far.vector.size)).codewords - far.codewords
+    assert moved[3].min() > 3 * moved[:3].max()
+
+
+def test_the_unit_of_temperature_by_hand():
+    states = np.array([[1.0, 2], [-1, 2], [1, -2], [-1, -2]])
+    labelled = LabelledStates(np.column_stack([states, np.ones(4)]), np.zeros((4, 1)))
+    assert units.temperature_unit(labelled, 4) == pytest.approx(5 / 4)
 
 
 # States that stand for all
@@ -100,3 +124,9 @@ def test_a_spread_is_as_dense_as_the_points_with_less_chance_than_draws():
     spreads = np.array([left[spread(points, 100, rng)].mean() for _ in range(200)])
     draws = np.array([left[rng.permutation(5000)[:100]].mean() for _ in range(200)])
     assert spreads.mean() == pytest.approx(left.mean(), abs=0.01) and spreads.std() < 0.6 * draws.std()
+
+
+def test_thinned_states_keep_their_actions():
+    labelled = LabelledStates(np.column_stack([np.arange(100.0), np.ones(100)]), np.arange(100.0)[:, None])
+    thin = labelled.thinned(10, np.random.default_rng(0))
+    assert np.sort(thin.states.ravel() // 10).tolist() == list(range(10)) and np.array_equal(thin.states, thin.actions)

@@ -30,11 +30,22 @@ def test_two_numbers_choose_a_faithful_policy():
         faithful_preset(PENDULUM, n_cells=0)
 
 
+def test_episodes_have_a_limit_where_they_are_short():
+    assert (
+        faithful_preset(dataclasses.replace(vsp.get_task(PENDULUM), name="Short-v0", max_steps=5)).n_episodes == 30_000
+    )
+
+
 def test_numbers_of_no_sense_are_refused():
+    assert Tuned(n_cells=3, initial_temperature=1.0, final_temperature=1.0).final_temperature == 1.0
     with pytest.raises(ValueError, match="final_temperature is 2.0, expected at most initial_temperature = 1.0"):
         Tuned(n_cells=3, final_temperature=2.0)
     with pytest.raises(ValueError, match="n_episodes is 10{12}, expected"):
         Faithful(n_cells=3, n_episodes=10**12)
+    with pytest.raises(ValueError, match="failure_penalty is -1"):
+        Faithful(n_cells=3, failure_penalty=-1.0)
+    with pytest.raises(ValueError, match="n_generations is False"):
+        Tuned(n_cells=3, n_generations=False)
 
 
 def test_quick_keeps_the_cells_and_what_is_off():

@@ -16,7 +16,8 @@ import vsp
 import vsp_beyond
 from studies import comparison
 from vsp.run import sealed
-from vsp_beyond.proofs import PROVERS, check, largest_disturbance, load_certificate, proved, steps_to_goal
+from vsp_beyond.proofs import PROVERS, check, largest_disturbance, load_certificate, proved, robust, steps_to_goal
+from vsp_beyond.proofs.grid import touches
 from vsp_beyond.proofs.polygons import box, line_of, meet, total
 from vsp_beyond.proofs.proof import CERTIFICATES, RESULTS
 from vsp_beyond.proofs.simplegoal import follow
@@ -151,12 +152,33 @@ def test_other_policies_get_one_clear_error(policy, match):
         vsp_beyond.prove(vsp.VoronoiPolicy(np.zeros((1, 8)), np.zeros((1, 9, 2)), task=LUNARLANDER))
 
 
+def test_all_pieces_count_also_those_that_ended():
+    policy = policy_of([[0.5, 0.5]], [DOWN_LEFT])
+    n = len(follow(policy))
+    with pytest.raises(ValueError, match=f"expected at most {n - 1}"):
+        follow(policy, most=n - 1)
+
+
 def test_every_task_has_its_own_prover():
     names = {task: prover.__name__ for task, prover in PROVERS.items()}
     assert names == {SIMPLEGOAL: "prove_simplegoal", MOUNTAINCAR: "prove_mountaincar", PENDULUM: "prove_pendulum"}
 
 
 # Over a grid
+
+
+def test_rounding_never_decides_what_boxes_prove(monkeypatch):
+    """On a border both cells act; what float32 hides widens a way; a box at the edge of the goal is not yet in it."""
+    point = np.array([[0.5], [0.5]])
+    two = policy_of([[0.25, 0.5], [0.75, 0.5]], [STILL, STILL])
+    assert all(touches(two, cell, point, point, np.ones(2)).all() for cell in (0, 1))
+    policy, edges = policy_of([[0.5, 0.5]], [[[-0.5, 0], [0, -0.5], [0, 0]]]), np.linspace(0, 1, 101)
+    low, high = (np.stack(np.meshgrid(ends, ends, indexing="ij")).reshape(2, -1) for ends in (edges[:-1], edges[1:]))
+    first = robust._way(policy, 0, low, high, 0.0, 100).first
+    monkeypatch.setattr(robust, "SEEN", 0.9)
+    assert (first - robust._way(policy, 0, low, high, 0.0, 100).first).max() >= 4
+    monkeypatch.undo()
+    assert not steps_to_goal(policy_of([[0.5, 0.5]], [DOWN_LEFT]), n=10).any()
 
 
 def test_the_largest_disturbance_is_smaller_than_what_breaks_it():
@@ -250,6 +272,12 @@ def test_a_forged_certificate_gets_one_clear_refusal(certificate, alter, match):
     alter(forged := copy.deepcopy(certificate))
     with pytest.raises(check.Refused, match=match):
         check.check_content(forged)
+
+
+def test_a_sign_that_rounding_may_decide_is_exact():
+    tenth, fifth, three_tenths = (Fraction(i, 10) for i in (1, 2, 3))
+    corner = check.simplegoal.corner((tenth, fifth), (tenth, fifth))
+    assert check.simplegoal.Form(ONE, ONE, -three_tenths).signs([corner]) == [0]
 
 
 def test_the_checker_shares_no_code_with_the_prover():

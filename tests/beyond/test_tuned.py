@@ -1,4 +1,5 @@
 import dataclasses
+import types
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
 from vsp.teachers.teacher import load_teacher
 from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
-from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, score, tune
+from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, is_snapshot, score, tune
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss, squared_error
 
@@ -155,6 +156,21 @@ def test_tuning_returns_more():
     policies = map(UNSCALED.policy, (SLOW, snapshots[-1]))
     before, after = (rollout_from_seed(policy, SIMPLEGOAL, 500, seed=9).returns.mean() for policy in policies)
     assert after > before + 1
+
+
+@pytest.mark.parametrize("penalty", [0.0, 1000.0])
+def test_a_failure_costs_a_tuning_its_penalty(monkeypatch, penalty):
+    told, still = [], ScaledCells(np.zeros((1, 2)), np.zeros((1, 3, 2)))
+    search = types.SimpleNamespace(ask=lambda: [still.vector], tell=lambda vectors, costs: told.extend(costs))
+    monkeypatch.setattr("vsp_beyond.few_cells.tune.cma_es", lambda *_: search)
+    monkeypatch.setattr("vsp_beyond.few_cells.tune.is_snapshot", lambda *_: False)
+    config = dataclasses.replace(SMALL, n_generations=1, failure_penalty=penalty)
+    assert not list(tune(UNSCALED.policy, UNSCALED.task, still, config, np.random.default_rng(0)))
+    assert penalty - 100 < told[0] < penalty + 100
+
+
+def test_snapshots_are_evenly_spread_and_the_last_generation_is_one():
+    assert [i for i in range(7) if is_snapshot(i, 7, 3)] == [2, 4, 6]
 
 
 # Criticality
