@@ -38,7 +38,7 @@ def episodes(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
         states = episode.states[::every]
         begun = f"seed {start[0]:.0f}" if task.one_by_one else "start " + ", ".join(f"{x:.3g}" for x in start)
         name = f"{f'{i}. of the worst' if i else 'median'}: return {played.returns[i]:.5g} "
-        name += f"(agent: {alike.returns['agent'][chosen[i]]:.5g}), {begun}{f', each {every} steps' * (every > 1)}"
+        name += f"(agent: {alike.returns['agent'][chosen[i]]:.5g}), {begun}{f', one moment in {every}' * (every > 1)}"
         theirs = np.asarray(agent.predict(states)[0], np.float64)
         shown.append({"name": name, "every": every, "states": _short(states), "agent": _short(theirs)})
     weights = np.abs(policy.coefficients[:, :-1]).max(axis=(0, 2))
@@ -46,10 +46,11 @@ def episodes(policy: VoronoiPolicy, agent: Policy, alike: Likeness) -> str:
     scene = {"task": task_of(task), "policies": [numbers_of(policy, "policy")], "episodes": shown}
     text = to_json(scene | {"curves": curves.tolist()}).replace("<", "\\u003c")  # no tag ends here
     words = "The policy plays. The strip has the colours of the cells that act. Of the actions, the thin curve is the "
-    words += "policy's, the blue one the agent's in the same states. Touch a moment to ask why."
+    words += "policy's, the blue one the agent's in the same states. Touch a moment to ask why. A change is of one "
+    words += "input alone, within its range in these episodes, so the state need not be possible."
     element = f'<div class="vsp-episodes"><script type="application/json">{text}</script></div>'
     strip = frames(policy, task, starts[0], played.lengths[0])
-    return f"<h2>Episodes</h2><p>{words}</p>{element}{strip and f'<p>The median episode:</p>{strip}'}"
+    return f"<h2>Episodes</h2><p>{words}</p>{element}{strip and f'<p>Frames of the median episode:</p>{strip}'}"
 
 
 def _short(values: np.ndarray) -> list:

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from vsp import agent as as_agent
-from vsp.evaluation import CLOSE, Likeness, likeness
+from vsp.evaluation import ALIKE, CLOSE, Likeness, likeness
 from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
@@ -32,10 +32,13 @@ from .proofs import PROVERS
 MOST_INPUTS = 8  # in an equation; of more, the five that move the action most
 PROOF_SECONDS = 60
 TINTS = json.loads(re.findall(r"CELLS = (\[.*?\])", SCRIPT)[0])  # colours of cells
-_PROVE = "import sys, vsp, vsp_beyond; print(vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1])))"
+_PROVE = """import sys, vsp, vsp_beyond
+proof = vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1]))
+print(f"{proof}. In this order: {' '.join(type(proof).claim.__doc__.split())}")"""
 _STYLE = """body { line-height: 1.5 }
 table { border-collapse: collapse }
 td, th { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid #ccc }
+@media (max-width: 500px) { table { font-size: .8rem } td, th { padding: .1rem .25rem } meter { display: none } }
 .cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 20rem), 1fr)); gap: 1rem }
 .cards > div, .wide { overflow-x: auto }
 .cards > div { border: 1px solid #ccc; border-radius: 6px; padding: .6rem 1rem }
@@ -48,7 +51,7 @@ def report(
     tried: Sequence[Tried] = (), until: float = math.inf,
 ) -> str:  # fmt: skip
     """Return a page as HTML: what it says first, equations, sizes that were tried, episodes, the explorer, how alike
-    they act, where they differ most, what is proved, and the policy as files to save.
+    they act, what is proved, and the policy as files to save.
 
     `name` and `remarks` stand on the page as text. `tried`: stages of `fewest`. `until`, a time of `time.monotonic`,
     bounds the proof. Raises ValueError unless the policy is cells and maps and both fit the task.
@@ -58,15 +61,18 @@ def report(
         raise ValueError(f"the policy is {policy!r:.60}, expected cells and maps: a vsp.PiecewisePolicy")
     known = [one.alike for one in tried if one.policy is policy]
     alike = known[0] if known else likeness(policy, agent, task)
-    acts = "is imitated, but not closely, by" if alike.poor else "acts like"
+    no_failures = alike.failures["policy"] is None
+    why = "the return is lower" if no_failures else "more episodes fail"
+    why = f", but not closely: {'the actions differ' if alike.r2 < ALIKE else why}" if alike.poor else ""
+    acts = "is imitated by" if alike.poor else "acts like"
     what = f"{len(policy)} cells with a map each" if len(policy) > 1 else "one equation"
     what = "one map: an equation for each action" if len(policy) == 1 < len(task.outputs) else what
     lines = "".join(f"<p>Note: {html.escape(line)}</p>" for line in remarks.splitlines())
-    undefined = "; failures are not defined" * (alike.failures["policy"] is None)
+    said = f"{alike}".removeprefix("warning: ") + "; no episode reaches a goal, so none counts as failed" * no_failures
     parts = [
-        f"<p><strong>{html.escape(f'{name} {acts} {what}.')}</strong> {html.escape(f'{alike}{undefined}')}.</p>",
+        f"<p><strong>{html.escape(f'{name} {acts} {what}{why}.')}</strong> {html.escape(said)}.</p>",
         lines, _cards(policy, alike), _sizes(tried, policy), _played(policy, agent, alike), _numbers(policy, alike),
-        _worst(policy, agent, alike), _kept(policy, alike.states, until),
+        _kept(policy, alike.states, until),
     ]  # fmt: skip
     return standalone(f"{task.name}: {name}", "\n".join(parts), _STYLE)
 
@@ -80,13 +86,15 @@ def _sizes(tried: Sequence[Tried], policy: PiecewisePolicy) -> str:
         alike, returns, failed = one.alike, one.alike.returns["policy"], one.alike.failures["policy"]
         said = "not defined" if failed is None else f"{failed} of {len(returns)}"
         name, bar = one.stage.name + " (chosen)" * (one.policy is policy), f'<meter value="{max(alike.r2, 0):.4f}">'
-        cells = bar, name, f"{alike.r2:.4f}", f"{alike.within.min():.1%}", f"{returns.mean():.5g}", said
+        returned = f"{returns.mean():.5g}{'' if one.level else ' (too low)'}"
+        cells = name, f"{alike.r2:.4f} {bar}", f"{alike.within.min():.1%}", returned, said
         rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
-    head = "".join(f"<th>{name}</th>" for name in ("", "cells", "R²", f"within {CLOSE:.0%}", "return", "failed"))
+    head = "".join(f"<th>{name}</th>" for name in ("cells", "R²", f"within {CLOSE:.0%}", "return", "failed"))
     rule = (
         f"The fewest cells are chosen whose R² is at most {LOSS} below the highest and whose return falls short of "
         f"the agent's by at most half of the paired 95 % interval, or {SHARE:.0%} of its distance to the best constant "
-        "action. “Within” counts the action that is close in the fewest states."
+        "action. Where none is, the best of them is tuned on the return, if there is time, and the one that returns "
+        "most is chosen. “Within” counts the action that is close in the fewest states."
     )
     return f'<h2>How many cells?</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div><p>{rule}</p>'
 
@@ -104,7 +112,7 @@ def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
     return (
         f"<h2>How alike?</h2><p>The policy reproduces {alike.r2:.1%} of the variance of the agent's actions (R²), on "
         f"{len(alike.states):,} states of the agent that no fit saw. Each action is within {CLOSE:.0%} of its "
-        f"range of the agent's: {html.escape(close)} of these states. The cells above show where.</p>"
+        f"range of the agent's: {html.escape(close)} of these states.</p>"
         f'<div class="wide"><table>{head}{rows}</table></div>'
     )
 
@@ -116,15 +124,21 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
         here = inside == cell
         where = html.escape(policy.where.place(cell, policy.task.inputs, 3))
         if len(policy.task.inputs) > MOST_INPUTS:
-            typical = html.escape(_typical(policy, alike.states, here))
-            where = f"{typical}<details><summary>where exactly</summary>{where}</details>"
+            lines = "".join(f"<p>{html.escape(line)}</p>" for line in policy.equations(cell))
+            where = f"<details><summary>exactly</summary>{where}{lines}</details>"
+            where = html.escape(_typical(policy, alike.states, here)) + where
         text = "".join(f"<p>{html.escape(line)}</p>" for line in _equations(policy, cell, alike.states[here]))
         close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
-        mark = f'<i class="vsp-mark" style="border-radius: 0; background: {TINTS[cell % len(TINTS)]}"></i>'
+        edge = "; border-top: .3em solid" * (cell >= len(TINTS))
+        mark = f'<i class="vsp-mark" style="border-radius: 0; background: {TINTS[cell % len(TINTS)]}{edge}"></i>'
         place = f"{mark}<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{where}"
         cards += f"<div>{place * (len(policy) > 1)}{text}</div>"
     about = f"In each state one cell acts. {policy.where.about(policy.task.inputs, 3)}" if len(policy) > 1 else ""
+    if about and isinstance(policy, VoronoiPolicy):
+        units = ", ".join(f"{name} {unit:.3g}" for name, unit in zip(policy.task.inputs, policy.scale))
+        about = "In each state the cell with the nearest codeword acts. Codewords need not be possible states. Their "
+        about += f"distances are {policy.metric}, after each input is divided by its unit: {units}"
     if len(policy.policy_class.terms) > MOST_INPUTS:
         about += f"{'. ' * bool(about)}An equation shows the five inputs that move the action most, and the others at "
         about += "their mean; in brackets, the share of the action's variance that this hides"
@@ -171,20 +185,6 @@ def _played(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
         return "<p>No episode is shown: that takes linear maps, and codewords with a Minkowski distance.</p>"
     seen = episodes(policy, agent, alike)
     return seen + (f"<h2>Explore</h2>{explore(policy).element()}" if policy.task.name in PLANES else "")
-
-
-def _worst(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
-    """Return the states in which the actions differ most, one per cell at most."""
-    worst, rows = np.argsort(-np.linalg.norm(alike.errors, axis=1)), ""
-    firsts = np.unique(policy.cells(alike.states[worst]), return_index=True)[1]  # of each cell, the worst state
-    for i in worst[np.sort(firsts)[:3]]:
-        state = ", ".join(f"{name} {value:.3g}" for name, value in zip(policy.task.inputs, alike.states[i]))
-        actions = (
-            ", ".join(f"{a:.3g}" for a in np.ravel(one.predict(alike.states[i : i + 1])[0])) for one in (policy, agent)
-        )
-        rows += f"<tr><td>{html.escape(state)}</td>" + "".join(f"<td>{said}</td>" for said in actions) + "</tr>"
-    head = "<tr><th>state</th><th>policy</th><th>agent</th></tr>"
-    return f'<h2>Where do they differ most?</h2><div class="wide"><table>{head}{rows}</table></div>'
 
 
 def _kept(policy: PiecewisePolicy, states: np.ndarray, until: float) -> str:

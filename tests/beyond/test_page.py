@@ -1,5 +1,6 @@
 import base64
 import dataclasses
+import html
 import json
 import os
 import re
@@ -25,7 +26,7 @@ def test_a_page_has_all_it_needs_and_names_are_text(monkeypatch, tmp_path):
     monkeypatch.setattr(page, "_PROVE", "print('a theorem <b>')")
     made = vsp_beyond.report(TWO, PumpingTeacher(), MOUNTAINCAR, name="<script>alert(1)</script>", remarks="few <i>")
     assert "F = 0.000 x + 0.000 v + 1.000" in made and "a theorem &lt;b&gt;" in made and "few &lt;i&gt;" in made
-    assert "<script>alert" not in made and "<p>In each state one cell acts. Manhattan distances.</p>" in made
+    assert "<script>alert" not in made and "by its unit: x 1, v 1.</p>" in made
     assert not re.search(r"(src|href)=\"(?!data:)", made) and len(made) < 2_000_000
     files = dict(re.findall(r'download="policy.(\w+)" href="data:[^,]*,([^"]*)"', made))
     assert "jumps by at most 2, as found around" in base64.b64decode(files["c"]).decode()
@@ -41,8 +42,8 @@ def test_of_a_task_that_a_browser_cannot_play_it_shows_episodes():
     policy = vsp.VoronoiPolicy([np.zeros(8), np.ones(8)], np.zeros((2, 9, 2)), task=LUNARLANDER)
     made = vsp_beyond.report(policy, Constant(0.0, 0.0), LUNARLANDER)
     assert "<h2>Explore" not in made and made.count("application/json") == 1
-    assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "<h2>Where do they differ", "Cell 0<"))
-    assert "of the worst: return" in made and "seed " in made and "The median episode:" in made
+    assert all(part in made for part in ("<h2>How alike", "<h2>The policy", "Cell 0<"))
+    assert "of the worst: return" in made and "seed " in made and "the median episode:" in made
     scene = scene_of(made)
     assert [len(scene["episodes"]), len(scene["curves"])] == [4, 4] and len(scene["episodes"][0]["states"]) <= 400
 
@@ -76,11 +77,33 @@ def test_by_hand_what_a_page_says_of_cells_states_and_sizes():
     two = vsp.VoronoiPolicy([[0.2, 0.2], [0.8, 0.8]], np.zeros((2, 3, 2)), task=SIMPLEGOAL)
     said = page._cards(two, of_two([[0.2, 0.2], [0.2, 0.3]], [[0.0, 0.9], [0.0, 0.0]]))
     assert "all actions within 5% in 50% of these" in said
-    said = page._worst(TWO, PumpingTeacher(), of_two([[-0.5, 0.01], [-0.5, 0.02]], [[0.1], [0.9]]))
-    assert "v 0.02" in said and "v 0.01" not in said
     tried = judged(0.9, [1], [1], 1, True), judged(0.8, [1], [1], 2, True)
     said = page._sizes([dataclasses.replace(tried[0], policy=TWO), tried[1]], TWO)
-    assert "1 cell (chosen)" in said and "2 cells (chosen)" not in said
+    assert "1 cell (chosen)" in said and "2 cells (chosen)" not in said and "too low" not in said
+    many = vsp.VoronoiPolicy(np.zeros((7, 2)) + np.arange(7)[:, None], np.zeros((7, 3, 2)), task=SIMPLEGOAL)
+    assert page._cards(many, of_two([[0.2, 0.2]], [[0.0, 0.0]])).count("border-top") == 1  # a colour that comes again
+
+
+def test_of_many_inputs_short_equations_and_what_is_typical_come_before_the_exact_ones():
+    rng = np.random.default_rng(0)
+    policy = vsp.VoronoiPolicy(rng.normal(size=(2, 24)), rng.normal(size=(2, 25, 4)), task="BipedalWalker-v3")
+    shown, exact = page._cards(policy, of_two(rng.normal(size=(50, 24)), np.zeros((50, 4)))).split("<details>")[:2]
+    assert "on average (in all cells): " in shown and "(hides " not in shown
+    assert html.escape(policy.equations(0)[0]) in exact and exact.count("(hides ") == 4
+
+
+@pytest.mark.parametrize(
+    ("r2", "failed", "words"),
+    [(0.5, 0, "the actions differ"), (0.99, 4, "more episodes fail"), (0.99, None, "the return is lower")],
+)
+def test_the_first_sentence_says_what_is_not_alike(r2, failed, words):
+    one = judged(r2, [1] * 4, [9] * 4, 1, False)
+    alike = dataclasses.replace(of_two([[-0.5, 0.01]], [[0.5]]), r2=r2, returns=one.alike.returns)
+    alike = dataclasses.replace(alike, failures={"policy": failed, "agent": failed and 0})
+    made = vsp_beyond.report(
+        TWO, PumpingTeacher(), MOUNTAINCAR, tried=[dataclasses.replace(one, policy=TWO, alike=alike)]
+    )
+    assert f"not closely: {words}.</strong>" in made and "1 (too low)" in made and "warning" not in made
 
 
 def test_a_proof_that_takes_long_is_given_up(monkeypatch, tmp_path):

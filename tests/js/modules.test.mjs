@@ -128,8 +128,8 @@ test("an address is read as it was written, and none that is damaged", () => {
 test("by hand: the smallest change of an input, on either side, and none beyond its range", () => {
   const scene = { task: { inputs: ["x", "y", "z"] } },
     changes = Episodes.prototype.changes.bind({ scene, ranges: [[-1, 2], [-0.5, 1], [0, 0]] })
-  assert.equal(changes([1, 0, 0], ([x, y]) => x < 0.5 || y > 0.1), "y were 0.110 more, or x were 0.520 less")
-  assert.equal(changes([1, 0, 0], ([x]) => x > 1.9 && " (cell 2)"), "x were 0.920 more (cell 2)")
+  assert.equal(changes([1, 0, 0], ([x, y]) => x < 0.5 || y > 0.1), "y were 0.101 more, or x were 0.501 less")
+  assert.equal(changes([1, 0, 0], ([x]) => x > 1.9 && " (cell 2)"), "x were 0.901 more (cell 2)")
   assert.match(changes([1, 0, 0], ([x, , z]) => z !== 0 || x > 2), /no change of one input/)
 })
 
@@ -166,7 +166,7 @@ test("modules import only those before them, and scripts are short with short li
       assert.ok(NAMES.slice(0, i).includes(used), `${path} imports ${used}`)
   })
   for (const path of BUNDLES) assert.ok(Buffer.byteLength(textOf(path)) <= 60 * 1024, path)
-  assert.ok(SCRIPTS.map(path => textOf(path).split("\n").length).reduce((a, b) => a + b) <= 1850)
+  assert.ok(SCRIPTS.map(path => textOf(path).split("\n").length).reduce((a, b) => a + b) <= 1900)
   for (const path of SCRIPTS) {
     const [first, ...lines] = textOf(path).split("\n")
     assert.equal(first, "// @ts-check")

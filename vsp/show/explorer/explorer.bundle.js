@@ -671,6 +671,8 @@ var Episodes = class {
     this.done.forEach(({ cell }, t) => {
       ctx.fillStyle = CELLS[cell % CELLS.length];
       ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND);
+      ctx.fillStyle = tone("ink");
+      if (cell >= CELLS.length) ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND / 3);
     });
     const plot = (name, place, ...lines) => {
       const [least, most] = ends(lines.flat()), low = BAND + ROW * (place + 1) - 4;
@@ -693,34 +695,38 @@ var Episodes = class {
     ctx.fillStyle = tone("failing");
     ctx.fillRect(x(this.at) - 1, 0, 2, high);
   }
-  /** The smallest changes of a single input for which `changed` holds, as found on a grid.
+  /** The smallest changes of a single input for which `changed` holds, between points of a grid.
    * @param {Vector} state @param {(seen: Vector) => string | boolean} changed may add words */
   changes(state, changed) {
-    const found = this.scene.task.inputs.map((name, i) => {
-      const [low, high] = this.ranges[i];
+    const found = this.scene.task.inputs.flatMap((name, i) => {
+      const [low, high] = this.ranges[i], moved = (by) => state.with(i, state[i] + by), holds = (by) => moved(by)[i] >= low && moved(by)[i] <= high && changed(moved(by));
       for (let n = 1; n <= STEPS && low < high; n++)
-        for (const way of ["more", "less"]) {
-          const by = n / STEPS * (high - low), there = state.with(i, state[i] + (way === "more" ? by : -by)), said = there[i] >= low && there[i] <= high && changed(there);
-          const words2 = `${name} were ${digits(by)} ${way}${said === true ? "" : said}`;
-          if (said) return { n, words: words2 };
+        for (const way of [1, -1]) {
+          let [before, by] = [n - 1, n].map((step) => way * step * (high - low) / STEPS);
+          if (!holds(by)) continue;
+          for (let half = 0; half < 20; half++)
+            if (holds((before + by) / 2)) by = (before + by) / 2;
+            else before = (before + by) / 2;
+          const said = holds(by) === true ? "" : holds(by), share = Math.abs(by) / (high - low), enough = digits(Math.ceil(Math.abs(by) * 1e3) / 1e3), words2 = `${name} were ${enough} ${way > 0 ? "more" : "less"}`;
+          return [{ share, words: words2 + said }];
         }
-      return { n: 0, words: "" };
+      return [];
     });
-    const nearest = found.filter(({ n }) => n).sort((a, b) => a.n - b.n);
-    const words = nearest.slice(0, CHANGES).map(({ words: words2 }) => words2);
-    return words.join(", or ") || "no change of one input within its range in these episodes";
+    const nearest = found.sort((a, b) => a.share - b.share).slice(0, CHANGES);
+    const words = nearest.map(({ words: words2 }) => words2).join(", or ");
+    return words || "no change of one input within its range in these episodes";
   }
   said() {
     const { scene, policy, at, episode } = this, { outputs, actionLow, actionHigh } = scene.task, state = episode.states[at], { cell, action } = this.done[at], cells = policy.codewords.length, theirs = episode.agent[at].map((value, k) => `${outputs[k]} = ${digits(value)}`).join(", "), then = (seen) => act(scene, policy, seen);
     const line = (what, told) => element("p", {}, element("b", {}, `${what}: `), `${told}.`);
     const why = answerOf({ scene, policy, cell, cells, asked: state, task: { see: (seen) => seen } });
-    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`), lines = [step, ...why], cellAt = (seen) => then(seen).cell, moved = (seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`, apart = (k) => Math.abs(action[k] - episode.agent[at][k]), differ = outputs.filter((_, k) => apart(k) > CLOSE * (actionHigh[k] - actionLow[k]));
-    const only = `${differ.join(", ")} differ, so what follows explains the policy alone`;
+    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`), lines = [step, ...why], cellAt = (seen) => then(seen).cell, moved = (seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`, apart = (k) => Math.abs(action[k] - episode.agent[at][k]), middles = actionLow.map((low, k) => (low + actionHigh[k]) / 2), above = (one, k) => one[k] >= middles[k], far = (k) => apart(k) > CLOSE * (actionHigh[k] - actionLow[k]), opposite = (k) => above(action, k) !== above(episode.agent[at], k), differ = outputs.filter((_, k) => far(k) || opposite(k));
+    const only = `it differs in ${differ.join(", ")}, so what follows explains the policy alone`;
     if (differ.length) lines.splice(1, 0, line("Not as the agent", only));
     if (cells > 1) lines.push(line("Another cell would act if", this.changes(state, moved)));
     outputs.forEach((name, k) => {
-      const middle = (actionLow[k] + actionHigh[k]) / 2, above = action[k] >= middle, other = this.changes(state, (seen) => then(seen).action[k] >= middle !== above);
-      const side = `${above ? "below" : "above"} ${minus(String(middle))}`;
+      const turned = (seen) => above(then(seen).action, k) !== above(action, k) && (moved(seen) || true);
+      const other = this.changes(state, turned), side = `${above(action, k) ? "below" : "above"} ${minus(String(middles[k]))}`;
       lines.push(line(`${name} would be ${side} if`, other));
     });
     return lines;
