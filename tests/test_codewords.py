@@ -1,7 +1,6 @@
 """Codewords in every position, one, two, in a row, nearly equal, on a grid, in 1 to 8 dimensions; and in any order."""
 
 import itertools
-from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import nearest_brute, nearest_kdtree, partition_of
 
-from vsp import Config, VoronoiPolicy
+from vsp import VoronoiPolicy
 from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours
 from vsp.tasks import Task
 
@@ -68,10 +67,6 @@ def policy_of(codewords, metric="manhattan", *, seed=0):
 
 
 # No position breaks anything
-
-
-def test_every_kind_of_neighbours_is_tried():
-    assert graphs(*codewords_of("two", 2, 0), "manhattan").keys() == set(get_args(get_type_hints(Config)["neighbours"]))
 
 
 @given_codewords

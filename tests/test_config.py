@@ -3,7 +3,6 @@ import dataclasses
 import pytest
 from support import TASKS, TINY, tiny
 
-import vsp
 from vsp.config import EXTENSIONS, paper_preset
 from vsp.paper.printed import printed_hyperparameters
 
@@ -60,8 +59,3 @@ def test_quick_is_a_tenth_and_nothing_else(task):
 def test_quick_of_a_short_config_is_still_one(n_epochs, n_freeze):
     quick = tiny(n_epochs=n_epochs, n_freeze=n_freeze).quick()
     assert 0 < quick.n_freeze <= quick.n_epochs <= n_epochs
-
-
-def test_a_preset_takes_no_settings():
-    with pytest.raises(TypeError, match="n_epochs"):
-        vsp.preset(TASKS[0], n_epochs=10)

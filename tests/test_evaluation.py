@@ -1,3 +1,4 @@
+import dataclasses
 import re
 
 import numpy as np
@@ -33,6 +34,9 @@ def test_how_alike_by_hand():
     """The teacher pushes with the velocity; half of its variance is that of a constant in each direction."""
     same = likeness(PumpingTeacher(), PumpingTeacher(), MOUNTAINCAR, 20)
     assert same.r2 == 1 and not same.errors.any() and same.failures == {"policy": 0, "agent": 0} and not same.poor
+    assert [dataclasses.replace(same, r2=r2).poor for r2 in (0.9, 0.899)] == [False, True]
+    many = dataclasses.replace(same, returns=dict.fromkeys(same.returns, np.zeros(100)))
+    assert [dataclasses.replace(many, failures={"policy": n, "agent": 1}).poor for n in (3, 4)] == [False, True]
     alike = likeness(TWO, PumpingTeacher(), MOUNTAINCAR, 20)
     theirs, ours = (one.predict(alike.states)[0] for one in (PumpingTeacher(), TWO))
     assert alike.r2 == pytest.approx(1 - np.mean((ours - theirs) ** 2) / theirs.var())

@@ -35,6 +35,9 @@ def test_kdtree_equals_brute_force_on_grids(metric):
     expected = nearest_brute(codewords, states, metric)
     for lookup in (nearest, nearest_kdtree):  # with so many codewords both use the tree
         assert np.array_equal(lookup(codewords, states, metric), expected)
+    codewords = rng.random((60, 8))
+    states = codewords[rng.integers(60, size=(4000, 2))].mean(axis=1)  # of some, rounding decides
+    assert np.array_equal(nearest_kdtree(codewords, states, metric), nearest_brute(codewords, states, metric))
 
 
 # Delaunay
@@ -50,6 +53,12 @@ def test_kdtree_equals_brute_force_on_grids(metric):
         ([[0, 0], [0.1, 0.3], [0.2, 0.6], [0.3, 0.9]], {(0, 1), (1, 2), (2, 3)}),  # in a row up to rounding
         ([[0, 0], [4, 0], [2, 1], [2, -1]], {(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),  # the short diagonal
         ([[0, 0], [2, 0], [0, 2], [2, 2], [1, 1]], {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),
+        ([[0, 0], [4, 0], [2, 1e-5], [2, -1e-5]], {(0, 2), (0, 3), (1, 2), (1, 3), (2, 3)}),  # not quite in a row
+        # Qhull leaves out what is far from the origin, or next to another point: its only neighbour then
+        ([[1e8, 1e8], [1e8 + 2, 1e8], [1e8, 1e8 + 2], [1e8 + 2, 1e8 + 2], [1e8 + 1, 1e8 + 1]],
+         {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),
+        ([[0, 0], [2, 0], [0, 2], [2, 2], [1, 1], [1, 1 + 3e-16]],
+         {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4), (4, 5)}),
         ([[5], [1], [3]], {(0, 2), (1, 2)}),
         ([[0, 0, 1], [2, 0, 1], [0, 2, 1], [2, 2, 1], [1, 1, 1]],
          {(0, 1), (0, 2), (1, 3), (2, 3), (0, 4), (1, 4), (2, 4), (3, 4)}),  # in a plane of three dimensions

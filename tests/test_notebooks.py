@@ -33,10 +33,6 @@ def code_cells(notebook):
     return [cell for cell in notebook.cells if cell.cell_type == "code"]
 
 
-def test_there_are_notebooks():
-    assert [path.stem[:2] for path in NOTEBOOKS] == [f"{n:02d}" for n in range(1, len(NOTEBOOKS) + 1)]
-
-
 @each_source
 def test_sources_hold_no_output_and_no_two_cells_one_id(path, notebook):
     nbformat.validate(notebook)

@@ -4,13 +4,12 @@ import time
 
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher
 
 import vsp
 from vsp.evaluation import Likeness
 from vsp.run.atomic import DamagedFile
 from vsp.tasks import get_task
-from vsp.tasks.gym_adapter import gymnasium_task
 from vsp_beyond.few_cells import fewest as module
 from vsp_beyond.few_cells.config import Faithful
 
@@ -148,7 +147,3 @@ def test_where_failures_are_not_defined_a_lost_return_warns(ours, poor):
     assert alike.poor == poor == str(alike).startswith("warning: ")
     wide = alike.returns | {"policy": np.array([0, 180, 0, 180.0])}
     assert not dataclasses.replace(alike, returns=wide, failures={"policy": 0, "agent": 0}).poor
-
-
-def test_an_engine_plays_fewer_episodes():
-    assert gymnasium_task("BipedalWalker-v3").slowness == 53 and get_task(LUNARLANDER).slowness == 10

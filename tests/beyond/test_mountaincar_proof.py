@@ -110,7 +110,6 @@ def test_a_block_is_what_the_checker_plays(policy):
     deviation = returns.std() / np.sqrt(len(returns))
     assert block.mean_low - 5 * deviation < returns.mean() < block.mean_high + 5 * deviation
     assert block.n_states > 200 and block.mean_high - block.mean_low < 1e-4
-    assert block.width == pytest.approx((high - low) / 0.2)
 
 
 def test_on_a_border_both_ways_are_followed():
@@ -139,6 +138,7 @@ def test_a_car_that_does_not_move_is_not_run():
     ("wrong", "match"),
     [(vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 1)), task=MOUNTAINCAR), "metric is 'manhattan'"),
      (vsp.VoronoiPolicy([[0, 0]], np.zeros((1, 3, 2)), task=SIMPLEGOAL), MOUNTAINCAR),
+     (vsp.VoronoiPolicy([[0, 0]], [[[0]]], task=MOUNTAINCAR, sub_policy="constant", metric="euclidean"), "linear"),
      (policy_of(np.arange(130).reshape(65, 2), np.zeros((65, 3, 1))), "at most 64")],
 )  # fmt: skip
 def test_other_policies_get_one_clear_error(wrong, match):

@@ -6,7 +6,6 @@ import gymnasium
 import numpy as np
 import own_tasks
 import pytest
-from support import python
 
 import vsp
 import vsp_beyond
@@ -65,15 +64,6 @@ def test_it_explains_itself_by_the_names_that_were_given(distilled):
     explained = policy.explain(0.5 * np.ones(len(task.low)))
     assert list(explained.contributions.columns[:-1]) == list(task.inputs) == NAMES[task.name][0]
     assert [text.split(" =")[0] for text in explained.equations] == NAMES[task.name][1]
-
-
-def test_it_is_saved_with_names_and_box_and_acts_where_nobody_knows_the_task(distilled, tmp_path):
-    task, _, policy, _ = distilled
-    policy.save(tmp_path / "own.vsp")
-    code = "import sys, vsp; print(vsp.VoronoiPolicy.load(sys.argv[1]).to_json())"
-    elsewhere = python(code, tmp_path / "own.vsp")
-    assert elsewhere.strip() == policy.to_json().strip() and NAMES[task.name][0][0] in elsewhere
-    assert vsp.VoronoiPolicy.load(tmp_path / "own.vsp").task is task
 
 
 def test_failures_are_defined_where_a_success_is(distilled):

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from spoilt import Argument, actor, array, but_for_none, count, name, number, refuses, settings
-from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, tiny
+from support import SIMPLEGOAL, CurvedTeacher, tiny
 
 import vsp
 import vsp_beyond
@@ -25,7 +25,6 @@ faithful = Argument(FAITHFUL, [3, "faithful", tiny(), TUNED, {}, np.nan])
 tuned = Argument(TUNED, [3, "tuned", tiny(), FAITHFUL, {}, np.nan])
 STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
 TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
-FLAT = vsp.VoronoiPolicy(np.zeros((1, 2)), np.zeros((1, 1, 1)), task=MOUNTAINCAR, sub_policy="constant")
 
 CASES = {
     "Tuned": (vsp_beyond.Tuned, settings(TUNED, from_zero=("n_corrections", "n_generations"))),
@@ -63,9 +62,3 @@ def test_the_limit_refuses_before_it_searches():
             if bad is not None:
                 with pytest.raises(ValueError, match="expected|fails on"):
                     vsp_beyond.at_the_limit(**good | {argument: bad})
-
-
-@pytest.mark.parametrize("policy", [FLAT, None, CurvedTeacher()])
-def test_only_linear_policies_are_proved(policy):
-    with pytest.raises(ValueError, match="expected"):
-        vsp_beyond.prove(policy)

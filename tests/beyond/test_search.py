@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from vsp_beyond.few_cells import search, units
+from vsp_beyond.few_cells import search
 from vsp_beyond.few_cells.search import N_STAGES, descend, least_error, local_init, moves, uncorrelated, whole_loss
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, expected_loss, spread, squared_error
 
@@ -101,12 +101,6 @@ def test_a_codeword_that_no_state_is_near_may_move_far():
     far = ScaledCells(np.vstack([cells.codewords, [[99, 99]]]), np.vstack([cells.coefficients, cells.coefficients[:1]]))
     moved = search.even_moves(labelled, far)(np.ones(far.vector.size)).codewords - far.codewords
     assert moved[3].min() > 3 * moved[:3].max()
-
-
-def test_the_unit_of_temperature_by_hand():
-    states = np.array([[1.0, 2], [-1, 2], [1, -2], [-1, -2]])
-    labelled = LabelledStates(np.column_stack([states, np.ones(4)]), np.zeros((4, 1)))
-    assert units.temperature_unit(labelled, 4) == pytest.approx(5 / 4)
 
 
 # States that stand for all

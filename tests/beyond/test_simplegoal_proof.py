@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
 import vsp
 import vsp_beyond
 from studies import comparison
 from vsp.run import sealed
-from vsp_beyond.proofs import PROVERS, check, largest_disturbance, load_certificate, proved, robust, steps_to_goal
+from vsp_beyond.proofs import check, largest_disturbance, load_certificate, proved, robust, steps_to_goal
 from vsp_beyond.proofs.grid import touches
 from vsp_beyond.proofs.polygons import box, line_of, meet, total
 from vsp_beyond.proofs.proof import CERTIFICATES, RESULTS
@@ -91,6 +91,8 @@ def test_the_areas_by_hand(action, goal, pit, outside, longest):
     shares = ", ".join(f"{name} {float(area):.6g}" for name, area in proof.areas.items())
     assert str(proof) == f"SimpleGoal-v0, cells: 1, proved: {shares}, longest {longest}"
     assert all(len(corners) > 2 for corners in proof.polygons()) and len(proof.polygons()) == len(proof.pieces)
+    with pytest.raises(ValueError, match=f"expected at most {len(proof.pieces) - 1}$"):
+        follow(proof.policy, most=len(proof.pieces) - 1)
 
 
 def test_a_tie_over_an_area_goes_to_the_lowest_cell():
@@ -150,18 +152,6 @@ def test_other_policies_get_one_clear_error(policy, match):
             refuses(policy)
     with pytest.raises(ValueError, match="the policy is .*, expected a VoronoiPolicy for one of"):
         vsp_beyond.prove(vsp.VoronoiPolicy(np.zeros((1, 8)), np.zeros((1, 9, 2)), task=LUNARLANDER))
-
-
-def test_all_pieces_count_also_those_that_ended():
-    policy = policy_of([[0.5, 0.5]], [DOWN_LEFT])
-    n = len(follow(policy))
-    with pytest.raises(ValueError, match=f"expected at most {n - 1}"):
-        follow(policy, most=n - 1)
-
-
-def test_every_task_has_its_own_prover():
-    names = {task: prover.__name__ for task, prover in PROVERS.items()}
-    assert names == {SIMPLEGOAL: "prove_simplegoal", MOUNTAINCAR: "prove_mountaincar", PENDULUM: "prove_pendulum"}
 
 
 # Over a grid

@@ -60,10 +60,6 @@ def test_a_policy_acts_as_its_cells_do_in_scaled_units_and_back(task):
     assert np.array_equal(cells.like(cells.vector).coefficients, cells.coefficients)
 
 
-def test_a_variable_that_never_varies_keeps_its_unit():
-    assert Scaling.of(get_task(SIMPLEGOAL), np.array([[0.5, 0.1], [0.5, 0.3]])).scale == pytest.approx([1.0, 0.1])
-
-
 # The loss
 
 

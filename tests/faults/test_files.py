@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload
 
 import vsp
@@ -262,23 +261,3 @@ def test_no_payload_runs(agent, tmp_path, listed, record):
         what = "files with pickles, YAML tags or code, through every loader"
         record("input", what, harmless, f"of {len(made)}", at_least=len(made), note="no code was run")
     assert harmless == len(made) >= 15
-
-
-def test_the_payloads_are_live(agent, tmp_path):
-    """Whoever unpickles them, or makes what their tags say, writes the mark."""
-    import torch
-
-    mark = tmp_path / "ran"
-    made = payloads(mark, agent)
-    attacks = [
-        lambda: pickle.loads(made["raw.run"]),
-        lambda: yaml.unsafe_load(made["tag.yaml"]),
-        lambda: np.load(io.BytesIO(made["objects.npy"]), allow_pickle=True),
-        lambda: torch.load(io.BytesIO(made["torch.pt"]), weights_only=False),
-        lambda: pickle.loads(base64.b64decode(json.loads(made["card.json"])[":serialized:"])),
-        lambda: eval(nbformat.reads(made["parameters.ipynb"].decode(), 4).cells[0].source.removeprefix("out = ")),
-    ]
-    for attack in attacks:
-        attack()
-        assert mark.exists()
-        mark.unlink()

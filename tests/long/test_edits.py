@@ -11,13 +11,8 @@ from vsp.run.command import CommandError
 from vsp.run.notebook import nbformat
 
 SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
-LAST = {
-    "06": "read-figure",
-    "07": "cells",
-    "08": "imports",
-    "10": "state",
-    "11": "fit",
-}  # the last cell that it concerns
+# The last cell that it concerns
+LAST = {"06": "read-figure", "07": "cells", "08": "imports", "10": "state", "11": "fit"}
 
 
 def played(number, out, **changes):

@@ -121,12 +121,8 @@ def test_a_comparison_makes_what_is_missing_alone(comparison, tmp_path, monkeypa
     first = vsp.compare(few, [SIMPLEGOAL], seeds=[0], n_episodes=20, runs=tmp_path)
     again = vsp.compare(few | {"split": METHODS["split"]}, [SIMPLEGOAL], seeds=[0, 1], n_episodes=20, runs=tmp_path)
     kinds = [(one.name or "SVM", seed) for one, seed in made]
-    assert kinds == [
-        ("the agent itself", 0),
-        ("SVM", 0),
-        ("SVM", 1),
-        *[("the paper's method", seed) for seed in (0, 1)],
-    ]
+    of_the_paper = [("the paper's method", seed) for seed in (0, 1)]
+    assert kinds == [("the agent itself", 0), ("SVM", 0), ("SVM", 1), *of_the_paper]
     key = SIMPLEGOAL, "SVM"
     assert np.array_equal(first.returns[key][0], again.returns[key][0]) and len(again.frame) == 3
     assert "\\toprule" in again.to_latex() and again.plot(SIMPLEGOAL).get_title() == SIMPLEGOAL
@@ -160,12 +156,9 @@ def shown(agent, task, data, seed):
 
 
 def test_who_always_fails_is_told_so(tmp_path):
-    """Where somebody reaches a goal; in a task without one, nobody fails."""
+    """Where somebody reaches a goal."""
     frame = vsp.compare({"still": standing}, [SIMPLEGOAL], seeds=[0], n_episodes=9, runs=tmp_path).frame
     assert frame["failing"].tolist() == [0, 1] and frame["cells"].isna().all()
-    aimless = vsp.Method(lambda *_: vsp.agent(lambda obs: 0 * obs[:, :1]), name="aimless", version=1)
-    frame = vsp.compare({"aimless": aimless}, ["Pendulum-v1"], seeds=[0], n_episodes=2, runs=tmp_path).frame
-    assert frame["failing"].isna().all() and frame["mean"].nunique() == 2
 
 
 def standing(agent, task, data, seed):
@@ -237,6 +230,8 @@ def test_a_version_stands_for_the_source_alone():
         function.version = 1
     assert len({str(identity(one)) for one in functions}) == 6 and identity(np.sin) != identity(np.cos)
     assert "source" in identity(functools.cache(made))["settings"]["of"]
+    table = np.arange(6.0).reshape(2, 3)  # in either order of memory
+    assert identity(np.asfortranarray(table)) == identity(table) != identity(table.T.reshape(2, 3))
 
 
 def test_code_without_source_needs_a_version():
@@ -254,12 +249,8 @@ def test_code_without_source_needs_a_version():
 
 def test_the_distance_is_part_of_every_id_and_file(tmp_path):
     teacher = vsp.load_teacher(SIMPLEGOAL)
-    for metric in (
-        "manhattan",
-        "euclidean",
-        next_metric.MINKOWSKI,
-        dataclasses.replace(next_metric.MINKOWSKI, order=4),
-    ):
+    mine = next_metric.MINKOWSKI
+    for metric in ("manhattan", "euclidean", mine, dataclasses.replace(mine, order=4)):
         one = Experiment(SIMPLEGOAL, dataclasses.replace(CONFIG, metric=metric), teacher, 5)
         (run,) = vsp.paper.runs.make_runs(one, [0], runs=tmp_path)
         again = vsp.rollout_from_seed(run.policy, SIMPLEGOAL, 5, seed=1)

@@ -9,7 +9,7 @@ from support import SIMPLEGOAL, CurvedTeacher, partition_of, same_arrays, tiny, 
 
 from studies.reproduction.hidden import PRIOR
 from vsp.algorithms import distill, merge_regions, split_regions
-from vsp.paper.readings import Readings, defaults
+from vsp.paper.readings import Readings
 from vsp.rollouts import Episode
 from vsp.tasks.registry import get_task
 
@@ -98,8 +98,3 @@ def test_every_reading_acts_in_a_run_and_no_other_word_is_taken(name):
     assert any(run(base, seed) != run(other, seed) for seed in range(5))
     with pytest.raises(ValueError, match=f"{name} is 'typo', expected"):
         Readings(**{name: "typo"})
-
-
-def test_the_defaults_are_those_of_the_settings():
-    found = defaults(tiny(n_minibatches=7))
-    assert found["n_minibatches"] == 7 and found["loss_after_split"] == "reset" and "n_epochs" not in found

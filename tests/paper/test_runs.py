@@ -148,16 +148,6 @@ def test_a_run_whose_returns_are_no_numbers_is_refused(tmp_path):
         one.run(tmp_path)
 
 
-def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(runs_module, "VERSION", 7)
-        make_runs(changed(), [0], runs=tmp_path)
-        old = changed().folder(tmp_path)
-    shutil.copytree(old, SMALL.folder(tmp_path))
-    with pytest.raises(atomic.DamagedFile, match="0000.run: made with version 7, expected 1: delete it"):
-        Distillation(SMALL, 0).run(tmp_path)
-
-
 def test_a_run_of_another_seed_is_refused_and_a_failing_one_keeps_the_others(tmp_path, monkeypatch):
     make = Distillation.make
     monkeypatch.setattr(Distillation, "make", lambda run: make(run) if run.seed == 0 else 1 / 0)

@@ -107,13 +107,6 @@ def test_a_resample_is_the_drawn_runs_from_the_drawn_starts(returns, seed):
     check_resamples(resample(returns, n_resamples=3, seed=seed), returns, seed)
 
 
-@pytest.mark.parametrize("shape", [(70, 1), (12, 30)])
-def test_many_resamples_are_too(shape):
-    rng = np.random.default_rng(3)
-    returns = rng.normal(15, 2, shape) - 25 * (rng.random(shape) < 0.06)
-    check_resamples(resample(returns, n_resamples=60, seed=4), returns, 4)
-
-
 def test_outliers_that_are_almost_equal_have_an_exact_deviation():
     """Far from the mean of all returns, so that sums of squares about it would keep no digit of it."""
     values = np.append(np.zeros(98), [1e6, 1e6 + 1e-6])

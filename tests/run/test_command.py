@@ -3,14 +3,12 @@
 import argparse
 import errno
 import os
-import subprocess
-import sys
 
 import pytest
 
 from studies import make_rows
-from vsp.paper import make_runs, runs
-from vsp.run.atomic import ROOT, DamagedFile, MissingFile, write_text
+from vsp.paper import make_runs
+from vsp.run.atomic import DamagedFile, MissingFile, write_text
 from vsp.run.command import CommandError, in_one_line, jobs
 
 
@@ -73,12 +71,3 @@ def test_commands_refuse_such_jobs_before_they_begin(monkeypatch, capsys, comman
         command.main()
     assert end.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith("command: error: argument --jobs: '0': expected a whole")
-
-
-def test_a_damaged_run_ends_the_command_in_one_line(tmp_path):
-    path = runs.paper_experiment("SimpleGoal-v0", quick=True).folder(tmp_path / "data" / "runs") / "0000.run"
-    path.parent.mkdir(parents=True)
-    os.mkfifo(path)
-    command = [sys.executable, "-m", "vsp.paper.make_runs", "--quick", "--jobs", "1", "--out", tmp_path]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1 and done.stderr.splitlines()[-1].startswith(f"error: {path}: is a folder, a FIFO or")

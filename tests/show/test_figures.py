@@ -8,17 +8,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-import seaborn as sns
 from drawn import hexes, labels
 from PIL import Image, UnidentifiedImageError
 from support import python
 
 from vsp import geometry, show
-from vsp.paper import ledger
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.show import state_space, style
-from vsp.show.returns import _VERDICTS, box_plot, boxes, intervals, ledger_gaps
+from vsp.show.returns import box_plot, boxes, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
 
@@ -200,11 +198,6 @@ def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
     assert ax.lines[1].get_xydata().tolist() == [[0.5, 0.2]]
 
 
-def test_written_out_colours_are_those_of_seaborn():
-    assert list(style.COLOURS) == sns.color_palette("colorblind").as_hex()
-    assert list(state_space._PASTEL) == sns.color_palette("pastel").as_hex()
-
-
 def test_importing_does_not_wait_for_what_few_notebooks_use():
     code = "import sys, vsp.show; print(sys.modules.keys() & {'seaborn', 'ipywidgets', 'scipy.stats', 'scipy.ndimage'})"
     assert python(code).strip() == "set()"
@@ -266,10 +259,6 @@ def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     assert drawn == [[[0, 3], [1, 1]], [[1, 1], [2, 3]], [[0, 2.5], [1, 2.5]], [[7, 0], [7, 1]]]
     show.margin(ax, ["1 %"], "fail")
     assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
-
-
-def test_every_verdict_with_a_gap_has_a_mark():
-    assert set(_VERDICTS) == set(ledger.VERDICTS) - {ledger.UNCHECKED}
 
 
 def test_boxes_lie_from_the_first_quartile_to_the_third(ax):

@@ -103,7 +103,3 @@ def test_a_laboratory_needs_a_task_of_the_paper_maps_to_draw_and_a_teacher_that_
         with pytest.raises(ValueError, match=message):
             Laboratory(teacher, task, config)
     assert Laboratory(PumpingTeacher(), MOUNTAINCAR, tiny(min_pol_distance=0.3)).trials
-
-
-def test_a_slider_answers_once_where_it_is_let_go(lab):
-    assert not any(control.continuous_update for name, control in lab.settings.items() if name != "sub_policy")

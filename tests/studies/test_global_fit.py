@@ -3,7 +3,7 @@ import pytest
 from support import SIMPLEGOAL, examples
 
 from studies.comparison import global_fit
-from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_cells, global_tree, greedy_cells
+from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_tree, greedy_cells
 from studies.comparison.tuning import of_tree
 from studies.rivals.trees import ObliqueLinearTree, Split
 from vsp import VoronoiPolicy, get_task
@@ -115,10 +115,3 @@ def test_greedy_cells_stop_where_one_map_is_exact():
     states, _ = examples(SIMPLEGOAL)
     assert len(greedy_cells(states, 0.5 * states - 0.2, 4, TASK, 0)) == 1
     assert len(greedy_cells(*examples(SIMPLEGOAL), 4, TASK, 0)) == 4
-
-
-@pytest.mark.parametrize("fit", [global_tree, global_cells, greedy_cells])
-def test_the_same_arguments_are_the_same_policy(fit):
-    states, actions = examples(SIMPLEGOAL, n=200)
-    one, again, other = (fit(states, actions, 3, TASK, seed).predict(states)[0] for seed in (1, 1, 2))
-    assert np.array_equal(one, again) and not np.array_equal(one, other) and np.abs(one).max() <= 1

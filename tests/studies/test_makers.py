@@ -35,12 +35,6 @@ def test_every_method_gives_a_policy_of_its_size_for_the_same_episodes_of_the_te
     assert sum(played) == (40 if corrections else 20)
 
 
-def test_a_method_that_imitates_alone_gives_a_policy_of_its_size():
-    policy = make(name := "our cells, greedy fit")
-    actions, _ = policy.predict(np.random.default_rng(0).random((5, 2)))
-    assert len(policy) == 3 and actions.shape == (5, 2) and np.abs(actions).max() <= 1 and len(make(name, 1)) == 1
-
-
 @pytest.mark.parametrize(("by_chance", "seeds"), [(True, [10, 11, 10, 10]), (False, [5, 5, 5])])
 def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_corrected(monkeypatch, by_chance, seeds):
     asked = []

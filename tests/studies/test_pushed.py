@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import KDTree
-from support import PENDULUM, WALKER
+from support import PENDULUM
 
 from studies.robots.imitation import Pushed, imitate_pushed
-from studies.robots.settings import Walking, walking_preset
+from studies.robots.settings import Walking
 from vsp import agent, get_task, load_teacher, visited_states
 
 FEW = Walking(n_cells=3, n_episodes=4, n_corrections=1, n_correction_episodes=2, n_states=1500, n_restarts=1)
@@ -43,8 +43,3 @@ def test_corrections_and_pushes_bring_states_that_the_teacher_never_sees():
     known = KDTree(visited_states(teacher, task, task.start(np.random.default_rng(9), 100)))
     own, pushed, visited = (known.query(rounds[-1][part])[0].mean() for part in np.split(np.arange(3200), [800, 2400]))
     assert pushed > 1.5 * own and visited > 3 * own
-
-
-def test_a_robot_has_the_discount_of_its_teacher():
-    for name in (WALKER, PENDULUM):
-        assert walking_preset(name).n_cells == 8 and walking_preset(name).gamma == (0.98 if name == WALKER else 0.99)

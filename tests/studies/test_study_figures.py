@@ -46,11 +46,8 @@ def test_lines_are_medians_and_our_band_spans_the_seeds(ax):
     edge = band.get_paths()[0].vertices
     ends = edge[edge[:, 0] == 1, 1]
     assert (ends.min(), ends.max()) == pytest.approx((-2.8, -1.2)) and hexes(band.get_facecolor()) == [style.OURS]
-    assert ax.get_ylim()[0] > -40 and ax.get_xticks().tolist() == [
-        1,
-        2,
-        8,
-    ]  # what is not drawn stretches nothing
+    assert ax.get_ylim()[0] > -40  # what is not drawn stretches nothing
+    assert ax.get_xticks().tolist() == [1, 2, 8]
 
 
 @pytest.mark.parametrize("looks", [show.TUNING, show.LIMITS, show.ROBOTS], ids=["tuning", "limits", "robots"])

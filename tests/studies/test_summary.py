@@ -127,7 +127,3 @@ def test_intervals_over_groups_by_enumeration():
     assert summary.over_groups([np.array([1.0, 3.0])]) == (1.0, 3.0)
     low, high = summary.over_groups([np.full(50, 1.0), np.full(5, 2.0), np.full(5, 6.0)])  # each group counts alike
     assert (low, high) == (1.0, 6.0)
-
-
-def test_targets_are_of_tasks_that_are_known():
-    assert summary.LEAST_R2.keys() == summary.AS_GOOD.keys()

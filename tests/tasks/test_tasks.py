@@ -261,8 +261,7 @@ def test_tasks_by_name():
     for name in task_names():
         task = get_task(name)
         assert isinstance(task, Task) and task.name == name and get_task(name) is task
-        assert len(set(task.inputs)) == len(task.low) == len(task.input_labels)
-        assert len(set(task.outputs) - set(task.inputs)) == len(task.action_low)
+        assert len({*task.inputs, *task.outputs}) == len(task.low) + len(task.action_low)
     task = get_task(SIMPLEGOAL)
     assert get_task(task) is task and task.name == SIMPLEGOAL
 

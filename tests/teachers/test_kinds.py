@@ -18,6 +18,7 @@ from zips import CAR, Car, bomb, in_float64, made, retold, rewritten, saved
 from vsp import load_teacher, rollout_from_seed
 from vsp.teachers import agent_zip
 from vsp.teachers.agent_zip import read_zip
+from vsp.teachers.inert import array, described
 
 SMALL, SDE = {"net_arch": [12, 8]}, {"use_sde": True}
 ACTIVATIONS = ("Tanh", "ReLU", "ELU", "LeakyReLU", "GELU", "SiLU")
@@ -52,6 +53,13 @@ def test_a_zip_of_any_kind_acts_as_its_library_does(name, about, settings, tmp_p
     model = made(algorithm, Car(), policy, about=about, **settings)
     model.save(tmp_path / "agent.zip")
     acts_as(model, load_teacher(tmp_path / "agent.zip", CAR))
+
+
+@pytest.mark.parametrize("protocol", [4, 5])
+def test_arrays_are_read_in_either_order_of_memory(protocol):
+    values = np.arange(6.0).reshape(2, 3)
+    for given in (values, np.asfortranarray(values)):
+        assert np.array_equal(array(described(pickle.dumps(given, protocol)), "it"), values)
 
 
 # What says one thing more
@@ -106,7 +114,7 @@ SAYS = {
     },
     "action_space is missing": {"action_space": None}, "its action_space is .*Discrete, expected": space("action"),
     r"low of its action_space is .0.0, 0.0., SimpleGoal-v0 has .-1": space("action", 0, 1, 2),
-    "high of its action_space": space("action", -1, 2, 2), "action_space is .-inf": space("action", -np.inf, 1, 2),
+    "high of its action_space": space("action", -1, 1.01, 2), "action_space is .-inf": space("action", -np.inf, 1, 2),
     "low of its observ": space("observation", -1, 1, 2), "observation_space has 3": space("observation", 0, 1, 3),
     "limit of its action_space is no": {"action_space": b"\x80\x04cgym.spaces.box\nBox\n)\x81}\x8c\x03low\x8c\x01ysb."},
 }  # fmt: skip

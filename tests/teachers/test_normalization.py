@@ -97,14 +97,8 @@ NO_SIGNS = [f"n_envs: 4\nnormalize: {value}" for value in (
     "false", "False", "", "~", "'no'", "dict(norm_obs=False, norm_reward=True)", "{norm_obs: false}",
     '"{\'norm_obs\': False}"', f'"{" " * 500_000}x{" " * 100_000}norm_obs=False"')]  # fmt: skip
 NO_SIGNS += ["&a [*a, *a]", "normalise: true", "a: {normalise: true}"]
-UNREADABLE = [
-    b"a: [",
-    b": : :",
-    b"[" * 9999,
-    b"a:\n\tnormalize: true",
-    b"a: \xfc\nnormalize: true",
-    b"#" * 2**20 + b"\nnormalize: true",
-]
+UNREADABLE = [b"a: [", b": : :", b"[" * 9999, b"a:\n\tnormalize: true", b"a: \xfc\nnormalize: true"]
+UNREADABLE.append(b"#" * 2**20 + b"\nnormalize: true")
 HIDDEN = ["a: 1\n---\nnormalize: true", "hyperparams: {normalize: true}", "normalize: false\nnormalize: true",
           "Normalize: true", "a: [[b, {normalize: dict(norm_obs=True)}]]"]  # fmt: skip
 

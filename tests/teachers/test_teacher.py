@@ -53,6 +53,11 @@ def test_weights_that_do_not_fit_are_one_clear_error(weights, message):
 def test_the_digest_tells_teachers_apart_and_repeats():
     digests = [network_teacher(SIMPLEGOAL, seed=s).digest for s in (0, 0, 1)]
     assert digests[0] == digests[1] != digests[2] and len(digests[0]) == 64
+    actor, moments = network_teacher(SIMPLEGOAL).actor, (np.zeros(2), np.ones(2))
+    norms = [normalization.Normalization(*moments, *n) for n in ((1e-8, 10.0), (1e-3, 10.0), (1e-8, 5.0))]
+    others = [Teacher(actor._replace(clip_mean=2.0), SIMPLEGOAL)]
+    others += [Teacher(actor, SIMPLEGOAL, normalization=one) for one in norms]
+    assert len({digests[0], *(other.digest for other in others)}) == 5
 
 
 # Files
@@ -155,16 +160,8 @@ def statistics(mark, sound):
     nested = bomb(lambda tuples: {"mean": tuples, "var": tuples})[11:-1]  # without its beginning and end
     system, claim = b"cposix\nsystem\n(Vtouch " + bytes(mark) + b"\ntR.", b"\x80\x04B\xff\xff\xff\x3fxxx"
     slow = b"\x80\x04N" + b"\x94" * 2**20 + b"."  # remembers the same value a million times
-    return [
-        pickle.dumps(Payload(mark)),
-        system,
-        bomb(),
-        sound[:-40],
-        b"]" * 2**24,
-        claim,
-        state + nested + b"sb.",
-        slow,
-    ]
+    found = [pickle.dumps(Payload(mark)), system, bomb(), sound[:-40], b"]" * 2**24, claim]
+    return [*found, state + nested + b"sb.", slow]
 
 
 def test_crafted_files_are_refused_within_memory_and_time(small, tmp_path):
@@ -201,11 +198,16 @@ def test_crafted_files_are_refused_within_memory_and_time(small, tmp_path):
 
 
 def test_no_more_of_a_member_is_unpacked_than_is_allowed(small, tmp_path, monkeypatch):
+    lies = rewritten(small, tmp_path / "lies.zip")
+    with zipfile.ZipFile(lies, "a") as archive:
+        archive.getinfo("data").file_size, archive._didModify = 2**31, True
     bad, read = rewritten(small, tmp_path / "x.zip", data=bytes(2**26)), zipfile.ZipExtFile.read
     whole = pytest.fail  # no Exception, all of which `read_zip` catches
     monkeypatch.setattr(zipfile.ZipExtFile, "read", lambda file, n=None: read(file, n) if n else whole("of any size"))
     with pytest.raises(DamagedFile, match="bytes unpacked, expected at most"):
         load_teacher(bad, SIMPLEGOAL)
+    with pytest.raises(DamagedFile, match="data is 2147483648 bytes unpacked, expected at most"):
+        load_teacher(lies, SIMPLEGOAL)
 
 
 @pytest.mark.parametrize("module", [agent_zip, normalization])
