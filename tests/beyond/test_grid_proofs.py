@@ -187,14 +187,16 @@ def test_the_checker_agrees_and_refuses_every_mutant(proof):
             pytest.fail(f"accepted a mutant: {kind}")
 
 
-def all_are(number):
-    """All boxes get one number: together they are never left, or all lead to others, whatever the policy does."""
+def all_five(content):
+    """All boxes lead to others of five steps."""
+    content["claim"] |= {"proved": content["claim"]["starts"], "longest": 5}
+    content["pieces"] = [[5, 16]] * 16
 
-    def alter(content):
-        claim = {**content["claim"], "proved": content["claim"]["starts"], "longest": number}
-        content |= {"pieces": [[number, 16]] * 16, "claim": claim}
 
-    return alter
+def kept_beyond(content):
+    """Of these rows around upright, the outer ones begin within 0.5 rad and end beyond."""
+    content["claim"] = {"n": 48, "proved": 48, "starts": 288, "longest": 0}
+    content["pieces"] = 20 * [[0, 48]] + 8 * [[-1, 48]] + 20 * [[0, 48]]
 
 
 @pytest.mark.parametrize(
@@ -204,7 +206,7 @@ def all_are(number):
      (lambda c: c["policy"]["codewords"].__setitem__(0, [1e200] * 3), "malformed"),
      (lambda c: c["policy"]["coefficients"].pop(), "1 codewords, but 0 maps"),
      (lambda c: c["policy"]["coefficients"][0].__setitem__(1, [200.0]), "too steep"),
-     (all_are(5), "may lead to one with 5"), (all_are(-1), "more than 0.5 rad from upright")],
+     (all_five, "may lead to one with 5"), (kept_beyond, "more than 0.5 rad from upright")],
 )  # fmt: skip
 def test_a_forged_certificate_is_refused(alter, match):
     alter(forged := copy.deepcopy(prove_pendulum(STILL, n=16).certificate()))
