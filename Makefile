@@ -57,8 +57,8 @@ once = stamp="$$STAMPS/$(1)"; now() { echo "quick=$$QUICK"; (cd "$$OUT" && cksum
   test "$$found" = "$$(cat "$$stamp" 2> /dev/null)" \
   && test -z "$$(find $(2) -type f ! -path '*__pycache__*' -newer "$$stamp" 2>&1 | head -n 1)" || { \
   for f in $$(test ! -f "$$stamp" || echo "$$found" | grep -vxFf "$$stamp" | sed -n 's/^[0-9]* [0-9]* //p'); do \
-    (cd "$$OUT" && git diff --quiet HEAD -- "$$f" && git ls-files --error-unmatch "$$f") > /dev/null 2>&1 && continue; \
-    test "$$FORCE" && rm "$$OUT/$$f" && continue; \
+    { grep -q " $$f$$" "$$stamp" && ! (cd "$$OUT" && git diff --quiet HEAD -- "$$f" && git ls-files --error-unmatch "$$f"); } \
+      > /dev/null 2>&1 || continue; test "$$FORCE" && rm "$$OUT/$$f" && continue; \
     echo "error: $$OUT/$$f was edited or damaged since make made it: keep a copy; FORCE=1 makes it anew" >&2; exit 1; done; \
   : > "$$stamp.new" && $(4) && now > "$$stamp.made" && touch -r "$$stamp.new" "$$stamp.made" && mv "$$stamp.made" "$$stamp"; }
 

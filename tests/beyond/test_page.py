@@ -98,11 +98,9 @@ def test_of_many_inputs_short_equations_and_what_is_typical_come_before_the_exac
 )
 def test_the_first_sentence_says_what_is_not_alike(r2, failed, words):
     one = judged(r2, [1] * 4, [9] * 4, 1, False)
-    alike = dataclasses.replace(of_two([[-0.5, 0.01]], [[0.5]]), r2=r2, returns=one.alike.returns)
-    alike = dataclasses.replace(alike, failures={"policy": failed, "agent": failed and 0})
-    made = vsp_beyond.report(
-        TWO, PumpingTeacher(), MOUNTAINCAR, tried=[dataclasses.replace(one, policy=TWO, alike=alike)]
-    )
+    alike = dataclasses.replace(one.alike, failures={"policy": failed, "agent": failed and 0})
+    one = dataclasses.replace(one, policy=TWO, alike=alike)
+    made = vsp_beyond.report(TWO, PumpingTeacher(), MOUNTAINCAR, tried=[one])
     assert f"not closely: {words}.</strong>" in made and "1 (too low)" in made and "warning" not in made
 
 
