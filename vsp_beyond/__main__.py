@@ -20,7 +20,7 @@ from .page import report
 
 MOST_SAID = 500  # characters of an error
 PAGE_SECONDS = 10  # kept for the page and its proof, at most a third of all
-END_SECONDS = 3  # kept for what follows the proof
+END_SECONDS = 5  # kept for what follows the proof, also on a busy machine
 
 
 def main() -> None:
