@@ -331,8 +331,8 @@ def test_a_sealed_file_that_is_no_certificate_is_refused(tmp_path, payload):
     assert len(str(refused.value)) < 1000
 
 
-@pytest.mark.parametrize("name", ["simplegoal_best_run", "mountaincar_limit", "pendulum_faithful"])
-@pytest.mark.parametrize("wrong", [None, [], "x", {"a": 1}, 10**400, [{"a": []}]], ids=repr)
+@pytest.mark.parametrize("name", ["simplegoal_simplified", "mountaincar_limit", "pendulum_faithful"])
+@pytest.mark.parametrize("wrong", [None, [], "x", {"a": 1}, 10**400, [{"a": []}]], ids=str)
 def test_a_certificate_with_wrong_types_is_refused(name, wrong):
     certificate = load_certificate(name)[1]
     policy = certificate["policy"]
