@@ -123,11 +123,11 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
     for cell in range(len(policy)):
         here = inside == cell
         where = html.escape(policy.where.place(cell, policy.task.inputs, 3))
+        text = "".join(f"<p>{html.escape(line)}</p>" for line in _equations(policy, cell, alike.states[here]))
         if len(policy.task.inputs) > MOST_INPUTS:
             lines = "".join(f"<p>{html.escape(line)}</p>" for line in policy.equations(cell))
-            where = f"<details><summary>exactly</summary>{where}{lines}</details>"
-            where = html.escape(_typical(policy, alike.states, here)) + where
-        text = "".join(f"<p>{html.escape(line)}</p>" for line in _equations(policy, cell, alike.states[here]))
+            text += f"<details><summary>exactly</summary>{where * (len(policy) > 1)}{lines}</details>"
+            where = html.escape(_typical(policy, alike.states, here))
         close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
         edge = "; border-top: .3em solid" * (cell >= len(TINTS))
