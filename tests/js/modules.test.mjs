@@ -23,7 +23,7 @@ const textOf = path => readFileSync(at(path), "utf8")
 const npm = (...words) =>
   execFileSync("npm", ["--prefix", fileURLToPath(at("docs")), "run", "-s", ...words])
 
-const [model, controls, , texts, { Episodes }, , address] = await Promise.all(
+const [model, controls, , texts, { Episodes, differs }, , address] = await Promise.all(
   [...EXPLORER, ARTICLE[0]].map(path => import(at(path))),
 )
 
@@ -123,6 +123,12 @@ test("an address is read as it was written, and none that is damaged", () => {
       assert.equal(read(wrong), null)
   }
   assert.equal(address.read(address.write(state), { you: ["three"] }, 3), null) // no such moment
+})
+
+test("by hand: two actions differ by a twentieth of their range, or by their side of the middle", () => {
+  assert.deepEqual([0.59, 0.61].map(theirs => differs(0.5, theirs, -1, 1)), [false, true])
+  assert.deepEqual([-0.01, 0.01].map(theirs => differs(0.02, theirs, -1, 1)), [true, false])
+  assert.equal(differs(1.05, 0.95, 0, 2), true)
 })
 
 test("by hand: the smallest change of an input, on either side, and none beyond its range", () => {

@@ -102,7 +102,7 @@ export class Episodes {
     ctx.fillRect(x(this.at) - 1, 0, 2, high)
   }
 
-  /** The smallest changes of a single input for which `changed` holds, between points of a grid.
+  /** The smallest changes of one input for which `changed` holds, by a grid and then by halving.
    * @param {Vector} state @param {(seen: Vector) => string | boolean} changed may add words */
   changes(state, changed) {
     const found = this.scene.task.inputs.flatMap((name, i) => {
@@ -144,12 +144,10 @@ export class Episodes {
       lines = [step, ...why],
       cellAt = (/** @type {Vector} */ seen) => then(seen).cell,
       moved = (/** @type {Vector} */ seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`,
-      apart = (/** @type {number} */ k) => Math.abs(action[k] - episode.agent[at][k]),
       middles = actionLow.map((low, k) => (low + actionHigh[k]) / 2),
       above = (/** @type {Vector} */ one, /** @type {number} */ k) => one[k] >= middles[k],
-      far = (/** @type {number} */ k) => apart(k) > CLOSE * (actionHigh[k] - actionLow[k]),
-      opposite = (/** @type {number} */ k) => above(action, k) !== above(episode.agent[at], k),
-      differ = outputs.filter((_, k) => far(k) || opposite(k))
+      agent = episode.agent[at],
+      differ = outputs.filter((_, k) => differs(action[k], agent[k], actionLow[k], actionHigh[k]))
     const only = `it differs in ${differ.join(", ")}, so what follows explains the policy alone`
     if (differ.length) lines.splice(1, 0, line("Not as the agent", only))
     if (cells > 1) lines.push(line("Another cell would act if", this.changes(state, moved)))
@@ -162,6 +160,13 @@ export class Episodes {
     })
     return lines
   }
+}
+
+/** Whether two actions within limits are far apart, or on both sides of the middle.
+ * @type {(ours: number, theirs: number, low: number, high: number) => boolean} */
+export function differs(ours, theirs, low, high) {
+  const middle = (low + high) / 2
+  return Math.abs(ours - theirs) > CLOSE * (high - low) || ours >= middle !== theirs >= middle
 }
 
 /** The least and the greatest of some numbers. @param {Vector} values */

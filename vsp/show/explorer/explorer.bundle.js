@@ -695,7 +695,7 @@ var Episodes = class {
     ctx.fillStyle = tone("failing");
     ctx.fillRect(x(this.at) - 1, 0, 2, high);
   }
-  /** The smallest changes of a single input for which `changed` holds, between points of a grid.
+  /** The smallest changes of one input for which `changed` holds, by a grid and then by halving.
    * @param {Vector} state @param {(seen: Vector) => string | boolean} changed may add words */
   changes(state, changed) {
     const found = this.scene.task.inputs.flatMap((name, i) => {
@@ -720,7 +720,7 @@ var Episodes = class {
     const { scene, policy, at, episode } = this, { outputs, actionLow, actionHigh } = scene.task, state = episode.states[at], { cell, action } = this.done[at], cells = policy.codewords.length, theirs = episode.agent[at].map((value, k) => `${outputs[k]} = ${digits(value)}`).join(", "), then = (seen) => act(scene, policy, seen);
     const line = (what, told) => element("p", {}, element("b", {}, `${what}: `), `${told}.`);
     const why = answerOf({ scene, policy, cell, cells, asked: state, task: { see: (seen) => seen } });
-    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`), lines = [step, ...why], cellAt = (seen) => then(seen).cell, moved = (seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`, apart = (k) => Math.abs(action[k] - episode.agent[at][k]), middles = actionLow.map((low, k) => (low + actionHigh[k]) / 2), above = (one, k) => one[k] >= middles[k], far = (k) => apart(k) > CLOSE * (actionHigh[k] - actionLow[k]), opposite = (k) => above(action, k) !== above(episode.agent[at], k), differ = outputs.filter((_, k) => far(k) || opposite(k));
+    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`), lines = [step, ...why], cellAt = (seen) => then(seen).cell, moved = (seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`, middles = actionLow.map((low, k) => (low + actionHigh[k]) / 2), above = (one, k) => one[k] >= middles[k], agent = episode.agent[at], differ = outputs.filter((_, k) => differs(action[k], agent[k], actionLow[k], actionHigh[k]));
     const only = `it differs in ${differ.join(", ")}, so what follows explains the policy alone`;
     if (differ.length) lines.splice(1, 0, line("Not as the agent", only));
     if (cells > 1) lines.push(line("Another cell would act if", this.changes(state, moved)));
@@ -732,6 +732,10 @@ var Episodes = class {
     return lines;
   }
 };
+function differs(ours, theirs, low, high) {
+  const middle = (low + high) / 2;
+  return Math.abs(ours - theirs) > CLOSE * (high - low) || ours >= middle !== theirs >= middle;
+}
 function ends(values) {
   let [least, most] = [Infinity, -Infinity];
   for (const value of values) [least, most] = [Math.min(least, value), Math.max(most, value)];
