@@ -18,8 +18,10 @@ import pytest
 from vsp import geometry
 from vsp.config import Config
 from vsp.partition import Partition
+from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
+from vsp.subpolicies import policy_class
 from vsp.tasks.registry import get_task
 from vsp.teachers.teacher import Teacher
 
@@ -101,8 +103,25 @@ def network_teacher(task, *, seed=0, width=(40, 30)):
     return Teacher(weights, task)
 
 
+def random_policy(k=6, *, seed=0, task=SIMPLEGOAL, form="linear", scaled=False, **options):
+    """Of codewords in the box and maps that reach the limits; `scaled`: of states that are divided, each by a number
+    of its own."""
+    rng, task = np.random.default_rng(seed), get_task(task)
+    units = policy_class(form, task).units
+    codewords = rng.uniform(task.low, task.high, size=(k, len(task.low)))
+    coefficients = rng.normal(size=(k, len(units), len(task.action_low))) / units
+    if scaled:
+        options["scale"] = np.linspace(0.5, 2, len(task.low))
+    return VoronoiPolicy(codewords, coefficients, task=task, sub_policy=form, **options)
+
+
 def tiny(**changes):
     return dataclasses.replace(TINY, **changes)
+
+
+def slopes(function, vector):
+    """The derivatives of `function` by each number of `vector`, from finite differences."""
+    return np.array([function(vector + step) - function(vector - step) for step in 1e-6 * np.eye(len(vector))]) / 2e-6
 
 
 def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL, filled=True):
@@ -143,6 +162,12 @@ def python(code, *arguments, cwd=ROOT, **options):
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, **options)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def called(main, *arguments):
+    """What `main` returns for these arguments of its command line."""
+    with mock.patch.object(sys, "argv", ["command", *map(str, arguments)]):
+        return main()
 
 
 _DISTIL = """

@@ -1,41 +1,32 @@
 import dataclasses
+import functools
 import json
 import re
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, acted, compiled
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, acted, compiled, random_policy
 
 from studies import zoo as agents
 from vsp.export import symbol
 from vsp.paper import published_policy
 from vsp.policy import VoronoiPolicy
-from vsp.subpolicies import policy_class
 from vsp.tasks import get_task
-
-
-def policy_of(task, metric="euclidean", form="linear", k=7):
-    """A random policy of scaled states."""
-    rng, task = np.random.default_rng(0), get_task(task)
-    scale, units = rng.uniform(0.5, 2, size=len(task.low)), policy_class(form, task).units
-    coefficients = rng.normal(size=(k, len(units), len(task.action_low))) / units
-    codewords = rng.uniform(task.low, task.high, (k, len(task.low)))
-    return VoronoiPolicy(codewords, coefficients, task=task, metric=metric, scale=scale, sub_policy=form)
 
 
 def states_of(policy, n):
     return np.random.default_rng(1).uniform(policy.task.low, policy.task.high, size=(n, len(policy.task.low)))
 
 
+SCALED = functools.partial(random_policy, metric="euclidean", scaled=True)
 OF_NORMALISED = agents.policy_of("ars", MOUNTAINCAR)  # its agent was trained on normalised observations
 
 each_policy = pytest.mark.parametrize(
     "policy",
     [
-        OF_NORMALISED,
-        published_policy(SIMPLEGOAL),
-        policy_of(SIMPLEGOAL, "manhattan"), policy_of(MOUNTAINCAR, "euclidean"), policy_of(PENDULUM, "chebyshev"),
-        policy_of(MOUNTAINCAR, form="constant"), policy_of(SIMPLEGOAL, form="quadratic"),
+        OF_NORMALISED, published_policy(SIMPLEGOAL), SCALED(task=SIMPLEGOAL, metric="manhattan"),
+        SCALED(task=MOUNTAINCAR), SCALED(task=PENDULUM, metric="chebyshev"),
+        SCALED(task=MOUNTAINCAR, form="constant"), SCALED(task=SIMPLEGOAL, form="quadratic"),
     ],
     ids=lambda policy: f"{policy.task.name}-{policy.metric}-{policy.policy_class.name}",
 )  # fmt: skip
@@ -67,7 +58,7 @@ def test_the_python_code_acts_as_the_policy_does(policy):
 @pytest.mark.parametrize("form", ["constant", "linear"])
 def test_a_state_that_is_not_finite_gets_no_action(form, tmp_path):
     """Not full torque: fmax and fmin prefer a limit to NaN, and a constant does not look at the state."""
-    policy = policy_of(MOUNTAINCAR, form=form)
+    policy = SCALED(task=MOUNTAINCAR, form=form)
     library, module = compiled(policy, tmp_path), executed(policy)
     for bad in ([np.nan, 0.0], [0.0, np.nan], [np.inf, 0.0], [0.0, -np.inf]):
         cell, action = acted(library, bad, 1)

@@ -2,14 +2,14 @@
 
 import ast
 import importlib.util
-import subprocess
-import sys
+import os
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
+from support import python
 
-ROOT = Path(__file__).resolve().parents[1]
+from vsp.run.atomic import ROOT
+
 PARTS = {"vsp": set(), "vsp_beyond": {"vsp"}, "studies": {"vsp", "vsp_beyond"}, "vsp_course": {"vsp", "vsp_beyond"}}
 
 METHOD = {path.stem for path in (ROOT / "vsp").glob("[!_]*.py")}
@@ -80,10 +80,8 @@ vsp.load_teacher("SimpleGoal-v0"), vsp.show.panels, vsp.paper.baselines.linear_m
 import studies.comparison, vsp_beyond, vsp_course
 print(*sys.modules)
 """
-    command = [sys.executable, "-W", "error", "-c", code]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    by_vsp, by_all = (line.split() for line in done.stdout.splitlines())
+    said = python(code, env=os.environ | {"PYTHONWARNINGS": "error"})
+    by_vsp, by_all = (line.split() for line in said.splitlines())
     tops = {name.partition(".")[0] for name in by_vsp}
     assert not tops & {"pandas", "sklearn", "matplotlib", "torch", "stable_baselines3", *PARTS.keys() - {"vsp"}}
     assert len([name for name in by_vsp if name.partition(".")[0] == "vsp"]) <= 36

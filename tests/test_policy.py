@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, same_arrays
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, random_policy, same_arrays
 
 import vsp
 from vsp.checks import check_finite
@@ -15,15 +15,6 @@ from vsp.run import sealed
 from vsp.run.atomic import DamagedFile
 from vsp.subpolicies import POLICY_CLASSES, policy_class
 from vsp.tasks import get_task
-
-
-def random_policy(k=6, *, seed=0, task=SIMPLEGOAL, form="linear", **options):
-    rng, task = np.random.default_rng(seed), get_task(task)
-    units = policy_class(form, task).units
-    codewords = rng.uniform(task.low, task.high, size=(k, len(task.low)))
-    coefficients = rng.normal(size=(k, len(units), len(task.action_low))) / units
-    return VoronoiPolicy(codewords, coefficients, task=task, sub_policy=form, **options)
-
 
 TWO = VoronoiPolicy(  # cells left and right; the right one answers constants, one of them beyond the limits
     [[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], [[0, 0], [0, 0], [3, -0.5]]], task=SIMPLEGOAL
@@ -134,7 +125,7 @@ def test_explain_by_hand():
 @given(st.integers(1, 9), st.integers(0, 99), st.sampled_from([SIMPLEGOAL, MOUNTAINCAR]), st.booleans())
 def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, scaled):
     task = get_task(task)
-    policy = random_policy(k, seed=seed, task=task, scale=task.high - task.low if scaled else None)
+    policy = random_policy(k, seed=seed, task=task, scaled=scaled)
     state = np.random.default_rng(seed + 1).uniform(task.low, task.high)
     told = policy.explain(state)
     assert np.array_equal(told.raw, policy.linear(state)) and np.array_equal(told.action, policy.predict(state)[0])

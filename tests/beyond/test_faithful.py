@@ -16,6 +16,7 @@ from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, nee
 SMALL = Faithful(
     n_cells=3, tolerance=0.1, n_episodes=200, n_restarts=8, n_generations=8, n_tuning_episodes=60, n_validation=200
 )
+STILL = ScaledCells(np.zeros((1, 2)), np.zeros((1, 3, 2)))
 UNTUNED = dataclasses.replace(SMALL, n_generations=0)
 
 pytestmark = pytest.mark.filterwarnings("ignore:no policy of 3 cells")  # so little work finds less than was asked
@@ -38,9 +39,8 @@ def r2(policy, teacher):
 
 def test_it_acts_like_the_teacher_and_returns_what_it_returns(distilled):
     policy, history = distilled
-    teachers, ours = (
-        rollout_from_seed(actor, SIMPLEGOAL, 2000, seed=5).returns.mean() for actor in (CurvedTeacher(), policy)
-    )
+    results = (rollout_from_seed(actor, SIMPLEGOAL, 2000, seed=5) for actor in (CurvedTeacher(), policy))
+    teachers, ours = (result.returns.mean() for result in results)
     best = history[history["kept"]]
     assert ours > teachers - 0.1 and len(policy) <= 3 and len(best) == 1
     assert r2(policy, CurvedTeacher()) == pytest.approx(best["r2"].item(), abs=0.02) and best["r2"].item() > 0.95
@@ -115,14 +115,13 @@ def test_the_goals_of_a_tuning_are_the_teachers_returns_less_its_failures_and_th
 
 def test_a_candidate_pays_for_its_failures_and_need_not_return_more_than_the_best(monkeypatch):
     unscaled = Scaling(get_task(SIMPLEGOAL), np.zeros(2), np.ones(2))
-    still = ScaledCells(np.zeros((1, 2)), np.zeros((1, 3, 2)))
     configs = [dataclasses.replace(SMALL, failure_penalty=penalty) for penalty in (0.0, 1000.0)]
     starts = np.array([[0.9, 0.9], [0.05, 0.05]])
     free, dear = (module._Candidates(config, unscaled, None, starts, 0.0, 0.1) for config in configs)
-    assert dear._gap(still) == pytest.approx(free._gap(still) - 500)
+    assert dear._gap(STILL) == pytest.approx(free._gap(STILL) - 500)
     monkeypatch.setattr(module._Candidates, "_gap", lambda *_: -5.0)
     free.rows.append({"cells": None, "r2": 0.9, "gap": -5.0})
-    assert free.returns_enough(still)
+    assert free.returns_enough(STILL)
 
 
 def test_observations_beyond_the_declared_box_are_counted():
@@ -139,8 +138,7 @@ def test_observations_beyond_the_declared_box_are_counted():
 
 def test_a_cell_that_the_return_needs_stays(monkeypatch, distilled):
     """Though the error does not."""
-    still = ScaledCells(np.array([[0.0, 0.0]]), np.zeros((1, 3, 2)))
-    monkeypatch.setattr("vsp_beyond.few_cells.faithful.needed_only", lambda cells, labelled: still)
+    monkeypatch.setattr("vsp_beyond.few_cells.faithful.needed_only", lambda cells, labelled: STILL)
     assert len(distilled_by(n_generations=1)[0]) > 1 == len(distilled_by(tolerance=1000.0)[0])
 
 

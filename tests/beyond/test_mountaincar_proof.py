@@ -1,14 +1,14 @@
 import copy
 import ctypes
 import math
-import runpy
 import shutil
 from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL
+from support import MOUNTAINCAR, SIMPLEGOAL, called
+from test_simplegoal_proof import check_command
 
 import vsp
 from studies import comparison
@@ -243,9 +243,8 @@ MUTANTS = {
 }  # fmt: skip
 
 
-def test_a_sample_is_not_called_a_proof(monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["check", str(CERTIFICATES / "mountaincar_limit.json")])
-    runpy.run_module("vsp_beyond.proofs.check", run_name="__main__")
+def test_a_sample_is_not_called_a_proof(capsys):
+    called(check_command, CERTIFICATES / "mountaincar_limit.json")
     assert ".json agrees, in a sample, with {" in capsys.readouterr().out
 
 

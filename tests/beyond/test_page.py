@@ -4,11 +4,10 @@ import html
 import json
 import os
 import re
-import sys
 
 import numpy as np
 import pytest
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher, PumpingTeacher
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher, PumpingTeacher, called
 from test_fewest import judged
 
 import vsp
@@ -121,21 +120,17 @@ def test_the_command_makes_a_page_once_and_says_in_one_line_why_not(monkeypatch,
     monkeypatch.setattr(command, "report", lambda *given, **named: f"page of {named['name']}, {named['remarks']}")
     monkeypatch.setattr(command.vsp, "agent", lambda source, task, **options: CurvedTeacher())
     out = tmp_path / "report.html"
-    monkeypatch.setattr(sys, "argv", ["x", "agent.zip", SIMPLEGOAL, "--out", str(out)])
-    command.main()
-    assert (
-        out.read_text().startswith("page of agent.zip, Left out, because the time was over: 8 cells.")
-        and "open it in a browser" in capsys.readouterr().out
-    )
+    called(command.main, "agent.zip", SIMPLEGOAL, "--out", out)
+    assert out.read_text().startswith("page of agent.zip, Left out, because the time was over: 8 cells.")
+    assert "open it in a browser" in capsys.readouterr().out
     for arguments, reason in (
         (["agent.zip", SIMPLEGOAL], "exists and is kept: name another file, or say --force"),
         (["agent.zip", SIMPLEGOAL, "--minutes", "0"], "--minutes is 0, expected a number above 0"),
         (["agent.zip", "Pendulum-v9"], f"unknown task 'Pendulum-v9', .*did you mean '{PENDULUM}'"),
     ):
         place = out if "exists" in reason else tmp_path / "other.html"
-        monkeypatch.setattr(sys, "argv", ["x", *arguments, "--out", str(place)])
         with pytest.raises(SystemExit) as end:
-            command.main()
+            called(command.main, *arguments, "--out", place)
         said = capsys.readouterr().err
         assert end.value.code == 2 and re.search(reason, said) and said.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html"]
@@ -158,9 +153,8 @@ def test_what_would_stop_the_page_at_the_end_stops_it_at_once(out, said, monkeyp
     (tmp_path / "file").write_text("x")
     before = sorted(tmp_path.iterdir())
     monkeypatch.setattr(command.vsp, "agent", interrupted)
-    monkeypatch.setattr(sys, "argv", ["x", "agent.zip", SIMPLEGOAL, "--force", "--out", str(tmp_path / out)])
     with pytest.raises(SystemExit):
-        command.main()
+        called(command.main, "agent.zip", SIMPLEGOAL, "--force", "--out", tmp_path / out)
     line = capsys.readouterr().err
     assert said in line and line.count("\n") == 1 and len(line) < 600
     assert sorted(tmp_path.iterdir()) == before and (tmp_path / "fifo").is_fifo()

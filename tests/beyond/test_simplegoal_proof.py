@@ -1,4 +1,5 @@
 import copy
+import functools
 import hashlib
 import json
 import re
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
-from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
+from support import LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL, called
 
 import vsp
 import vsp_beyond
@@ -317,6 +318,8 @@ def test_policies_with_the_theorem():
 
 # Files and the command
 
+check_command = functools.partial(runpy.run_module, "vsp_beyond.proofs.check", run_name="__main__")
+
 
 def seal(path, payload):
     path.write_bytes(hashlib.sha256(payload).hexdigest().encode() + b"\n" + payload)
@@ -345,16 +348,12 @@ def test_a_certificate_with_wrong_types_is_refused(name, wrong):
         where[part] = kept
 
 
-def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path, monkeypatch, capsys):
-    def run(*paths):
-        monkeypatch.setattr("sys.argv", ["check", *map(str, paths)])
-        runpy.run_module("vsp_beyond.proofs.check", run_name="__main__")
-
+def test_the_command_prints_what_is_proved_or_says_in_one_line_why_not(tmp_path, capsys):
     vsp_beyond.prove(TWO).save(good := tmp_path / "two.json")
-    run(good)
+    called(check_command, good)
     assert capsys.readouterr().out.startswith(f"{good} proves {{'goal': ")
     (altered := tmp_path / "altered.json").write_bytes(good.read_bytes().replace(b"goal", b"goat", 1))
     for paths in ((), (tmp_path / "none.json",), (good, seal(tmp_path / "x.json", b"[]")), (altered,)):
         with pytest.raises(SystemExit) as end:
-            run(*paths)
+            called(check_command, *paths)
         assert end.value.code and "\n" not in str(end.value.code)

@@ -1,22 +1,20 @@
+import dataclasses
 import importlib
 
 import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, PumpingTeacher
+from test_tuned import SMALL
 
 from vsp.evaluation import start_states
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.simplification import gathered, prune, rounded, simplify
 from vsp_beyond.few_cells.tune import score
 
 module = importlib.import_module("vsp_beyond.few_cells.simplification")
-CONFIG = Tuned(
-    n_cells=3, n_episodes=60, n_restarts=1, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
-    n_generations=2, n_tuning_episodes=50, failure_penalty=100.0, n_validation=100,
-)  # fmt: skip
+CONFIG = dataclasses.replace(SMALL, n_restarts=1, n_generations=2)
 
 
 def some(codewords=((0.12345, 0.5), (0.75, 0.5))):
@@ -119,9 +117,7 @@ def gain(value, k=1):
 
 def simplified(monkeypatch, policies, tolerance):
     """Where tuning gives these policies, by the number of cells."""
-    monkeypatch.setattr(
-        module, "distill_tuned", lambda teacher, task, config, *, seed: (policies[config.n_cells], None)
-    )
+    monkeypatch.setattr(module, "distill_tuned", lambda *given, seed: (policies[given[2].n_cells], None))
     return simplify(gain(12.0), MOUNTAINCAR, CONFIG, tolerance=tolerance, seed=0)
 
 

@@ -1,14 +1,13 @@
 import dataclasses
 import re
 import shutil
-import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 import support
-from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, network_teacher, same_arrays
+from support import MOUNTAINCAR, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, called, network_teacher, same_arrays
 from threadpoolctl import threadpool_limits
 
 from vsp import distill
@@ -220,7 +219,6 @@ def test_the_command_makes_the_runs(tmp_path, monkeypatch, options, quick, jobs)
     made = []
     monkeypatch.setattr(command, "paper_results", lambda task, **named: made.append((task, named)) or results)
     results = SimpleNamespace(runs=[])
-    monkeypatch.setattr(sys, "argv", ["make_runs", "--out", str(tmp_path), *options])
-    main()
+    called(main, "--out", tmp_path, *options)
     named = {"runs": tmp_path / "data" / "runs", "quick": quick, "jobs": jobs}
     assert made == [(task, named) for task in N_RUNS]

@@ -5,6 +5,7 @@ import errno
 import os
 
 import pytest
+from support import called
 
 from studies import make_rows
 from vsp.paper import make_runs
@@ -65,9 +66,8 @@ def test_other_jobs_are_refused(text):
 
 
 @pytest.mark.parametrize("command", [make_runs, make_rows], ids=lambda module: module.__name__)
-def test_commands_refuse_such_jobs_before_they_begin(monkeypatch, capsys, command):
-    monkeypatch.setattr("sys.argv", ["command", "--jobs", "0"])
+def test_commands_refuse_such_jobs_before_they_begin(capsys, command):
     with pytest.raises(SystemExit) as end:
-        command.main()
+        called(command.main, "--jobs", 0)
     assert end.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1].startswith("command: error: argument --jobs: '0': expected a whole")

@@ -5,6 +5,7 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from support import called
 
 from vsp.paper.results import read_results
 from vsp.run import manifest
@@ -71,15 +72,14 @@ def test_an_altered_file_is_named_with_the_ways_out(table, tmp_path):
         read_listed(table)
 
 
-def test_somebody_accepts_files_as_they_are(table, tmp_path, monkeypatch, capsys):
+def test_somebody_accepts_files_as_they_are(table, tmp_path, capsys):
     """By the command, whatever the manifest was."""
     table.write_text("x\n3\n")
     (tmp_path / "c.csv").write_text("x\n4\n")
     (tmp_path / "a.csv").unlink()
     (tmp_path / ".DS_Store").write_text("")
     (tmp_path / MANIFEST).write_text("rubbish")
-    monkeypatch.setattr("sys.argv", ["x", str(tmp_path)])
-    manifest.main()
+    called(manifest.main, tmp_path)
     assert capsys.readouterr().out == f"{tmp_path / MANIFEST}: 2 files\n"
     assert [read_listed(tmp_path / name) for name in ("b.csv", "c.csv")] == [b"x\n3\n", b"x\n4\n"]
     assert [line[66:] for line in (tmp_path / MANIFEST).read_text().splitlines()] == ["b.csv", "c.csv"]

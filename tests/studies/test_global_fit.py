@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, examples
+from support import SIMPLEGOAL, examples, slopes
 
 from studies.comparison import global_fit
 from studies.comparison.global_fit import RandomTree, descend, expected_loss, global_tree, greedy_cells
@@ -36,6 +36,10 @@ def tree_of(leaves=4, seed=0, kind=RandomTree):
     return tree, of_tree(tree), LabelledStates(frame.inputs(states), frame.outputs(2 * actions))  # some beyond limits
 
 
+def oblique(states, actions, seed=0):
+    return ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=seed)
+
+
 def error(policy, states, actions):
     return np.square(policy.predict(states)[0] - actions).mean()
 
@@ -47,9 +51,8 @@ def test_the_gradient_is_that_of_finite_differences():
     _, numbers, seen = tree_of()
     about = {"temperature": 0.3, "clip_slope": 0.1}
     vector = numbers.vector + 0.1 * np.random.default_rng(1).normal(size=numbers.vector.size)
-    steps = 1e-6 * np.eye(len(vector))
-    ends = [[expected_loss(numbers.like(vector + sign * step), seen, **about)[0] for sign in (1, -1)] for step in steps]
-    assert expected_loss(numbers.like(vector), seen, **about)[1] == pytest.approx(np.diff(ends)[:, 0] / -2e-6, abs=1e-6)
+    expected = slopes(lambda vector: expected_loss(numbers.like(vector), seen, **about)[0], vector)
+    assert expected_loss(numbers.like(vector), seen, **about)[1] == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("leaves", [1, 2, 5])
@@ -74,8 +77,7 @@ def test_a_random_tree_has_states_in_every_leaf():
 
 def test_a_descent_finds_a_planted_border():
     states, actions = kinked()
-    start = ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=0)
-    begun = of_tree(start)
+    begun = of_tree(oblique(states, actions))
     ended = descend(begun, states, actions, range(10, search.N_STAGES))
     assert error(ended, states, actions) < 0.2 * error(begun, states, actions)
     assert len(ended) == 2
@@ -87,10 +89,7 @@ def test_a_descent_finds_a_planted_border():
 def test_a_tree_fitted_together_is_no_worse_than_the_greedy_one():
     for states, actions in (kinked(), examples(SIMPLEGOAL)):
         found = global_tree(states, actions, 2, TASK, 0)
-        greedy = min(
-            error(ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=seed), states, actions)
-            for seed in (0, 1)
-        )
+        greedy = min(error(oblique(states, actions, seed), states, actions) for seed in (0, 1))
         assert len(found) == 2 and error(found, states, actions) < 1.05 * greedy + 1e-9
 
 
@@ -98,9 +97,8 @@ def test_two_cells_are_a_tree_of_two_leaves():
     """Two codewords and one oblique cut are the same borders: both greedy fits take the same hyperplane."""
     for states, actions in (kinked(), examples(SIMPLEGOAL)):
         cells = greedy_cells(states, actions, 2, TASK, 3)
-        tree = ObliqueLinearTree(states, actions, leaves=2, task=TASK, seed=3)
         assert isinstance(cells, VoronoiPolicy) and cells.metric == "euclidean" and len(cells) == 2
-        assert error(cells, states, actions) <= error(tree, states, actions) + 1e-12
+        assert error(cells, states, actions) <= error(oblique(states, actions, 3), states, actions) + 1e-12
 
 
 def test_pairs_by_hand():

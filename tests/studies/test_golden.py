@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import small
 from support import SIMPLEGOAL, TEACHERS, CurvedTeacher, tiny
 
 from studies.comparison import beside, measure
@@ -19,7 +20,7 @@ from studies.robots import Walking
 from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
 from vsp.run import kernels
-from vsp_beyond import Faithful, Tuned, simplify
+from vsp_beyond import Faithful, simplify
 from vsp_beyond.few_cells import limit
 from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.optimum import TASKS as SOLVED
@@ -34,10 +35,7 @@ SENSITIVE = [
     for name, method in METHODS.items()
     if method.table == "robots" or any(kind in name for kind in ("oblique tree", "small network", "greedy fit"))
 ]
-SMALL = Tuned(
-    n_cells=3, n_episodes=20, n_restarts=2, n_steps=60, batch_size=64, n_corrections=1, n_correction_episodes=10,
-    n_generations=1, n_tuning_episodes=10, n_validation=20,
-)  # fmt: skip
+SMALL = dataclasses.replace(small.SMALL, n_cells=3, n_steps=60, n_corrections=1)
 PRESETS = {
     "tuned": SMALL,
     "faithful": Faithful(

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from small import SMALL
-from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Constant
+from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Constant, called
 
 from studies import make_rows
 from studies.committed import RESULTS, keys, read_results
@@ -38,9 +38,8 @@ def only(patch, task, name, table):
     patch.setitem(TABLES, task, {name: table})
 
 
-def command(patch, *arguments):
-    patch.setattr("sys.argv", ["x", *map(str, arguments), "--jobs", "1"])
-    make_rows.main()
+def command(*arguments):
+    called(make_rows.main, *arguments, "--jobs", 1)
 
 
 # What is compared
@@ -143,7 +142,7 @@ def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     for where in ("studies.committed", "studies.comparison.beside"):
         small.setattr(f"{where}.RESULTS", results)
     watch(small, made)
-    command(small, "--out", tmp_path)
+    command("--out", tmp_path)
     files = [results / "methods_SimpleGoal-v0.csv", results / "methods_seconds.csv"]
     before = [file.read_text() for file in files]
     assert "seconds" not in before[0] and len(read_rows(SIMPLEGOAL, results)) == 5 == before[1].count("\n") - 1
@@ -151,13 +150,13 @@ def test_of_one_more_method_just_its_rows_are_made(small, tmp_path):
     still = Entry(lambda teacher, task, config, seed: Constant(0.5, 0.5), sizes=(1, 3))
     small.setitem(METHODS, "still", still)
     only(small, SIMPLEGOAL, "methods", Table(range(2), methods=("CART", "still", "teacher"), sizes=(0, 1, 3)))
-    command(small, "--out", tmp_path)
+    command("--out", tmp_path)
     after = [file.read_text() for file in files]
     assert [job.method for job in made] == [*"CART CART teacher CART CART".split(), *["still"] * 4]
     assert ["".join(line for line in text.splitlines(True) if "still" not in line) for text in after] == before
     assert [text.count("still") for text in after] == [4, 4]
     small.setattr(Row, "make", None)  # nothing is left to do
-    command(small, "--out", tmp_path / "elsewhere")
+    command("--out", tmp_path / "elsewhere")
     assert [(tmp_path / "elsewhere" / file.relative_to(tmp_path)).read_text() for file in files] == after
 
 
@@ -167,7 +166,7 @@ def test_of_faithful_rows_the_policies_are_kept_and_compared(small, tmp_path):
     )
     small.setitem(PRESETS, "faithful", lambda task: quick)
     only(small, SIMPLEGOAL, "faithful", Table(range(2), sizes=(1, 2), keeps="faithful"))
-    command(small, "--out", tmp_path)
+    command("--out", tmp_path)
     frame, same = (pd.read_csv(tmp_path / f"data/beyond/{name}_SimpleGoal-v0.csv") for name in ("faithful", "same"))
     assert frame["size"].tolist() == [1, 1, 2, 2] and frame["r2"].between(-1, 1).all() and (frame["cells"] <= 2).all()
     assert same[["size", "seed", "other"]].to_numpy().tolist() == [[1, 0, 1], [2, 0, 1]]
@@ -186,7 +185,7 @@ def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
     gait = pd.DataFrame({"step": range(3)})
     small.setattr(beside, "record_gait", lambda policy, task, **how: gait.assign(cells=len(policy)))
     only(small, WALKER, "robots", Table(range(1), methods=("cells", "robot's teacher"), sizes=(0, 2), keeps="cells"))
-    command(small, "--long", "--out", tmp_path)
+    command("--long", "--out", tmp_path)
     made = {name: pd.read_csv(tmp_path / f"data/beyond/{name}_{WALKER}.csv") for name in ("robots", "gait")}
     assert made["robots"]["method"].tolist() == ["cells", "robot's teacher"] and made["robots"]["r2"][1] == 1
     assert made["gait"]["cells"].tolist() == [2] * 3 and made["gait"]["version"].tolist() == [beside.GAIT_VERSION] * 3

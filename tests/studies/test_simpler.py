@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-from support import SIMPLEGOAL, TASKS, TEACHERS, tiny
+from support import SIMPLEGOAL, TASKS, TEACHERS, called, tiny
 
 from studies import make_study
 from studies.reproduction import simpler, verdicts
@@ -66,10 +66,8 @@ def test_every_kind_of_policy_has_its_row_by_hand(compared):
     one, task = result.experiment, result.experiment.task
     name, rule = rule_of_thumb(task)
     policies = {name: [rule], "published policy": [printed.published_policy(task)], "teacher (TD3)": [one.teacher]}
-    policies |= {
-        "distilled, best run": [result.best.policy],
-        "distilled, all runs": [run.policy for run in result.runs],
-    }
+    policies["distilled, best run"] = [result.best.policy]
+    policies["distilled, all runs"] = [run.policy for run in result.runs]
     fitted = [fit(one, run) for run in result.runs[:2]]
     policies |= {kind: [of_run[kind] for of_run in fitted] for kind in FITTED}
     assert set(frame.index) == set(policies) and frame["mean"].is_monotonic_decreasing
@@ -92,10 +90,8 @@ def test_make_study_writes_every_table_and_keeps_all_digits_of_the_comparison(tm
     asked, frame = [], pd.DataFrame({"a": [0.1 + 0.2]})
     for study in (simpler, verdicts):
         monkeypatch.setattr(study, "study", lambda runs, *, jobs: asked.append((runs, jobs)) or frame)
-    monkeypatch.setattr("sys.argv", ["make_study", "--out", str(tmp_path), "--jobs", "3"])
-    make_study.main()
-    runs = tmp_path / "build/study", 3
-    assert asked == [(tmp_path / "data/runs", 3), runs]
+    called(make_study.main, "--out", tmp_path, "--jobs", 3)
+    assert asked == [(tmp_path / "data/runs", 3), (tmp_path / "build/study", 3)]
     folder = tmp_path / "data" / "results"
     written = [read_results(name, folder)["a"].item() for name in ("simpler", "verdicts")]
     assert written == [0.1 + 0.2, 0.3]

@@ -20,6 +20,7 @@ TASK, TEACHER = get_task(PENDULUM), load_teacher(PENDULUM)
 STATES = visited_states(TEACHER, TASK, TASK.start(np.random.default_rng(0), 20))
 FRAME = Scaling.of(TASK, STATES)
 FEW = Walking(n_cells=3, n_validation=5, n_steps=160, n_filling=60, gamma=0.98)
+WAITS = replace(FEW, n_filling=FEW.n_steps)
 
 
 def pieces(kind):
@@ -69,19 +70,17 @@ def test_further_training_keeps_the_best_and_repeats():
 
 def test_nothing_learns_until_the_replay_buffer_is_filled():
     frame, numbers, policy = pieces("cells")
-    waits = replace(FEW, n_filling=FEW.n_steps)
-    assert np.allclose(train_further(frame, numbers, TEACHER, waits, seed=0).coefficients, policy.coefficients)
+    assert np.allclose(train_further(frame, numbers, TEACHER, WAITS, seed=0).coefficients, policy.coefficients)
 
 
 def test_a_single_cell_can_be_trained_further():
     one = FRAME.policy(local_init(FRAME.labelled(STATES, TEACHER.predict(STATES)[0]), 1, np.random.default_rng(1)))
-    waits = replace(FEW, n_filling=FEW.n_steps)
-    found = trained_further(TEACHER, TASK, waits, 0, imitation=lambda *about: one)
+    found = trained_further(TEACHER, TASK, WAITS, 0, imitation=lambda *about: one)
     assert len(found) == 1 and np.allclose(found.coefficients, one.coefficients, atol=1e-5)
 
 
 def test_a_tree_is_fitted_like_cells_and_trained_further():
-    waits = replace(FEW, n_filling=FEW.n_steps, n_episodes=3, n_corrections=1, n_correction_episodes=2, n_states=500)
+    waits = replace(WAITS, n_episodes=3, n_corrections=1, n_correction_episodes=2, n_states=500)
     tree = robot_tree(TEACHER, TASK, waits, 0)
     found = trained_further(TEACHER, TASK, waits, 0, imitation=lambda *about: tree)
     assert len(found) == 3 and np.allclose(found.predict(STATES)[0], tree.predict(STATES)[0], atol=1e-3)

@@ -3,7 +3,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER
+from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER, called
 
 from studies import make_teachers, training
 from studies.make_teachers import BARS, export, main, short_recipe
@@ -148,11 +148,9 @@ def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp
 
 def test_a_teacher_below_the_bar_takes_nobodys_place(short, tmp_path, monkeypatch):
     monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (1000.0, 0.0)})
-    out = tmp_path / "out"
-    monkeypatch.setattr("sys.argv", ["x", "--cache", str(tmp_path / "cache"), "--out", str(out)])
     with pytest.raises(command.CommandError, match="seed 0 does not meet the requirements"):
-        main()
-    assert not out.exists() and len(list((tmp_path / "cache").iterdir())) == 1
+        called(main, "--cache", tmp_path / "cache", "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists() and len(list((tmp_path / "cache").iterdir())) == 1
 
 
 def test_a_bar_asks_for_a_mean_and_for_few_failures():
@@ -201,8 +199,7 @@ def test_make_short_teachers_trains_and_exports_actors_of_every_seed(short, fewe
     from safetensors.numpy import load_file
 
     monkeypatch.setattr(make_teachers, "SHORT_SEEDS", {SIMPLEGOAL: (4, 5), MOUNTAINCAR: (7,)})
-    monkeypatch.setattr("sys.argv", ["x", "--short", "--cache", str(tmp_path / "in"), "--out", str(tmp_path / "out")])
-    main()
+    called(main, "--short", "--cache", tmp_path / "in", "--out", tmp_path / "out")
     cards = sorted((tmp_path / "out" / "short").glob("*.json"))  # nobody takes the shipped teacher's place
     assert [path.name for path in cards] == [f"{MOUNTAINCAR}-7.json", f"{SIMPLEGOAL}-4.json", f"{SIMPLEGOAL}-5.json"]
     teachers = [load_teacher(path.with_suffix(".safetensors")) for path in cards]

@@ -1,14 +1,14 @@
 """`make agents` and `make hub-teacher`: agents in a folder, what is kept of them, and what is refused in one line."""
 
+import functools
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from support import MOUNTAINCAR, PENDULUM, tiny
+from support import MOUNTAINCAR, PENDULUM, called, tiny
 
 from studies import make_study
 from studies import zoo as agents
@@ -70,28 +70,27 @@ def test_what_is_refused_or_slow_has_a_reason(small, monkeypatch, tmp_path):
 def test_the_command_writes_table_policies_and_maps_and_resumes(small, monkeypatch, tmp_path):
     """First from its files, then from the committed results: there only the agent that has none is left to do."""
     given = folder_of(tmp_path / "given", f"td3-{MOUNTAINCAR}.zip", "sac-Nothing-v0.zip")
-    monkeypatch.setattr(sys, "argv", ["x", str(given), "--out", str(tmp_path), "--jobs", "1"])
-    agents.main()
+    run = functools.partial(called, agents.main, given, "--out", tmp_path, "--jobs", 1)
+    run()
     folder, make, asked = tmp_path / "data" / "beyond", agents.Study.make, []
     written = [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
     monkeypatch.setattr(agents.Study, "make", None)  # nothing is left to do
-    agents.main()
+    run()
     for where in ("studies.zoo", "studies.committed"):
         monkeypatch.setattr(f"{where}.RESULTS", folder)
     shutil.copy(RESULTS / "zoo.csv", folder)
     listed.list_folder(folder)
     shutil.rmtree(tmp_path / "build")
     monkeypatch.setattr(agents.Study, "make", lambda one: (asked.append(one.algorithm), make(one))[1])
-    agents.main()
+    run()
     assert asked == ["sac"]
     assert written == [(folder / f"{name}.csv").read_bytes() for name in ("agents", "agents_paper")]
     car, unknown = pd.read_csv(folder / "agents.csv").sort_values("task").to_dict("records")
     assert unknown["reason"].startswith("unknown task") and (car["zoo"], car["cells"]) == (93.483, 2)
     assert len(agents.policy_of("td3", MOUNTAINCAR)) == 2
     assert agents.actions_of("td3", MOUNTAINCAR).shape == (agents.POINTS**2, 1)
-    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "none")])
     with pytest.raises(command.CommandError, match="no .zip below it, expected a folder of agents"):
-        agents.main()
+        called(agents.main, tmp_path / "none")
 
 
 def test_the_committed_agents_are_those_of_the_collection_and_within_what_was_published():
@@ -128,9 +127,8 @@ def test_the_committed_rows_are_those_of_the_zips():
         assert (row["checksum"], row["teacher"]) == (agents.atomic.sha256(path), agent.digest[:10])
         assert np.abs(agent.predict(agents.plane(task)[2])[0] - agents.actions_of(algorithm, task)).max() < 1e-5
         alike = likeness(agents.policy_of(algorithm, task), agent, task)
-        assert row["r2_least"] <= alike.r2 + 1e-6 and row["agent"] == pytest.approx(
-            alike.returns["agent"].mean(), abs=0.01
-        )
+        assert row["r2_least"] <= alike.r2 + 1e-6
+        assert row["agent"] == pytest.approx(alike.returns["agent"].mean(), abs=0.01)
 
 
 # The paper's part with another teacher
@@ -141,8 +139,7 @@ def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp
     monkeypatch.setattr(make_study, "N_RUNS", {MOUNTAINCAR: 2})
     monkeypatch.setattr(make_study, "paper_experiment", lambda task: Experiment(task, config, None, n_episodes=9))
     monkeypatch.setattr(make_study, "read", lambda path, task: load_teacher(task))
-    monkeypatch.setattr(sys, "argv", ["x", "--agent", "an_agent.zip", "--out", str(tmp_path), "--jobs", "1"])
-    make_study.main()
+    called(make_study.main, "--agent", "an_agent.zip", "--out", tmp_path, "--jobs", 1)
     folder = tmp_path / "data" / "results"
     ledger = pd.read_csv(folder / "hub_teacher_ledger.csv")
     mean = ledger.set_index("id").loc["mc_spread_ours_mean"]
@@ -152,8 +149,7 @@ def test_another_teacher_gets_the_papers_rows_and_ledger(small, monkeypatch, tmp
 
 
 def test_an_agent_of_another_task_is_refused(monkeypatch, tmp_path):
-    monkeypatch.setattr(sys, "argv", ["x", "--agent", str(tmp_path / "none.zip"), "--out", str(tmp_path)])
     monkeypatch.setattr(make_study, "read", lambda path, task: load_teacher(PENDULUM, task))
     with pytest.raises(command.CommandError, match="load it for the task it was trained on"):
-        make_study.main()
+        called(make_study.main, "--agent", tmp_path / "none.zip", "--out", tmp_path)
     assert not list(tmp_path.iterdir())

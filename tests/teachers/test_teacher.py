@@ -1,16 +1,15 @@
 import os
 import pickle
-import subprocess
 import sys
 import zipfile
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, Payload, network_teacher
+from support import MOUNTAINCAR, SIMPLEGOAL, Payload, network_teacher, python
 from test_normalization import written
 from zips import bomb, rewritten, saved
 
-from vsp.run import atomic, listed
+from vsp.run import listed
 from vsp.run.atomic import DamagedFile
 from vsp.teachers import agent_zip, normalization
 from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
@@ -129,8 +128,7 @@ def test_loading_and_acting_needs_no_torch(small):
         f"vsp.load_teacher({str(small)!r}, '{SIMPLEGOAL}')\n"
         "print({'torch', 'stable_baselines3'} & set(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=atomic.ROOT, capture_output=True, text=True)
-    assert done.stdout.strip() == "set()", done.stderr
+    assert python(code).strip() == "set()"
 
 
 # Files that are made to harm
@@ -190,10 +188,8 @@ def test_crafted_files_are_refused_within_memory_and_time(small, tmp_path):
         "    except ValueError as error: print(type(error).__name__, str(error)[:500])\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
     )
-    command = [sys.executable, "-c", code, *map(str, [small, *paths])]
-    done = subprocess.run(command, cwd=atomic.ROOT, capture_output=True, text=True, timeout=60)
-    *lines, peak = done.stdout.splitlines()
-    assert [line.split(":")[0] for line in lines] == [f"DamagedFile {path}" for path in paths], done.stderr
+    *lines, peak = python(code, small, *paths, timeout=60).splitlines()
+    assert [line.split(":")[0] for line in lines] == [f"DamagedFile {path}" for path in paths]
     assert int(peak) < 1.5 * 2**30 / (1 if sys.platform == "darwin" else 1024) and not mark.exists()
 
 
