@@ -45,7 +45,8 @@ def test_an_agent_with_its_statistics_acts_as_the_library_does_and_asks_for_them
     path, given = folder / "ppo.zip", {"normalize": folder / "statistics.pkl"}
     alone, unaware = type(model).load(path), load_teacher(path, SIMPLEGOAL, normalize=False)
     expected = model.predict(env.normalize_obs(OBS), deterministic=True)[0]
-    for agent in (load_teacher(path, SIMPLEGOAL, **given), vsp.agent(model), vsp.agent(alone, **given)):
+    by_object = (vsp.agent(source, SIMPLEGOAL, normalize=env) for source in (path, alone))
+    for agent in (load_teacher(path, SIMPLEGOAL, **given), vsp.agent(model), vsp.agent(alone, **given), *by_object):
         assert np.abs(agent.predict(OBS)[0] - expected).max() < 1e-4
     for agent in (unaware, vsp.agent(alone, normalize=False), vsp.agent(model, normalize=False)):
         assert np.abs(agent.predict(OBS)[0] - expected).max() > 0.05
@@ -126,16 +127,19 @@ LAYOUTS = {  # of RL Zoo, and names that people give
     "sac/Walker2d-v3_12/Walker2d-v3.zip": "sac/Walker2d-v3_12/Walker2d-v3/vecnormalize.pkl",
     "best_model.zip": "best_vecnorm.pkl", "model.zip": "vecnorm.pkl", "a/model.zip": "a/VecNormalize.pkl",
     "run_best.zip": "run_vecnormalize.pkl", "final.zip": "my_vec_normalize.pickle",
+    "Pendulum-v1_3/best_model.zip": "Pendulum-v1_3/Pendulum-v1/config.yml",
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("zip_file", LAYOUTS)
-def test_statistics_are_found_wherever_people_keep_them(zip_file, small, tmp_path):
+def test_statistics_and_settings_are_found_wherever_people_keep_them(zip_file, small, tmp_path):
     for name in (zip_file, LAYOUTS[zip_file]):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-    path = shutil.copy(small, tmp_path / zip_file)
-    written(tmp_path / LAYOUTS[zip_file])
-    with pytest.raises(ValueError, match=f"{LAYOUTS[zip_file]} lies beside it"):
+    path, found = shutil.copy(small, tmp_path / zip_file), tmp_path / LAYOUTS[zip_file]
+    written(found)
+    if settings := found.suffix == ".yml":
+        found.write_text("normalize: true")
+    with pytest.raises(ValueError, match=f"{LAYOUTS[zip_file]} {'says so' if settings else 'lies beside it'}"):
         load_teacher(path, SIMPLEGOAL)
 
 
@@ -149,21 +153,11 @@ def test_statistics_named_after_another_agent_are_that_agents(small, tmp_path):
             load_teacher(tmp_path / f"{name}.zip", SIMPLEGOAL)
 
 
-def test_settings_in_the_folder_of_the_task_are_read(small, tmp_path):
-    folder = tmp_path / "Pendulum-v1_3" / "Pendulum-v1"
-    folder.mkdir(parents=True)
-    (folder / "config.yml").write_text("normalize: true")
-    path = shutil.copy(small, tmp_path / "Pendulum-v1_3" / "best_model.zip")
-    with pytest.raises(ValueError, match="Pendulum-v1.config.yml says so"):
-        load_teacher(path, SIMPLEGOAL)
-
-
 def test_another_version_of_the_environment_is_named(small, tmp_path):
     path = shutil.copy(small, tmp_path / "x.zip")
     (tmp_path / "args.yml").write_text("!!python/object/apply:collections.OrderedDict\n- - - env\n    - SimpleGoal-v9")
-    with pytest.warns(
-        UserWarning, match="x.zip was trained on SimpleGoal-v9, and acts on SimpleGoal-v0: they may differ"
-    ):
+    said = "x.zip was trained on SimpleGoal-v9, and acts on SimpleGoal-v0: they may differ"
+    with pytest.warns(UserWarning, match=said):
         load_teacher(path, SIMPLEGOAL)
     (tmp_path / "args.yml").write_text("env: SimpleGoal-v0")
     load_teacher(path, SIMPLEGOAL)
@@ -176,12 +170,9 @@ def normalising(obs):
     return np.clip(np.tanh(obs[:, ::-1]), -1, 1)
 
 
-def test_statistics_may_be_an_object_or_two_arrays(trained, small):
+def test_statistics_may_be_two_arrays(trained):
     folder, model, env = trained
-    alone, path = type(model).load(folder / "ppo.zip"), folder / "ppo.zip"
-    expected = model.predict(env.normalize_obs(OBS), deterministic=True)[0]
-    for source in (path, alone):
-        assert np.abs(vsp.agent(source, SIMPLEGOAL, normalize=env).predict(OBS)[0] - expected).max() < 1e-4
+    alone = type(model).load(folder / "ppo.zip")
     both = env.obs_rms.mean, env.obs_rms.var
     plain = np.clip((OBS - both[0]) / np.sqrt(both[1] + 1e-8), -10, 10).astype(np.float32)
     for source, raw in ((alone, alone.predict), (normalising, normalising)):
@@ -189,9 +180,8 @@ def test_statistics_may_be_an_object_or_two_arrays(trained, small):
             teacher = vsp.agent(source, SIMPLEGOAL, name="mine", normalize=both)
         answer = raw(plain, deterministic=True)[0] if raw != normalising else raw(plain)
         assert np.abs(teacher.predict(OBS)[0] - answer).max() < 1e-6
-        assert (
-            teacher.digest != vsp.agent(source, SIMPLEGOAL, name="mine", normalize=False).digest or raw != normalising
-        )
+        unaware = vsp.agent(source, SIMPLEGOAL, name="mine", normalize=False)
+        assert teacher.digest != unaware.digest or raw != normalising
 
 
 @pytest.mark.parametrize("given", [np.True_, {"mean": 0, "var": 1}, (np.zeros(2),), 1, np.zeros(2), open])
@@ -213,9 +203,8 @@ def test_a_wrapper_that_normalises_is_seen(small, tmp_path):
     env = gymnasium.wrappers.NormalizeObservation(gymnasium.make(SIMPLEGOAL), epsilon=0.1)
     model = made("SAC", DummyVecEnv([lambda: gymnasium.wrappers.NormalizeReward(env)]), net_arch=[8])
     env.obs_rms.mean, env.obs_rms.var = np.array([0.25, 0.5]), np.array([0.25, 0.1])
-    expected = model.predict(
-        ((OBS - env.obs_rms.mean) / np.sqrt(env.obs_rms.var + 0.1)).astype(np.float32), deterministic=True
-    )
+    seen = (OBS - env.obs_rms.mean) / np.sqrt(env.obs_rms.var + 0.1)
+    expected = model.predict(seen.astype(np.float32), deterministic=True)
     with pytest.warns(UserWarning, match="NormalizeObservation changed them"):
         teacher = vsp.agent(model, SIMPLEGOAL)
     assert np.abs(teacher.predict(OBS)[0] - expected[0]).max() < 1e-6
