@@ -110,17 +110,3 @@ def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
 def test_bad_names_and_outcomes_are_refused(about, why):
     with pytest.raises(ValueError, match=why):
         vsp.register("Tank-v0", **about)
-
-
-def test_our_own_tasks_keep_their_names():
-    with pytest.raises(ValueError, match="'Pendulum-v1' is one of vsp's own tasks"):
-        vsp.register("Pendulum-v1", outputs=["torque"])
-
-
-def test_an_agent_with_a_memory_is_refused():
-    class Recurrent:
-        def predict(self, obs, state=None, episode_start=None, deterministic=False):
-            return np.zeros((len(obs), 1)), np.zeros(3)
-
-    with pytest.raises(ValueError, match="the agent keeps a state between steps, .* train one without memory"):
-        vsp_beyond.faithful(vsp.agent(Recurrent()), "Tank-v0", LITTLE, seed=0)
