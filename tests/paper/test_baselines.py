@@ -4,6 +4,7 @@ import types
 import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression
+from sklearn.tree import DecisionTreeRegressor
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
 
 from studies.rivals.dagger import dagger
@@ -22,6 +23,31 @@ def test_the_linear_map_is_that_of_least_squares(task):
     policy, model = linear_map(states, actions, task), LinearRegression().fit(states, actions)
     assert np.allclose(policy.coefficients[0], np.vstack([model.coef_.T, model.intercept_]))
     assert len(policy) == 1 and policy.codewords[0] == pytest.approx(states.mean(axis=0))
+
+
+# The tree that notebook 05 compares with
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("leaves", [2, 13, 32])
+def test_a_tree_is_that_of_scikit_learn(task, leaves):
+    states, actions = examples(task)
+    tree, other = Tree(states, actions, leaves=leaves), examples(task, seed=1)[0]
+    model = DecisionTreeRegressor(max_leaf_nodes=leaves, criterion="squared_error", random_state=0)
+    found, state = tree.predict(other)
+    assert found.shape == actions.shape and state is None
+    assert np.array_equal(found, model.fit(states, actions).predict(other).reshape(actions.shape))
+    assert len(tree) == leaves == len(np.unique(tree.predict(states)[0], axis=0))
+
+
+def test_a_leaf_holds_the_mean_action_of_its_states():
+    states = np.array([[0.1, 0.5], [0.2, 0.5], [0.8, 0.5], [0.9, 0.5]])
+    actions = np.array([[0.0, 1.0], [0.2, 1.0], [-1.0, -1.0], [-0.6, -1.0]])
+    tree = Tree(states, actions, leaves=2)
+    assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
+    assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
+    assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
+    assert np.allclose(Tree(states, actions, leaves=1).predict(states)[0], actions.mean(axis=0))
 
 
 # Cells of k-means, and DAgger
@@ -74,9 +100,8 @@ def test_dagger_keeps_the_best_on_the_validation_starts():
     kept = dagger([fit], TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0)
     assert kept.coefficients[0, 1, 0] == 40.0
     gains = iter([12.0, -40.0, 40.0])
-    assert (
-        dagger([fit], TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0).coefficients[0, 1, 0] == 12.0
-    )
+    kept = dagger([fit], TEACHERS[MOUNTAINCAR], get_task(MOUNTAINCAR), rounds=ROUNDS, seed=0)
+    assert kept.coefficients[0, 1, 0] == 12.0
 
 
 def test_of_several_fits_the_one_with_the_best_first_policy_goes_on():
