@@ -16,9 +16,8 @@ SMALL = Experiment(SIMPLEGOAL, tiny(n_epochs=500, n_freeze=5), CurvedTeacher(), 
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed")  # an extra
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs="CRITICAL"
-    ) as cluster:
+    how = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": "CRITICAL"}
+    with distributed.LocalCluster(n_workers=2, **how) as cluster:
         yield cluster
 
 

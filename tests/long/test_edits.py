@@ -1,31 +1,14 @@
 """What readers change in notebooks 06 to 11: parameters, and their *try*; quick, but with `make test-tries`."""
 
-import re
-
 import numpy as np
 import pytest
-from support import QUICK
+from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
+from test_tries import run, to_try
 
-from vsp.run.atomic import ROOT
 from vsp.run.command import CommandError
-from vsp.run.notebook import nbformat
 
-SIMPLEGOAL, MOUNTAINCAR, PENDULUM = "SimpleGoal-v0", "MountainCarContinuous-v0", "Pendulum-v1"
 # The last cell that it concerns
 LAST = {"06": "read-figure", "07": "cells", "08": "imports", "10": "state", "11": "fit"}
-
-
-def played(number, out, **changes):
-    """The names in notebook NUMBER after its cells up to `LAST`, with other parameters."""
-    (path,), names = (ROOT / "notebooks").glob(f"{number}_*.ipynb"), {}
-    for cell in nbformat.read(path, as_version=4).cells:
-        if cell.cell_type == "code":
-            exec(compile(cell.source, f"{path.name}, {cell.id}", "exec"), names)
-        if cell.id == "parameters":
-            assert changes.keys() <= names.keys()
-            names.update(changes, out=str(out), quick=QUICK)
-        if cell.id == LAST[number]:
-            return names
 
 
 EDITS = [
@@ -38,7 +21,7 @@ EDITS = [
 
 @pytest.mark.parametrize(("number", "changes"), EDITS, ids=str)
 def test_other_values_run_through(number, changes, tmp_path, capsys):
-    names = played(number, tmp_path, **changes)
+    names = run(number, tmp_path, last=LAST[number], **changes)
     said = capsys.readouterr().out
     if number == "06":
         by_hand = names["by_hand"]
@@ -68,14 +51,11 @@ def test_other_values_run_through(number, changes, tmp_path, capsys):
 )
 def test_what_is_not_possible_is_one_line(number, changes, said, tmp_path):
     with pytest.raises(CommandError, match=said):
-        played(number, tmp_path, **changes)
+        run(number, tmp_path, last=LAST[number], **changes)
 
 
 @pytest.mark.parametrize(("by", "fails_outside"), [(0.02, False), (0.3, True)])
 def test_the_try_of_the_proofs(by, fails_outside, tmp_path):
-    names = played("08", tmp_path)
-    (path,) = (ROOT / "notebooks").glob("08_*.ipynb")
-    text = nbformat.read(path, as_version=4).cells[-1].source.partition("*Try:*")[2]
-    code = "\n".join(re.findall("^    (.*)", text, flags=re.M)).replace("-= 0.02", f"-= {by}")
-    exec(code.replace("vsp_beyond.prove", "prove"), names)
+    names = run("08", tmp_path, last=LAST["08"])
+    exec(to_try("08").replace("-= 0.02", f"-= {by}").replace("vsp_beyond.prove", "prove"), names)
     assert (names["proof"].failing_outside > 0) == fails_outside

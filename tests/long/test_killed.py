@@ -11,11 +11,6 @@ from support import write_story as write
 
 from vsp.run.atomic import ROOT
 
-DRAW = """\
-from pathlib import Path
-folder = Path(out) / "figures"
-folder.mkdir(parents=True)"""
-
 WORKERS = """\
 import joblib, os, pathlib, tempfile, time
 import numpy as np
@@ -50,9 +45,9 @@ def test_a_killed_run_leaves_nothing_in_the_folders_of_others_and_the_next_remov
 
 def test_end_by_signal_ends_kernel(tmp_path):
     """SIGTERM to the runner: no kernel and no output is left, and its lock is free."""
-    pid = tmp_path / "pid"
+    pid, draw = tmp_path / "pid", "from pathlib import Path\n(Path(out) / 'figures').mkdir(parents=True)"
     wait = "import os, time\n(Path(out).parents[4] / 'pid').write_text(str(os.getpid()))\ntime.sleep(120)"
-    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, DRAW, wait), "--out", tmp_path]
+    command = [sys.executable, "-m", "vsp.run.run_notebook", write(tmp_path, draw, wait), "--out", tmp_path]
     process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
     until(lambda: pid.exists() and pid.read_text())
     process.send_signal(signal.SIGTERM)

@@ -15,15 +15,29 @@ from vsp.run.notebook import nbformat
 from vsp.tasks import simplegoal
 
 
-def run(number, folder, **values):
-    """The names of a notebook after its last cell, with these parameters."""
-    (path,), names = (ROOT / "notebooks").glob(f"{number}_*.ipynb"), {}
-    for cell in nbformat.read(path, as_version=4).cells:
-        exec(cell.source if cell.cell_type == "code" else "", names)
+def cells_of(number):
+    (path,) = (ROOT / "notebooks").glob(f"{number}_*.ipynb")
+    return nbformat.read(path, as_version=4).cells
+
+
+def run(number, folder, *, last=None, **values):
+    """The names of a notebook after its cell `last`, None: all, with these parameters."""
+    names = {}
+    for cell in cells_of(number):
+        exec(compile(cell.source, f"{number}, {cell.id}", "exec") if cell.cell_type == "code" else "", names)
         plt.close("all")
         if cell.id == "parameters":
-            names |= {"out": folder, "runs": folder, "quick": QUICK, **values}
+            assert values.keys() <= names.keys()
+            names |= {"out": str(folder), "runs": str(folder), "quick": QUICK, **values}
+        if cell.id == last:
+            break
     return names
+
+
+def to_try(number):
+    """The code that the last cell of a notebook suggests."""
+    text = cells_of(number)[-1].source.rpartition("*Try:*")[2]
+    return "\n".join(re.findall("^    (.*)", text, flags=re.M))
 
 
 RUNS_THROUGH = [
@@ -85,10 +99,9 @@ def test_what_03_and_04_let_try_changes_the_policy(row, tmp_path):
 
 @pytest.mark.parametrize("n_minibatches", [3, 5])
 def test_05_judges_runs_of_ones_own(n_minibatches, tmp_path):
-    (path,) = (ROOT / "notebooks").glob("05_*.ipynb")
-    code = "\n".join(re.findall("^    (.*)", nbformat.read(path, as_version=4).cells[-1].source, flags=re.M))
     results = {task: paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in paper.TASKS}
     names = {"results": results, "runs": tmp_path, "paper": paper}
-    exec(code.replace("=5", f"={n_minibatches}").replace("range(10)", "range(2)" if QUICK else "range(10)"), names)
+    code = to_try("05").replace("=5", f"={n_minibatches}")
+    exec(code.replace("range(10)", "range(2)" if QUICK else "range(10)"), names)
     assert names["new"].experiment.config.n_minibatches == n_minibatches
     assert not np.array_equal(names["new"].returns[:2], results[SIMPLEGOAL].returns)
