@@ -228,6 +228,18 @@ def write_story(folder: Path, *cells: str) -> Path:
     return path
 
 
+def visible(folder):
+    """The names in a folder."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def flipped(content, bit):
+    """A copy of `content` in which that bit is the other one."""
+    damaged = bytearray(content)
+    damaged[bit // 8] ^= 1 << bit % 8
+    return bytes(damaged)
+
+
 class Payload:
     """Writes a file when it is unpickled."""
 

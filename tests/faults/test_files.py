@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload
+from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload, flipped
 
 import vsp
 from studies import training
@@ -96,14 +96,12 @@ KINDS = {
 TALLY = {}  # kind: refused, tried
 
 
-def damage(content: bytes) -> list[tuple[int, bytes]]:
-    """Copies of `content`, each with one bit flipped or cut off, and at which byte."""
+def damage(content: bytes) -> list[bytes]:
+    """Copies of `content`, each with one bit flipped or cut off."""
     rng, found = np.random.default_rng(len(content)), []
     for bit in rng.choice(8 * len(content), FLIPS, replace=False):
-        damaged = bytearray(content)
-        damaged[bit // 8] ^= 1 << bit % 8
-        found.append((int(bit // 8), bytes(damaged)))
-    return found + [(int(n), content[:n]) for n in rng.choice(len(content), TRUNCATIONS, replace=False)]
+        found.append(flipped(content, bit))
+    return found + [content[:n] for n in rng.choice(len(content), TRUNCATIONS, replace=False)]
 
 
 def refused(read: Callable[[], object]) -> bool:
@@ -126,7 +124,7 @@ def test_a_damaged_file_is_refused_before_it_is_parsed(name, tmp_path, monkeypat
     kind.read(path)
     for parser in kind.parsers:
         monkeypatch.setattr(parser, parse)
-    for _, damaged in damage(content):
+    for damaged in damage(content):
         path.write_bytes(damaged)
         found.append(refused(partial(kind.read, path)))
     TALLY[name] = sum(found), len(found)
@@ -176,18 +174,15 @@ def payloads(mark: Path, agent: bytes) -> dict[str, bytes]:
     import torch
 
     raw, tag = pickle.dumps(Payload(mark)), f'!!python/object/apply:builtins.open ["{mark}", "w"]'
-    text, saved = (
-        base64.b64encode(raw).decode(),
-        by(lambda file: torch.save({"actor.mu.0.weight": Payload(mark)}, file)),
-    )
+    text = base64.b64encode(raw).decode()
+    saved = by(lambda file: torch.save({"actor.mu.0.weight": Payload(mark)}, file))
     objects = np.array([Payload(mark)], dtype=object)
     with zipfile.ZipFile(io.BytesIO(agent)) as archive:
         parts = {name.replace(".", "__"): archive.read(name) for name in archive.namelist()}
     about = {**json.loads(parts["data"]), "policy_class": {":type:": "x", ":serialized:": text}}
     card = {"task": SIMPLEGOAL, "sha256": hashlib.sha256(raw).hexdigest(), ":serialized:": text, "yaml": tag}
-    found = {f"raw.{suffix}": raw for suffix in SUFFIXES} | {
-        f"torch.{suffix}": saved for suffix in ("pt", "zip", "run")
-    }
+    found = {f"raw.{suffix}": raw for suffix in SUFFIXES}
+    found |= {f"torch.{suffix}": saved for suffix in ("pt", "zip", "run")}
     found |= {
         "data.zip": as_zip(**parts | {"data": json.dumps(about).encode()}),
         "policy.zip": as_zip(**parts | {"policy__pth": raw}),

@@ -53,9 +53,8 @@ def test_the_order_of_jobs(record, tmp_path):
             make_runs(experiment, order, runs=tmp_path / name, jobs=jobs)
         folders = [experiment.folder(tmp_path / name) for name in "abcd"]
         for other in folders[1:]:
-            same += [
-                filecmp.cmp(*(folder / f"{n:04d}.run" for folder in (folders[0], other)), shallow=False) for n in seeds
-            ]
+            for name in (f"{n:04d}.run" for n in seeds):
+                same.append(filecmp.cmp(folders[0] / name, other / name, shallow=False))
     tell(record, "run files in any order of jobs, 1 or 2 at a time", same, "files")
 
 
@@ -114,6 +113,4 @@ def test_runs_made_anew_on_an_old_processor(tmp_path, record):
             draws = [values[rng.integers(len(values), size=(1000, len(values)))].mean(axis=1) for values in (then, now)]
             inside.append(abs(then.mean() - now.mean()) <= z * np.hypot(*(draw.std() for draw in draws)))
     what = "runs made anew as on a Prescott"
-    record(
-        "same", what, sum(inside), f"of {len(inside)} statistics", at_least=len(inside), note="inside 99.9 % intervals"
-    )
+    tell(record, what, inside, "statistics", note="inside 99.9 % intervals")

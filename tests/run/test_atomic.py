@@ -4,6 +4,7 @@ import os
 import stat
 
 import pytest
+from support import visible
 
 from vsp.run import atomic
 from vsp.run.atomic import DamagedFile, MissingFile, read_bytes, sha256, write_text
@@ -11,10 +12,6 @@ from vsp.run.listed import list_file, read_listed, write_listed
 from vsp.run.sealed import read_sealed
 
 READERS = (read_bytes, sha256, read_sealed, read_listed)
-
-
-def visible(folder):
-    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])

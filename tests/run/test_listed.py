@@ -5,22 +5,12 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from support import called
+from support import called, flipped, visible
 
 from vsp.paper.results import read_results
 from vsp.run import manifest
 from vsp.run.atomic import DamagedFile, sha256
 from vsp.run.listed import MANIFEST, read_listed, write_listed
-
-
-def visible(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
-def flipped(content, bit):
-    damaged = bytearray(content)
-    damaged[bit // 8] ^= 1 << bit % 8
-    return bytes(damaged)
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import flipped
 
 from vsp.run.atomic import DamagedFile
 from vsp.run.sealed import load_arrays, read_sealed, save_arrays, write_sealed
@@ -26,16 +27,14 @@ def test_the_same_content_gives_the_same_bytes(tmp_path):
 
 
 def test_one_flipped_bit_or_another_length_is_found(tmp_path):
-    path = tmp_path / "x"
+    path, said = tmp_path / "x", "x: damaged.* SHA-256 is [0-9a-f]{64}, its first line .*delete it"
     save_arrays(path, ARRAYS, ABOUT)
     content = path.read_bytes()
-    flipped = [bytes([*content[:n], content[n] ^ 1 << n % 8, *content[n + 1 :]]) for n in range(len(content))]
+    altered = [flipped(content, 8 * n + n % 8) for n in range(len(content))]
     cut = [content[:n] for n in (0, 64, 65, 66, len(content) - 1)]
-    for damaged in [*flipped, *cut, content + b"\0", b"of another origin"]:
+    for damaged in [*altered, *cut, content + b"\0", b"of another origin"]:
         path.write_bytes(damaged)
-        with pytest.raises(
-            DamagedFile, match="x: damaged.* SHA-256 is [0-9a-f]{64}, its first line .*delete it"
-        ) as found:
+        with pytest.raises(DamagedFile, match=said) as found:
             load_arrays(path, kind="Thing")
         assert "\n" not in str(found.value)
 
