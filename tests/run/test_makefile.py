@@ -61,6 +61,11 @@ def packages(checkout):
 # Set-up
 
 
+@pytest.fixture
+def venv(checkout):
+    make(checkout, "venv")
+
+
 def test_parts_are_added_when_they_are_asked_for_and_what_is_whole_is_left(checkout):
     said, status = make(checkout, "venv", PYTHONWARNINGS="error")
     assert status == 0 and packages(checkout) == {"numpy-2.0.dist-info"} and "to draw (1 MB of downloads)" in said
@@ -73,8 +78,7 @@ def test_parts_are_added_when_they_are_asked_for_and_what_is_whole_is_left(check
     assert make(checkout, "venv-train") == make(checkout, "venv") == ("", 0) and asked(checkout) == ""
 
 
-def test_torch_with_another_checksum_is_refused_and_the_first_part_goes_on_working(checkout):
-    make(checkout, "venv")
+def test_torch_with_another_checksum_is_refused_and_the_first_part_goes_on_working(checkout, venv):
     said, status = make(checkout, "venv-train", FAKE_HASH="beef")
     assert status and "error: SHA-256 of torch.whl is not among those of torch==2.13.0 in environment.lock" in said
     assert make(checkout, "venv") == ("", 0)
@@ -92,8 +96,7 @@ STALE = {
 
 
 @pytest.mark.parametrize("fault", STALE)
-def test_a_stale_environment_is_made_anew(checkout, fault):
-    make(checkout, "venv")
+def test_a_stale_environment_is_made_anew(checkout, venv, fault):
     moved = STALE[fault](checkout)
     here = moved if fault == "moved" else checkout
     said, status = make(here, "venv", FAKE_BROKEN="install")
@@ -103,8 +106,7 @@ def test_a_stale_environment_is_made_anew(checkout, fault):
     assert make(here, "venv") == ("", 0)
 
 
-def test_another_python_makes_it_anew_and_one_too_old_is_named(checkout):
-    make(checkout, "venv")
+def test_another_python_makes_it_anew_and_one_too_old_is_named(checkout, venv):
     said, status = make(checkout, "venv", "PYTHON=no such python")
     assert status and "tried no such python, expected Python 3.11, 3.12 or 3.13" in said and "make PYTHON=" in said
     assert make(checkout, "venv") == ("", 0)
@@ -163,8 +165,7 @@ ODD = ["Tim's \"results\" `touch hit`", "$(touch hit) $(shell touch hit) $HOME $
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_any_path_works(checkout, name):
-    make(checkout, "venv")
+def test_any_path_works(checkout, venv, name):
     for out in (name, str(checkout.parent / name)):
         there = set(checkout.iterdir())
         asked(checkout)
@@ -179,8 +180,7 @@ def test_any_path_works(checkout, name):
         assert not (checkout / out / "data/runs").exists()
 
 
-def test_any_path_reaches_the_makes_inside(checkout):
-    make(checkout, "venv")
+def test_any_path_reaches_the_makes_inside(checkout, venv):
     said, status = make(checkout, "quick", "OUT=$(HOME) `touch hit` 'x\"", "DASK=://`touch hit`")
     given = asked(checkout)
     assert "<--out=./$(HOME) `touch hit` 'x\"/build/quick><--jobs=://`touch hit`><--quick>" in given, said
@@ -197,9 +197,8 @@ def test_modules_of_tests_run_by_their_names_and_all_without_one(checkout):
     assert make(checkout, "test", "FILES=$(touch hit) `touch hit`")[1] and not (checkout / "hit").exists()
 
 
-def test_what_cannot_be_is_refused_in_one_line(checkout):
+def test_what_cannot_be_is_refused_in_one_line(checkout, venv):
     (checkout / "file").write_text("")
-    make(checkout, "venv")
     for jobs in ("", "03", "2 `touch hit`"):
         said, status = make(checkout, "runs", f"JOBS={jobs}")
         assert status and said.startswith(f"error: JOBS is {jobs}, expected a number from 1 on\nmake: ***")
@@ -214,9 +213,8 @@ def test_what_cannot_be_is_refused_in_one_line(checkout):
 
 
 @pytest.fixture
-def ran(checkout):
+def ran(checkout, venv):
     """`ran(target)`: which notebooks run for it."""
-    make(checkout, "venv")
 
     def ran(*targets):
         asked(checkout)
