@@ -26,9 +26,11 @@ def returns(seed=0):
     return rng.normal(16, 3, 200), np.concatenate([rng.normal(15, 4, (5, 200)), rng.normal(-10, 0.1, (1, 200))])
 
 
-def written(out, name="some_table"):
+def saved(out, frame=FRAME, caption="", **shown):
+    """The LaTeX that is written for a frame, and the path of its CSV."""
+    save_table(frame, "some_table", caption=caption, out=out, **shown)
     folder = out / "figures" / "tables"
-    return (folder / f"{name}.tex").read_text(encoding="utf-8"), folder / f"{name}.csv"
+    return (folder / "some_table.tex").read_text(encoding="utf-8"), folder / "some_table.csv"
 
 
 def balanced(tex):
@@ -44,8 +46,7 @@ def unescaped(tex):
 
 
 def test_the_latex_is_a_table_of_booktabs(tmp_path):
-    save_table(FRAME, "some_table", caption="Numbers of $x_0$.", out=tmp_path)
-    tex, _ = written(tmp_path)
+    tex, _ = saved(tmp_path, caption="Numbers of $x_0$.")
     parts = [r"\toprule", r"\midrule", r"\bottomrule", r"\label{tab:some_table}", r"\centering"]
     assert [tex.count(part) for part in [*parts, r"\caption{Numbers of $x_0$.}"]] == [1] * 6
     assert balanced(tex) and not unescaped(tex) and r"a\_b" in tex and r"c \& d" in tex and r"name\_of" in tex
@@ -62,8 +63,7 @@ def test_what_goes_beyond_the_paper_has_a_folder_of_its_own(tmp_path):
 
 
 def test_the_csv_parses_back(tmp_path):
-    save_table(FRAME, "some_table", caption="", out=tmp_path)
-    _, csv = written(tmp_path)
+    _, csv = saved(tmp_path)
     back = pd.read_csv(csv)
     assert back.columns.tolist() == FRAME.columns.tolist() and back["name_of"].tolist() == FRAME["name_of"].tolist()
     assert np.allclose(back["value"], FRAME["value"], rtol=1e-5) and back["count"].tolist() == [10, 2_000_000]
@@ -75,8 +75,7 @@ def test_the_csv_parses_back(tmp_path):
 )
 def test_numbers_in_a_csv_have_at_most_eight_digits_also_beside_words(tmp_path, make):
     """Digits beyond the eighth differ between processors."""
-    save_table(make(), "some_table", caption="", out=tmp_path)
-    numbers = re.findall(r"\d+\.\d+", written(tmp_path)[1].read_text())
+    numbers = re.findall(r"\d+\.\d+", saved(tmp_path, make())[1].read_text())
     assert numbers and max(len(number.replace(".", "").lstrip("0")) for number in numbers) <= 8
 
 
@@ -89,8 +88,7 @@ def test_a_equation_table_is_a_row_of_equations_per_cell(tmp_path, task):
     assert first == pytest.approx(policy.codewords[0], abs=5e-4)
     signed = [float(s.replace(" ", "")) for s in re.findall(r"[+-]? ?\d+\.\d+", shown.iloc[0, 1])]
     assert signed == pytest.approx(policy.coefficients[0, :, 0], abs=5e-4)
-    save_table(policy.to_frame(), "some_table", caption="c", out=tmp_path, shown=shown)
-    tex, csv = written(tmp_path)
+    tex, csv = saved(tmp_path, policy.to_frame(), shown=shown)
     assert balanced(tex) and not unescaped(tex)
     back = pd.read_csv(csv).to_numpy()
     assert np.allclose(back[:, : len(policy.task.low)], policy.codewords, rtol=1e-5)
@@ -117,9 +115,8 @@ def test_the_spread_table_stands_beside_the_papers(task):
     assert frame.index.tolist() == printed.index.tolist() and frame.shape == (9, 4)
     assert frame["teacher, paper"].tolist() == printed["drl"].tolist()
     assert frame["distilled, paper"].tolist() == printed["ours"].tolist()
-    assert frame.loc[["Mean", "Median/Q2"], "teacher, here"].tolist() == pytest.approx(
-        [teacher.mean(), np.median(teacher)], rel=1e-14
-    )
+    assert frame.at["Mean", "teacher, here"] == pytest.approx(teacher.mean(), rel=1e-14)
+    assert frame.at["Median/Q2", "teacher, here"] == pytest.approx(np.median(teacher), rel=1e-14)
     assert frame.at["Q1", "distilled, here"] == spread(runs)["q1"]
     assert frame.at["Coverage", "distilled, here"] == pytest.approx(100 * spread(runs)["coverage"]) != 100
 
@@ -144,8 +141,8 @@ def test_the_text_numbers_stand_beside_the_papers(task):
 
 def test_hyperparameters_per_cent_and_names_of_rows(tmp_path):
     assert hyperparameter_table(list(TASKS)).iloc[0].tolist() == ["n_epochs", 5000, 5000, 2000, 2000]
-    save_table(FRAME, "some_table", caption="5 %", out=tmp_path)
-    assert r"5 \%" in written(tmp_path)[0] and "$-$2" in written(tmp_path)[0]
+    tex, _ = saved(tmp_path, caption="5 %")
+    assert r"5 \%" in tex and "$-$2" in tex
     named = pd.DataFrame({"a": [1]}, index=pd.Index(["x"], name="who"))
     assert cells(tables.show_table(named).data) == ["who", "a", "x", "1"]
 
@@ -160,15 +157,14 @@ def test_readings_are_the_fields_that_the_papers_table_does_not_print():
 
 def test_a_long_table_is_whole_in_the_csv_and_in_part_in_print(tmp_path):
     shown = save_table(FRAME, "some_table", caption="c", out=tmp_path, shown=FRAME[["value"]][:1])
-    tex, csv = written(tmp_path)
+    tex, csv = saved(tmp_path, shown=FRAME[["value"]][:1])
     assert "0.333" in shown.data and "a_b" not in shown.data
     assert "0.333" in tex and "a\\_b" not in tex and len(pd.read_csv(csv).columns) == 4
 
 
 @pytest.mark.parametrize(("rows", "environment"), [(40, "table"), (41, "longtable")])
 def test_a_table_of_more_than_a_page_is_a_longtable(tmp_path, rows, environment):
-    save_table(pd.DataFrame({"n": range(rows)}), "some_table", caption="Many numbers.", out=tmp_path)
-    tex, csv = written(tmp_path)
+    tex, csv = saved(tmp_path, pd.DataFrame({"n": range(rows)}), "Many numbers.")
     assert f"\\begin{{{environment}}}" in tex and ("longtable" in tex) == (environment == "longtable")
     assert balanced(tex) and tex.count(r"\label{tab:some_table}") == 1 and tex.count(r"\caption{Many numbers.}") == 1
     assert len(pd.read_csv(csv)) == rows and f"\n{rows - 1} \\\\\n" in tex
@@ -216,9 +212,8 @@ def test_a_notebook_shows_no_row_numbers():
 
 
 def test_counts_have_no_decimals_where_each_row_is_another_quantity():
-    frame = pd.DataFrame(
-        {"quantity": ["outliers", "mean"], "here": [24.0, 1.5], "low": [20.0, 1.25], "high": [30.0, 2.25]}
-    )
+    rows = {"quantity": ["outliers", "mean"], "here": [24.0, 1.5], "low": [20.0, 1.25], "high": [30.0, 2.25]}
+    frame = pd.DataFrame(rows)
     assert as_text(present(frame)).values.tolist() == [["outliers", "24", "20 to 30"], ["mean", "1.5", "1.25 to 2.25"]]
     same = frame.rename(columns={"quantity": "task"})
     assert as_text(present(same)).values.tolist()[0] == ["outliers", "24.0", "20.00 to 30.00"]
@@ -230,12 +225,9 @@ def test_no_is_said_among_other_values_only():
 
 
 def test_headings_are_words_and_shares_are_per_cent():
-    found = present(
-        pd.DataFrame({"mean": [1.0], "failing": [0.00025], "task": ["MountainCarContinuous-v0"], "wide": [True]})
-    )
-    assert found.to_dict("records") == [
-        {"mean return": 1.0, "failed (%)": "0.025", "task": "MountainCar", "wide": "yes"},
-    ]  # fmt: skip
+    row = {"mean": [1.0], "failing": [0.00025], "task": ["MountainCarContinuous-v0"], "wide": [True]}
+    (found,) = present(pd.DataFrame(row)).to_dict("records")
+    assert found == {"mean return": 1.0, "failed (%)": "0.025", "task": "MountainCar", "wide": "yes"}
     assert present(pd.DataFrame({"wide": [False], "good": [np.nan]})).values.tolist() == [["", tables.MISSING]]
 
 
@@ -264,10 +256,8 @@ def test_a_long_table_is_folded_below_its_caption():
 
 
 def test_numbers_have_true_minus_signs_and_intervals_do_not_wrap():
-    frame = pd.DataFrame(
-        {"low": [-2.5], "high": [-1.25], "task": ["Pendulum-v1"], "code": ["$x-1$"], "name": ["1-2 to -3"]}
-    )
-    page = tables.show_table(frame).data
+    row = {"low": [-2.5], "high": [-1.25], "task": ["Pendulum-v1"], "code": ["$x-1$"], "name": ["1-2 to -3"]}
+    page = tables.show_table(pd.DataFrame(row)).data
     assert cells(page)[-4:] == ["−2.5\xa0to\xa0−1.25", "Pendulum", "$x-1$", "1-2\xa0to\xa0−3"] and "95\xa0%" in page
 
 

@@ -218,6 +218,8 @@ def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
     assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
     assert ax.get_ylim() == (2.5, -0.5)
     assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [style.DISTILLED]
+    intervals(ax, ROWS, color=(colours := [style.TEACHER, style.DISTILLED, style.GOAL]))
+    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections[2:]] == [colours, colours]
 
 
 GAPS = pd.DataFrame(
@@ -279,13 +281,6 @@ def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
 def test_nothing_of_a_committed_figure_is_cut_off(path):
     pixels = np.asarray(Image.open(path).convert("L"))
     assert min(edge.min() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1])) > 250
-
-
-def test_intervals_have_colours_of_their_own(ax):
-    colours = [style.TEACHER, style.DISTILLED, style.GOAL]
-    rows = pd.DataFrame({"here": [1.0, 2.0, 3.0], "low": [0.0, 1.0, 2.0], "high": [2.0, 3.0, 4.0]})
-    show.intervals(ax, rows, color=colours)
-    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections] == [colours, colours]
 
 
 def test_a_figure_without_an_alternative_text_is_refused(tmp_path):
