@@ -8,10 +8,14 @@ from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
-from support import Constant
+from support import SIMPLEGOAL, Constant
 
+from vsp.policy import VoronoiPolicy
 from vsp.run.atomic import ROOT
 
+# What good calls are made of: numbers that float32 holds exactly
+STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
+TWO = VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
 NOWHERE = (np.nan, np.inf, -np.inf)
 
 

@@ -8,7 +8,7 @@ import functools
 import numpy as np
 import pandas as pd
 import pytest
-from spoilt import Argument, actor, array, but_for_none, count, name, refuses, settings
+from spoilt import STATES, TWO, Argument, actor, array, but_for_none, count, name, refuses, settings
 from support import SIMPLEGOAL, CurvedTeacher, network_teacher, partition_of, tiny
 
 import vsp
@@ -18,12 +18,10 @@ from vsp.rollouts import Episode, standard
 from vsp.subpolicies import policy_class
 from vsp.teachers.teacher import Teacher
 
-# What good calls are made of: numbers that float32 holds exactly
+# What good calls are made of
 
 TEACHER = CurvedTeacher()
-STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
 ACTIONS = (STATES - 0.5) * [1.0, -1.0]
-TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
 SHORT = tiny(n_epochs=24, n_freeze=4)
 HISTORY = vsp.distill(TEACHER, SIMPLEGOAL, SHORT, seed=0)[1]
 NET = network_teacher(SIMPLEGOAL)
@@ -34,11 +32,17 @@ def weights(**tensors):
     return Teacher({f"mu.0.{part}": tensor for part, tensor in tensors.items()}, SIMPLEGOAL)
 
 
+def observe(states, actions):
+    partition_of([[0.25, 0.5], [0.75, 0.5]]).observe(Episode(states, actions))
+
+
 def episodes(**arguments):
     return list(vsp.teacher_episodes(task=vsp.get_task(SIMPLEGOAL), rng=np.random.default_rng(0), **arguments))
 
 
-states, actions = array(STATES), array(ACTIONS)
+teacher_file = Argument(SIMPLEGOAL, ["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"])
+config = Argument(SHORT, [3, "paper", {}, np.nan])
+states, wide = array(STATES), {"free": (1,), "nonempty": True}
 pairs = {"states": array(STATES, free=(), nonempty=True), "actions": array(ACTIONS, free=(), nonempty=True)}
 task, seed, teacher, n = name(SIMPLEGOAL), count(0, least=0), actor(TEACHER), count(3)
 player, n_episodes = {"policy": teacher, "task": task}, {"n_episodes": n, "seed": seed}
@@ -53,19 +57,13 @@ returns = {"returns": array(STATES, any_shape=True, nonempty=True)}
 
 CASES = {
     "agent": (vsp.agent, {"source": Argument(TEACHER, [None, 3, "TD3", np.zeros(2), np.nan])}),
-    "load_teacher": (
-        vsp.load_teacher,
-        {"source": Argument(SIMPLEGOAL, ["", "SimpelGoal-v0", "agent.pth", "agent.zip", "agent"])},
-    ),
+    "load_teacher": (vsp.load_teacher, {"source": teacher_file}),
     "Teacher": (weights, {"weight": array(np.eye(2), free=()), "bias": array(np.zeros(2), free=())}),
     "Teacher.predict": (NET.predict, {"obs": states}),
     "get_task": (vsp.get_task, {"name": task}),
     "preset": (vsp.preset, {"task": task}),
     "Config": (vsp.Config, settings(SHORT)),
-    "distill": (
-        vsp.distill,
-        {"teacher": teacher, "task": task, "config": Argument(SHORT, [3, "paper", {}, np.nan]), "seed": seed},
-    ),
+    "distill": (vsp.distill, {"teacher": teacher, "task": task, "config": config, "seed": seed}),
     "teacher_episodes": (episodes, {"teacher": teacher, "n": count(2, least=0)}),
     "start_states": (vsp.start_states, {"task": task} | n_episodes),
     "evaluate": (vsp.evaluate, player | n_episodes),
@@ -73,20 +71,14 @@ CASES = {
     "rollout": (vsp.rollout, player | starts),
     "collect_episodes": (vsp.collect_episodes, player | starts),
     "visited_states": (vsp.visited_states, player | {"starts": array(STATES, nonempty=True)}),
-    "Episode": (
-        Episode,
-        {"states": array(STATES, free=(1,), nonempty=True), "actions": array(ACTIONS, free=(1,), nonempty=True)},
-    ),
+    "Episode": (Episode, {"states": array(STATES, **wide), "actions": array(ACTIONS, **wide)}),
     "standard": (standard, {"states": array(STATES, free=(0, 1), nonempty=True)}),
     # Cells
     "nearest": (vsp.nearest, cells_of_states | {"states": states}),
     "geometry.distances": (geometry.distances, cells_of_states | {"states": states}),
     "geometry.delaunay_neighbours": (geometry.delaunay_neighbours, codewords),
     "geometry.lookup_neighbours": (geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
-    "Partition.observe": (
-        lambda states, actions: partition_of([[0.25, 0.5], [0.75, 0.5]]).observe(Episode(states, actions)),
-        {"states": array(STATES, free=(), nonempty=True), "actions": array(ACTIONS, free=(), nonempty=True)},
-    ),
+    "Partition.observe": (observe, pairs),
     "History.policy_at": (HISTORY.policy_at, {"n": count(3, least=0, most=23)}),
     "policy_class": (functools.partial(policy_class, task=vsp.get_task(SIMPLEGOAL)), {"sub_policy": name("linear")}),
     # The policy

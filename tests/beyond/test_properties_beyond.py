@@ -4,10 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from spoilt import Argument, actor, array, but_for_none, count, name, number, refuses, settings
+from spoilt import STATES, TWO, Argument, actor, array, but_for_none, count, name, number, refuses, settings
 from support import SIMPLEGOAL, CurvedTeacher, tiny
 
-import vsp
 import vsp_beyond
 from vsp_beyond.optimum import best_policy, best_returns
 from vsp_beyond.proofs import largest_disturbance, steps_to_goal
@@ -23,29 +22,20 @@ FAITHFUL = vsp_beyond.Faithful(
 task, seed, teacher = name(SIMPLEGOAL), count(0, least=0), actor(CurvedTeacher())
 faithful = Argument(FAITHFUL, [3, "faithful", tiny(), TUNED, {}, np.nan])
 tuned = Argument(TUNED, [3, "tuned", tiny(), FAITHFUL, {}, np.nan])
-STATES = np.array([(x, y) for x in (0.125, 0.375, 0.625, 0.875) for y in (0.25, 0.5, 0.75)])  # (12, 2)
-TWO = vsp.VoronoiPolicy([[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], np.zeros((3, 2))], task=SIMPLEGOAL)
+tolerance, finer, both = number(1.0, least=0), number(0.5, least=0.1, most=10.0), {"task": task, "seed": seed}
+price, push = but_for_none(number(0.01, least=0.0)), number(0.01, least=0.0, most=1.0)
 
 CASES = {
     "Tuned": (vsp_beyond.Tuned, settings(TUNED, from_zero=("n_corrections", "n_generations"))),
     "Faithful": (vsp_beyond.Faithful, settings(FAITHFUL, from_zero=("n_generations",), any_sign=("margin",))),
     "tuned_preset": (vsp_beyond.tuned_preset, {"task": task}),
     "faithful_preset": (vsp_beyond.faithful_preset, {"task": task, "n_cells": but_for_none(count(2))}),
-    "faithful": (vsp_beyond.faithful, {"agent": teacher, "task": task, "config": faithful, "seed": seed}),
-    "tuned": (vsp_beyond.tuned, {"agent": teacher, "task": task, "config": tuned, "seed": seed}),
-    "simplify": (
-        vsp_beyond.simplify,
-        {"teacher": teacher, "task": task, "config": tuned, "tolerance": number(1.0, least=0), "seed": seed},
-    ),
+    "faithful": (vsp_beyond.faithful, {"agent": teacher, "config": faithful} | both),
+    "tuned": (vsp_beyond.tuned, {"agent": teacher, "config": tuned} | both),
+    "simplify": (vsp_beyond.simplify, {"teacher": teacher, "config": tuned, "tolerance": tolerance} | both),
     "optimum.best_returns": (best_returns, {"starts": array(STATES)}),
-    "optimum.best_policy": (
-        best_policy,
-        {"task": task, "finer": number(0.5, least=0.1, most=10.0), "price": but_for_none(number(0.01, least=0.0))},
-    ),
-    "proofs.steps_to_goal": (
-        functools.partial(steps_to_goal, TWO),
-        {"disturbance": number(0.01, least=0.0, most=1.0), "n": count(20, most=4000)},
-    ),
+    "optimum.best_policy": (best_policy, {"task": task, "finer": finer, "price": price}),
+    "proofs.steps_to_goal": (functools.partial(steps_to_goal, TWO), {"disturbance": push, "n": count(20, most=4000)}),
     "proofs.largest_disturbance": (functools.partial(largest_disturbance, TWO), {"n": count(10, most=4000)}),
 }
 
