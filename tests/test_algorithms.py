@@ -370,6 +370,5 @@ def test_many_inputs_warn_of_a_slow_triangulation(neighbours, d, slow, monkeypat
     config = dataclasses.replace(vsp.preset(SIMPLEGOAL), neighbours=neighbours)
     monkeypatch.setattr(vsp, "agent", lambda teacher, task: teacher)
     distill(CurvedTeacher(), task, config, seed=0, progress=False)
-    assert [str(one.message) for one in recwarn] == [
-        f"neighbours='delaunay' is slow with {d} inputs: 'lookup' is not"
-    ] * slow
+    said = f"neighbours='delaunay' is slow with {d} inputs: 'lookup' is not"
+    assert [str(one.message) for one in recwarn] == [said] * slow

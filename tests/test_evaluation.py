@@ -44,9 +44,8 @@ def test_how_alike_by_hand():
     gentle = likeness(vsp.agent(lambda obs: 0.8 * PumpingTeacher().predict(obs)[0]), PumpingTeacher(), MOUNTAINCAR, 20)
     assert gentle.within == pytest.approx(np.mean(np.abs(theirs) <= 0.5)) and 0 < gentle.within < 1
     assert f"within 5% of its range in {gentle.within[0]:.0%} of them" in str(gentle)
-    assert np.array_equal(
-        alike.returns["agent"], rollout(PumpingTeacher(), MOUNTAINCAR, start_states(MOUNTAINCAR, 20, 7)).returns
-    )
+    played = rollout(PumpingTeacher(), MOUNTAINCAR, start_states(MOUNTAINCAR, 20, 7))
+    assert np.array_equal(alike.returns["agent"], played.returns)
     assert likeness(STILL, PumpingTeacher(), MOUNTAINCAR, 20).failures["policy"] == 20
 
 
@@ -55,9 +54,8 @@ def test_a_distillation_ends_with_a_remark_unless_nobody_reads_it(monkeypatch, c
     config = vsp.preset(MOUNTAINCAR).quick()
     vsp.distill(PumpingTeacher(), MOUNTAINCAR, config, seed=0)
     first, last = re.fullmatch(r"(?s)(.*?)([^\n]*)\n", capsys.readouterr().err).groups()
-    assert re.match(
-        r"(warning: )?R² -?[01]\.\d+ on [\d,]+ new states, each action .* fail \(agent: 0\); closer: vsp_b", last
-    )
+    said = r"(warning: )?R² -?[01]\.\d+ on [\d,]+ new states, each action .* fail \(agent: 0\); closer: vsp_b"
+    assert re.match(said, last)
     for progress_wanted, level in ((False, ""), (True, "1")):
         monkeypatch.setenv("MAKELEVEL", level) if level else None
         vsp.distill(PumpingTeacher(), MOUNTAINCAR, config, seed=0, progress=progress_wanted)

@@ -85,9 +85,8 @@ def test_every_saved_figure_and_table_has_its_caption_in_the_notebooks_order(pat
 
 def test_figures_and_tables_that_the_text_names_exist(notebook):
     text = "".join(cell.source for cell in notebook.cells if cell.cell_type == "markdown")
-    assert set(re.findall(r"\b(?:Figure|Table) \d\.\d+", text)) <= {
-        caption.label for caption in captions._book().values()
-    }
+    labels = {caption.label for caption in captions._book().values()}
+    assert set(re.findall(r"\b(?:Figure|Table) \d\.\d+", text)) <= labels
 
 
 def test_what_notebook_02_says_of_refitted_maps_stands_in_its_table():

@@ -128,11 +128,8 @@ def test_faithful_policies_are_those_of_the_table():
     table = read_table("beyond/faithful").set_index("task")
     names = {task: next(name for name in vsp.task_names() if name.startswith(task)) for task in table.index}
     teachers = {task: table_of(name).set_index("method")["mean"]["teacher"] for task, name in names.items()}
-    within = (
-        read_table("beyond/within")
-        .groupby("task")["within"]
-        .apply(lambda shares: "/".join(f"{100 * s:.0f}" for s in shares))
-    )
+    shares = read_table("beyond/within").groupby("task")["within"]
+    within = {task: "/".join(f"{100 * share:.0f}" for share in those) for task, those in shares}
     assert rows_of(section("## A few equations that act like the teacher"), 7) == [
         [task, f"{row['at most']}", f"{row['r2']:.3f}", f"{row['mean']:.2f}", f"{teachers[task]:.2f}",
          f"{row['both'] * row['policies']:.0f} of {row['policies']}", f"{within[task]} %"]
@@ -180,9 +177,8 @@ def test_every_decimal_number_of_a_section_is_in_its_tables(page, title):
     possible = 10 * (math.sqrt(2) + math.asinh(1)) / 3 + 9 + math.pi / 1200  # the mean of max(10, 10 d + 9)
     elsewhere = pd.DataFrame([vsp.load_teacher("SimpleGoal-v0").card["score"]["mean"], possible])
     values = values_of([*map(table_of, TABLES[page, title].split()), read_results("proofs"), elsewhere])
-    numbers = re.findall(
-        r"(?<!Figure )(?<![\w.,])(-?\d+\.\d+|\d+(?= %))", re.sub("```.*?```", "", section(title, page), flags=re.S)
-    )
+    text = re.sub("```.*?```", "", section(title, page), flags=re.S)
+    numbers = re.findall(r"(?<!Figure )(?<![\w.,])(-?\d+\.\d+|\d+(?= %))", text)
     digits = {number: len(number.partition(".")[2]) for number in numbers}
     assert len(numbers) > 1
     missing = [n for n in digits if not np.isclose(values.round(digits[n]), float(n), rtol=0, atol=1e-9).any()]

@@ -2,14 +2,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, Constant, CurvedTeacher, PumpingTeacher, same_arrays
+from support import SIMPLEGOAL, TASKS, TEACHERS, Constant, same_arrays
 
 import vsp
 from vsp import collect_episodes, get_task, rollout, rollouts, visited_states
 from vsp.rollouts import standard
 from vsp.tasks import GOAL, PIT, TRUNCATED
-
-PLAYERS = {SIMPLEGOAL: CurvedTeacher(), MOUNTAINCAR: PumpingTeacher()}
 
 
 def test_three_episodes_by_hand():
@@ -38,7 +36,7 @@ def test_visited_states_by_hand():
 
 @pytest.mark.parametrize("task", TASKS)
 def test_playing_and_recording_agree_and_an_episode_is_the_same_by_itself(task):
-    player, task = PLAYERS[task], get_task(task)
+    player, task = TEACHERS[task], get_task(task)
     starts = task.start(np.random.default_rng(0), 40)
     result, episodes = rollout(player, task, starts), collect_episodes(player, task, starts)
     assert [len(e.states) for e in episodes] == [len(e.actions) for e in episodes] == result.lengths.tolist()

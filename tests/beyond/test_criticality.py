@@ -9,11 +9,11 @@ from vsp.teachers.teacher import Teacher
 from vsp_beyond.few_cells.criticality import Critics
 
 
-def teacher_with(**critics):
-    """An actor that says (0, 0) on SimpleGoal, and critics that are linear in state and action."""
-    actor = {"mu.0.weight": np.zeros((2, 2)), "mu.0.bias": np.zeros(2)}
+def teacher_with(task=SIMPLEGOAL, m=2, **critics):
+    """An actor of m actions that are all 0, and critics that are linear in state and action."""
+    actor = {"mu.0.weight": np.zeros((m, 2)), "mu.0.bias": np.zeros(m)}
     parts = {f"{name}.0.weight": np.array([row]) for name, row in critics.items()}
-    return Teacher(actor, SIMPLEGOAL, critic=parts | {f"{name}.0.bias": np.zeros(1) for name in critics})
+    return Teacher(actor, task, critic=parts | {f"{name}.0.bias": np.zeros(1) for name in critics})
 
 
 def test_criticality_is_the_value_of_the_own_action_over_that_of_the_worst():
@@ -34,6 +34,4 @@ def test_a_teacher_without_critics_is_refused():
 
 def test_critics_see_actions_in_units_of_the_action_box():
     task = dataclasses.replace(get_task(MOUNTAINCAR), action_low=np.array([2.0]), action_high=np.array([6.0]))
-    actor = {"mu.0.weight": np.zeros((1, 2)), "mu.0.bias": np.zeros(1)}
-    critic = {"qf0.0.weight": np.array([[0.0, 0.0, 1.0]]), "qf0.0.bias": np.zeros(1)}
-    assert Critics(Teacher(actor, task, critic=critic)).criticality(np.zeros((1, 2))).tolist() == [1]  # 0 against -1
+    assert Critics(teacher_with(task, 1, qf0=[0.0, 0, 1])).criticality(np.zeros((1, 2))).tolist() == [1]  # 0 against -1

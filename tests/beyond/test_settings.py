@@ -31,9 +31,8 @@ def test_two_numbers_choose_a_faithful_policy():
 
 
 def test_episodes_have_a_limit_where_they_are_short():
-    assert (
-        faithful_preset(dataclasses.replace(vsp.get_task(PENDULUM), name="Short-v0", max_steps=5)).n_episodes == 30_000
-    )
+    short = dataclasses.replace(vsp.get_task(PENDULUM), name="Short-v0", max_steps=5)
+    assert faithful_preset(short).n_episodes == 30_000
 
 
 def test_numbers_of_no_sense_are_refused():

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL
 
-from vsp.paper.printed import linear_policies, printed_spread, printed_text_numbers, published_policy
+from vsp.paper.printed import PREFIX, linear_policies, printed_spread, printed_text_numbers, published_policy
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 NAMES = {SIMPLEGOAL: "simplegoal", MOUNTAINCAR: "mountaincar"}
-PREFIXES = {SIMPLEGOAL: "sg", MOUNTAINCAR: "mc"}
 METRICS = ["Min", "Max", "Mean", "Std", "Q1", "Median/Q2", "Q3", "IQR", "Coverage"]
 
 
@@ -83,7 +82,7 @@ def test_text_numbers_are_the_printed_ones(task, first, key, count):
     frame = frame[(frame["task"] == task) & frame["where"].str.contains(key)]
     held = list(zip(frame.index, frame["subject"], frame["printed"], strict=True))
     assert len(printed) == count
-    asked = [(f"{PREFIXES[task]}_{id}", who, text.replace("No", "no")) for who, id, text in printed]
+    asked = [(f"{PREFIX[task]}_{id}", who, text.replace("No", "no")) for who, id, text in printed]
     assert sorted(held) == sorted(asked)
 
 

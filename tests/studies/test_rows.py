@@ -117,9 +117,8 @@ def test_missing_rows_are_made_and_others_are_not(small, tmp_path):
     make_all(tmp_path, jobs)
     found = [job.row(tmp_path) for job in jobs]
     assert [row["method"] for row in found] == ["CART"] * 4 + ["teacher"] and found[0]["task"] == SIMPLEGOAL
-    assert [{name: row[name] for name in ("settings", "teacher", "version")} for row in found] == [
-        job.provenance for job in jobs
-    ]
+    for row, job in zip(found, jobs, strict=True):
+        assert {name: row[name] for name in ("settings", "teacher", "version")} == job.provenance
     watch(small, made)
     jobs[2].path(tmp_path).unlink()
     make_all(tmp_path, jobs)
