@@ -19,6 +19,7 @@ def test_a_trial_of_the_laboratory(task, record):
         lab = Laboratory(vsp.load_teacher(task), task, replace(vsp.preset(task), sub_policy=sub_policy))
         distance, begin = lab.settings["min_pol_distance"], time.perf_counter()
         distance.value = distance.min
+        lab.distil.click()
         times[f"{len(lab.trials[1][1])} {sub_policy} cells"] = time.perf_counter() - begin
     longest = max(times, key=times.get)
     note = f"with {longest}; median of all classes {statistics.median(times.values()):.1f} s"

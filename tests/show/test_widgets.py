@@ -39,9 +39,14 @@ def lab():
     return Laboratory(CurvedTeacher(), SIMPLEGOAL, CONFIG, seed=3)
 
 
+def tried(lab, name, value, expected=""):
+    lab.settings[name].value, lab.expected.value = value, expected
+    lab.distil.click()
+
+
 def test_a_trial_is_a_distillation_and_its_evaluation(lab):
     """Two routes: its trials, and distillation and evaluation by themselves."""
-    lab.settings["min_pol_distance"].value = 0.6
+    tried(lab, "min_pol_distance", 0.6)
     changes = {}, {"min_pol_distance": 0.6}
     for (config, policy, _), (_, row), changed in zip(lab.trials[:2], lab.to_frame().iterrows(), changes):
         assert config == dataclasses.replace(CONFIG, **changed)
@@ -55,9 +60,10 @@ def test_a_trial_is_a_distillation_and_its_evaluation(lab):
         assert row["failures"] == (result.outcomes != 1).sum()
 
 
-def test_a_setting_makes_a_trial_and_the_explorer_draws_it(lab):
+def test_a_click_makes_a_trial_with_what_was_expected_and_the_explorer_draws_it(lab):
     known = len(lab.trials)
-    lab.settings["min_pol_distance"].value = 0.45
+    lab.settings["min_pol_distance"].value = 0.5  # a key on a slider alone makes none
+    tried(lab, "min_pol_distance", 0.45, "more <cells>")
     config, policy, _ = lab.trials[-1]
     assert len(lab.trials) == known + 1 and config == dataclasses.replace(CONFIG, min_pol_distance=0.45)
     names, first = drawn(lab)
@@ -65,13 +71,14 @@ def test_a_setting_makes_a_trial_and_the_explorer_draws_it(lab):
     assert np.array_equal(first["codewords"], policy.codewords)
     assert np.array_equal(first["coefficients"], policy.coefficients)
     heads, newest, *_ = table = rows_of(lab.text.value)
-    assert heads[:4] == ["trial", "cells", "mean return", "failures"]
+    assert heads[:5] == ["trial", "cells", "mean return", "failures", "I expected"] and lab.expected.value == ""
+    assert "more &lt;cells&gt;" in lab.text.value
     assert dict(zip(heads, newest))["min pol distance"] == "0.45"
     assert [row[0] for row in table[1:]] == [f"→\N{NO-BREAK SPACE}{known + 1}", *map(str, range(known, 0, -1))]
 
 
 def test_constants_are_drawn_as_maps_without_weights(lab):
-    lab.settings["sub_policy"].value = "constant"
+    tried(lab, "sub_policy", "constant")
     policy, (_, first) = lab.trials[-1][1], drawn(lab)
     maps = np.array(first["coefficients"])
     assert policy.policy_class.name == "constant" and (maps[:, :2] == 0).all()

@@ -172,6 +172,7 @@ def test_controls_fit_into_the_notebook(notebook, explorer, laboratory):
 def test_a_setting_of_the_laboratory_makes_a_trial_that_the_explorer_draws(laboratory):
     before = _drawn(laboratory)
     laboratory.get_by_label("sub-policy").select_option("constant")
+    laboratory.get_by_role("button", name="distil").click()
     for text in ("distilling …", "→ 2", "Change a setting"):
         _reads(laboratory, text)
     after = _drawn(laboratory)

@@ -1,4 +1,4 @@
-"""`Laboratory`: distil again whenever a setting changes, and draw the result with the explorer."""
+"""`Laboratory`: change settings, say what to expect, distil again, and draw the result with the explorer."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ REACH = {"max_pol_loss": (1e-2, 1e4), "min_pol_distance": (0.5, 3.0), "min_param
 DRAWN = ("linear", "constant")  # sub-policies that the explorer draws: a constant is a linear map without weights
 SHOWN = 8  # trials in the table and in the explorer
 
-_WITHOUT = "<p>The laboratory's controls need a kernel: <code>make lab</code> opens JupyterLab. Here is trial 1.</p>"
+_WITHOUT = "<p>The laboratory's controls need a kernel: run this cell in JupyterLab (again). Here is trial 1.</p>"
 _LABELS = {"style": {"description_width": "145px"}, "layout": {"width": "455px"}}
 
 
 class Laboratory:
-    """Laboratory: distil again whenever a setting changes, explore the policy, and compare it with earlier trials.
+    """Laboratory: change settings, say what to expect, distil, explore the policy, and compare it with earlier trials.
 
     `config` holds the initial settings, to six digits, by default the paper's preset. Raises ValueError for tasks other
     than the paper's, for sub-policies that are not linear or constant, and for a teacher that cannot act in the task.
@@ -46,54 +46,49 @@ class Laboratory:
             raise ValueError(f"config is {self.config!r}, expected a Config whose sub_policy is one of {list(DRAWN)}")
         self._teacher_result = _judge(teacher, self.task)
         self.trials: list[tuple[Config, VoronoiPolicy, dict]] = []
-        self._listening = True
         self.settings = {name: self._slider(name) for name in REACH}
         about = {"options": DRAWN, "description": "sub-policy", **_LABELS}
         self.settings["sub_policy"] = widgets.Dropdown(value=self.config.sub_policy, **about)
-        self.back = widgets.Button(description="back to trial 1", layout={"width": "auto", "align_self": "flex-start"})
+        self.expected = widgets.Text(description="I expect", placeholder="fewer cells, because ...", **_LABELS)
+        self.distil, self.back = (widgets.Button(description=what) for what in ("distil", "back to trial 1"))
         self.status, self.text = widgets.HTML(), widgets.HTML(layout={"flex": "1 1 560px", "min_width": "0"})
         self.explorer = View()
         self._answer()
-        controls = widgets.VBox([*self.settings.values(), self.back, self.status], layout={"max_width": "100%"})
-        above = widgets.HBox([controls, self.text], layout={"flex_flow": "row wrap"})
-        self.view = widgets.VBox([above, self.explorer])
-        self.view.add_class("vsp-controls")
+        controls = [*self.settings.values(), self.expected, widgets.HBox([self.distil, self.back]), self.status]
+        left = widgets.VBox(controls, layout={"max_width": "100%"})
+        above = widgets.HBox([left, self.text], layout={"flex_flow": "row wrap"})
+        self.view = widgets.VBox([above, self.explorer]).add_class("vsp-controls")
+        self.distil.on_click(self._answer)
         self.back.on_click(self._go_back)
-        for control in self.settings.values():
-            control.observe(self._answer, names="value")
 
     def _slider(self, name: str) -> widgets.Widget:
         """A slider over the range in `REACH`: logarithmic for a loss, linear for a distance."""
         value = getattr(self.config, name)
         low, high = (value * times for times in REACH[name])
-        about = {"description": name, "continuous_update": False, **_LABELS}
+        about = {"description": name, **_LABELS}
         if name == "max_pol_loss":
             low, high = math.log10(low), math.log10(high)
             return widgets.FloatLogSlider(value, min=low, max=high, step=0.5, readout_format=".1e", **about)
         return widgets.FloatSlider(value, min=low, max=high, step=value / 10, readout_format=".3f", **about)
 
     def _go_back(self, _=None) -> None:
-        """Reset all settings at once, as a single trial."""
-        self._listening = False
+        """Reset all settings, and show trial 1."""
         for name, control in self.settings.items():
             control.value = getattr(self.config, name)
-        self._listening = True
         self._answer()
 
     def _answer(self, _=None) -> None:
         """Distil with the current settings, unless an earlier trial had them, and show the trial."""
-        if not self._listening:
-            return
         self.status.value = "distilling …"
         chosen = {name: _rounded(control.value) for name, control in self.settings.items()}
         config = dataclasses.replace(self.config, **chosen)
-        tried = [config for config, _, _ in self.trials]
-        if config not in tried:
+        place = next((n for n, (tried, *_) in enumerate(self.trials) if tried == config), len(self.trials))
+        if place == len(self.trials):
             policy, _ = distill(self.teacher, self.task, config, seed=self.seed)
-            self.trials.append((config, policy, _judge(policy, self.task)))
-            tried.append(config)
-        self._put(tried.index(config))
-        self.status.value = "Change a setting to distil again; this takes about a second."
+            self.trials.append((config, policy, _judge(policy, self.task) | {"I expected": self.expected.value}))
+            self.expected.value = ""
+        self._put(place)
+        self.status.value = "Change a setting, say what you expect, and distil: about a second."
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row per trial: its results and its settings."""

@@ -14,9 +14,7 @@ from ..tasks import simplegoal
 from ..tasks.base import Task
 from .style import BORDER, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
 
-_PASTEL = (  # seaborn's palette of this name
-    "#a1c9f4", "#ffb482", "#8de5a1", "#ff9f9b", "#d0bbff", "#debb9b", "#fab0e4", "#cfcfcf", "#fffea3", "#b9f2f0",
-)  # fmt: skip
+_TINTS = ("#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0")  # of the explorer's cells, too (picture.js)
 
 
 def cells(
@@ -29,12 +27,22 @@ def cells(
     """
     index = index.reshape(x.shape)
     if fill:
-        shades = mpl.colors.to_rgba_array(_PASTEL)[index % len(_PASTEL)]
+        shades = 1 - 0.4 * (1 - mpl.colors.to_rgba_array(_TINTS)[_colours(index)])  # pale
         image(ax, x, y, shades, interpolation="nearest", zorder=0)
     for i in np.unique(index):
         inside = (index == i).astype(float)
         if inside.min() < 1:
             ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
+
+
+def _colours(index: np.ndarray) -> np.ndarray:
+    """Return the number of a tint for each point of a grid: by its cell, and if possible other than in cells beside."""
+    near = {*zip(index[1:].flat, index[:-1].flat), *zip(index[:, 1:].flat, index[:, :-1].flat)}
+    chosen: list[int] = []
+    for i in range(index.max() + 1):
+        taken = {chosen[min(pair)] for pair in near if max(pair) == i and min(pair) < i}
+        chosen.append(next((tint for tint in (i % 6, *range(6)) if tint not in taken), i % 6))
+    return np.array(chosen)[index]
 
 
 def codewords(
