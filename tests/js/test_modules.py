@@ -1,8 +1,10 @@
 """The scripts in Node: they compute what Python computes, and modules.test.mjs holds by itself."""
 
 import base64
+import dataclasses
 import functools
 import importlib
+import itertools
 import json
 import re
 import shutil
@@ -12,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 import vsp
 from studies import comparison
@@ -129,6 +132,30 @@ def test_what_the_teacher_did_is_pythons_and_so_are_r2_and_refitted_maps(article
         inside = cells == cell
         wanted = np.linalg.lstsq(inputs[inside], actions[inside])[0] if inside.any() else policy.coefficients[cell]
         assert np.allclose(found, wanted, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_run_in_the_browser_is_pythons(seed):
+    """Codewords and maps, for thresholds between which runs differ much."""
+    task, teacher = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
+    schedule = {"n_epochs": 100, "n_split": 2, "n_merge": 5, "n_freeze": 10, "n_reset": 1000}
+    exact = dataclasses.replace(vsp.preset(task), fit="closed_form", initial="zeros", **schedule)
+    starts, *_ = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))  # as a run draws
+    with threadpool_limits(1):  # for the same last bits
+        taught = [*vsp.teacher_episodes(teacher, task, 100, starts)]
+    episodes = [{name: getattr(each, name).astype(float).tolist() for name in ("states", "actions")} for each in taught]
+    limits = [*itertools.product((1e-4, 0.1, 0.5), (0.1, 0.3), (0.3, 1.2))]
+    code = """return limits.map(([loss, distance, difference]) => {
+      const partition = new algorithms.Partition({ loss, distance, difference }, 2)
+      for (const _ of algorithms.distil(partition, episodes, { split: 2, merge: 5, freeze: 10 }));
+      return partition
+    })"""
+    made = model(code, ROOT / "vsp/show/explorer/algorithms.js", limits=limits, episodes=episodes)
+    for (loss, far, apart), found in zip(limits, made, strict=True):
+        config = dataclasses.replace(exact, max_pol_loss=loss, min_pol_distance=far, min_param_distance=apart)
+        policy, _ = vsp.distill(teacher, task, config, seed=seed, progress=False)
+        assert np.array_equal(policy.codewords, found["codewords"])
+        assert np.allclose(policy.coefficients, found["coefficients"], rtol=0, atol=1e-7)
 
 
 def test_no_two_neighbours_share_a_colour():

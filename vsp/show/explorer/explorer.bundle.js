@@ -521,7 +521,9 @@ function drawArrows(view) {
   ctx.beginPath();
   for (let i = 0; i < ARROWS * ARROWS; i++) {
     const point = picture.middle(i, ARROWS);
-    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action, [x, y] = picture.at(point), [ex, ey] = [x + dx * length, y - dy * length], turn = Math.atan2(-dy, dx);
+    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action;
+    if (!dx && !dy) continue;
+    const [x, y] = picture.at(point), [ex, ey] = [x + dx * length, y - dy * length], turn = Math.atan2(-dy, dx);
     ctx.moveTo(x - dx * length, y + dy * length);
     ctx.lineTo(ex, ey);
     for (const side of [-2.6, 2.6]) {

@@ -52,7 +52,7 @@ function distances({ scaled, scale, power, place, far }, seen) {
 
 /** The index of the nearest codeword; among equally near ones, up to `slack`, the first.
  * @param {Linear} policy @param {Vector} seen */
-function cellOf(policy, seen, slack = 0) {
+export function cellOf(policy, seen, slack = 0) {
   const far = distances(policy, seen)
   let best = 0
   for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j

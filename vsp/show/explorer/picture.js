@@ -291,8 +291,9 @@ function drawArrows(view) {
   ctx.beginPath()
   for (let i = 0; i < ARROWS * ARROWS; i++) {
     const point = picture.middle(i, ARROWS)
-    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action,
-      [x, y] = picture.at(point),
+    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action
+    if (!dx && !dy) continue // it stands still
+    const [x, y] = picture.at(point),
       [ex, ey] = [x + dx * length, y - dy * length],
       turn = Math.atan2(-dy, dx)
     ctx.moveTo(x - dx * length, y + dy * length)

@@ -1,0 +1,4 @@
+// What the page's scripts pass to each other, for `tsc` alone; __init__.py writes the data.
+
+type Reruns = { means: number[]; sds: number[] }
+type Data = { scene: Scene; visited: Visited; episodes: Visited[]; reruns: Reruns }
