@@ -1,46 +1,65 @@
 """The hand-out: one zip file with the lessons for students and everything they need.
 
-The lessons need no torch, because teachers act by NumPy, so a student's set-up is a small download.
+The code comes as a wheel. The lessons need no torch, because teachers act by NumPy, so a set-up is a small download.
 """
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import io
 import re
-import tomllib
 import zipfile
 from pathlib import Path
 
 from vsp.run.atomic import ROOT, write_bytes
 
-FOLDER = "vsp-course"
-UNUSED = ("papermill",)  # dependencies of the package that the course does not need
-CODE = ("vsp/**/*.py", "vsp/show/**/*.js", "vsp/show/**/*.css", "vsp_beyond/**/*.py")
-CHECKS = tuple(f"vsp_course/{name}.py" for name in ("__init__", "drawing", "feedback", "lesson_*"))
-FILES = ("LICENSE", "docs/article.html", "data/paper/*", "data/teachers/*.*", *CODE, *CHECKS)
+from .feedback import tables
+
+PARTS = tables("handout.toml")
 
 
 def write_handout(path: Path, copies: dict[str, str]) -> None:
-    """Write a zip file with the students' notebooks `copies` (file name: text), the package, its data and the list of
-    packages to install. Same sources, same bytes."""
-    readme, project = (Path(__file__).with_name(name).read_text("utf-8") for name in ("handout.md", "project.md"))
-    texts = {**copies, "README.md": readme, "requirements.txt": requirements(), "project.md": project}
-    files = {file.relative_to(ROOT).as_posix(): file for pattern in FILES for file in ROOT.glob(pattern)}
-    contents = {name: text.encode() for name, text in texts.items()}
-    contents |= {name: file.read_bytes() for name, file in files.items()}
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w") as archive:
+    """Write a zip file with the texts `copies` (file name: text), a wheel, and the lists of packages to install. Same
+    sources, same bytes."""
+    wheel = f"{PARTS['wheel']}-py3-none-any.whl"
+    texts = copies | {name: Path(__file__).with_name(name).read_text("utf-8") for name in PARTS["beside"]}
+    texts |= {"README.md": texts.pop("handout.md"), "hosted.txt": pinned(PARTS["hosted"])}
+    texts["requirements.txt"] = f"{pinned(PARTS['hosted'] + PARTS['own'])}./{wheel}\n"
+    contents = {name: text.encode() for name, text in texts.items()} | _files(PARTS["files"]) | {wheel: _wheel()}
+    write_bytes(path, _zipped({f"{PARTS['folder']}/{name}": content for name, content in contents.items()}))
+
+
+def _files(patterns: list[str]) -> dict[str, bytes]:
+    files = [file for pattern in patterns for file in ROOT.glob(pattern)]
+    return {file.relative_to(ROOT).as_posix(): file.read_bytes() for file in files}
+
+
+def _zipped(contents: dict[str, bytes]) -> bytes:
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
         for name in sorted(contents):
-            member = zipfile.ZipInfo(f"{FOLDER}/{name}")  # dated 1980, as all of them
+            member = zipfile.ZipInfo(name)  # dated 1980, as all of them
             member.external_attr = 0o644 << 16
             archive.writestr(member, contents[name], zipfile.ZIP_DEFLATED)
-    write_bytes(path, content.getvalue())
+    return made.getvalue()
 
 
-def requirements() -> str:
-    """Return the lines of requirements.txt: the packages that the lessons need, in the versions of environment.lock."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    wanted = re.findall(r"^[\w-]+", "\n".join(project["dependencies"]), re.MULTILINE)
+def _wheel() -> bytes:
+    """Return code, teachers and the paper's values as a wheel (PyPA's binary distribution format 1.0)."""
+    contents = _files(PARTS["code"]) | {f"vsp/{name}": content for name, content in _files(PARTS["data"]).items()}
+    name, version = (whole := PARTS["wheel"]).split("-")
+    about = {"METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n"}
+    about["WHEEL"] = "Wheel-Version: 1.0\nGenerator: vsp_course\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+    contents |= {f"{whole}.dist-info/{part}": text.encode() for part, text in about.items()}
+    sums = {file: base64.urlsafe_b64encode(hashlib.sha256(each).digest()).decode() for file, each in contents.items()}
+    record = [f"{file},sha256={sums[file].rstrip('=')},{len(content)}" for file, content in contents.items()]
+    listed = "\n".join([*record, f"{whole}.dist-info/RECORD,,\n"]).encode()
+    return _zipped(contents | {f"{whole}.dist-info/RECORD": listed})
+
+
+def pinned(names: list[str]) -> str:
+    """Return a line for each package, with its version in environment.lock."""
     lock = (ROOT / "environment.lock").read_text(encoding="utf-8")
     locked = dict(re.findall(r"^([\w-]+)==(\S+)", lock, re.MULTILINE))
-    return "".join(f"{name}=={locked[name]}\n" for name in wanted if name not in UNUSED)
+    return "".join(f"{name}=={locked[name]}\n" for name in names)

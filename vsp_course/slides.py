@@ -23,6 +23,7 @@ from vsp.show.explorer import Explorer, standalone
 from . import drawing
 
 REVEAL = Path(__file__).with_name("reveal")
+PARTS = ("page.html", "reveal.css", "reveal.js", "notes.js")
 WIDE = 1280  # pixels of a slide
 PROJECTED = 1920  # pixels of a picture as wide as a slide, for a projector
 NOTE = "\n\nNote:\n\n"
@@ -47,8 +48,9 @@ def is_slide(cell: NotebookNode) -> bool:
     return "slide" in cell.metadata.get("tags", [])
 
 
-def slides(lesson: NotebookNode) -> str:
-    """Return a lesson's slides as one HTML page with pictures, style and script. Raises ValueError if it has none."""
+def slides(lesson: NotebookNode, tag: str = "slide") -> str:
+    """Return a lesson's slides as one HTML page with pictures, style and script: those that have the `tag`, too. Raises
+    ValueError if it has none."""
     import mistune  # nbconvert's own
 
     cells, pages, names = [cell for cell in lesson.cells if is_slide(cell)], [], {}
@@ -57,10 +59,13 @@ def slides(lesson: NotebookNode) -> str:
     exec(next(cell.source for cell in lesson.cells if cell.id == "imports"), names)
     for cell in cells:
         if cell.cell_type == "markdown":
-            pages.append(str(mistune.html(cell.source.partition(NOTE)[0])))
+            shown, _, said = cell.source.partition(NOTE)
+            begun = f'{mistune.html(shown)}<aside class="notes">{mistune.html(said)}</aside>'
         else:
-            pages[-1] += _shown(cell, names)
-    page, css, script = ((REVEAL / name).read_text("utf-8") for name in ("page.html", "reveal.css", "reveal.js"))
+            picture = _shown(cell, names)  # also of those left out: later ones may need its names
+            pages += [begun + picture] if tag in cell.metadata.tags else []
+    page, css, *scripts = ((REVEAL / name).read_text("utf-8") for name in PARTS)
+    script = "\n".join(scripts).replace("</script", "<\\/script")
     body = "\n".join(f"<section>\n{slide}</section>" for slide in pages)
     return page.format(title=html.escape(_title(cells[0])), css=css, script=script, slides=body, wide=WIDE)
 
@@ -83,6 +88,6 @@ def _shown(cell: NotebookNode, names: dict[str, object]) -> str:
     if not isinstance(made, Explorer):
         return made._repr_html_()
     # A page of its own, as light as the slides: their keys and style stay outside
-    style = ":root { color-scheme: light } h1 { display: none } body { margin-top: 0 }"
+    style = REVEAL.with_name("slides.css").read_text("utf-8")
     page = standalone("", made.element(), style).replace("<html", '<html data-theme="light"', 1)
     return f'<div><iframe title="An explorer" loading="lazy" srcdoc="{html.escape(page)}"></iframe></div>'

@@ -3,7 +3,7 @@
 import pytest
 
 from vsp_course.build import read_sources
-from vsp_course.slides import is_slide, slides
+from vsp_course.slides import NOTE, is_slide, slides
 
 LESSONS = read_sources()
 OVERFLOWS = """() => [...document.querySelectorAll('section')].map((slide, i) => {
@@ -43,6 +43,17 @@ def test_keys_turn_the_slides(shown):
     page.evaluate("Reveal.slide(0)")
     page.keyboard.press("ArrowRight")
     assert page.evaluate("Reveal.getIndices().h") == 1
+
+
+def test_a_key_opens_the_speakers_view_with_what_is_said(shown):
+    page, said, _, lesson = shown
+    page.evaluate("Reveal.slide(0)")
+    with page.context.expect_page() as opened:
+        page.keyboard.press("s")
+    first = next(cell.source for cell in lesson.cells if is_slide(cell)).partition(NOTE)[2].split()[:5]
+    opened.value.locator(".speaker-controls-notes", has_text=" ".join(first)).wait_for()
+    opened.value.close()
+    assert said == []
 
 
 def test_a_slide_has_ten_words_at_most_and_one_picture_or_the_explorer(shown):
