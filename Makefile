@@ -126,8 +126,8 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 	cp data/README.md "$$source/data"; \
 	cp "$$OUT"/build/course/pages/*.ipynb "$$source/notebooks/course"
 	@$(PY) -m sphinx -q -W -c docs -d "$$SITE-work/doctrees" "$$SITE-work/source" "$$SITE-work/pages"
-	@rm -rf "$$SITE"; mv "$$SITE-work/pages" "$$SITE"; rm -r "$$SITE-work"; \
-	printf 'made: run %s -m http.server -d %s and open http://localhost:8000\n' "$(PY)" "$$SITE"
+	@cp -R "$$OUT/build/course/pages/course" "$$SITE-work/pages"; rm -rf "$$SITE"; mv "$$SITE-work/pages" "$$SITE"; \
+	rm -r "$$SITE-work"; printf 'made: run %s -m http.server -d %s and open http://localhost:8000\n' "$(PY)" "$$SITE"
 
 ## Develop
 PYTEST = tmp=$$(mktemp -d) && trap 'rm -rf "$$tmp"' EXIT && TMPDIR="$$tmp" MPLBACKEND=Agg $(PY) -m pytest -q -rs

@@ -29,6 +29,7 @@ from vsp.run.run_notebook import KERNEL, clean_outputs
 from vsp.run.sealed import read_sealed, write_sealed
 
 from .handout import write_handout
+from .live import live
 from .slides import is_slide, slides, spoken
 
 SOURCES = ROOT / "notebooks" / "course"
@@ -38,6 +39,8 @@ BEGIN, END = "### BEGIN SOLUTION", "### END SOLUTION"
 TIMEOUT = 600  # seconds for a cell of a page
 STUB = ("# YOUR CODE HERE", "raise NotImplementedError()")  # nbgrader's own
 _ANSWER = re.compile(rf"^([ \t]*){re.escape(BEGIN)}\n.*?^[ \t]*{re.escape(END)}$", re.MULTILINE | re.DOTALL)
+
+_EXAM = re.compile(r"\*Exam\.\*\s(.*?)\s\*Answer:\*\s(.*)", re.DOTALL)
 
 
 def build(out: str | os.PathLike) -> list[Path]:
@@ -50,16 +53,17 @@ def build(out: str | os.PathLike) -> list[Path]:
     texts = {f"student/{name}": text for name, text in students.items()}
     texts |= {f"solution/{name}": nbformat.writes(solution(lesson)) + "\n" for name, lesson in lessons.items()}
     texts |= {f"slides/{Path(name).stem}.html": slides(lesson) for name, lesson in lessons.items()}
-    texts |= {name: (HERE / name).read_text("utf-8") for name in ("project.md", "project_marking.md")}
+    texts["slides/half_hour.html"] = slides(next(iter(lessons.values())), "half-hour")
+    texts |= {name: (HERE / name).read_text("utf-8") for name in ("half_hour.md", "project.md", "project_marking.md")}
     texts["project_solution.py"] = (SOURCES / "project_solution.py").read_text("utf-8")
-    texts["guide.md"] = guide(lessons)
+    texts |= exam(lessons) | {"guide.md": guide(lessons), "live.html": live()}
     made = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     with folder_lock(folder, f"another run writes into {folder}"):
         _keep_edited(folder, made)
         for name, text in texts.items():
             write_text(folder / name, text)
         write_sealed(folder / MADE, json.dumps(made).encode())
-        write_handout(folder / "handout.zip", students)
+        write_handout(folder / "handout.zip", students | {"live.html": texts["live.html"]})
     return [folder / name for name in (*texts, "handout.zip")]
 
 
@@ -161,12 +165,22 @@ def _notes(lesson: NotebookNode) -> str:
     return "\n".join(filter(None, lines))
 
 
+def exam(lessons: dict[str, NotebookNode]) -> dict[str, str]:
+    """Return the lecturer's questions for an exam as one file in Markdown, and the answers as another."""
+    cells = [(n, cell) for n, lesson in enumerate(lessons.values(), 1) for cell in lesson.cells if for_lecturer(cell)]
+    found = [(n, *pair) for n, cell in cells for pair in _EXAM.findall(cell.source)]
+    questions = "\n".join(f"{i}. Lesson {n}. {' '.join(text.split())}" for i, (n, text, _) in enumerate(found, 1))
+    answers = "\n".join(f"{i}. {' '.join(text.split())}" for i, (_, _, text) in enumerate(found, 1))
+    return {"exam.md": f"# Questions for an exam\n\n{questions}\n", "exam_answers.md": f"# Answers\n\n{answers}\n"}
+
+
 def write_pages(out: str | os.PathLike) -> list[Path]:
     """Write the pages of the site to OUT/build/course/pages and return the files. Same sources, same bytes."""
     folder, lessons = Path(out) / "build" / "course" / "pages", read_sources()
     for name, lesson in lessons.items():
         write_text(folder / name, nbformat.writes(page(student(lesson))) + "\n")
-    return [folder / name for name in lessons]
+    write_text(folder / "course" / "live.html", live())
+    return [folder / name for name in (*lessons, "course/live.html")]
 
 
 def page(lesson: NotebookNode) -> NotebookNode:
@@ -204,8 +218,8 @@ def main() -> None:
     if options.pages:
         print(*write_pages(options.out), sep="\n")
         return
-    *_, guide, handout = build(options.out)
-    print(f"lessons, slides and project are in {guide.parent}; begin with {guide}; for students: {handout}")
+    folder = build(options.out)[-1].parent
+    print(f"lessons, slides and project are in {folder}: begin with guide.md; students get handout.zip")
 
 
 if __name__ == "__main__":

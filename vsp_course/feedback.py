@@ -5,21 +5,37 @@ Feedback names what was found and what was expected, and points to a hint. It ne
 
 from __future__ import annotations
 
+import contextlib
 import copy
-import dis
 import functools
 import hashlib
 import inspect
+import os
+import sys
 import textwrap
+import threading
+import tomllib
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 WIDTH = 83  # characters of a message's lines: nbgrader's Validate cuts longer ones
+SEED = int(os.environ.get("VSP_COURSE_SEED", 0))  # of all cases; an exam has one that nobody knows
 _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with questions
+
+
+def generators(n: int) -> list[np.random.Generator]:
+    """Return random generators for the cases of a check."""
+    return [np.random.default_rng([SEED, i]) for i in range(n)]
+
+
+def tables(name: str) -> dict[str, Any]:
+    """Return the tables of a file beside this module."""
+    return tomllib.loads(Path(__file__).with_name(name).read_text("utf-8"))
 
 
 class NotYet(AssertionError):
@@ -38,22 +54,13 @@ class Mistake(NamedTuple):
     hint: int | None = None
 
 
-class Question(NamedTuple):
-    """A question, its possible answers, and the feedback for wrong ones."""
-
-    options: Sequence[str]
-    right: str  # the `seal` of the right answer
-    hint: int
-    teaching: Mapping[str, str] = {}
-
-
 @dataclass(frozen=True)
 class Exercise:
     """One exercise: its number, and the name that the student defines."""
 
     number: str
     name: str
-    refused: tuple[str, ...] = ()  # functions of vsp that the answer must not call
+    refused: tuple[Callable, ...] = ()  # functions of vsp that the answer must not call, by whatever name
     cures: tuple[tuple[type, str, int], ...] = ()  # type of an error, words of its message, the hint that helps
 
     def wrong(self, found: str, expected: str, hint: int | None = None) -> NotYet:
@@ -94,23 +101,26 @@ class Exercise:
         print(*_lines(f"✓ {self.number} {self.name}: {text}"), sep="\n")
 
     def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> Any:
-        """Call a student's function and return its result. It gets copies of `arguments` unless `keep`.
+        """Call a student's function and return its result. It gets copies of `arguments`; with `keep`, the first one
+        itself, to be altered.
 
         Raises NotYet for a stub, an error, an interrupt, an argument altered in place, a call of the library's own
         function, and (unless `empty`) for no result.
         """
         self.refuse_if(not callable(function), f"{function!r}", "a function")
-        for name in _called(function) & set(self.refused):
-            raise self.wrong(f"a call of vsp's `{name}`", "code of your own")
-        given = arguments if keep else copy.deepcopy(arguments)
+        given = copy.deepcopy(arguments, {id(arguments[0]): arguments[0]} if keep else None)
         try:
-            result = function(*given)
-        except (Exception, KeyboardInterrupt) as error:
+            with _noted(self.refused) as called:
+                result = function(*given)
+        except BaseException as error:
             raise self._failure(function, error) from None
+        for name in [function.__name__ for function in self.refused if function.__name__ in called]:
+            raise self.wrong(f"a call of vsp's `{name}`", "code of your own")
         self.refuse_if(result is None and not empty, "None as the result", "something after `return`")
         for i, (before, after) in enumerate(zip(arguments, given), 1):
-            altered = isinstance(before, np.ndarray) and not np.array_equal(before, after)
-            self.refuse_if(altered, f"argument {i} altered in place", "it as it was: work on a copy")
+            now = _arrays(after)
+            same = all(_close(now.get(name, ()), array, 1e-9) for name, array in _arrays(before).items())
+            self.refuse_if(not same, f"argument {i} altered in place", "it as it was: work on a copy")
         return result
 
     def _failure(self, function: Callable, error: BaseException) -> NotYet:
@@ -145,10 +155,10 @@ class Exercise:
         return values
 
     def compare(self, value: object, right: object, mistakes: Sequence[Mistake], rtol: float = 1e-6) -> None:
-        """Raise NotYet unless `value` equals `right`. The feedback is that of the first of `mistakes` with the
-        result `value`; the last one matches any value."""
+        """Raise NotYet unless `value` equals `right`, up to `rtol` of its largest number. The feedback is that of the
+        first of `mistakes` with the result `value`; the last one matches any value."""
         if not _close(value, right, rtol):
-            mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, rtol))
+            mistake = next(m for m in mistakes if m.result is None or _close(value, m.result, min(rtol, 0.02)))
             raise self.wrong(mistake.found, mistake.expected, mistake.hint)
 
     def answers(self, given: Any, options: Mapping[str, Sequence[str]]) -> None:
@@ -162,17 +172,19 @@ class Exercise:
             unknown = len(choices) > 0 and answer not in choices
             self.refuse_if(unknown, f"{answer!r} for {key!r}", f"one of {list(choices)}")
 
-    def ask(self, given: Any, questions: dict[str, Question], text: str) -> None:
-        """Raise NotYet unless the dictionary `given` has the right answer to every question; else print `text`.
+    def ask(self, given: Any, text: str) -> None:
+        """Raise NotYet unless the dictionary `given` has the right answer to every question of the exercise in
+        questions.toml; else print `text`.
 
         With it comes how many of the first answers were right: who guesses sees it in the result.
         """
-        first = self.first(given, {key: question.options for key, question in questions.items()})
-        right = [seal(self.number, key, first[key]) == question.right for key, question in questions.items()]
+        questions = tables("questions.toml")[self.number]
+        first = self.first(given, {key: question["options"] for key, question in questions.items()})
+        right = [seal(self.number, key, first[key]) == question["right"] for key, question in questions.items()]
         for key, question in questions.items():
-            if seal(self.number, key, given[key]) != question.right:
-                words = f"not {given[key]!r}: {question.teaching.get(given[key], 'look again')}."
-                raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}{self._pointer(question.hint)}")
+            if seal(self.number, key, given[key]) != question["right"]:
+                words = f"not {given[key]!r}: {question.get('teaching', {}).get(given[key], 'look again')}."
+                raise NotYet(f"{self.number} {self.name}, question {key!r}: {words}{self._pointer(question['hint'])}")
         self.passed(f"{text} Of your first answers {sum(right)} of {len(questions)} were right.")
 
     def first(self, given: Any, options: Mapping[str, Sequence[str]]) -> dict:
@@ -186,13 +198,33 @@ def seal(number: str, key: str, answer: str) -> str:
     return hashlib.sha256(f"vsp course|{number}|{key}|{answer}".encode()).hexdigest()[:16]
 
 
-def _called(function: Callable) -> set[str]:
-    """Names that the code of a student's function looks up, but its own; of a function of vsp, its name."""
-    if str(getattr(function, "__module__", "")).startswith("vsp"):
-        return {function.__name__}
-    steps = dis.get_instructions(function) if inspect.isfunction(function) else ()
-    names = {(step.opname, step.argval) for step in steps if step.opcode in dis.hasname}
-    return {name for _, name in names - {("LOAD_GLOBAL", getattr(function, "__name__", ""))}}
+@contextlib.contextmanager
+def _noted(refused: Sequence[Callable]) -> Iterator[set[str]]:
+    """Note which functions are called meanwhile, by whatever name. Nothing in them is changed."""
+    codes, called = {inspect.unwrap(function).__code__: function.__name__ for function in refused}, set()
+    before = sys.getprofile()
+
+    def note(frame: Any, event: str, _: object) -> None:
+        if event == "call" and frame.f_code in codes:
+            called.add(codes[frame.f_code])
+
+    if codes:
+        threading.setprofile(note)
+        sys.setprofile(note)
+    try:
+        yield called
+    finally:
+        threading.setprofile(None)
+        sys.setprofile(before)
+
+
+def _arrays(value: object, name: str = "", depth: int = 3) -> dict[str, np.ndarray]:
+    """The arrays of numbers in `value` and in its parts, by name."""
+    if isinstance(value, np.ndarray):
+        return {name: value} if value.dtype.kind in "biuf" else {}
+    parts = dict(enumerate(value)) if isinstance(value, list | tuple) else getattr(value, "__dict__", {})
+    parts = parts if depth else {}
+    return {k: v for key, part in parts.items() for k, v in _arrays(part, f"{name}.{key}", depth - 1).items()}
 
 
 def _place(function: Callable, error: BaseException) -> str:
@@ -209,4 +241,5 @@ def _lines(text: str) -> list[str]:
 
 def _close(value: object, right: object, rtol: float) -> bool:
     value, right = np.asarray(value, dtype=np.float64), np.asarray(right, dtype=np.float64)
-    return value.shape == right.shape and np.allclose(value, right, rtol=rtol, atol=1e-9)
+    within = rtol * np.abs(right).max(initial=1e-3)
+    return value.shape == right.shape and bool((np.abs(value - right) <= within).all())

@@ -18,39 +18,14 @@ from vsp import Config, History, Partition, Policy, Task, VoronoiPolicy, teacher
 from vsp.algorithms import distill
 from vsp.rollouts import Episode
 
-from .feedback import Exercise, Mistake, NotYet, Question
+from .feedback import Exercise, Mistake, NotYet, generators, tables
 from .lesson_2_passes import MERGE, SMALL, SPLIT, merge_regions, split_regions, walk  # noqa: F401  checks, re-exported
 from .lesson_2_policy_class import OWN_CLASS, my_policy_class  # noqa: F401
 
 READING = Exercise("2.1", "reading")
 RUNNING_MEAN = Exercise("2.2", "running_mean")
-ALGORITHM_1 = Exercise("2.5", "algorithm_1")
 PREDICTION = Exercise("2.6", "prediction")
-
-MOMENTS = ("before iteration 500", "between 500 and 2000", "after 2000")
-CAUSES = ("a split", "a merge", "a reset of the buffers", "a change of the teacher")
-FEWER = {
-    "a split": "a split adds a codeword",
-    "a reset of the buffers": "a reset empties buffers and leaves codewords where they are",
-    "a change of the teacher": "the teacher is the same all the time",
-}
-JUMPS = {
-    "a merge": "a merge keeps a map that is trained already",
-    "a reset of the buffers": "an emptied buffer holds few states for a while, which moves the loss a little, also in "
-    "the freeze; the large jumps are another matter",
-    "a change of the teacher": "the teacher is the same all the time",
-}
-QUESTIONS = {
-    "half of the cells": Question(MOMENTS, "97a828fa47052c2d", 1),
-    "fewer cells by": Question(CAUSES, "fb8f27a3b939a5dc", 2, FEWER),
-    "loss jumps by": Question(CAUSES, "71c02946198a22ee", 3, JUMPS),
-}
-CHANGES = {
-    "a lower distance": {"min_pol_distance": 0.15},
-    "a higher loss": {"max_pol_loss": 1e-3},
-    "easier merges": {"min_param_distance": 1.0},
-    "exact maps": {"fit": "closed_form"},
-}
+CHANGES = tables("cases.toml")["changes"]
 PREDICTIONS = dict.fromkeys(CHANGES, ("more cells", "as many", "fewer cells"))
 SEEDS = range(3)  # of the runs for each change
 
@@ -58,25 +33,24 @@ SEEDS = range(3)  # of the runs for each change
 @READING.checks
 def reading(answers: dict, history: History, config: Config) -> None:
     """2.1: answers `last change` (an iteration), `half of the cells`, `fewer cells by`, `loss jumps by`."""
-    READING.answers(answers, {"last change": ()})
+    options = {key: question["options"] for key, question in tables("questions.toml")["2.1"].items()}
+    READING.first(answers, {"last change": ()} | options)
     given, last = answers["last change"], max(event.iteration for event in history.events)
-    READING.refuse_if(not isinstance(given, int | float | np.number), f"{given!r} for 'last change'", "a number")
-    if abs(given - last) > 0.04 * config.n_epochs:
-        side = "the number of cells still changes after it" if given < last else "nothing changes there any more"
-        side = "that is where the freeze begins" if given == config.n_epochs - config.n_freeze else side
-        raise READING.wrong(f"iteration {given:g}, but {side}", "the last step of the left curve", 1)
-    READING.ask(answers, QUESTIONS, "the plot has told you what the algorithm does when.")
+    number = isinstance(given, int | float | np.number) and np.isfinite(given)
+    READING.refuse_if(not number, f"{given!r} for 'last change'", "a number")
+    side = "the number of cells still changes after it" if given < last else "nothing changes there any more"
+    side = "that is where the freeze begins" if given == config.n_epochs - config.n_freeze else side
+    far = abs(given - last) > 0.04 * config.n_epochs
+    READING.refuse_if(far, f"iteration {given:g}, but {side}", "the last step of the left curve", 1)
+    READING.ask(answers, "the plot has told you what the algorithm does when.")
 
 
 @RUNNING_MEAN.checks
 def running_mean(function: Callable) -> None:
     """2.2: `running_mean(cells, losses)` returns, per step, the mean loss since its cell was entered. (T,)"""
-    cases = [
-        (np.array([4, 4, 4]), np.array([1.0, 0.0, 2.0])),
-        (np.array([0, 0, 1, 1, 0, 0]), np.array([1.0, 3.0, 5.0, 1.0, 4.0, 0.0])),
-    ]
-    for rng in map(np.random.default_rng, range(4)):
-        cells = np.repeat(rng.integers(3, size=8), rng.integers(1, 5, size=8))
+    cases = [(np.array(visit["cells"]), np.array(visit["losses"])) for visit in tables("cases.toml")["visit"]]
+    for rng, k in zip(generators(6), (3, 3, 3, 3, 9, 300)):  # of 300 cells, an episode enters few twice
+        cells = np.repeat(rng.integers(k, size=3 + 2 * k), rng.integers(1, 20, size=3 + 2 * k))
         cases.append((cells, rng.uniform(size=len(cells))))
     remember = "the mean since the cell was entered (is the cell of the step before remembered in every step?)"
     for cells, losses in cases:
@@ -100,50 +74,87 @@ def running_mean(function: Callable) -> None:
     RUNNING_MEAN.passed("it restarts whenever the episode enters another cell.")
 
 
+def _algorithm_1(
+    partition: Partition, episodes: list[Episode], config: Config, rng: object, split: Callable, merge: Callable
+) -> None:
+    """Algorithm 1 as in the lesson's text, for students who have not written theirs."""
+    partition.add(episodes[0].states[0], rng)
+    for n, episode in enumerate(episodes):
+        partition.observe(episode)
+        partition.train(rng)
+        thawed = 0 < n < config.n_epochs - config.n_freeze
+        if thawed and n % config.n_split == 0:
+            split(partition, episode, config, rng)
+        if thawed and n % config.n_merge == 0:
+            merge(partition, config)
+        if n and n % config.n_reset == 0:
+            partition.clear()
+
+
+ALGORITHM_1 = Exercise("2.5", "algorithm_1", (_algorithm_1,))
+
+
 class _Log:
-    """Stand-in for a partition and its passes that notes what is done with it, a list for each observed episode."""
+    """Stand-in for a partition and its passes that notes what is done with it, a list for each observed episode. It
+    accepts only what a partition and vsp's passes would: itself, the episode, the settings and the generator given."""
 
-    def __init__(self) -> None:
+    def __init__(self, config: Config, rng: np.random.Generator) -> None:
+        self.config, self.state = config, rng.bit_generator.state
         self.codewords, self.episodes, self.rounds = np.zeros((0, 2)), [], [[]]
-        self.strays = 0  # splitting passes over anything but the last episode
+        self.rng: np.random.Generator | None = None
+        self.strays: list[str] = []  # passes over, or with, something else
 
-    def add(self, state: np.ndarray, rng: object = None) -> int:
-        self.codewords = np.vstack([self.codewords, state])
-        self.rounds[-1].append(f"add {state.tolist()}")
+    def _did(self, what: str, right: bool) -> None:
+        self.strays += [] if right else [what.split()[0]]
+        self.rounds[-1].append(what)
+
+    def _given(self, rng: np.random.Generator) -> bool:
+        """Whether this is always the same generator, and not used by anybody else."""
+        self.rng = self.rng or rng
+        return rng is self.rng and rng.bit_generator.state == self.state
+
+    def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
+        self.codewords = np.concatenate([self.codewords, state[None]])  # as a partition does
+        self._did(f"add {state.tolist()}", self._given(rng))
         return len(self.codewords) - 1
 
     def observe(self, episode: Episode) -> None:
         self.episodes.append(episode)
         self.rounds.append([])
 
-    def train(self, rng: object = None) -> float:
-        self.rounds[-1].append("train")
+    def train(self, rng: np.random.Generator) -> float:
+        self._did("train", self._given(rng))
         return 0.0
 
     def clear(self) -> None:
         self.rounds[-1] += ["clear"] if len(self.rounds) > 2 else []  # does no harm after the first episode
 
-    def split(self, partition: object, episode: Episode, config: Config, rng: object) -> list:
-        self.strays += episode is not self.episodes[-1]
-        self.rounds[-1].append("split")
-        return []
+    def reset(self, _: object) -> None:
+        self.clear()
+
+    def policy(self) -> None:
+        """To be returned at the end."""
+
+    def split(self, partition: object, episode: Episode, config: Config, rng: np.random.Generator) -> list:
+        last = partition is self and config == self.config and episode is self.episodes[-1]
+        self._did("split", last and self._given(rng))
+        return [episode.states[-1]]
 
     def merge(self, partition: object, config: Config) -> list:
-        self.rounds[-1].append("merge")
+        self._did("merge", partition is self and config == self.config)
         return []
 
 
 @ALGORITHM_1.checks
 def algorithm_1(function: Callable) -> None:
     """2.5: `algorithm_1(partition, episodes, config, rng, split, merge)` makes the right calls in the right order."""
-    for schedule in ((40, 4, 10, 8, 15), (30, 3, 5, 6, 9), (50, 7, 7, 14, 50)):
-        names = ("n_epochs", "n_split", "n_merge", "n_freeze", "n_reset")
-        config, log = replace(SMALL, **dict(zip(names, schedule))), _Log()
-        episodes = [walk([0.5 * n / config.n_epochs, 0.5], [0, 0]) for n in range(config.n_epochs)]
-        rng = np.random.default_rng(0)
+    for rng, schedule in zip(generators(3), tables("cases.toml")["schedule"]):
+        config = replace(SMALL, **schedule)
+        log = _Log(config, rng)
+        episodes = [walk([0.5 * n / config.n_epochs, 0.5], [n, 0]) for n in range(config.n_epochs)]
         ALGORITHM_1.call(function, log, list(episodes), config, rng, log.split, log.merge, keep=True, empty=True)
         _on_schedule(log, episodes, config, "the freeze begins at n_epochs - n_freeze")
-        few, log = episodes[:-5], _Log()  # the run may stop with an error when there are no more
+        few, log = episodes[:-5], _Log(config, rng)  # the run may stop with an error when there are no more
         with contextlib.suppress(Exception):
             function(log, list(few), config, rng, log.split, log.merge)
         words = f"the freeze begins at n_epochs - n_freeze, however many episodes there are ({len(few)})"
@@ -153,16 +164,18 @@ def algorithm_1(function: Callable) -> None:
 
 def _on_schedule(log: _Log, episodes: list[Episode], config: Config, freeze: str) -> None:
     """Compare what was done with what is right, iteration by iteration."""
-    right, observed = _Log(), log.episodes
-    _algorithm_1(right, episodes, config, None, right.split, right.merge)
+    rng, observed = np.random.default_rng(0), log.episodes
+    right = _Log(config, rng)
+    _algorithm_1(right, episodes, config, rng, right.split, right.merge)
     expected = "the first state of the first episode, added before it is observed"
     ALGORITHM_1.refuse_if(not observed, "no episode observed", "one in every iteration", 1)
     ALGORITHM_1.refuse_if(log.rounds[0] != right.rounds[0], "another first codeword or none", expected, 1)
-    in_order = len(observed) == len(episodes) and all(seen is e for seen, e in zip(observed, episodes))
-    number = f"{len(observed)} episodes observed"
-    ALGORITHM_1.refuse_if(not in_order, number, f"each of the {len(episodes)}, in order", 1)
-    stray = "a splitting pass over something else"
-    ALGORITHM_1.refuse_if(log.strays > 0, stray, "one over the episode just observed", 1)
+    seen, given = ([(one.states.tolist(), one.actions.tolist()) for one in each] for each in (observed, episodes))
+    ALGORITHM_1.refuse_if(
+        seen != given, f"{len(observed)} episodes observed", f"each of the {len(episodes)}, in order", 1
+    )
+    stray = f"`{log.strays[0]}` with something else" if log.strays else ""
+    ALGORITHM_1.refuse_if(bool(stray), stray, "partition, settings and generator, and the episode just observed", 1)
     frozen = config.n_epochs - config.n_freeze
     for n, (done, due) in enumerate(zip(log.rounds[1:], right.rounds[1:])):
         steps = f"{', '.join(done) or 'nothing'} in iteration {n} after its episode was observed"
@@ -211,23 +224,6 @@ def _or_ours(function: Callable, ours: Callable, stubs: set[str]) -> Callable:
             return ours(*given, **named)
 
     return either
-
-
-def _algorithm_1(
-    partition: Partition, episodes: list[Episode], config: Config, rng: object, split: Callable, merge: Callable
-) -> None:
-    """Algorithm 1 as in the lesson's text, for students who have not written theirs."""
-    partition.add(episodes[0].states[0], rng)
-    for n, episode in enumerate(episodes):
-        partition.observe(episode)
-        partition.train(rng)
-        thawed = 0 < n < config.n_epochs - config.n_freeze
-        if thawed and n % config.n_split == 0:
-            split(partition, episode, config, rng)
-        if thawed and n % config.n_merge == 0:
-            merge(partition, config)
-        if n and n % config.n_reset == 0:
-            partition.clear()
 
 
 @PREDICTION.checks

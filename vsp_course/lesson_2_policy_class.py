@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,6 +13,7 @@ from vsp import Partition, Policy, PolicyClass, Task, preset, teacher_episodes
 from vsp.export import SHARED
 from vsp.rollouts import Episode, Episodes
 from vsp.subpolicies import POLICY_CLASSES, policy_class
+from vsp.subpolicies.base import PYTHON, linear_outputs
 
 from .feedback import Exercise
 
@@ -28,15 +28,16 @@ def my_policy_class(function: Callable, teacher: Policy, task: Task) -> None:
     OWN_CLASS.refuse_if(not isinstance(own_class, PolicyClass), f"a {type(own_class).__name__}", "a PolicyClass", 1)
     states = np.random.default_rng(0).uniform(task.low, task.high, size=(50, len(task.low)))
     features = _features(own_class, states)
-    plain = type(own_class) is PolicyClass  # which computes no more than weighted sums of its features
+    _code(own_class, states, features)
+    _gradient(own_class, features, len(task.outputs))
+    theta = np.random.default_rng(2).normal(size=(len(own_class.rows), 1))
+    plain = np.allclose(own_class.outputs(features, theta), linear_outputs(features, theta))  # weighted sums, no more
     for name in POLICY_CLASSES:
         known = policy_class(name, task).features(states)
         there = plain and _within(features, known) and _within(known, features)
         OWN_CLASS.refuse_if(there, f"the features of {name!r}", "a class that is not there yet", 1)
     sums = plain and _within(features, states)
     OWN_CLASS.refuse_if(sums, "features that are sums of the state's components", "at least one that is no such sum", 4)
-    _code(own_class, states, features)
-    _gradient(own_class, features, len(task.outputs))
     constant, error = _errors(policy_class("constant", task), teacher, task), _errors(own_class, teacher, task)
     share = f"{error / constant:.0%} of the error that constants have in the same cells"
     OWN_CLASS.refuse_if(error > ENOUGH * constant, share, f"at most {ENOUGH:.0%}", 4)
@@ -58,20 +59,23 @@ def _features(own_class: PolicyClass, states: np.ndarray) -> np.ndarray:
     sizes, n = OWN_CLASS.array(own_class.sizes, (q,), "sizes", 2), len(own_class.code)
     wrong = (sizes <= 0).any() or n != q
     OWN_CLASS.refuse_if(wrong, f"{n} pieces of code and sizes {sizes}", f"{q} of both, sizes above 0", 2)
+    ratio = np.abs(features[0]).max(axis=0) / sizes
+    far = ratio[(ratio < 0.1) | (ratio > 10)]
+    OWN_CLASS.refuse_if(far.size > 0, f"a feature of {far[:1]} times its size", "its largest absolute value, about", 2)
     return features[0]
 
 
 def _within(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether features `a` are linear combinations of features `b` and a constant."""
-    both, alone = (np.column_stack([*parts, np.ones(len(a))]) for parts in ((a, b), (b,)))
-    return np.linalg.matrix_rank(both) == np.linalg.matrix_rank(alone)
+    """Whether features `a` are linear combinations of features `b` and a constant, up to a hundredth of their size."""
+    alone, size = np.column_stack([b, np.ones(len(b))]), a.std(axis=0).max()
+    return bool((np.abs(a - alone @ np.linalg.lstsq(alone, a, rcond=None)[0]) <= 0.01 * size).all())
 
 
 def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> None:
     """Whether the exported code computes the same features."""
     names = {name: getattr(math, name) for name in SHARED}
     for j, text in enumerate(own_class.code):
-        if python := re.search(r"\*\*|//| if ", text):
+        if python := PYTHON.search(text):
             raise OWN_CLASS.wrong(f"{python[0].strip()!r} in the code {text!r}", "what C has too, such as products", 3)
         try:
             values = [float(eval(text, {"__builtins__": {}}, {**names, "state": state})) for state in states]
@@ -81,6 +85,7 @@ def _code(own_class: PolicyClass, states: np.ndarray, features: np.ndarray) -> N
             raise OWN_CLASS.wrong(failure, expected, 3) from None
         other = f"code {text!r} that gives other numbers than feature {own_class.terms[j]!r}"
         OWN_CLASS.refuse_if(not np.allclose(values, features[:, j]), other, "the same", 3)
+    own_class.feature_code()
 
 
 def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
@@ -95,11 +100,9 @@ def _gradient(own_class: PolicyClass, features: np.ndarray, m: int) -> None:
     outputs, pull_back = own_class.batch(inputs, theta)
     if not np.allclose(outputs[0], own_class.outputs(features, theta[0])):
         raise OWN_CLASS.wrong("other outputs in training (`batch`) than in use (`outputs`)", "the same", 3)
-    gradient, slopes = pull_back(2 * (outputs - actions)).ravel(), approx_fprime(theta.ravel(), loss, 1e-6)
-    worst = np.abs(gradient - slopes).argmax()
-    number = f"a gradient of {gradient[worst]:.4g} by coefficient {worst // m}"
-    wrong = not np.allclose(gradient, slopes, rtol=1e-3, atol=1e-2)
-    OWN_CLASS.refuse_if(wrong, number, f"the slope {slopes[worst]:.4g}", 3)
+    off = pull_back(2 * (outputs - actions)).ravel() - (slopes := approx_fprime(theta.ravel(), loss, 1e-6))
+    wrong = not (np.abs(off) <= 1e-2 + 1e-3 * np.abs(slopes)).all()
+    OWN_CLASS.refuse_if(wrong, f"a gradient off by up to {np.abs(off).max():.4g}", "the slopes of the loss", 3)
 
 
 def _errors(own_class: PolicyClass, teacher: Policy, task: Task) -> float:

@@ -5,9 +5,11 @@ are the lesson's own solution with a piece of its text changed: `wrongs` enters 
 """
 
 from dataclasses import replace
+from multiprocessing.pool import ThreadPool
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 from scipy.stats import bootstrap
 
 import vsp
@@ -27,7 +29,9 @@ EXERCISES = {
 SOLUTIONS = [
     cell.source for lesson in build.read_sources().values() for cell in lesson.cells if build.is_solution(cell)
 ]
-GIVEN = {"np": np, "vsp": vsp, "tasks": tasks, "rollout": rollout, "collect_episodes": collect_episodes}
+GIVEN = {"np": np, "vsp": vsp, "tasks": tasks, "rollout": rollout, "collect_episodes": collect_episodes,
+         "EXPERT": lesson_3.standard_errors, "FAILURES": lesson_3.failures, "REFIT": baselines.refit,
+         "LOOP": lesson_2._algorithm_1}  # fmt: skip
 WRONG, RIGHT = [], []  # (exercise, words of the message, answer), (exercise, answer)
 
 
@@ -55,6 +59,26 @@ def wrongs(exercise, *entries):
     """Enter wrong answers: of each the words, then the changes of the solution."""
     for words, *changes in entries:
         wrong(exercise, words)(changed(exercise, *changes))
+
+
+def first(exercise, statement):
+    """The function that solves an exercise, with a statement before its body."""
+    return changed(exercise, "    ### BEGIN", f"    {statement}\n    ### BEGIN")
+
+
+SHUFFLED = "np.random.default_rng(0).shuffle(actions)"
+CENTRED = "actions -= actions.mean(axis=0)"
+for exercise, i, statement in (
+    ("1.2", 1, "states *= 2"), ("1.2", 2, CENTRED), ("1.2", 2, SHUFFLED), ("1.3", 3, "states *= 0"),
+    ("1.5", 3, "states[:] = 0"), ("1.7", 1, "states.sort(axis=0)"), ("2.2", 2, "losses *= 0"), ("3.2", 1, "ours *= 2"),
+    ("3.5", 3, "actions *= -1"), ("3.5", 3, CENTRED), ("3.5", 3, SHUFFLED), ("3.5", 2, "states.sort(axis=0)"),
+    ("3.6", 6, "actions *= -1"),
+):  # fmt: skip
+    wrong(exercise, f"argument {i} altered in place")(first(exercise, statement))
+GAPS = "return ours.mean() - theirs.mean(), EXPERT(ours, theirs)[0]"
+wrong("3.2", "a call of vsp's `standard_errors`")(first("3.2", GAPS))
+wrong("3.5", "a call of vsp's `refit`")(first("3.5", "return REFIT(policy, states, actions)"))
+wrong("2.2", "KeyError")(first("2.2", "known = dict.fromkeys(range(4), 0); [known[cell] for cell in cells]"))
 
 
 # 1.1 reading
@@ -85,7 +109,8 @@ wrongs(
     ("None as the result", "return np", "np"),
     ("not of other variables", "inputs =", "actions = states = np.eye(9)[:, :2]; inputs ="),
     ("the least that a linear map", LSTSQ, RIDGE),
-    ("argument 2 altered in place", "return", "actions -= actions.mean(axis=0); return"),
+    ("in line", "len(states)", "40"),
+    ("NaN or infinity", "[0]", "[0] * np.nan"),
 )
 right("1.2")(changed("1.2", LSTSQ, "np.array([np.linalg.pinv(inputs) @ column for column in actions.T]).T.tolist()"))
 
@@ -112,6 +137,8 @@ wrongs(
     ("→ Hint 1", "teacher.predict(states)[0]", "np.array(teacher.predict(states))"),
     ("another number", "policy.predict(states)[0]", "1"),
     ("one number for all states", ".mean()", ".mean(axis=1)"),
+    ("another number", ".mean()", ".sum() / 60"),
+    ("NaN or infinity", ".mean()", ".mean() * np.nan"),
 )
 
 
@@ -135,8 +162,11 @@ wrongs(
     ("not distances", "argmin", "min"),
     ("begin at 1", ".argmin(axis=1)", ".argmin(axis=1) + 1"),
     ("farthest", "argmin", "argmax"),
-    ("of 200 states, expected the right one for all", "states[:, None]", "1.02 * states[:, None]"),
+    ("states, expected the right one for all", "states[:, None]", "1.02 * states[:, None]"),
     ("indices of type float64", ".argmin(axis=1)", ".argmin(axis=1).astype(float)"),
+    ("the right one for all", "states[:, None] - codewords", "states[:, None, :3] - codewords[:, :3]"),
+    ("the right one for all", ".sum(axis=2)", ".sum(axis=2).clip(max=10)"),
+    ("", ".sum(axis=2)", "[:, range(6)].sum(axis=2)"),
 )
 
 
@@ -155,7 +185,8 @@ wrongs(
     ("without their bias", " + own[:, -1]", ""),
     ("one map for all states", "vsp.nearest(codewords, states)", "np.zeros(len(states), int)"),
     ("after the limits", " + own[:, -1]", "", "np.clip(actions, -1.0, 1.0)", "np.clip(actions, -1, 1) + own[:, -1]"),
-    ("a wrong action in 1 of 60 states", "    return np.clip", "    actions[0] = 0.5\n    return np.clip"),
+    ("a wrong action in 1 of", "    return np.clip", "    actions[0] = 0.5\n    return np.clip"),
+    ("", "own =", "coefficients = coefficients[:4]; own ="),
 )
 
 
@@ -167,17 +198,20 @@ def state_by_state(codewords, coefficients, states):
     ]
 
 
+right("1.5")(lambda *given: changed("1.5")(*(np.asarray(one, np.float32) for one in given)))
+right("1.4")(lambda codewords, states: by_min(codewords, states) and np.array(by_min(codewords, states), dtype=object))
+
 # 1.6 codewords
 
 wrong("1.6", "is not written yet")(np.array([[0.3, 0.3], [0.7, 0.6]]))
-wrong("1.6", "expected at most 8")(np.random.default_rng(0).uniform(size=(9, 2)))
+wrong("1.6", "expected at most 4")(np.random.default_rng(0).uniform(size=(5, 2)))
 wrong("1.6", "a row x, y per codeword")(np.zeros((0, 2)))
-wrong("1.6", "→ Hint 2")([[0.6, 0.7], [0.7, 0.6], [0.7, 0.85], [0.85, 0.7], [0.8, 0.95], [0.95, 0.8], [0.3, 0.3]])
+wrong("1.6", "→ Hint 2")([[0.6, 0.7], [0.7, 0.6], [0.8, 0.95], [0.3, 0.3]])
 wrong("1.6", "there twice")(np.array([[0.5, 0.5], [0.5, 0.5]]))
 wrong("1.6", "NaN or infinity in codewords")(np.array([[np.nan, 0.5], [0.2, 0.3]]))
 wrong("1.6", "outside the unit square")(np.array([[0.5, 0.5], [5, 0.5]]))
-right("1.6")(np.array([[0.04, 0.15], [0.14, 0.05], [0.3, 0.5], [0.5, 0.3], [0.65, 0.85], [0.85, 0.65]]))
-right("1.6")([[0.05, 0.2], [0.2, 0.05], [0.2, 0.6], [0.6, 0.2], [0.6, 0.8], [0.8, 0.6]])
+right("1.6")(np.array([[0.29, 0.1], [0.07, 1.0], [0.28, 0.31], [0.69, 0.04]]))
+right("1.6")([[0.17, 0.31], [0.1, 0.05], [0.22, 0.44], [0.39, 0.19]])
 
 
 # 1.7 place
@@ -185,7 +219,11 @@ right("1.6")([[0.05, 0.2], [0.2, 0.05], [0.2, 0.6], [0.6, 0.2], [0.6, 0.8], [0.8
 
 wrong("1.7", "expected (8, 2)")(lambda states, actions, k: states[: k - 1])
 wrong("1.7", "of random codewords on SimpleGoal-v0")(lambda states, actions, k: np.unique(states, axis=0)[:k])
-wrongs("1.7", ("→ Hint 3", "range(60)", "range(5)"))
+wrongs(
+    "1.7",
+    ("→ Hint 3", "range(60)", "range(5)"),
+    ("expected (5, 2)", "candidates, k,", "candidates, 8,"),
+)
 
 
 right("1.7")(changed("1.7", "range(60)", "range(20)", "default_rng(0)", "default_rng(1)"))
@@ -205,6 +243,7 @@ wrong("2.1", "where the freeze begins")(READ_2 | {"last change": 4000})
 wrong("2.1", "a split adds a codeword")(READ_2 | {"fewer cells by": "a split"})
 wrong("2.1", "the large jumps are another matter")(READ_2 | {"loss jumps by": "a reset of the buffers"})
 wrong("2.1", "expected a number")(READ_2 | {"last change": "3540"})
+wrong("2.1", "expected a number")(READ_2 | {"last change": float("nan")})
 right("2.1")(READ_2 | {"last change": 3700.0})
 
 
@@ -218,6 +257,7 @@ wrongs(
     ("sums", MEAN, "sum(since)"),
     ("the losses themselves, as if the mean began anew at every step", NEW, "cell != None"),
     ("outside the first cell", NEW, "cell != cells[0]"),
+    ("NaN or infinity", "np.array(means)", "np.array(means) / 0"),
 )
 
 
@@ -236,6 +276,7 @@ def by_pandas(cells, losses):
 # 2.3 split_regions
 
 LOCATE = "        i = partition.locate(state)\n"
+BESIDE = "abs(np.arange(len(partition.codewords) + 1) - i) < 2"
 EUCLIDEAN = "np.linalg.norm(partition.codewords[i] - state) > config.min_pol_distance"
 FOR_ALL_CELLS = "for i, state, action in zip([*map(partition.locate, episode.states)], "
 wrongs(
@@ -258,6 +299,9 @@ wrongs(
     ("→ Hint 1", "        split = np.mean(losses) > config.max_pol_loss and partition.far(i, state)\n", ""),
     ("→ Hint 5", "np.append(partition.neighbours()[i], False)", "partition.neighbours()[i]"),
     ("exactly at the limit", "> config.max_pol_loss", ">= config.max_pol_loss"),
+    ("on a random walk", "config.max_pol_loss", "0.25"),
+    ("on a random walk", "partition.far(i, state)", "np.abs(partition.codewords[i] - state).sum() > 0.2"),
+    ("emptied, no others", "np.append(partition.neighbours()[i], False)", BESIDE),
 )
 # The paper does not say whether the mean begins anew after a split
 right("2.3")(changed("2.3", "            losses = []  # after a split the mean begins anew\n    return", "    return"))
@@ -289,6 +333,8 @@ wrongs(
     ("exactly the limit", "apart < config", "apart <= config"),
     ("both go at once", "if alike.any()", "alike[alike.argmax() + 1 :] = False\n        if alike.any()"),
     ("all neighbours alike, of any index", "if alike.any()", "alike[:i] = False\n        if alike.any()"),
+    ("with random maps", "config.min_param_distance", "0.6"),
+    ("emptied, no others", RESET, "partition.reset(abs(np.arange(len(near)) - i) < 2)"),
 )
 # A turn that goes on while a neighbour is alike
 right("2.4")(changed("2.4", "        i += 1", "        i += not alike.any()"))
@@ -330,6 +376,13 @@ wrongs(
     ("something else", "split(partition, episode,", "split(partition, episodes[0],"),
     ("no episode observed", "partition.add", "return; partition.add"),
     ("however many episodes there are", "config.n_epochs - config.n_freeze", "len(episodes) - config.n_freeze"),
+    ("`merge` with something else", "merge(partition, config)", "merge(config, partition)"),
+    ("`split` with something else", "split(partition, episode, config, rng)", "split(None, episode, config, rng)"),
+    ("`split` with something else", "split(partition, episode, config, rng)", "split(partition, episode, None, rng)"),
+    ("in line", "partition.train(rng)", "partition.train()"),
+    ("in line", "episodes[0].states[0], rng", "episodes[0].states[0]"),
+    ("`train` with something else", "partition.train(rng)", "partition.train(np.random.default_rng())"),
+    ("`add` with something else", "episodes[0].states[0], rng", "episodes[0].states[0], np.random.default_rng(8)"),
 )
 
 
@@ -369,9 +422,9 @@ right("2.6")(PREDICTION)
 # 2.7 my_policy_class
 
 
-def class_of(features, code, terms=None, name="mine", sizes=None):
+def class_of(features, code, terms=None, name="mine", sizes=None, kind=PolicyClass):
     terms = terms or tuple(f"f{i}" for i in range(len(code)))
-    return PolicyClass(name, terms, code, np.ones(len(terms)) if sizes is None else sizes, features)
+    return kind(name, terms, code, np.ones(len(terms)) if sizes is None else sizes, features)
 
 
 def wrong_class(words, features, *code, **others):
@@ -386,6 +439,10 @@ wrong_class("the features of 'linear'", lambda s: 2 * s[..., ::-1], "2 * state[1
 wrong_class("sums of the state's components", lambda s: s[..., 1:], "state[1]")
 wrong_class("a string for `terms`", sides, "fabs(state[0] - state[1])", terms="d")
 wrong_class("at most 80%", lambda s: np.sin(50 * s[..., :1]), "sin(50 * state[0])")
+XY = ("state[0]", "state[1]")
+for size in (1e-9, 0.05):
+    waves = lambda s, size=size: np.concatenate([s, size * np.sin(50 * s[..., :1])], axis=-1)  # noqa: E731
+    wrong_class("a feature of", waves, *XY, f"{size} * sin(50 * state[0])")
 wrong_class("features of a single state", lambda s: np.atleast_2d(s)[:, :1] ** 2, "state[0] * state[0]")
 wrong_class("that gives other numbers than feature", sides, "state[0] - state[1]")
 wrong_class("'**' in the code", lambda s: s**3, "state[0] ** 3", "state[1] ** 3")
@@ -458,6 +515,11 @@ wrongs(
     ("a standard error of", "difference.std(ddof=1)", "np.ptp(np.percentile(difference, [25, 75])) / 1.349"),
     ("a standard error of", "difference.std(ddof=1)", "1.4826 * np.median(np.abs(difference - np.median(difference)))"),
     ("a standard error of", "len(difference)", "(len(ours) + len(theirs))"),
+    ("of the standard error", ERROR, f"1.04 * {ERROR}"),
+    ("of the standard error", ERROR, f"0.95 * {ERROR}"),
+    ("a standard error of", ERROR, "difference.std() / 20"),
+    ("a standard error of", "difference.std(ddof=1)", "difference[20:].std()"),
+    ("a standard error of", "difference.std(ddof=1)", "difference[:-20].std()"),
 )
 
 
@@ -479,11 +541,18 @@ wrongs(
     ("of a few thousand draws", "4000", "20"),
     ("an interval that is too wide", "[2.5, 97.5]", "[1, 99]"),
     ("aside of the mean", "[2.5, 97.5]", "[1, 96]"),
-    ("aside of the mean", "rng.integers(p,", "rng.integers(p - 1,"),
+    ("without the mean", "rng.integers(p,", "rng.integers(p - 1,"),
     ("the range of single policies", MEANS, "returns.mean(axis=1)"),
     ("without the mean", "returns.mean(axis=1)", "np.median(returns, axis=1)"),
     ("the upper end first", "return low, high", "return high, low"),
     ("one standard error", LOW_HIGH, "returns.mean() + np.array([-1, 1]) * returns.mean(axis=1).std() / p**0.5"),
+    ("of the width", "[2.5, 97.5]", "[2, 98]"),
+    ("of the width", "[2.5, 97.5]", "[3, 97]"),
+    ("beside an outlier", LOW_HIGH, "means.mean() + np.array([-2, 2]) * means.std()"),
+    ("beside an outlier", LOW_HIGH, "means.mean() + rng.normal(1.96, 0.01) * np.array([-1, 1]) * means.std()"),
+    ("", "(4000, p)", "(4000, 30)"),
+    ("", "size=(4000, p)", "size=(4000, 28)"),
+    ("", "size=(4000, p)", "size=(4000, p - 1)"),
 )
 
 
@@ -501,6 +570,7 @@ def normal_theory(returns, rng):
 
 # 3.4 blame
 
+ENDS = "np.array([e.states[-1] for e in collect_episodes(policy, task, starts[failed])])"
 LAST = "counts[policy.cells(episode.states[-1])] += 1"
 wrongs(
     "3.4",
@@ -511,6 +581,10 @@ wrongs(
     ("every step of a failure", LAST, "np.add.at(counts, policy.cells(episode.states), 1)"),
     ("a count per cell", "return counts", "return counts[:-1]"),
     ("shares", "return counts", "return counts / counts.sum()"),
+    ("in line", "np.zeros(len(policy), dtype=int)", "np.zeros(5, dtype=int)"),
+    ("", "counts = np.zeros(len(policy), dtype=int)", f"return np.bincount(policy.cells({ENDS})); counts = 0"),
+    ("", "starts[failed]", "starts[failed[:40]]"),
+    ("a call of vsp's `failures`", "(theirs == goal) & (ours != goal)", "FAILURES(policy, teacher, task, starts)"),
 )
 
 # 3.5 refit
@@ -523,12 +597,18 @@ wrongs(
     ("→ Hint 3", FIT, INVERSE, "np.unique(cells)", "range(len(policy))"),
     ("in a cell without states", "policy.coefficients.copy()", "np.zeros_like(policy.coefficients)"),
     ("the same map in every cell", FIT, "np.linalg.lstsq(inputs, actions, rcond=None)[0]"),
-    ("the old policy altered", "policy.coefficients.copy()", "policy.coefficients"),
+    ("argument 1 altered in place", "policy.coefficients.copy()", "policy.coefficients"),
     ("the least there is", FIT, f"0.99 * {FIT}"),
     ("that misses the actions", FIT, f"np.linalg.solve({SQUARES} + 1e-3 * np.eye(3), inputs[mine].T @ actions[mine])"),
     ("a vsp.VoronoiPolicy", "return vsp", "return coefficients; vsp"),
     ("is not written yet", "cells, coefficients =", "raise NotImplementedError(); cells, coefficients ="),
+    ("", "np.unique(cells)", "range(6)"),
+    ("the least there is", "np.unique(cells)", "np.unique(cells)[:6]"),
 )
+
+
+RESTORED = "mean = actions.mean(axis=0); actions -= mean; actions += mean"
+right("3.5")(first("3.5", RESTORED))
 right("3.5")(changed("3.5", FIT, "np.linalg.pinv(inputs[mine]) @ actions[mine]"))
 
 
@@ -547,6 +627,7 @@ wrongs(
     ("inhomogeneous", "labels, _ =", "labels ="),
     ("actions that is not made of numbers", "labels, _ =", "labels =", LABELS, "[*actions, *labels]"),
     ("two arrays", f", {LABELS}", ""),
+    ("", "task, starts)", "task, starts[:20])"),
 )
 
 
@@ -584,3 +665,53 @@ def for_another_task():
 def quadratic_maps():
     config = replace(vsp.preset("SimpleGoal-v0"), fit="closed_form", sub_policy="quadratic")
     return vsp.distill(vsp.load_teacher("SimpleGoal-v0"), "SimpleGoal-v0", config, seed=0)[0]
+
+
+# What somebody wrote who tried to break the checks
+
+ADD, SPLIT = "partition.add(state, rng)", "split(partition, episode, config, rng)"
+AT_END, ALIKE = "    return added", "np.abs(coefficients - coefficients[i])"
+for exercise, words, *changes in (
+    ("1.2", "the least that", LSTSQ, RIDGE.replace("0.1", "0.05")),
+    ("1.4", "expected", "states[:, None] - codewords", "np.abs(states)[:, None] - np.abs(codewords)"),
+    ("1.5", "a wrong action in", "own =", "states = states.clip(0, 1); own ="),
+    ("2.2", "another number", "np.mean(since)", "np.mean(since[-7:])"),
+    ("2.3", "other maps in the cells", ADD, "partition.add(state, np.random.default_rng(0))"),
+    ("2.3", "other maps in the cells", AT_END, "    partition.models.coefficients[:] = 0\n    return added"),
+    ("2.3", "on the other side", "losses = []  # after", "losses = losses[-1:]  # after"),
+    ("2.3", "on the other side", "losses = []  # after", "losses = losses[:1]  # after"),
+    ("2.3", "ten bad states", "np.mean(losses)", "np.mean(losses[-10:])"),
+    ("2.3", "codewords returned", AT_END, "    return added[-2:]"),
+    ("2.4", "others equal", f"{ALIKE}.max(axis=1)", f"{ALIKE}[:, [0, 5]].max(axis=1)"),
+    ("2.4", "codewords returned", "return removed", "return removed[:3]"),
+    ("2.5", "`split` with something else", SPLIT, SPLIT.replace("rng", "type(rng)(type(rng.bit_generator)(0))")),
+    ("2.5", "in line", "episodes[0].states[0], rng", "episodes[0].states[0].tolist(), rng"),
+    ("2.5", "no `merge`", SPLIT, f"if {SPLIT}: continue"),
+    ("2.5", "it is not due then", "config.n_freeze", "2 * config.n_split"),
+    ("2.5", "episodes observed", "observe(episode)", "observe(type(episode)(episode.states, 0 * episode.actions))"),
+    ("2.5", "a call of vsp's `_algorithm_1`", "partition.add", "LOOP(*locals().values()); partition.add"),
+    ("3.3", "aside of the mean", "[2.5, 97.5]", "[3, 98]"),
+    ("3.3", "aside of the mean", "[2.5, 97.5]", "[2, 97]"),
+):  # fmt: skip
+    wrong(exercise, words)(changed(exercise, *changes))
+
+
+wrong("1.4", "expected")(lambda codewords, states: cKDTree(codewords).query(states, p=1)[1])
+wrong("1.4", "a call of vsp's `nearest`")(lambda *given: ThreadPool(1).apply(vsp.nearest, given))
+Late, Named = (type(f"Own{kind.__name__}", (kind,), {}) for kind in (vsp.VoronoiPolicy, PolicyClass))
+wrong("3.5", "a OwnVoronoiPolicy")(lambda old, *data: Late(old.codewords, old.coefficients, task=old.task))
+wrong_class("the features of 'linear'", lambda s: s, *XY, kind=Named)
+wrong_class("a feature of", sides, "fabs(state[0] - state[1])", sizes=np.array([30.0]))
+wrong_class(
+    "in the code", lambda s: np.stack([s[..., 0] / 2, s[..., 1] ** 2], axis=-1), "state[0]*(1/2)", "state[1]*state[1]"
+)
+wrong_class("expected arithmetic", lambda s: s**3, "state[0]*state[0]*state[0]", "state[-1]*state[1]*state[1]")
+right("2.5")(
+    changed(
+        "2.5",
+        "            partition.clear()",
+        "            partition.reset(slice(None))\n    return partition.policy()",
+    )
+)
+right("3.6")(lambda *given: np.array(changed("3.6")(*given)))
+right("2.7")(lambda task: class_of(lambda s: np.concatenate([s, sides(s)], -1), (*XY, "fabs(state[0] - state[1])")))

@@ -21,6 +21,7 @@ import vsp
 from vsp import distill, show
 from vsp.algorithms import split_regions, teacher_episodes
 from vsp.paper import baselines
+from vsp.paper.readings import Readings
 from vsp.paper.statistics import spread
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
@@ -32,7 +33,7 @@ SIMPLEGOAL = "SimpleGoal-v0"
 RUNS = {}
 
 
-def once(teacher, task, config=None, *, seed):
+def once(teacher, task, config=None, *, seed, progress=False):
     """`distill`, whose runs are kept for the next copy of a lesson: same arguments, same policy."""
     key = teacher.digest, vsp.get_task(task).name, config or vsp.preset(task), seed
     if key not in RUNS:
@@ -104,7 +105,7 @@ def test_limits_in_the_text_of_lesson_1_are_those_of_its_checks():
     text = " ".join(cell.source for cell in LESSONS["lesson_1_black_box.ipynb"].cells)
     assert f"{lesson_1.CELLS} codewords, at most {lesson_1.MARGIN * 100:.0f} % of the error" in text
     assert f"(the median of {lesson_1.DRAWS} draws)" in text
-    assert lesson_1.AT_MOST == 8 and "**at most eight codewords that" in text
+    assert lesson_1.AT_MOST == 4 and f"**at most four codewords that leave at most {lesson_1.SHARE:.0%}" in text
 
 
 # The copies
@@ -150,8 +151,18 @@ def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
     copies = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if path.name != build.MADE)
     kinds = {"student": ".ipynb", "solution": ".ipynb", "slides": ".html"}
     lessons = [f"{kind}/{name.split('.')[0]}{ending}" for kind, ending in kinds.items() for name in LESSONS]
-    project = ["project.md", "project_marking.md", "project_solution.py"]
-    assert copies == sorted(["guide.md", "handout.zip", *project, *lessons])
+    texts = [
+        "exam.md",
+        "exam_answers.md",
+        "guide.md",
+        "half_hour.md",
+        "project.md",
+        "project_marking.md",
+        "project_solution.py",
+    ]
+    assert copies == sorted(["handout.zip", "live.html", "slides/half_hour.html", *texts, *lessons])
+    asked, answered = ((folder / name).read_text("utf-8") for name in ("exam.md", "exam_answers.md"))
+    assert asked.count(". Lesson ") == answered.count("\n") - 2 == 22 and "*Answer" not in asked + answered
 
 
 def test_slides_are_in_no_copy_and_nothing_of_the_lecturers_in_the_hand_out(tmp_path):
@@ -301,7 +312,7 @@ def arguments(number):
     task, teacher, states, actions = examples()
     if number == "2.1":
         return once(teacher, SIMPLEGOAL, vsp.preset(SIMPLEGOAL), seed=0)[1], vsp.preset(SIMPLEGOAL)
-    few = {"1.6": (states, actions, task), "2.7": (teacher, task)}
+    few = {"2.7": (teacher, task)}
     return few.get(number, (teacher, task, vsp.preset(SIMPLEGOAL).quick()) if number == "2.6" else ())
 
 
@@ -370,18 +381,15 @@ def test_a_loop_without_end_is_told_when_the_student_interrupts_it():
         signal.signal(signal.SIGINT, before)
 
 
-def test_a_call_of_vsps_own_function_is_told_from_a_recursion_and_a_variable():
-    def nearest(n):
-        look_up = n
-        return nearest(look_up - 1) if n else 1
-
-    assert lesson_1.NEAREST.call(nearest, 3) == 1
-    for exercise in (lesson_1.ACTION_ERROR, lesson_2.SPLIT, lesson_2.MERGE, lesson_3.PAIRED_GAP, lesson_3.REFIT):
-        for name in exercise.refused:
-            for answer in (eval(f"lambda n: anything.{name}(n)"), eval(f"lambda n: {name}(n)")):
-                with pytest.raises(feedback.NotYet, match=f"found a call of vsp's `{name}`, expected code of your own"):
-                    exercise.call(answer, 3)
-    assert "a call of vsp's `nearest`" in _refused("1.4", vsp.nearest)
+def test_a_call_of_vsps_own_function_is_told_by_whatever_name_and_through_errors():
+    before = sys.getprofile()
+    for answer in (vsp.nearest, functools.partial(vsp.nearest, metric="manhattan"), lambda *given: vsp.nearest(*given)):
+        assert "found a call of vsp's `nearest`, expected code of your own" in _refused("1.4", answer)
+    assert "a call of vsp's `split`" in _refused("2.3", Readings().split)
+    for error in (ValueError(), KeyboardInterrupt(), SystemExit()):
+        with pytest.raises((feedback.NotYet, SystemExit)):
+            lesson_1.NEAREST.call(lambda error=error: (_ for _ in ()).throw(error))
+        assert sys.getprofile() is before
 
 
 def test_the_first_prediction_is_kept(monkeypatch, capsys):
@@ -401,10 +409,11 @@ def test_the_first_prediction_is_kept(monkeypatch, capsys):
 def test_who_guesses_sees_how_many_first_answers_were_right(monkeypatch, capsys):
     monkeypatch.setattr(feedback, "_FIRST", {})
     quiz = feedback.Exercise("0.1", "quiz")
-    questions = {n: feedback.Question(("yes", "no"), feedback.seal("0.1", n, "yes"), 1) for n in "abc"}
+    questions = {n: {"options": ["yes", "no"], "right": feedback.seal("0.1", n, "yes"), "hint": 1} for n in "abc"}
+    monkeypatch.setattr(feedback, "tables", lambda name: {"0.1": questions})
     with pytest.raises(feedback.NotYet, match="question 'b': not 'no'"):
-        quiz.ask({"a": "yes", "b": "no", "c": "no"}, questions, "well read.")
-    quiz.ask(dict.fromkeys("abc", "yes"), questions, "well read.")
+        quiz.ask({"a": "yes", "b": "no", "c": "no"}, "well read.")
+    quiz.ask(dict.fromkeys("abc", "yes"), "well read.")
     assert capsys.readouterr().out == "✓ 0.1 quiz: well read. Of your first answers 1 of 3 were right.\n"
 
 
@@ -450,7 +459,7 @@ def test_a_long_message_is_shown_in_lines():
 
 @pytest.fixture
 def no_slides(monkeypatch):
-    monkeypatch.setattr(build, "slides", lambda lesson: "their pictures take long")
+    monkeypatch.setattr(build, "slides", lambda *_: "their pictures take long")
 
 
 def test_what_somebody_wrote_into_a_copy_is_kept(no_slides, tmp_path, capsys):
@@ -475,30 +484,30 @@ def test_what_was_written_before_a_kill_is_nobodys_work(no_slides, tmp_path):
     assert {path: path.read_bytes() for path in copies} == before and not list(tmp_path.rglob("*.kept-*"))
 
 
-def test_a_hand_out_stands_on_its_own(tmp_path):
-    """Packages and teachers are found where it was unpacked; the answers are not in it."""
+def test_a_hand_out_installs_itself_where_somebody_else_runs_jupyter(tmp_path):
+    """From its wheel, beside the lessons, without the answers; and it says what the kernel had loaded before."""
     handout.write_handout(tmp_path / "handout.zip", {"lesson.ipynb": "{}"})
     with zipfile.ZipFile(tmp_path / "handout.zip") as archive:
         assert not [name for name in archive.namelist() if b"BEGIN SOL" in archive.read(name)]
-        archive.extractall(tmp_path)
-    folder = tmp_path / handout.FOLDER
-    code = (
-        "import vsp, vsp_beyond, vsp_course; from vsp_course import lesson_1, lesson_2, lesson_3; "
-        "print(vsp.__file__, vsp_beyond.__file__, vsp_course.__file__); "
-        "from vsp.paper.printed import printed_spread; vsp.load_teacher('{0}'); printed_spread('{0}')"
-    )
-    assert all((folder / "data" / name / "MANIFEST.sha256").is_file() for name in ("paper", "teachers"))
-    names = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    places = [str(folder / package / "__init__.py") for package in ("vsp", "vsp_beyond", "vsp_course")]
-    assert python(code.format(SIMPLEGOAL), cwd=folder, env=names).split() == places
+    (cell,) = {c.source for lesson in LESSONS.values() for c in lesson.cells if c.id == "hosted"}
+    cell = cell.replace('importlib.util.find_spec("vsp")', "None")  # as where it is not installed
+    folder = tmp_path / handout.PARTS["folder"]
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | {"PIP_NO_INDEX": "1"}
+    told = python(f"try:\n    exec({cell!r})\nexcept SystemExit as error:\n    print(error)", cwd=tmp_path, env=env)
+    assert "Nothing is installed: what pip says above is why" in told
+    (folder / "hosted.txt").write_text("")  # the others would come from the network
+    used = "\nfrom vsp_course import lesson_1, lesson_2, lesson_3; vsp.load_teacher('{0}'); printed_spread('{0}')"
+    used = f"\nimport vsp, vsp_beyond; from vsp.paper.printed import printed_spread{used.format(SIMPLEGOAL)}"
+    for words in ("RESTART", "the host loads its own numpy", "Ready. "):
+        before = "" if words == "Ready. " else "import numpy\n"
+        *_, said, place = python(f"{before}{cell}{used}; print(vsp.__file__)", cwd=tmp_path, env=env).splitlines()
+        assert words in said and place.startswith(str(folder / "packages-"))
 
 
 def test_a_hand_out_asks_for_locked_versions_without_torch():
-    lines = handout.requirements().splitlines()
+    lines = handout.pinned(handout.PARTS["hosted"] + handout.PARTS["own"]).splitlines()
     locked = (atomic.ROOT / "environment.lock").read_text(encoding="utf-8")
-    assert len(lines) > 12 and all(f"\n{line} " in locked for line in lines)
-    names = {line.partition("==")[0] for line in lines}
-    assert {"numpy", "jupyterlab", "ipywidgets", "gymnasium"} <= names and not names & set(handout.UNUSED)
+    assert len(lines) > 12 and all(f"\n{line} " in locked for line in lines) and "torch" not in handout.PARTS["hosted"]
 
 
 # Pages

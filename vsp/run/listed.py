@@ -61,8 +61,7 @@ def _listed(folder: Path) -> dict[str, str]:
     """
     manifest = folder / MANIFEST
     text = read_bytes(manifest).decode(errors="replace") if os.path.lexists(manifest) else ""
-    lines = [line.partition("  ") for line in text.split("\n")[:-1]]
-    return {name: digest for digest, _, name in lines}
+    return {name: digest for digest, _, name in (line.partition("  ") for line in text.split("\n")[:-1])}
 
 
 def _write_manifest(folder: Path, listed: dict[str, str]) -> None:

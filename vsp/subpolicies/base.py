@@ -23,6 +23,7 @@ Pullback = Callable[[np.ndarray], np.ndarray]
 # Functions that `PolicyClass.code` may use: C and Python's math have them under the same names
 SHARED = ("sin", "cos", "tan", "atan2", "exp", "log", "sqrt", "tanh", "hypot", "fabs", "pow", "remainder")
 _CODE = re.compile(rf"(?:state\[\d+\]|\b(?:{'|'.join(SHARED)})\b|(?<=\d)e-?(?=\d)|[-+*/(),. \d])+")
+PYTHON = re.compile(r"\*\*|//| if |(?<![.\d])\d+ */ *\d+(?![.\d])")  # what C has not, or takes for something else
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class PolicyClass:
     def feature_code(self) -> str:
         """Return code of the features and a final 1, valid in C and Python. Raises ValueError for other code."""
         for code in self.code:
-            if not _CODE.fullmatch(code):
+            if PYTHON.search(code) or not _CODE.fullmatch(code):
                 raise ValueError(f"code {code!r}, expected arithmetic with state[0], ... and functions of {SHARED}")
         return ", ".join([*self.code, "1.0"])
 
