@@ -1,5 +1,5 @@
-"""The course: the drawing helper of its notebooks (`picture`), the checks of each lesson, and `build`, which writes the
-versions for students and lecturers.
+"""The course: the drawing helper of its notebooks (`picture`), the checks of each lesson, `build`, which writes the
+versions for students and lecturers, `grade` for exams, and `live`, the page without Python.
 
 A lesson imports its checks by name, as in `from vsp_course import lesson_1 as check`.
 """
