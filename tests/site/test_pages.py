@@ -10,7 +10,8 @@ import pytest
 from visits import Visit
 
 SITE = Path(os.environ.get("SITE", "nowhere"))
-NAMES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob("*.html") if "_static" not in path.parts)
+APART = {"_static", "live.html"}  # the page without Python is no page of Sphinx: test_live.py
+NAMES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob("*.html") if not APART & {*path.parts})
 # Paper: A4 less its margins
 DESK, PHONE, PAPER = ({"width": w, "height": h} for w, h in ((1280, 900), (390, 844), (680, 960)))
 NAVIGATION = ".bd-sidebar-primary, .bd-sidebar-secondary, .bd-header-article, .prev-next-footer, #pst-back-to-top"
@@ -40,7 +41,11 @@ def start(browser, address):
 
 def test_the_pages_that_are_promised_are_there():
     notebooks = {f"notebooks/{path.stem}.html" for path in Path("figures").glob("**/executed/*.ipynb")}
-    assert len(notebooks) >= 6 and notebooks | {"index.html", "course.html", "api.html", "search.html"} <= set(NAMES)
+    assert (
+        (SITE / "course/live.html").is_file()
+        and len(notebooks) >= 6
+        and notebooks | {"index.html", "course.html", "api.html", "search.html"} <= set(NAMES)
+    )
 
 
 def test_the_site_can_be_read_and_its_sidebar_overlooked(start):
