@@ -41,11 +41,7 @@ def start(browser, address):
 
 def test_the_pages_that_are_promised_are_there():
     notebooks = {f"notebooks/{path.stem}.html" for path in Path("figures").glob("**/executed/*.ipynb")}
-    assert (
-        (SITE / "course/live.html").is_file()
-        and len(notebooks) >= 6
-        and notebooks | {"index.html", "course.html", "api.html", "search.html"} <= set(NAMES)
-    )
+    assert len(notebooks) >= 6 and notebooks | {"index.html", "course.html", "api.html", "search.html"} <= set(NAMES)
 
 
 def test_the_site_can_be_read_and_its_sidebar_overlooked(start):
