@@ -34,10 +34,7 @@ def test_each_part_asks_and_nothing_overflows_a_phone(shown):
             part.get_by_role("button").first.click()
         assert part.locator(".see").is_visible()
     assert shown.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    serious = [
-        each["id"] for each in Axe().run(shown).response["violations"] if each["impact"] in ("serious", "critical")
-    ]
-    assert serious == []
+    assert Axe().run(shown).response["violations"] == []
 
 
 def test_cells_by_hand_are_fitted_at_once(shown):
