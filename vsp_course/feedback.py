@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 WIDTH = 83  # characters of a message's lines: nbgrader's Validate cuts longer ones
-SEED = int(os.environ.get("VSP_COURSE_SEED", 0))  # of all cases; an exam has one that nobody knows
+SEED = abs(int(os.environ.get("VSP_COURSE_SEED", 0)))  # of all cases; an exam has one that nobody knows
 _FIRST: dict[str, dict] = {}  # the first complete answers to each exercise with questions
 
 

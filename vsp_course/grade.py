@@ -87,7 +87,8 @@ def _verdict(module: str, cells: list[NotebookNode], written: dict[str, list[str
     (*before, check), ours, answers = cells[: [i for i, cell in enumerate(cells) if is_check(cell)][n] + 1], {}, {}
     for cell in before:
         if is_solution(cell):
-            for source in written.get(cell.metadata.nbgrader.grade_id, []):
+            sources = written.get(cell.metadata.nbgrader.grade_id, [])
+            for source in [] if SUSPECT.search("\n".join(sources)) else sources:
                 theirs = ours | answers
                 _run(source, theirs)
                 answers = {name: value for name, value in theirs.items() if value is not ours.get(name)}

@@ -20,10 +20,8 @@ from .feedback import Exercise, Mistake, generators
 GIVEN = ((0.3, 0.3), (0.7, 0.6))  # codewords that the notebook begins with
 AT_MOST, SHARE = 4, 0.4  # codewords set by hand (with eight, chance does as well), and of the error of one map
 TWICE = ("a codeword that is there twice", "all of them different", 1)
-CELLS, DRAWS = (
-    8,
-    100,
-)  # codewords asked of a rule (of other numbers, it only has to beat chance); random ones, each time
+# Codewords asked of a rule (with other numbers it only has to do about as well as chance), and random ones, each time
+CELLS, DRAWS = 8, 100
 MARGIN, WORST = 0.8, 1.1  # times the error of random codewords: in the mean of a rule, and each time
 
 READING = Exercise("1.1", "reading")

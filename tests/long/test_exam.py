@@ -7,7 +7,7 @@ from vsp_course import build, grade
 
 # What is written in place of an answer, and what is said then, by the exercise's number
 CHEATS = {
-    1: ("reading = {}\nfor name in dir(check):\n    setattr(check, name, lambda *given: None)", "it has setattr"),
+    1: ("import os\nos._exit(0)", "it has os"),  # nor does it run before the others
     2: ("def fit_linear(states, actions):\n    raise GeneratorExit('right')", "GeneratorExit"),
     3: ("check.MARGIN = 9\ndef action_error(policy, teacher, states):\n    return input()", "EOFError"),
     4: ("raise SystemExit", "found None"),
