@@ -1,5 +1,6 @@
 """The site, for Sphinx: `make site` gathers pages and executed notebooks in build/site-work/source and calls it."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -45,6 +46,8 @@ maximum_signature_line_length = 80
 
 html_theme = "sphinx_book_theme"
 html_title = "Voronoi state partitioning"
+html_baseurl = os.environ.get("SITE_URL", "")  # where it will be, with a slash at its end: previews of links ask for it
+html_extra_path = ["article.png"]
 html_favicon = html_logo = "static/logo.svg"
 EXPLORER = [f"../vsp/show/explorer/explorer.{name}" for name in ("bundle.js", "css")]
 html_static_path = ["static", "article/article.css", *EXPLORER]

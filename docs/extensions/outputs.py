@@ -49,7 +49,14 @@ def _improve(text: str, folder: Path = None, top: str = "") -> str:
         script.decompose()
     for table in soup.find_all("table"):
         _table(soup, table)
+    for label in soup.select("figure > figcaption > b:first-child"):
+        label.find_parent("figure")["id"] = anchor(label.get_text())
     return str(soup)
+
+
+def anchor(label: str) -> str:
+    """Where on its page the figure with this label is: figure-6-2 of "Figure 6.2."."""
+    return "-".join(re.findall(r"\w+", label.lower()))
 
 
 def _picture(tag, image: bytes, folder: Path, top: str) -> None:

@@ -1,4 +1,4 @@
-"""Links of pages, their descriptions for search engines, and what the theme brings along that no page asks for."""
+"""Links of pages, what search engines and previews of links say of them, and what the theme brings that no page uses."""
 
 import html
 import re
@@ -12,6 +12,7 @@ _ICON = re.compile(r'((?:\.fa-[\w-]+,?)+)\{--fa:"\\([0-9a-f]+)"\}')
 _UNFOLDS = '<summary><span class="toctree-toggle"'
 _NAMED = _UNFOLDS.replace(">", ' aria-label="unfold">', 1)
 _DATA = re.compile(r"(\]\((?:\.\./)*)data/README\.md")
+_PICTURE, _TAG = re.compile(r"_images/\w+\.webp"), re.compile("<[^>]*>")
 _MAP = re.compile(rb"\n?(//# |/\*# )sourceMappingURL=[^\n*]*( \*/|\*/)?")
 
 
@@ -27,12 +28,26 @@ def _move_links_of_included(app, path, docname, source):
 
 
 def _describe(app, pagename, templatename, context, doctree):
-    """The first paragraph with something in it, as the page's description."""
-    paragraphs = doctree.findall(nodes.paragraph) if doctree else ()
-    texts = (node.astext() for node in paragraphs if isinstance(node.parent, nodes.section))
-    text = next((text for text in texts if len(text) > 60), f"{app.config.html_title}: {pagename}")
-    text = html.escape(textwrap.shorten(text, 200, placeholder=" …"))
-    context["metatags"] = context.get("metatags", "") + f'\n<meta name="description" content="{text}" />'
+    """The page's description, for search engines, and what a link to it shows: title, description and picture."""
+    text = next(filter(lambda text: len(text) > 60, _paragraphs(doctree)), f"{app.config.html_title}: {pagename}")
+    picture = _PICTURE.search("" if pagename == "index" else context.get("body", ""))
+    about = {
+        "og:title": _TAG.sub("", context.get("title", "")),
+        "og:description": textwrap.shorten(text, 200, placeholder=" …"),
+        "og:image": (app.config.html_baseurl or "../" * pagename.count("/")) + (picture[0] if picture else "article.png"),
+    }
+    tags = [("name", "description", about["og:description"]), *(("property", *item) for item in about.items())]
+    lines = (f'\n<meta {kind}="{name}" content="{html.escape(html.unescape(value))}" />' for kind, name, value in tags)
+    context["metatags"] = context.get("metatags", "") + "".join(lines)
+
+
+def _paragraphs(doctree):
+    """Yield the text of each paragraph of a section, and of the article's."""
+    for node in doctree.findall(lambda node: isinstance(node, (nodes.paragraph, nodes.raw))) if doctree else ():
+        if isinstance(node, nodes.raw):
+            yield from (_TAG.sub("", text) for text in re.findall("<p>(.*?)</p>", node.astext(), re.DOTALL))
+        elif isinstance(node.parent, nodes.section):
+            yield node.astext()
 
 
 def _thin(app, error):

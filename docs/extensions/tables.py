@@ -1,10 +1,13 @@
-"""The directives `measured`, what missed its target in data/results/trust.csv, and `artefacts`, what notebooks make."""
+"""The directives `measured`, what missed its target, `artefacts`, what notebooks make, and `gallery`, their figures."""
 
+import html
 import re
 import tomllib
 from pathlib import Path
 
 import pandas as pd
+from docutils import nodes
+from outputs import anchor
 from sphinx.util.docutils import SphinxDirective
 
 from vsp.paper.results import read_results
@@ -40,6 +43,18 @@ def artefacts() -> str:
     return "\n".join(lines)
 
 
+def gallery() -> list[tuple[str, str, str]]:
+    """Every figure of notebooks/captions.toml: its file, its alternative text, and its caption as HTML, in brief."""
+    shown = []
+    for notebook, kinds in tomllib.loads(BOOK.read_text("utf-8")).items():
+        for name in kinds.get("figures", {}):
+            caption = caption_of("figures", name)
+            link = f'<a href="notebooks/{notebook}.html#{anchor(caption.label)}">{caption.label}</a>'
+            brief = re.match(r".*?\.(?=\s|$)", caption.text)[0]
+            shown.append((f"figures/{name}.png", caption.alt, f"{link}. {html.escape(brief, quote=False)}"))
+    return shown
+
+
 class _Table(SphinxDirective):
     """A table made when the site is built. The content is for readers of the source, on GitHub."""
 
@@ -56,7 +71,17 @@ class Artefacts(_Table):
         return self.parse_text_to_nodes(artefacts())
 
 
+class Gallery(_Table):
+    def run(self):
+        box = nodes.container(classes=["gallery"])
+        for file, alt, caption in gallery():
+            end = nodes.raw("", f"<figcaption>{caption}</figcaption></figure>", format="html")
+            box += [nodes.raw("", "<figure>", format="html"), nodes.image(uri=file, alt=alt), end]
+        return [box]
+
+
 def setup(app):
+    app.add_directive("gallery", Gallery)
     app.add_directive("measured", Measured)
     app.add_directive("artefacts", Artefacts)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -38,10 +38,34 @@ var splitQuery = (/** @type {string} */ query) =>
     .split(/[^\p{Letter}\p{Number}_]+/u)
     .filter(term => term.length > 1)
 
+// "What is a cell?" asks for the cell.
+const ask = (/** @type {string} */ query) => {
+  const few = /^(what|which|who|how|why|when|where|is|are|was|do|does|did|can|an?|the|mean|means|of)$/i
+  return splitQuery(query).filter(word => !few.test(word)).join(" ") || query
+}
+
+// The glossary explains a word; all else only uses it. (Sphinx's search takes this for its own.)
+var Scorer = {
+  objNameMatch: 11,
+  objPartialMatch: 6,
+  objPrio: { 0: 15, 1: 5, 2: -5 },
+  objPrioDefault: 0,
+  title: 15,
+  partialTitle: 7,
+  term: 5,
+  partialTerm: 2,
+  score: (/** @type {[string, string, string, string, number]} */ [page, , , , score]) =>
+    page == "glossary" && score > 6 ? score + 20 : score,
+}
+
 // A hit leads to the words, not to the top of a long page.
 addEventListener("DOMContentLoaded", () => {
   const found = document.querySelector("#search-results"),
-    [word] = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
+    [word] = splitQuery(ask(new URLSearchParams(location.search).get("q") ?? ""))
+  if (found) {
+    const search = Search.performSearch
+    Search.performSearch = (/** @type {string} */ query) => search(ask(query))
+  }
   if (found && word)
     new MutationObserver(() => {
       for (const link of found.querySelectorAll("a:not([href*='#'])"))
