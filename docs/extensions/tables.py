@@ -75,8 +75,8 @@ class Gallery(_Table):
     def run(self):
         box = nodes.container(classes=["gallery"])
         for file, alt, caption in gallery():
-            end = nodes.raw("", f"<figcaption>{caption}</figcaption></figure>", format="html")
-            box += [nodes.raw("", "<figure>", format="html"), nodes.image(uri=file, alt=alt), end]
+            text = nodes.caption("", "", nodes.raw("", caption, format="html"))
+            box += nodes.figure("", nodes.image(uri=file, alt=alt), text)
         return [box]
 
 

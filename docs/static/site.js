@@ -38,12 +38,6 @@ var splitQuery = (/** @type {string} */ query) =>
     .split(/[^\p{Letter}\p{Number}_]+/u)
     .filter(term => term.length > 1)
 
-// "What is a cell?" asks for the cell.
-const ask = (/** @type {string} */ query) => {
-  const few = /^(what|which|who|how|why|when|where|is|are|was|do|does|did|can|an?|the|mean|means|of)$/i
-  return splitQuery(query).filter(word => !few.test(word)).join(" ") || query
-}
-
 // The glossary explains a word; all else only uses it. (Sphinx's search takes this for its own.)
 var Scorer = {
   objNameMatch: 11,
@@ -54,21 +48,23 @@ var Scorer = {
   partialTitle: 7,
   term: 5,
   partialTerm: 2,
-  score: (/** @type {[string, string, string, string, number]} */ [page, , , , score]) =>
-    page == "glossary" && score > 6 ? score + 20 : score,
+  score: (/** @type {[string, string, string, string, number]} */ [page, , anchor, , score]) =>
+    page == "glossary" && score > 6 ? score + (anchor ? 30 : 20) : score,
 }
 
-// A hit leads to the words, not to the top of a long page.
-addEventListener("DOMContentLoaded", () => {
-  const found = document.querySelector("#search-results"),
-    [word] = splitQuery(ask(new URLSearchParams(location.search).get("q") ?? ""))
-  if (found) {
-    const search = Search.performSearch
-    Search.performSearch = (/** @type {string} */ query) => search(ask(query))
-  }
-  if (found && word)
-    new MutationObserver(() => {
-      for (const link of found.querySelectorAll("a:not([href*='#'])"))
-        /** @type {HTMLAnchorElement} */ (link).hash = `:~:text=${encodeURIComponent(word)}`
-    }).observe(found, { childList: true, subtree: true })
-})
+// "What is a cell?" asks for the cell. A hit leads to the words, not to the top of a long page.
+{
+  const few = /^(what|which|who|how|why|when|where|is|are|was|do|does|did|can|an?|the|mean|means|of)$/i
+  const asked = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
+  const terms = asked.filter(word => !few.test(word))
+  if (0 < terms.length && terms.length < asked.length)
+    history.replaceState(null, "", `?q=${encodeURIComponent(terms.join(" "))}`)
+  addEventListener("DOMContentLoaded", () => {
+    const found = document.querySelector("#search-results")
+    if (found && terms.length)
+      new MutationObserver(() => {
+        for (const link of found.querySelectorAll("a:not([href*='#'])"))
+          /** @type {HTMLAnchorElement} */ (link).hash = `:~:text=${encodeURIComponent(terms[0])}`
+      }).observe(found, { childList: true, subtree: true })
+  })
+}
