@@ -1,4 +1,4 @@
-"""Links of pages, what search engines and previews of links say of them, and what the theme brings that no page uses."""
+"""Links of pages, what search engines and previews of links say of them, and what no page uses of the theme."""
 
 import html
 import re
@@ -31,10 +31,11 @@ def _describe(app, pagename, templatename, context, doctree):
     """The page's description, for search engines, and what a link to it shows: title, description and picture."""
     text = next(filter(lambda text: len(text) > 60, _paragraphs(doctree)), f"{app.config.html_title}: {pagename}")
     picture = _PICTURE.search("" if pagename == "index" else context.get("body", ""))
+    top = app.config.html_baseurl or "../" * pagename.count("/")
     about = {
         "og:title": _TAG.sub("", context.get("title", "")),
         "og:description": textwrap.shorten(text, 200, placeholder=" …"),
-        "og:image": (app.config.html_baseurl or "../" * pagename.count("/")) + (picture[0] if picture else "article.png"),
+        "og:image": top + (picture[0] if picture else "article.png"),
     }
     tags = [("name", "description", about["og:description"]), *(("property", *item) for item in about.items())]
     lines = (f'\n<meta {kind}="{name}" content="{html.escape(html.unescape(value))}" />' for kind, name, value in tags)

@@ -51,6 +51,7 @@ def test_the_site_can_be_read_and_its_sidebar_overlooked(start):
     texts = [text for page in pages if page for text in page(string=True) if not text.find_parent(["pre", "code"])]
     assert 20_000 < len(" ".join(texts).split()) <= 42_000
     assert sum(link.is_visible() for link in start.locator(".bd-sidebar-primary a.reference").all()) <= 14
+    assert start.locator(".bd-sidebar-primary .caption").count() == 4
 
 
 def test_nothing_fails_and_no_other_host_is_asked(opened, page):
@@ -72,6 +73,8 @@ def test_every_picture_is_there_says_what_it_shows_has_its_room_and_leads_to_its
 def test_it_says_in_a_sentence_what_it_is_about(opened, page):
     text = page.locator("meta[name=description]").get_attribute("content")
     assert 30 < len(text) <= 200
+    image = page.locator("meta[property='og:image']").get_attribute("content")
+    assert (SITE / opened.name).parent.joinpath(image).is_file() and ("article" in image or opened.name != "index.html")
     others = [name for name in NAMES if name != opened.name]
     assert not any(f'content="{text}"' in (SITE / name).read_text("utf-8") for name in others)
 
@@ -114,10 +117,8 @@ def test_no_dollar_is_left_outside_of_code_and_tables_have_headers(page):
 
 
 def test_headings_descend_in_order_below_one_title(page):
-    levels = page.evaluate(
-        "[...document.querySelectorAll('main :is(h1, h2, h3, h4, h5, h6)')]"
-        ".filter(h => h.checkVisibility()).map(h => Number(h.tagName[1]))"
-    )
+    headings = page.locator("main :is(h1, h2, h3, h4, h5, h6)").filter(visible=True)
+    levels = headings.evaluate_all("found => found.map(heading => Number(heading.tagName[1]))")
     assert levels[0] == 1 and levels.count(1) == 1
     assert all(below - above <= 1 for above, below in zip(levels, levels[1:]))
     assert page.locator("main").count() == 1
@@ -185,11 +186,8 @@ def test_the_printer_gets_every_word_of_tables_and_code(page):
 
 def test_a_dark_page_is_light_while_it_is_printed(browser, address):
     visit = Visit(browser, address, color_scheme="dark")
-    themes = visit.page.evaluate("""['beforeprint', 'afterprint'].map(name => {
-        dispatchEvent(new Event(name))
-        return document.documentElement.dataset.theme
-    })""")
-    assert themes == ["light", "dark"]
+    theme_at = "event => dispatchEvent(new Event(event)) && document.documentElement.dataset.theme"
+    assert [visit.page.evaluate(theme_at, event) for event in ("beforeprint", "afterprint")] == ["light", "dark"]
 
 
 def test_links_within_the_site_lead_somewhere(page, address):
@@ -244,7 +242,10 @@ def test_a_search_quotes_the_text_and_leads_to_the_words(start, address):
     assert start.locator("main input[name=q]").evaluate("field => parseFloat(getComputedStyle(field).paddingLeft)") > 30
     start.wait_for_selector("#search-results a[href$='02_distillation.html#:~:text=Delaunay']")
     assert not any("On this page" in text for text in start.locator("#search-results p.context").all_inner_texts())
-    start.goto(address + "search.html?q=L")  # one letter
-    start.wait_for_selector(".search-summary:has-text('did not match')")
+    for nothing in ("L", "DecisionTreeClassifier"):  # one letter; code of a notebook
+        start.goto(f"{address}search.html?q={nothing}")
+        start.wait_for_selector(".search-summary:has-text('did not match')")
+    start.goto(address + "search.html?q=What+is+a+cell%3F")
+    start.wait_for_selector("#search-results li:first-child a[href='glossary.html#cell']")
     start.goto(address + "search.html?q=L∞")
     start.locator("#search-results a", has_text="Distillation").first.wait_for()
