@@ -54,9 +54,9 @@ var Scorer = {
 
 // "What is a cell?" asks for the cell. A hit leads to the words, not to the top of a long page.
 {
-  const few = /^(what|which|who|how|why|when|where|is|are|was|do|does|did|can|an?|the|mean|means|of)$/i
+  const asks = "what which who how why when where is are was do does can an the mean of".split(" ")
   const asked = splitQuery(new URLSearchParams(location.search).get("q") ?? "")
-  const terms = asked.filter(word => !few.test(word))
+  const terms = asked.filter(word => !asks.includes(word.toLowerCase()))
   if (0 < terms.length && terms.length < asked.length)
     history.replaceState(null, "", `?q=${encodeURIComponent(terms.join(" "))}`)
   addEventListener("DOMContentLoaded", () => {

@@ -216,6 +216,7 @@ test("no function is longer than forty lines", async () => {
   // As V8 finds them: top-level functions and methods. Those inside of them are shorter.
   globalThis.addEventListener = () => {}
   globalThis.document = { currentScript: { src: "" } }
+  globalThis.location = { search: "" }
   const session = new inspector.Session()
   let found = []
   session.connect()
