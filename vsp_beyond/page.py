@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 import math
-import re
 import subprocess
 import sys
 import tempfile
@@ -21,7 +19,9 @@ from vsp.evaluation import ALIKE, CLOSE, Likeness, likeness
 from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
 from vsp.rollouts import Policy
-from vsp.show.explorer import PLANES, SCRIPT, explore, standalone
+from vsp.show.explorer import PLANES, Explorer, standalone
+from vsp.show.state_space import birth_colours
+from vsp.show.style import CELLS
 from vsp.tasks import Task, get_task
 
 from .device import to_c, to_header
@@ -31,7 +31,6 @@ from .proofs import PROVERS
 
 MOST_INPUTS = 8  # in an equation; of more, the five that move the action most
 PROOF_SECONDS = 60
-TINTS = json.loads(re.findall(r"CELLS = (\[.*?\])", SCRIPT)[0])  # colours of cells
 _PROVE = """import sys, vsp, vsp_beyond
 proof = vsp_beyond.prove(vsp.VoronoiPolicy.load(sys.argv[1]))
 print(f"{proof}. In this order: {' '.join(type(proof).claim.__doc__.split())}")"""
@@ -120,7 +119,8 @@ def _numbers(policy: PiecewisePolicy, alike: Likeness) -> str:
 def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
     """Return a card per cell: where it is, the share of the agent's states in it, and its equations."""
     inside, cards = policy.cells(alike.states), ""
-    for cell in range(len(policy)):
+    tints = birth_colours(policy)[1] if isinstance(policy, VoronoiPolicy) else np.arange(len(policy)) % len(CELLS)
+    for cell, tint in enumerate(tints):
         here = inside == cell
         where = html.escape(policy.where.place(cell, policy.task.inputs, 3))
         text = "".join(f"<p>{html.escape(line)}</p>" for line in _equations(policy, cell, alike.states[here]))
@@ -130,8 +130,8 @@ def _cards(policy: PiecewisePolicy, alike: Likeness) -> str:
             where = html.escape(_typical(policy, alike.states, here))
         close = (alike.errors[here] <= CLOSE).all(axis=1)
         said = f", all actions within {CLOSE:.0%} in {close.mean():.0%} of these" if len(close) else ""
-        edge = "; border-top: .3em solid" * (cell >= len(TINTS))
-        mark = f'<i class="vsp-mark" style="border-radius: 0; background: {TINTS[cell % len(TINTS)]}{edge}"></i>'
+        edge = "; border-top: .3em solid" * (cell >= len(CELLS))
+        mark = f'<i class="vsp-mark" style="border-radius: 0; background: {CELLS[tint]}{edge}"></i>'
         place = f"{mark}<b>Cell {cell}</b>, {here.mean():.0%} of the states{said}<br>{where}"
         cards += f"<div>{place * (len(policy) > 1)}{text}</div>"
     about = f"In each state one cell acts. {policy.where.about(policy.task.inputs, 3)}" if len(policy) > 1 else ""
@@ -183,8 +183,8 @@ def _played(policy: PiecewisePolicy, agent: Policy, alike: Likeness) -> str:
     linear = policy.policy_class.name == "linear"
     if not (linear and isinstance(policy, VoronoiPolicy) and policy.where.metric.order is not None):
         return "<p>No episode is shown: that takes linear maps, and codewords with a Minkowski distance.</p>"
-    seen = episodes(policy, agent, alike)
-    return seen + (f"<h2>Explore</h2>{explore(policy).element()}" if policy.task.name in PLANES else "")
+    seen, shown = episodes(policy, agent, alike), policy.task.name in PLANES
+    return seen + ("<h2>Explore</h2>" + Explorer({"policy": policy}).element() if shown else "")
 
 
 def _kept(policy: PiecewisePolicy, states: np.ndarray, until: float) -> str:

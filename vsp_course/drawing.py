@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from vsp import show
+from vsp import History, show
 from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Policy
 
@@ -42,11 +42,11 @@ def walls(ax: Axes) -> Axes:
 
 
 def actions_and_error(
-    policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None
+    policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None, history: History | None = None
 ) -> tuple[Figure, np.ndarray]:
     """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords.
 
-    The error is shown over the whole square, or in `states` (n, 2).
+    The error is shown over the whole square, or in `states` (n, 2). Numbers are those of births in the `history`.
     """
     x, y, grid = show.grid(policy.task.low, policy.task.high, 101)
     _, _, sparse = show.grid(policy.task.low, policy.task.high, 21)
@@ -58,7 +58,7 @@ def actions_and_error(
         on_the_way(axes[1], states, squared_error(policy, teacher, states))
     for ax in axes:
         show.cells(walls(ax), x, y, policy.cells(grid))
-        show.codewords(ax, policy.codewords, numbers=True)
+        show.codewords(ax, policy.codewords, numbers=show.state_space.birth_colours(policy, history)[0])
     show.letter(axes, ["the policy", "its error" if states is None else "its error where the teacher goes"])
     return fig, axes
 

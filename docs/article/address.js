@@ -1,6 +1,6 @@
 // @ts-check
 // The state of the article in the address of its page: "#v=1&s=cells&p=run&a=0.7,0.7&k=1x2y3z".
-// Only known keys and numbers are read, and a checksum tells what is cut: links come from anywhere.
+// Only what would be written so is read, with a checksum: links come from anywhere.
 
 const [VERSION, LONGEST, MOST_CELLS, LARGEST] = ["1", 4096, 16, 1e6]
 
@@ -21,28 +21,24 @@ export function write({ section, policy, at, moment, zoomed, numbers }) {
   return `#${text}&k=${checksum(text)}`
 }
 
+/** @type {<T>(list: T[], size: number) => T[][]} */
+const cut = (list, size) => list.flatMap((_, i) => (i % size ? [] : [list.slice(i, i + size)]))
+
 /** The state in an address, or null if it is not whole and known: with one of the policies of a
  * section, and one of the run's moments. A cell has 2 numbers of its codeword, and 6 of its map.
  * @param {string} hash @param {Record<string, string[]>} sections @param {number} moments */
 export function read(hash, sections, moments) {
-  const [, text, sum] = hash.slice(0, LONGEST + 1).match(/^#(.*)&k=(\w+)$/) ?? ["", "", ""]
-  if (hash.length > LONGEST || checksum(text) !== sum) return null
-  const { v, s: section, p: policy, z, n, ...lists } = Object.fromEntries(new URLSearchParams(text))
-  if (v !== VERSION || !Object.hasOwn(sections, section)) return null
-  if (!sections[section].includes(policy)) return null
-  const moment = n === undefined ? undefined : Number(n)
-  if (moment !== undefined && !(Number.isInteger(moment) && moment >= 0 && moment < moments))
-    return null
-  const [at, codewords, maps] = ["a", "c", "m"].map(key =>
-    lists[key]?.split(",").map(one => (one ? +one : NaN)),
-  )
-  const all = [at, codewords ?? [], maps ?? []].flat()
-  if (at?.length !== 2 || !all.every(value => Math.abs(value) <= LARGEST)) return null
-  const state = { section, policy, at, moment, zoomed: z === "1" }
-  if (!codewords && !maps) return state
-  if (!codewords || maps?.length !== 3 * codewords.length) return null
-  if (codewords.length % 2 || codewords.length > 2 * MOST_CELLS) return null
-  /** @type {<T>(list: T[], size: number) => T[][]} */
-  const cut = (list, size) => list.flatMap((_, i) => (i % size ? [] : [list.slice(i, i + size)]))
-  return { ...state, numbers: { codewords: cut(codewords, 2), coefficients: cut(cut(maps, 2), 3) } }
+  const text = new URLSearchParams(hash.slice(1, LONGEST)),
+    { s: section, p: policy, n, z, ...lists } = Object.fromEntries(text),
+    [at, words, maps] = ["a", "c", "m"].map(key => lists[key]?.split(",").map(Number) ?? []),
+    own = { codewords: cut(words, 2), coefficients: cut(cut(maps, 2), 3) },
+    moment = n === undefined ? undefined : Number(n),
+    shown = { section, policy, at, moment, zoomed: z === "1" },
+    state = { ...shown, numbers: words.length ? own : undefined }
+  const known = Object.hasOwn(sections, section) && sections[section].includes(policy),
+    small = [...at, ...words, ...maps].every(value => Math.abs(value) <= LARGEST),
+    sized = at.length === 2 && words.length % 2 === 0 && maps.length === 3 * words.length,
+    played = moment === undefined || (Number.isInteger(moment) && moment >= 0 && moment < moments)
+  if (words.length > 2 * MOST_CELLS) return null
+  return known && small && sized && played && write(state) === hash ? state : null
 }

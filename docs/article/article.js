@@ -4,14 +4,19 @@
 
 import { Explorer } from "../../vsp/show/explorer/explorer.js"
 import { floats, network, rSquared, refit } from "../../vsp/show/explorer/model.js"
-import { button, count, minus } from "../../vsp/show/explorer/controls.js"
-import { read, write } from "./address.js"
+import { button, count, minus, one, textOf } from "../../vsp/show/explorer/controls.js"
+import { Distiller } from "../../vsp/show/explorer/distiller.js"
 
+import { read, write } from "./address.js"
+import { Opening } from "./opening.js"
+
+const ZOOM = 1500 // milliseconds
+const NARROW = 800 // pixels: here the picture is above the text (article.css)
 const UNLOADED = "A part of the page could not be loaded. Try again."
 const UNREAD = "This link is damaged or from a newer version. So here is the first picture."
+const WON = "No failure. Now the return."
+const BEATEN = "No failure, and more than section 5: send it!"
 
-/** @type {(root: ParentNode, selector: string) => HTMLElement} */
-const one = (root, selector) => /** @type {HTMLElement} */ (root.querySelector(selector))
 /** @type {(root: ParentNode, selector: string) => HTMLElement[]} */
 const all = (root, selector) => Array.from(root.querySelectorAll(selector))
 const words = (/** @type {string | undefined} */ text) => text?.split(" ") ?? []
@@ -20,8 +25,7 @@ const words = (/** @type {string | undefined} */ text) => text?.split(" ") ?? []
  * @template {keyof Parts} N @param {N} name @returns {Promise<Parts[N]>} */
 async function data(name) {
   const inner = one(document, `#article-${name}`)
-  if (inner.textContent) return JSON.parse(inner.textContent)
-  return (await fetch(String(inner.dataset.source))).json()
+  return JSON.parse(await textOf(inner, inner.dataset.source))
 }
 
 /** Stored numbers, two by two. @param {string} text */
@@ -31,7 +35,7 @@ function pairs(text) {
 }
 
 /** The moments of the stored run. @param {StoredRun} stored @returns {Moment[]} */
-function replayOf({ n, cells, codewords, coefficients, events }) {
+function replayOf({ n, cells, codewords, coefficients, events, failures }) {
   const rows = pairs(coefficients),
     places = new Map(codewords)
   let [at, placed] = [0, /** @type {Vector[]} */ ([])]
@@ -39,7 +43,8 @@ function replayOf({ n, cells, codewords, coefficients, events }) {
     placed = places.get(i) ?? placed
     const maps = Array.from({ length: cells[i] }, () => rows.slice(at, (at += 3))),
       happened = events.filter(event => event.n === iteration)
-    return { n: iteration, codewords: placed, coefficients: maps, events: happened }
+    const numbers = { codewords: placed, coefficients: maps }
+    return { n: iteration, ...numbers, events: happened, failures: failures[i] }
   })
 }
 
@@ -52,7 +57,7 @@ function firstOf({ dataset }) {
 /** Text and explorer. */
 class Article {
   /** @type {Record<string, Promise<unknown>>} */ parts = {}
-  /** @type {Record<string, State>} */ left = {} // the scenes of sections that a reader has left
+  /** @type {Record<string, State>} */ left = {} // the scenes of sections, as a reader left them
   /** @type {HTMLElement | undefined} */ section
   /** @type {Promise<void> | null} */ entering = null
   staging = false // whether a scene is being set
@@ -62,8 +67,6 @@ class Article {
   held = -Infinity // when a focus scrolled
   /** @type {Vector[] | null} */ proved = null // failing starts of the policy as it was
   /** @type {Visited | undefined} */ visited // states, and the teacher's actions there
-  /** @type {number | undefined} */ r2
-  /** @type {Partial<Numbers> | undefined} */ rated // the numbers that have this R²
 
   /** @param {HTMLElement} root @param {Parts["scene"]} scene */
   constructor(root, scene) {
@@ -75,63 +78,62 @@ class Article {
     const settled = () => {
       this.keep()
       this.gestured = true
+      this.tell("gesture")
     }
     const hooks = { bare: true, settled, told: () => this.say() }
     this.view = new Explorer(one(root, ".view"), scene, hooks)
     root.classList.add("live")
-    one(root, "[data-http]").hidden = !location.protocol.startsWith("http")
+    new Opening(one(root, ".opening"), scene, /** @type {Linear} */ (this.policies.faithful_3))
     this.listen()
     this.follow()
   }
   listen() {
-    for (const section of this.sections)
+    const { root, sections } = this,
+      { canvas } = this.view,
+      { style } = one(root, ".own")
+    for (const section of sections)
       section.addEventListener("focusin", () => {
         this.held = performance.now()
         this.enter(section)
       })
-    const begun = (/** @type {Element} */ section) =>
-      section.getBoundingClientRect().top < 0.55 * innerHeight
     addEventListener("scroll", () => {
       if (performance.now() - this.held < 200) return // a focus has scrolled
-      const section = this.sections.findLast(begun)
+      const line = (innerWidth < NARROW ? 0.6 : 0.4) * innerHeight,
+        section = sections.findLast(each => each.getBoundingClientRect().top < line)
       if (section && section !== this.section) this.enter(section)
     })
-    this.root.addEventListener("click", event => {
-      const target = /** @type {Element} */ (event.target),
-        pressed = /** @type {HTMLElement | null} */ (target.closest("[data-act]"))
-      if (pressed) this.act(pressed, ...words(pressed.dataset.act))
-    })
-    this.root.addEventListener("input", event => {
-      const target = /** @type {HTMLInputElement} */ (event.target),
-        { stops } = target.dataset
-      if (stops) this.act(target, "policy", words(stops)[+target.value])
-    })
-    const { canvas } = this.view
+    for (const pressed of all(root, "[data-act]"))
+      pressed.addEventListener("click", () => this.act(pressed, ...words(pressed.dataset.act)))
+    const slider = /** @type {HTMLInputElement} */ (one(root, "[data-stops]")),
+      stops = words(slider.dataset.stops)
+    slider.addEventListener("input", () => this.act(slider, "policy", stops[+slider.value]))
     canvas.addEventListener("pointerdown", () => this.wake())
     canvas.addEventListener("keydown", ({ key }) => {
       if (key !== "Escape") this.wake()
       else if (this.section) one(this.section, ".skip").focus()
     })
-    for (const task of all(this.root, ".do")) {
+    for (const task of all(root, ".do")) {
       const skip = button("to the picture (arrows; Escape: back)", () => canvas.focus())
       skip.className = "skip"
       task.append(skip)
     }
     addEventListener("popstate", () => this.follow())
+    const score = style.getPropertyValue("--score")
     addEventListener("beforeprint", () => {
-      for (const output of this.root.querySelectorAll("output")) output.value = output.defaultValue
+      for (const output of root.querySelectorAll("output")) output.value = output.defaultValue
+      style.setProperty("--score", score) // of the printed policy
     })
     addEventListener("afterprint", () => this.say())
   }
   /** A part of the data, loaded once.
    * @template {keyof Parts} N @param {N} name @returns {Promise<Parts[N] | undefined>} */
   part(name) {
-    const { parts } = this
-    parts[name] ??= data(name).catch(() => {
-      delete parts[name]
+    this.parts[name] ??= data(name).catch(() => {
+      delete this.parts[name]
+      this.entering = null
       this.status.textContent = UNLOADED
     })
-    return /** @type {Promise<Parts[N] | undefined>} */ (parts[name])
+    return /** @type {Promise<Parts[N] | undefined>} */ (this.parts[name])
   }
   /** Load the network when a reader asks it. Before that, its arrows and one episode are known. */
   async wake() {
@@ -150,6 +152,7 @@ class Article {
     if (this.section === section && !state && this.entering) return this.entering
     this.remember()
     Object.assign(this, { section, staging: true })
+    this.distiller?.stop()
     this.status.textContent = ""
     for (const each of this.sections) each.classList.toggle("active", each === section)
     this.entering = this.stage(section, state ?? this.left[section.id] ?? firstOf(section), put)
@@ -157,25 +160,23 @@ class Article {
   }
   /** @param {HTMLElement} section @param {State} state @param {Put} [put] */
   async stage(section, { policy, at, moment, zoomed = false, numbers }, put) {
-    const { view } = this,
-      { needs, ...about } = section.dataset,
-      names = /** @type {(keyof Parts)[]} */ (words(needs)),
-      loaded = await Promise.all(names.map(name => this.part(name)))
-    if (policy === "teacher" && String(at) !== about.at) await this.wake()
-    if (this.section !== section) return // gone on
-    if (loaded.includes(undefined)) {
-      this.entering = null
-      return
-    }
-    /** @type {Partial<Parts>} */
-    const { run, visited, proofs } = Object.fromEntries(names.map((name, i) => [name, loaded[i]]))
+    const { view, scene } = this
+    /** @type {<N extends keyof Parts>(name: N) => Promise<Parts[N] | undefined> | null} */
+    const load = name => (words(section.dataset.needs).includes(name) ? this.part(name) : null)
+    const loaded = await Promise.all([load("run"), load("visited"), load("proofs")])
+    if (policy === "teacher" && String(at) !== section.dataset.at) await this.wake()
+    if (this.section !== section || loaded.includes(undefined)) return // gone on, or without them
+    const [run, visited, proofs] = loaded
     if (visited) this.visited ??= { states: pairs(visited.states), actions: pairs(visited.actions) }
     if (run) this.takeRun(run)
     const proof = proofs?.[policy]
     Object.assign(this, { zoomed, proved: proof?.polygons ?? null })
-    const [low, high] = zoomed && proof ? proof.box : [this.scene.plane.low, this.scene.plane.high]
-    view.picture.plane = { ...this.scene.plane, low, high }
-    Object.assign(view, { fixed: "fixed" in about, starts: !proof, asked: at })
+    const [low, high] = zoomed && proof ? proof.box : [scene.plane.low, scene.plane.high],
+      small = proof && proof.box[1][0] - proof.box[0][0] < 0.1,
+      moves = view.original.id === policy && put && !view.replay.slow
+    view.zoom({ low, high }, moves ? ZOOM : 0)
+    view.ring = small && !zoomed ? proof.at : null
+    Object.assign(view, { fixed: Boolean(section.dataset.fixed), starts: !proof, asked: at })
     view.show(this.policies[policy], numbers)
     if (view.run.length && moment !== undefined) view.replay.to(+moment)
     view.regions = this.same ? this.proved : null
@@ -187,60 +188,69 @@ class Article {
   /** Put the controls into a section, and set its own.
    * @param {HTMLElement} section @param {string} policy */
   arrange(section, policy) {
-    const { replay, form, backs } = this.view,
-      slots = new Map(Object.entries({ replay: [replay.row], form: [form, backs] }))
+    const { replay, form, backs, cells } = this.view,
+      distil = this.distiller ? [this.distiller.row] : [],
+      slots = new Map(Object.entries({ replay: [replay.row], form: [form, backs], distil }))
     for (const slot of all(section, "[data-slot]"))
       // What stays keeps the focus
       for (const part of slots.get(String(slot.dataset.slot)) ?? [])
         if (part.parentNode !== slot) slot.append(part)
     for (const slider of /** @type {HTMLInputElement[]} */ (all(section, "[data-stops]"))) {
       slider.value = String(words(slider.dataset.stops).indexOf(policy))
-      slider.setAttribute("aria-valuetext", count(this.view.cells, "cell"))
+      slider.setAttribute("aria-valuetext", count(cells, "cell"))
     }
   }
   takeRun(/** @type {StoredRun} */ stored) {
-    const { run } = this.policies
+    const { run } = this.policies,
+      { max_pol_loss: split, min_param_distance: merge } = stored.config
     if (run.replay) return
-    const replay = (run.replay = replayOf(stored))
-    Object.assign(replay[replay.length - 1], this.view.numbers(run)) // exact, unlike the others
-    run.limits = { split: stored.split, merge: stored.merge }
+    run.replay = replayOf(stored)
+    Object.assign(run.replay[run.replay.length - 1], this.view.numbers(run)) // exact, not as others
+    run.limits = { split, merge }
+    const names = "max_pol_loss min_pol_distance min_param_distance n_split n_merge n_reset",
+      more = "learning_rate n_minibatches",
+      groups = { "thresholds and periods": words(names), "step size, minibatches": words(more) }
+    this.distiller = new Distiller(this.view, stored.config, {}, () => this.part("teacher"), groups)
+  }
+  /** What a section tells comes after a gesture, or after the one that it names.
+   * @param {string} done */
+  tell(done) {
+    const { section } = this
+    if (section && done === (section.dataset.tells ?? done)) section.classList.add("done")
   }
   /** Whether the policy is as it was: not one that the reader has changed. */
   get same() {
     const { view } = this
     return JSON.stringify(view.numbers()) === JSON.stringify(view.numbers(view.original))
   }
-  /** @returns {State} */
-  stateOf(/** @type {HTMLElement} */ section) {
-    const { view, zoomed } = this,
-      replayed = section.querySelector("[data-slot=replay]"),
-      shown = { section: section.id, policy: String(view.original.id), at: view.asked, zoomed }
-    if (replayed) return { ...shown, moment: view.replay.at }
-    return { ...shown, numbers: this.same ? undefined : view.numbers() }
-  }
+  /** Remember the scene of a section. */
   remember() {
-    if (this.section && !this.staging) this.left[this.section.id] = this.stateOf(this.section)
+    const { view, zoomed, section } = this
+    if (!section || this.staging) return
+    const { id = "run" } = view.original, // a reader's own run
+      shown = { section: section.id, policy: id, at: view.asked, zoomed },
+      replayed = section.querySelector("[data-slot=replay]"),
+      numbers = this.same ? undefined : view.numbers()
+    this.left[section.id] = { ...shown, ...(replayed ? { moment: view.replay.at } : { numbers }) }
   }
   /** Remember the scene, and write it into the address: after a gesture, to come back from. */
   keep(put = history.pushState) {
     if (!this.section || this.staging) return
     this.remember()
-    const address = write(this.stateOf(this.section))
+    const address = write(this.left[this.section.id])
     if (address !== location.hash && this.begun) put.call(history, null, "", address)
     this.begun = true // the first scene keeps the page's own address
   }
   /** Show what the address says: a state, a section, or the first scene. */
   follow() {
-    const hash = location.hash.replaceAll("%2C", ",") // as some programs write it
-    const policies = this.sections.map(({ id, dataset }) => [id, words(dataset.policies)]),
-      sections = Object.fromEntries(policies)
-    const state = read(hash, sections, this.scene.moments),
+    const hash = location.hash.replaceAll("%2C", ","), // as some programs write it
+      policies = this.sections.map(({ id, dataset }) => [id, words(dataset.policies)]),
+      state = read(hash, Object.fromEntries(policies), this.scene.moments),
       named = state?.section ?? hash.slice(1),
-      known = this.sections.find(({ id }) => id === named)
-    if (!known && document.getElementById(named))
-      // another part of the page
-      return this.section ?? this.enter(this.sections[0])
-    const section = known ?? this.sections[0]
+      known = this.sections.find(({ id }) => id === named),
+      section = known ?? this.sections[0]
+    // Another part of the page
+    if (!known && document.getElementById(named)) return this.section ?? this.enter(section)
     if (hash || this.section) section.scrollIntoView()
     if (this.section) this.held = performance.now()
     this.enter(section, state ?? firstOf(section), history.replaceState)
@@ -250,9 +260,11 @@ class Article {
   // -- What buttons do
   /** @param {HTMLElement} pressed @param {string[]} words */
   async act(pressed, ...[verb, what]) {
-    await this.enter(/** @type {HTMLElement} */ (pressed.closest("section")))
-    const { view, section } = this
-    if (!section || this.staging) return
+    const section = /** @type {HTMLElement} */ (pressed.closest("section"))
+    await this.enter(section)
+    const { view } = this
+    if (section !== this.section || this.staging) return
+    this.tell(`${verb} ${what}`)
     const scene = (/** @type {Partial<State>} */ to) =>
       this.enter(section, { at: view.asked, policy: what, ...to }, history.pushState)
     if (verb === "policy") await scene({ moment: section.dataset.moment })
@@ -260,26 +272,26 @@ class Article {
       await scene({ at: (await this.part("proofs"))?.[what].at, zoomed: true })
     else if (verb === "reset") view.take(view.original)
     else if (verb === "refit") this.refit(what === "cell")
-    else await this.copy(pressed, what)
+    else if (verb === "copy") await this.copy(pressed)
+    else if (verb === "guess") {
+      section.dataset.guess = what
+      one(section, ".guess").textContent = `You said: the ${what}. `
+    }
   }
   refit(/** @type {boolean} */ here) {
     const { view, visited } = this
     view.redo() // just entered, it waits for a frame
     view.judge()
     if (view.policy.layers || !visited) return
-    const coefficients = refit(view.policy, visited, here ? [view.cell] : undefined)
-    view.take({ ...view.policy, coefficients })
+    view.take({ coefficients: refit(view.policy, visited, here ? [view.cell] : undefined) })
   }
-  /** @param {HTMLElement} pressed @param {string} what */
-  async copy(pressed, what) {
-    const { href } = location,
-      frame = `<iframe src="${href}" allow="clipboard-write" width="100%" height="800"></iframe>`,
-      text = what === "link" ? href : frame
+  /** @param {HTMLElement} pressed */
+  async copy(pressed) {
     try {
-      await navigator.clipboard.writeText(text)
-      pressed.textContent = `${what} copied`
+      await navigator.clipboard.writeText(location.href)
+      pressed.textContent = "link copied"
     } catch {
-      this.status.textContent = text
+      this.status.textContent = location.href
     }
   }
 
@@ -288,25 +300,26 @@ class Article {
     const { view, section } = this
     if (!section || this.staging || !view.played.states.length) return
     if (this.proved && !this.same) view.regions = null // they are not proved for another policy
-    const { results, policy, cell, cells } = view
-    if (this.visited && !policy.layers && this.rated !== view.kept) {
-      this.r2 = this.same ? view.original.r2 : rSquared(this.scene, policy, this.visited)
-      this.rated = view.kept
-    }
-    const here = [...view.failing.values()].filter(last => last === cell).length,
-      { failures, mean } = results,
-      rounded = { mean: mean.toFixed(2), r2: this.r2?.toFixed(2) },
-      about = { cell, cells, failures, here, episode: view.from.textContent, ...rounded },
-      known = new Map(Object.entries(about))
+    const { policy, cells } = view,
+      { failures, mean, played } = view.results,
+      { visited } = this,
+      r2 = visited && !this.same ? rSquared(this.scene, policy, visited) : view.original.r2,
+      rounded = { mean: mean.toFixed(2), exactly: mean.toFixed(3), r2: r2?.toFixed(2) },
+      about = { cells, failures, ...rounded },
+      known = new Map(Object.entries({ ...about, episode: view.from.textContent }))
     for (const output of section.querySelectorAll("output")) {
       const now = minus(String(known.get(String(output.dataset.say)) ?? output.value))
       if (output.value !== now) output.value = now
     }
-    const scale = one(this.root, ".scale"),
-      [low, high] = [scale.dataset.low, scale.dataset.high].map(Number),
-      score = String((mean - low) / (high - low))
-    one(scale, "*").style.setProperty("--score", score)
+    const [scale, won] = [".scale", ".won"].map(selector => one(this.root, selector)),
+      [low, high, aim] = [scale.dataset.low, scale.dataset.high, won.dataset.aim].map(Number),
+      done = !failures && played === this.scene.starts.length && section.id === "you"
+    one(scale, ".own").style.setProperty("--score", String((mean - low) / (high - low)))
+    won.textContent = done ? (mean > aim + 0.005 ? BEATEN : WON) : ""
   }
 }
 
-export const begin = async () => new Article(one(document, ".vsp-article"), await data("scene"))
+/** Begin the page. */
+export async function begin() {
+  return new Article(one(document, ".vsp-article"), await data("scene"))
+}

@@ -14,7 +14,7 @@ from pathlib import Path
 import yaml
 from stills import stills
 
-from data import longer, parts, policies
+from data import cuts, longer, parts, policies
 from vsp import VoronoiPolicy
 from vsp.run import atomic
 from vsp.show import style
@@ -24,14 +24,23 @@ from vsp.show.explorer.explorer import SECURITY
 FOLDER = Path(__file__).parent
 TITLE = "A network in a few equations"
 LONGER = 45_000  # more iterations in section 4: with them ten times as many
+LIMITS = {
+    "split": "max_pol_loss", "merge": "min_param_distance", "distance": "min_pol_distance", "n_split": "n_split",
+    "n_merge": "n_merge",
+}  # fmt: skip
 SCALE = 12, 17  # of the mean return, in section 7
+ABOUT = "400 walkers led by a network, and by three equations that one can read, drag and prove: the method runs live."
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 {security}
 <title>{title}</title>
+<meta name="description" property="og:description" content="{about}">
+<meta property="og:title" content="{title}"><meta property="og:image" content="article.png">
 <style>
 :root {{ color-scheme: light dark }}
-body {{ max-width: 68rem }}
+body {{ max-width: 84rem }}
+h1 {{ max-width: 68rem; margin-inline: auto }}
+@media (min-width: 85em) {{ h1 {{ max-width: none }} }}
 {style}</style></head>
 <body class="vsp-page"><main>
 <h1>{title}</h1>
@@ -39,7 +48,7 @@ body {{ max-width: 68rem }}
 {text}</div>
 </main>
 {data}
-<script type="module">
+<script type="module" id="vsp-script">
 {script}
 begin()
 </script>
@@ -50,14 +59,14 @@ begin()
 def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
     """Return the article's HTML with its numbers, each computed, and its pictures."""
     says, (low, high) = scene["says"], SCALE
-    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best", "three")}
+    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best", "misplaced")}
     still = {
         name: f'<figure class="still">{style.embedded(png, alt, width=460)}</figure>'
         for name, (png, alt) in pictures.items()
     }
-    limits = {name: run[name] for name in ("split", "merge", "distance", "n_split", "n_merge")}
+    limits = {short: run["config"][name] for short, name in LIMITS.items()}
     numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
-    numbers |= {"longer": LONGER, "longer_failures": longer(LONGER), "cite": citation()}
+    numbers |= {"longer": LONGER, "longer_failures": longer(LONGER), "cite": citation(), "cut": cut()}
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
     return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)
 
@@ -69,13 +78,30 @@ def citation() -> str:
 
 
 def card(policy: VoronoiPolicy) -> str:
-    """Return the equations of all cells as HTML."""
+    """Return the equations of all cells as HTML, each beside the colour of its cell."""
     lines = ""
-    for cell, codeword in enumerate(policy.codewords):
+    for cell, (codeword, colour) in enumerate(zip(policy.codewords, style.CELLS)):
         near = ", ".join(f"{value:.2f}" for value in codeword)
         equations = " ".join(f"<code>{one.replace('-', '−')}</code>" for one in policy.equations(cell))
-        lines += f"<p><b>Nearest to ({near})</b> {equations}</p>"
+        lines += f'<p style="--tint: {colour}"><b>Nearest to ({near})</b> {equations}</p>'
     return lines
+
+
+def cut() -> str:
+    """Return a moving picture of how a proof cuts the square of starts, as SVG: one stage after the other."""
+    stages, drawn = cuts(), ""
+    for i, pieces in enumerate(stages):
+        drawn += f'<g style="--at: {i}">'
+        for cell, corners in pieces:
+            way = " ".join(f"{100 * x:.1f} {100 - 100 * y:.1f}" for x, y in corners)
+            drawn += f'<path fill="{style.CELLS[cell]}" d="M{way}z"/>'
+        drawn += "</g>"
+    n = ", ".join(str(len(pieces)) for pieces in stages[1:])
+    words = f"The square after 1, 2, 3 steps: {n} pieces."
+    return (
+        f'<figure class="cut"><svg viewBox="0 0 100 100" role="img" aria-label="{words}">{drawn}</svg>'
+        f"<figcaption>{words}</figcaption></figure>"
+    )
 
 
 def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
@@ -89,11 +115,12 @@ def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:
         for name, part in data.items()
     )
     look, script = ((FOLDER / f"article.{name}").read_text("utf-8") for name in ("css", "bundle.js"))
-    return PAGE.format(title=TITLE, style=STYLE + look, text=said, data=stored, script=script, security=SECURITY)
+    parts = {"style": STYLE + look, "text": said, "data": stored, "script": script, "security": SECURITY}
+    return PAGE.format(title=TITLE, about=ABOUT, **parts)
 
 
 if __name__ == "__main__":
     pictures = stills()
     docs = Path(sys.argv[1]) / "docs"
     atomic.write_text(docs / "article.html", page(parts(), pictures))
-    atomic.write_bytes(docs / "article.png", pictures["fails"][0])
+    atomic.write_bytes(docs / "article.png", pictures["opening"][0])

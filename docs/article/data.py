@@ -23,7 +23,8 @@ from vsp.paper.baselines import linear_map, refit
 from vsp.paper.printed import published_policy
 from vsp.paper.results import read_results as read_paper_results
 from vsp.rollouts import Episodes, Policy, rollout
-from vsp.show.explorer.scene import scene_of, starts_of
+from vsp.show import state_space
+from vsp.show.explorer.scene import encoded, network_of, scene_of, starts_of
 from vsp.tasks.base import GOAL, RUNNING
 from vsp.tasks.simplegoal import PIT_LOW, TASK
 from vsp_beyond.optimum import best_policy, best_returns
@@ -35,8 +36,10 @@ from vsp_beyond.proofs.simplegoal_proof import SIDES
 SEED = 0  # of the run, as in notebook 02
 N_REFIT = EPISODES_AHEAD  # episodes to refit on: the first of those from which the run learnt
 MARGIN = 0.05  # between a codeword that is drawn in and the edge of the plane
+OUT_OF_PLACE = (0.4, 0.3)  # where a codeword lies in section 7
 FIRST = (0.9, 0.8)  # the start that is chosen at first
 N_FIT = 200  # episodes that the one linear map is fitted to
+N_CUTS = 3  # steps after which the square is shown in pieces
 N_ARROWS = 14  # along each axis, as in picture.js
 DIGITS = {"paper": 7, "margin": 12}  # of the corners of failing starts: the margin's are to be enlarged
 NAMES = {
@@ -49,13 +52,14 @@ NAMES = {
     "tuned_1": "one linear map, tuned for the return",
     "margin": "tuned with a margin, three cells",
     "three": "three cells that pass the pit on both sides",
+    "misplaced": "the three cells, one codeword out of place",
 }
 
 
 def parts() -> dict[str, dict]:
     """Return the parts of the article's data by name, each JSON-serialisable: the same on every machine whose kernels
     are fixed."""
-    return {"scene": scene(), "teacher": network(), "run": run(), "visited": visited(), "proofs": proofs()}
+    return {"scene": scene(), "teacher": network_of(teacher()), "run": run(), "visited": visited(), "proofs": proofs()}
 
 
 # Policies
@@ -76,8 +80,8 @@ def distilled() -> tuple[VoronoiPolicy, vsp.History]:
 @functools.cache
 def policies() -> dict[str, VoronoiPolicy]:
     """Return the policies of the article, in the order of `NAMES`."""
-    on_both_sides = np.zeros((3, 3, 2))
-    on_both_sides[:, 2] = [[-1.0, -1.0], [-0.8, -1.0], [-1.0, -0.8]]  # cells at the goal, right of the pit, above it
+    on_both_sides = np.zeros((3, 3, 2))  # of earlier links
+    on_both_sides[:, 2] = [[-1.0, -1.0], [-0.8, -1.0], [-1.0, -0.8]]
     episodes = vsp.collect_episodes(teacher(), TASK, vsp.start_states(TASK, N_FIT, 0))
     made = {
         "one_map": linear_map(episodes.states, episodes.actions, TASK.name),
@@ -89,6 +93,7 @@ def policies() -> dict[str, VoronoiPolicy]:
         "tuned_1": kept("limit", "_size_1"),
         "margin": load_certificate("simplegoal_margin")[0],
         "three": VoronoiPolicy([[0.25, 0.25], [0.75, 0.4], [0.4, 0.75]], on_both_sides, task=TASK),
+        "misplaced": misplaced(drawn_in(kept("faithful", "_size_3"))),
     }
     return {name: made[name] for name in NAMES}
 
@@ -110,6 +115,15 @@ def drawn_in(policy: VoronoiPolicy) -> VoronoiPolicy:
     room = np.where(ways > 0, 1 - MARGIN - middle, middle - MARGIN)  # to the nearest edge in each direction
     codewords = middle + ways * (room / np.abs(ways)).min()
     return VoronoiPolicy(codewords, policy.coefficients, task=TASK, metric=policy.metric, scale=policy.scale)
+
+
+def misplaced(policy: VoronoiPolicy) -> VoronoiPolicy:
+    """Return a policy whose last codeword is at `OUT_OF_PLACE`, all numbers with two digits, as a link carries them."""
+    codewords = policy.codewords.round(2)
+    codewords[-1] = OUT_OF_PLACE
+    return VoronoiPolicy(
+        codewords, policy.coefficients.round(2), task=TASK, metric=policy.metric, scale=policy.scale.round(2)
+    )
 
 
 def longer(more: int) -> int:
@@ -135,12 +149,24 @@ def learnt_from() -> Episodes:
 # The scene
 
 
+def walks() -> dict:
+    """Return the teacher's episodes from the scene's starts: how many states each has, and all states in units of
+    1/65535, little-endian, as base64."""
+    episodes = vsp.collect_episodes(teacher(), TASK, starts_of(TASK))
+    ends = [TASK.step(each.states[-1:], each.actions[-1:])[0] for each in episodes]
+    ways = [np.concatenate([each.states, end]) for each, end in zip(episodes, ends)]
+    whole = np.concatenate(ways).astype(float) * 65535
+    stored = base64.b64encode(whole.round().astype("<u2").tobytes()).decode()
+    return {"lengths": [len(way) for way in ways], "states": stored}
+
+
 def scene() -> dict:
     """Return task, plane, starts and policies as the explorer has them, and what the text says."""
     made = scene_of({NAMES[name]: policy for name, policy in policies().items()}, TASK)
     shown = {"teacher": taught()} | dict(zip(NAMES, made["policies"]))
     made["policies"] = {name: about | {"r2": says()[f"{name}_r2"]} for name, about in shown.items()}
-    return made | {"teacher": played(teacher()), "moments": len(run()["n"]), "says": says()}
+    shown = {"teacher": played(teacher()), "moments": len(run()["n"]), "walks": walks()}
+    return made | shown | {"says": says()}
 
 
 def taught() -> dict:
@@ -178,8 +204,9 @@ def says() -> dict[str, float | str]:
         numbers[f"{name}_r2"] = measure.fidelity(policy, teacher(), TASK, states)["r2"]
     numbers |= {f"scale_{axis}": value for axis, value in zip("xy", policies()["faithful_3"].scale.tolist())}
     numbers |= {"turns_at": turns_at(), "one_change": changed("one_map", 0, 1, 1, 1.0)}  # the number of y in Δy
-    numbers |= {"three_change": changed("three", 1, 2, 0, -0.3)}  # the bias of Δx
-    return numbers | about_run() | from_tables()
+    three = policies()["faithful_3"]
+    numbers |= {"three_numbers": three.codewords.size + three.coefficients.size} | aloud(three)
+    return numbers | about_run() | about_spike() | from_tables()
 
 
 def turns_at(y: float = 0.9) -> float:
@@ -188,6 +215,16 @@ def turns_at(y: float = 0.9) -> float:
     ways = [each.states for each in vsp.collect_episodes(teacher(), TASK, starts)]
     left = [way[(way < PIT_LOW).any(axis=1)][0, 0] < PIT_LOW for way in ways]
     return float(starts[left.index(False), 0])
+
+
+def aloud(policy: VoronoiPolicy) -> dict[str, float]:
+    """Return what is read aloud of three cells: the greatest Δx of the first and the greatest Δy of the second, over a
+    grid of the square, and the numbers of x and y that the first Δx has."""
+    points = state_space.grid(TASK.low, TASK.high, 401)[2]
+    maps, cells = policy.coefficients, policy.cells(points)
+    most = [(points[cells == i] @ maps[i, :2] + maps[i, 2])[:, i].max() for i in (0, 1)]
+    left, down = (np.ceil(10 * value) / 10 for value in most)  # so that "below" is true
+    return {"goes_left": left, "goes_down": down, "of_x": maps[0, 0, 0], "of_y": -maps[0, 1, 0]}
 
 
 def changed(name: str, cell: int, term: int, action: int, value: float) -> int:
@@ -231,11 +268,22 @@ def about_run() -> dict[str, float | str]:
     return {
         "run_episodes": len(history.cells),
         "run_cells": len(policy),
-        "run_worst_cell": worst,
+        "run_worst_cell": int(state_space.birth_colours(policy, history)[0][worst]),
         "run_worst_cell_failures": int(failing_cells()[worst]),
         "fails_at": ",".join(map(str, starts_of(TASK)[cured][0])),
         "refit_states": len(learnt_from().states),
     }
+
+
+def about_spike() -> dict[str, int]:
+    """Return the worst moment of the run after half of its iterations: failures before, then, and after how many
+    iterations there are less than half as many."""
+    stored = run()
+    n, failures = np.array(stored["n"]), np.array(stored["failures"])
+    at = int(np.where(n > n[-1] // 2, failures, 0).argmax())
+    healed = next(i for i in range(at, len(n)) if failures[i] < failures[at] / 2)
+    about = {"at": n[at], "before": failures[at - 1], "then": failures[at], "healed": n[healed] - n[at]}
+    return {f"spike_{what}": int(value) for what, value in about.items()}
 
 
 def from_tables() -> dict[str, float]:
@@ -263,19 +311,7 @@ def from_tables() -> dict[str, float]:
 # The teacher's network, the run, and the episodes that it learnt from
 
 
-def encoded(arrays: list[np.ndarray]) -> str:
-    """Return the numbers of some arrays, one array after the other, as base64 of little-endian float32."""
-    return base64.b64encode(b"".join(np.ascontiguousarray(each, "<f4").tobytes() for each in arrays)).decode()
-
-
-def network() -> dict:
-    """Return the teacher's layers: for each the weights (outputs, inputs), row by row, then the biases."""
-    actor = teacher().actor
-    sizes = [actor.layers[0][0].shape[0], *(len(bias) for _, bias in actor.layers)]
-    layers = [part for weight, bias in actor.layers for part in (weight.T, bias)]
-    return {"sizes": sizes, "weights": encoded(layers)}
-
-
+@functools.cache
 def run() -> dict:
     """Return the run at every change and every `History.every` iterations; the last moment is the final policy."""
     (policy, history), config = distilled(), vsp.preset(TASK.name)
@@ -296,12 +332,9 @@ def run() -> dict:
         "cells": [len(each) for each in snapshots],
         "codewords": codewords,
         "coefficients": encoded([each.coefficients for each in snapshots]),
+        "failures": [played(each)["failures"] for each in snapshots],
         "events": events,
-        "split": config.max_pol_loss,
-        "merge": config.min_param_distance,
-        "distance": config.min_pol_distance,
-        "n_split": config.n_split,
-        "n_merge": config.n_merge,
+        "config": dataclasses.asdict(config),
     }
 
 
@@ -337,6 +370,17 @@ def failing_starts(name: str, digits: int) -> dict:
     box = [(middle - reach).round(digits).tolist(), (middle + reach).round(digits).tolist()]
     inside = np.reshape(polygons[0], (-1, 2)).mean(axis=0).round(digits).tolist()
     return {"share": float(share), "polygons": polygons, "box": box, "at": inside}
+
+
+def cuts() -> list[list[tuple[int, list[tuple[float, float]]]]]:
+    """Return how the square of starts is cut after 0, 1, ... steps of the policy with a margin: of each piece the cell
+    of its last step and its corners."""
+    pieces, stages = [Piece(SQUARE)], []
+    for _ in range(N_CUTS + 1):
+        stages.append([(each.steps[-1].cell if each.steps else 0, each.starts.points()) for each in pieces])
+        loop = Loop(policies()["margin"])
+        pieces = [after for piece in pieces for after in (loop.advance(piece) if piece.outcome == RUNNING else [piece])]
+    return stages
 
 
 def followed(policy: VoronoiPolicy, itineraries: list[list[str]]) -> list[Polygon]:

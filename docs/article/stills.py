@@ -22,8 +22,8 @@ from vsp.tasks.simplegoal import TASK
 WIDTH, PIXELS = 3.2, 880  # inches and pixels: shown 440 pixels wide, a type of 8 points is 15 pixels high
 N_COLOURS = 24  # of the palette of a PNG
 N_GRID = 403  # points on an axis: few lie on a border, where cells are tied
-TINTS = ("#f1e3cd", "#dfe9f2", "#e3efe0", "#f0e0ee", "#ececec", "#f7f3c9")  # pale, so that dots and arrows stand out
 WAYS = np.array([[0.95, 0.62], [0.62, 0.95], [0.85, 0.85]])  # starts of the teacher's ways
+HALFWAY = 4  # steps of the walkers
 MOMENTS = (0, 20, 40, 4999)  # iterations of the run
 SLIVER, ENLARGED = ((0.499, 0.503), (0.497, 0.501)), 250  # x and y of what is enlarged, and how many times
 DECIMALS = {"paper": 4, "margin": 5}  # of the areas that fail, in percent, as in the text
@@ -32,14 +32,40 @@ DECIMALS = {"paper": 4, "margin": 5}  # of the areas that fail, in percent, as i
 def stills() -> dict[str, tuple[bytes, str]]:
     """Return a PNG and its alternative text for each section of the article, by name."""
     makers: dict[str, Callable[[], tuple[Figure, str]]] = {
-        "teacher": _teacher, "one-map": _one_map, "cells": _cells, "fails": _fails, "few": _few, "certain": _certain,
-        "you": _you,
+        "opening": _opening, "teacher": _teacher, "one-map": _one_map, "cells": _cells, "fails": _fails, "few": _few,
+        "certain": _certain, "you": _you,
     }  # fmt: skip
     made = {}
     for name, make in makers.items():
         figure, alt = make()
         made[name] = _png(figure), alt
     return made
+
+
+def _opening() -> tuple[Figure, str]:
+    policy, said = data.policies()["faithful_3"], []
+    fig, axes = _boards(2, height=2.75)
+    says = data.says()
+    names = f"network: {says['weights']:,} numbers", f"three equations: {says['three_numbers']}"
+    _tiles(axes[1], policy)
+    for ax, each, name, colour in zip(axes, (data.teacher(), policy), names, (style.TEACHER, "black")):
+        there = 0
+        for episode in vsp.collect_episodes(each, TASK, starts_of(TASK)):
+            way = np.concatenate([episode.states, TASK.step(episode.states[-1:], episode.actions[-1:])[0]])
+            there += len(way) <= HALFWAY + 1
+            way = way[: HALFWAY + 1][-2:]
+            ax.plot(*way.T, color=colour, lw=0.5, alpha=0.5, zorder=3)
+            ax.plot(*way[-1], ls="", marker=".", ms=2.5, color=colour, zorder=4)
+        said.append(there)
+        ax.set_title(name, loc="left")
+    for i, colour in enumerate(style.CELLS[: len(policy)]):
+        text, box = "   ".join(policy.equations(i)).replace("-", "−"), {"fc": _pale(colour), "ec": "none", "pad": 2}
+        fig.text(0.02, 0.17 - 0.065 * i, text, fontsize=6, bbox=box)
+    fig.get_layout_engine().set(rect=(0, 0.22, 1, 0.78))
+    return fig, (
+        "Two squares with goal and pit. 400 dots walk to the goal and around the pit, left led by a network, right by "
+        f"three equations, each in its cell's colour. After {HALFWAY} steps {said[0]} and {said[1]} are at the goal."
+    )
 
 
 def _teacher() -> tuple[Figure, str]:
@@ -74,7 +100,7 @@ def _cells() -> tuple[Figure, str]:
         policy = final if n == MOMENTS[-1] else history.policy_at(n)
         cells = f"{len(policy)} cell{'s' * (len(policy) > 1)}"
         said.append(f"{cells} in iteration {n:,}")
-        _tiles(ax, policy)
+        _tiles(ax, policy, history, n)
         state_space.codewords(ax, policy.codewords)
         ax.set_title(f"iteration {n:,}: {cells}", loc="left")
     return fig, (
@@ -86,14 +112,15 @@ def _fails() -> tuple[Figure, str]:
     trained, refitted = data.policies()["run"], data.repaired()["run_worst_refitted"]
     worst, counts = int(data.failing_cells().argmax()), []
     x, y, points = state_space.grid(TASK.low, TASK.high, N_GRID)
+    pale = _pale(style.CELLS[state_space.birth_colours(trained, data.distilled()[1])[1][worst]])
     index, inside = trained.cells(points), _points(11)[trained.cells(_points(11)) == worst]
     fig, axes = _boards(2, height=2.15)
     for ax, policy, name in zip(axes, (trained, refitted), ("as trained", "this cell refitted")):
-        marked = np.where(index.reshape(x.shape)[..., None] == worst, to_rgb(TINTS[0]), 1.0)
+        marked = np.where(index.reshape(x.shape)[..., None] == worst, pale, 1.0)
         state_space.image(ax, x, y, marked, interpolation="nearest", zorder=0)
         state_space.cells(ax, x, y, index, width=0.4, color="0.6")
         state_space.cells(ax, x, y, (index == worst).astype(int), width=1.4)
-        _arrows(ax, policy, style.DISTILLED, where=inside)
+        _arrows(ax, policy, style.OTHER, where=inside)
         counts.append(_failing(ax, policy, worst))
         ax.set_title(f"{name}: {counts[-1]} fail", loc="left")
     _legend(fig, axes[0])
@@ -111,7 +138,7 @@ def _few() -> tuple[Figure, str]:
     for ax, k in zip(axes, sizes):
         policy = data.policies()[f"faithful_{k}"]
         _tiles(ax, policy)
-        _arrows(ax, policy, style.OURS, n=9)
+        _arrows(ax, policy, style.OTHER, n=9)
         ax.set_title(f"{k} cells\nR² {says[f'faithful_{k}_r2']:.2f}", loc="left")
     r2 = ", ".join(f"{says[f'faithful_{k}_r2']:.2f} with {k} cells" for k in sizes)
     return fig, (
@@ -140,7 +167,7 @@ def _certain() -> tuple[Figure, str]:
 
 
 def _you() -> tuple[Figure, str]:
-    policy = data.policies()["three"]
+    policy = data.policies()["misplaced"]
     fig, (ax,) = _boards(1, height=4.0)
     _tiles(ax, policy)
     _arrows(ax, policy, style.OTHER, n=11)
@@ -151,7 +178,7 @@ def _you() -> tuple[Figure, str]:
     said = [f"{name}: return {row['mean']:.2f}, {row['failures']} of 400 fail" for name, row in played.items()]
     ax.set_xlabel("\n".join(said))
     _legend(fig, ax)
-    shown = "Three cells with their codewords; arrows point down and left, and pass the pit on both sides."
+    shown = "Three cells with their codewords, one out of place, and arrows: they lead into the pit from one side."
     return fig, f"{shown} {'; '.join(said).capitalize()}."
 
 
@@ -180,18 +207,15 @@ def _arrows(ax: Axes, policy: Policy, color: str, *, n: int = 12, where: np.ndar
     state_space.arrows(ax, states, actions, color=color)
 
 
-def _tiles(ax: Axes, policy: vsp.VoronoiPolicy) -> None:
-    """Draw the cells of a policy, neighbours in different tints: each takes the first that no neighbour has."""
+def _tiles(ax: Axes, policy: vsp.VoronoiPolicy, history: vsp.History | None = None, n: float = np.inf) -> None:
+    """Draw the cells of a policy in their colours: with the history of a run, of that after iteration n."""
     x, y, points = state_space.grid(TASK.low, TASK.high, N_GRID)
-    index = policy.cells(points).reshape(x.shape)
-    pairs = np.hstack([(index[1:].ravel(), index[:-1].ravel()), (index[:, 1:].ravel(), index[:, :-1].ravel())])
-    tints = np.full(len(policy), -1)
-    for cell in range(len(policy)):
-        taken = set(tints[pairs[:, (pairs == cell).any(axis=0)]].ravel().tolist())
-        tints[cell] = min(set(range(len(TINTS))) - taken)
-    colours = np.array([to_rgb(tint) for tint in TINTS])
-    state_space.image(ax, x, y, colours[tints[index]], interpolation="nearest", zorder=0)
-    state_space.cells(ax, x, y, index.ravel())
+    state_space.cells(ax, x, y, policy.cells(points), fill=state_space.birth_colours(policy, history, n)[1])
+
+
+def _pale(colour: str) -> np.ndarray:
+    """Return a colour of `style.CELLS` as pale as pictures show it. (3,)"""
+    return 1 - state_space.PALE * (1 - np.array(to_rgb(colour)))
 
 
 def _failing(ax: Axes, policy: vsp.VoronoiPolicy, cell: int | None = None) -> int:

@@ -1,7 +1,7 @@
 // What the article's scripts pass to each other, for `tsc` alone; data.py writes the parts.
 
 type Parts = {
-  scene: Scene & { moments: number }
+  scene: Scene & { moments: number; walks: Walks }
   teacher: StoredNetwork
   run: StoredRun
   visited: { states: string; actions: string }
@@ -13,9 +13,10 @@ type StoredRun = {
   codewords: [moment: number, codewords: Vector[]][] // where they change
   coefficients: string
   events: (Change & { n: number })[]
-  split: number
-  merge: number
+  failures: Vector
+  config: Settings
 }
+type Walks = { lengths: Vector; states: string }
 type Proof = { polygons: Vector[]; box: [low: Vector, high: Vector]; at: Vector }
 
 // A scene of a section: `moment` of its run, which an attribute may give, and a reader's `numbers`

@@ -24,7 +24,7 @@ class Article(SphinxDirective):
         page = _FILE.read_text("utf-8")
         text = re.search(r'<div class="vsp-article">.*</div>(?=\n</main>)', page, re.DOTALL)[0]
         data = (f'{match[1]} data-source="_static/article-{match[2]}.json"></script>' for match in _DATA.finditer(page))
-        script = '<script type="module" src="_static/article.js"></script>'
+        script = '<script type="module" id="vsp-script" src="_static/article.js"></script>'
         return [nodes.raw("", _DOOR.sub(r'<a href="\1">', text) + "".join(data) + script, format="html")]
 
 
@@ -33,7 +33,7 @@ def _write(app, error):
         page, static = _FILE.read_text("utf-8"), app.outdir / "_static"
         for match in _DATA.finditer(page):
             (static / f"article-{match[2]}.json").write_text(match[3], "utf-8")
-        script = re.search(r'<script type="module">(.*?)</script>', page, re.DOTALL)[1]
+        script = re.search(r'<script type="module" id="vsp-script">(.*?)</script>', page, re.DOTALL)[1]
         (static / "article.js").write_text(script, "utf-8")
 
 

@@ -13,7 +13,8 @@ from vsp.paper.baselines import linear_map
 from vsp.paper.printed import TASKS, published_policy
 from vsp.paper.results import read_results
 from vsp.show.explorer import Explorer
-from vsp.show.explorer.scene import to_json
+from vsp.show.explorer.scene import bench_of, to_json
+from vsp.show.explorer.scripts import BENCH
 from vsp.teachers.teacher import Teacher
 
 AGENTS = comparison.RESULTS / "agents"
@@ -65,8 +66,22 @@ class Shown(SphinxDirective):
         return [nodes.raw("", next(iter(explorers.values())).element(sources=sources), format="html")]
 
 
+class Bench(SphinxDirective):
+    """Shows the workbench. Its content is for readers of the source."""
+
+    has_content = True
+
+    def run(self):
+        top = "../" * self.env.docname.count("/") + "_static/workbench"
+        script = f'<script type="module" id="vsp-script" src="{top}.js"></script>'
+        return [nodes.raw("", f'<div class="vsp-explorer" data-bench="{top}.json"></div>{script}', format="html")]
+
+
 def _write(app, error):
-    """The scenes, beside the pages."""
+    """The scenes and the workbench, beside the pages."""
+    if error is None:
+        (app.outdir / "_static/workbench.json").write_text(to_json([bench_of(task) for task in TASKS]), "utf-8")
+        (app.outdir / "_static/workbench.js").write_text(f"{BENCH}\nbegin()\n", "utf-8")
     for task, explorer in app.explorers.items() if error is None else ():
         (app.outdir / "_static" / f"{task}.json").write_text(to_json(explorer.scene), "utf-8")
 
@@ -74,5 +89,6 @@ def _write(app, error):
 def setup(app):
     app.explorers = {}
     app.add_directive("explorer", Shown)
+    app.add_directive("workbench", Bench)
     app.connect("build-finished", _write)
     return {"parallel_read_safe": False, "parallel_write_safe": True}

@@ -18,13 +18,12 @@ addEventListener("DOMContentLoaded", async () => {
 })
 
 // Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
+const LONG = "article :is(pre, .pst-scrollable-table-container, div.math)"
 const mark = (/** @type {Element} */ box) =>
   box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
 addEventListener("load", () => {
   const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
-  for (const box of document.querySelectorAll(
-    "article :is(pre, .pst-scrollable-table-container, div.math)",
-  )) {
+  for (const box of document.querySelectorAll(LONG)) {
     sizes.observe(box)
     box.addEventListener("scroll", () => mark(box), { passive: true })
   }
@@ -38,19 +37,12 @@ var splitQuery = (/** @type {string} */ query) =>
     .split(/[^\p{Letter}\p{Number}_]+/u)
     .filter(term => term.length > 1)
 
-// The glossary explains a word; all else only uses it. (Sphinx's search takes this for its own.)
-var Scorer = {
-  objNameMatch: 11,
-  objPartialMatch: 6,
-  objPrio: { 0: 15, 1: 5, 2: -5 },
-  objPrioDefault: 0,
-  title: 15,
-  partialTitle: 7,
-  term: 5,
-  partialTerm: 2,
-  score: (/** @type {[string, string, string, string, number]} */ [page, , anchor, , score]) =>
-    page == "glossary" && score > 6 ? score + (anchor ? 30 : 20) : score,
-}
+// The glossary explains a word; all else only uses it. (Sphinx's search has a place for this.)
+document.addEventListener("DOMContentLoaded", () => {
+  const { Scorer = {} } = /** @type {any} */ (globalThis)
+  Scorer.score = (/** @type {(string | number)[]} */ [page, , anchor, , score]) =>
+    page === "glossary" && +score > 6 ? +score + (anchor ? 30 : 20) : score
+})
 
 // "What is a cell?" asks for the cell. A hit leads to the words, not to the top of a long page.
 {

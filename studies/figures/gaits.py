@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from vsp.show import style
+from vsp.show.state_space import PALE
 
 ENDS = ("x0", "z0", "x1", "z1")
 APART = 1.6  # metres from one pose to the next
@@ -29,13 +30,13 @@ def poses(ax: Axes, gait: pd.DataFrame, *, every: int) -> None:
 
 def cell_colors(gait: pd.DataFrame) -> dict[int, str]:
     """Return the colour of each cell that acts, in order of number; a number has the same colour in each figure."""
-    return {int(cell): style.COLOURS[int(cell) % len(style.COLOURS)] for cell in np.unique(gait.cell)}
+    return {int(cell): style.CELLS[int(cell) % len(style.CELLS)] for cell in np.unique(gait.cell)}
 
 
 def footfall(ax: Axes, gait: pd.DataFrame, *, step_seconds: float) -> None:
-    """Draw over time the active cell, as a band in its colour, and which foot is on the ground, as black bars."""
+    """Draw over time the active cell, as a band in its colour, pale, and which foot is on the ground, as black bars."""
     colors, times = cell_colors(gait), step_seconds * np.arange(len(gait))
-    ax.bar(times, 0.8, step_seconds, 1.6, align="edge", color=[colors[int(cell)] for cell in gait.cell])
+    ax.bar(times, 0.8, step_seconds, 1.6, align="edge", color=[colors[int(cell)] for cell in gait.cell], alpha=PALE)
     for time, cell in zip(times, gait.cell):
         ax.text(time + step_seconds / 2, 2.0, str(cell), ha="center", va="center", size="small")
     for i, foot in enumerate(("front", "back")):

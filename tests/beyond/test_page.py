@@ -79,7 +79,7 @@ def test_by_hand_what_a_page_says_of_cells_states_and_sizes():
     tried = judged(0.9, [1], [1], 1, True), judged(0.8, [1], [1], 2, True)
     said = page._sizes([dataclasses.replace(tried[0], policy=TWO), tried[1]], TWO)
     assert "1 cell (chosen)" in said and "2 cells (chosen)" not in said and "too low" not in said
-    many = vsp.VoronoiPolicy(np.zeros((7, 2)) + np.arange(7)[:, None], np.zeros((7, 3, 2)), task=SIMPLEGOAL)
+    many = vsp.VoronoiPolicy(np.zeros((9, 2)) + np.arange(9)[:, None], np.zeros((9, 3, 2)), task=SIMPLEGOAL)
     assert page._cards(many, of_two([[0.2, 0.2]], [[0.0, 0.0]])).count("border-top") == 1  # a colour that comes again
 
 

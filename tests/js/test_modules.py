@@ -4,7 +4,6 @@ import base64
 import dataclasses
 import functools
 import importlib
-import itertools
 import json
 import re
 import shutil
@@ -14,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
 import vsp
 from studies import comparison
@@ -25,6 +23,7 @@ from vsp.rollouts import rollout
 from vsp.run.atomic import ROOT
 from vsp.show import state_space
 from vsp.show.explorer import PLANES, scene_of
+from vsp.show.explorer.scene import network_of
 
 HERE, NODE = Path(__file__).resolve().parent, shutil.which("node")
 SIMPLEGOAL, *_ = TASKS = [*PLANES]
@@ -97,15 +96,15 @@ def test_least_squares_are_numpys():
         assert np.allclose(found, np.linalg.lstsq(a, b)[0], rtol=0, atol=1e-9)
 
 
-def test_the_network_is_the_teachers(article):
+def test_the_network_is_the_teachers():
     values = states = RANDOM.uniform(size=(500, 2)).astype(np.float32).astype(float)  # as a network sees them
     layers = [[part.astype(float) for part in layer] for layer in vsp.load_teacher(SIMPLEGOAL).actor.layers]
     for i, (weights, biases) in enumerate(layers, 1):
         values = values @ weights + biases
         values = np.maximum(values, 0) if i < len(layers) else np.tanh(values)
     code = "const policy = model.network(network); return states.map(state => model.act(scene, policy, state).action)"
-    given = {"network": article.network(), "states": states.tolist(), "scene": scene_of({}, vsp.get_task(SIMPLEGOAL))}
-    assert np.allclose(model(code, **given), values, rtol=0, atol=1e-6)
+    given = {"network": network_of(vsp.load_teacher(SIMPLEGOAL)), "scene": scene_of({}, vsp.get_task(SIMPLEGOAL))}
+    assert np.allclose(model(code, **given, states=states.tolist()), values, rtol=0, atol=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -134,40 +133,80 @@ def test_what_the_teacher_did_is_pythons_and_so_are_r2_and_refitted_maps(article
         assert np.allclose(found, wanted, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_run_in_the_browser_is_pythons(seed):
-    """Codewords and maps, for thresholds between which runs differ much."""
-    task, teacher = vsp.get_task(SIMPLEGOAL), vsp.load_teacher(SIMPLEGOAL)
-    schedule = {"n_epochs": 100, "n_split": 2, "n_merge": 5, "n_freeze": 10, "n_reset": 1000}
-    exact = dataclasses.replace(vsp.preset(task), fit="closed_form", initial="zeros", **schedule)
-    starts, *_ = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))  # as a run draws
-    with threadpool_limits(1):  # for the same last bits
-        taught = [*vsp.teacher_episodes(teacher, task, 100, starts)]
-    episodes = [{name: getattr(each, name).astype(float).tolist() for name in ("states", "actions")} for each in taught]
-    limits = [*itertools.product((1e-4, 0.1, 0.5), (0.1, 0.3), (0.3, 1.2))]
-    code = """return limits.map(([loss, distance, difference]) => {
-      const partition = new algorithms.Partition({ loss, distance, difference }, 2)
-      for (const _ of algorithms.distil(partition, episodes, { split: 2, merge: 5, freeze: 10 }));
-      return partition
-    })"""
-    made = model(code, ROOT / "vsp/show/explorer/algorithms.js", limits=limits, episodes=episodes)
-    for (loss, far, apart), found in zip(limits, made, strict=True):
-        config = dataclasses.replace(exact, max_pol_loss=loss, min_pol_distance=far, min_param_distance=apart)
-        policy, _ = vsp.distill(teacher, task, config, seed=seed, progress=False)
-        assert np.array_equal(policy.codewords, found["codewords"])
-        assert np.allclose(policy.coefficients, found["coefficients"], rtol=0, atol=1e-7)
+SOON = {"n_split": 20, "n_merge": 30, "n_reset": 100}
+READINGS = [
+    {}, {"one_split": True, "scale": "box"}, {"freeze": "first_n_freeze"},
+    {"freeze": "last_n_split", "initial": "zeros"},
+    {"split_metric": "euclidean", "metric": "euclidean"}, {"periodic_reset": "off", "adam_on_reset": "restart"},
+    {"split_loss": "clipped", "merge_parameters": "weights"}, {"inclusive": True, "metric": "chebyshev"},
+    {"fit": "closed_form", "max_pol_loss": 0.02}, {"n_minibatches": 3, "batch_size": 16, "learning_rate": 0.01},
+    {"n_split": 10, "n_merge": 30, "min_pol_distance": 0.02, "min_param_distance": 0.8},
+]  # fmt: skip
 
 
-def test_no_two_neighbours_share_a_colour():
-    side, metrics = 60, 200 * ("euclidean", "manhattan", "chebyshev")
-    square = state_space.grid(np.zeros(2), np.ones(2), side)[2]
-    pictures = [vsp.nearest(RANDOM.uniform(size=(2 + i // 4, 2)), square, metrics[i]) for i in range(200)]
-    for task in TASKS:
-        low, high = map(np.array, PLANES[task][:2])
-        inputs = vsp.get_task(task).see(state_space.grid(low, high, side)[2])
-        pictures += [policy.cells(inputs) for policy in policies(task)]
-    code = "return pictures.map(cells => model.colouring(cells, side, Math.max(...cells) + 1))"
-    for cells, colours in zip(pictures, model(code, side=side, pictures=[cells.tolist() for cells in pictures])):
-        cells, shown = cells.reshape(side, side), np.array(colours)[cells].reshape(side, side)
-        for axis in (0, 1):
-            assert (np.diff(shown, axis=axis)[np.diff(cells, axis=axis) != 0] != 0).all()
+class Recorder:
+    """A generator that keeps what it draws, from 0 to 1."""
+
+    def __init__(self, seed):
+        self.rng, self.drawn = np.random.Generator(np.random.PCG64(seed)), []
+
+    def __getattr__(self, name):
+        return getattr(self.rng, name)
+
+    def random(self, size):
+        self.drawn.append(self.rng.random(size))
+        return self.drawn[-1]
+
+    def uniform(self, low, high, size):
+        return low + (high - low) * self.random(size)
+
+
+def recorded(task, config, monkeypatch):
+    """A run: its history, numbers drawn for maps and for rows, and the teacher's episodes."""
+    recorders, episodes = [], []
+    monkeypatch.setattr(vsp.history, "SNAPSHOT_EVERY", 1)
+    with monkeypatch.context() as patch:
+        patch.setattr(np.random, "default_rng", lambda seed: recorders.append(Recorder(seed)) or recorders[-1])
+        patch.setattr(vsp.algorithms, "steps", lambda each, *_, **__: (episodes.append(e) or e for e in each))
+        _, history = vsp.algorithms.distill(vsp.load_teacher(task.name), task, config, seed=3)
+    maps, rows = (np.concatenate([part.ravel() for part in r.drawn] or [[]]).tolist() for r in recorders[1:])
+    given = [{what: getattr(e, what).astype(float).tolist() for what in ("states", "actions")} for e in episodes]
+    return history, {"maps": maps, "rows": rows, "episodes": given}
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_a_run_in_the_browser_is_pythons_in_every_iteration(name, monkeypatch):
+    """The same episodes and draws give the same codewords, maps and losses, for eleven settings."""
+    task, n = vsp.get_task(name), {"SimpleGoal-v0": 240}.get(name, 110)
+    code = """return (([at, drawn]) => {
+      const draws = { map: n => maps.slice(at, (at += n)), rows: n => rows.slice(drawn, (drawn += n)) }
+      const partition = new algorithms.Partition(config, task, draws), found = []
+      for (const { n, loss } of algorithms.distil(partition, episodes))
+        found[n] = structuredClone([partition.look.codewords, partition.look.coefficients, loss])
+      return [found, maps.length - at, rows.length - drawn]
+    })([0, 0])"""
+    ends = {"low": task.low, "high": task.high, "actionLow": task.action_low, "actionHigh": task.action_high}
+    box = {end: numbers.tolist() for end, numbers in ends.items()}
+    for reading in READINGS:
+        config = dataclasses.replace(vsp.preset(task), n_epochs=n, n_freeze=n // 5, **SOON | reading)
+        history, given = recorded(task, config, monkeypatch)
+        about = {"config": dataclasses.asdict(config), "task": box, **given}
+        found, maps, rows = model(code, ROOT / "vsp/show/explorer/algorithms.js", **about)
+        assert len(history.events) > 2 and rows == 0 and maps in (0, len(given["maps"]))  # zeros need no draws
+        near = 1e-9 if config.fit == "adam" else 1e-8  # a ridge of 1e-6 enlarges rounding
+        for i, (words, coefficients, loss) in enumerate(found):
+            policy = history.policy_at(i)
+            assert np.array_equal(policy.codewords, words), (reading, i)
+            assert np.allclose(policy.coefficients, coefficients, rtol=0, atol=near), (reading, i)
+            assert config.fit != "adam" or loss == pytest.approx(history.losses[i], abs=1e-9)
+
+
+def test_numbers_and_colours_of_codewords_are_pythons():
+    task = vsp.get_task(SIMPLEGOAL)
+    policy, history = vsp.distill(vsp.load_teacher(task.name), task, vsp.preset(task).quick(), seed=0, progress=False)
+    scene = scene_of({"": policy}, task, history=history)
+    code = "const [policy] = scene.policies; model.name(policy); return [policy.born, policy.tints]"
+    numbers, tints = state_space.birth_colours(policy, history)
+    assert model(code, scene=scene) == [numbers.tolist(), tints.tolist()] and max(numbers) > len(policy)
+    for each in policies(SIMPLEGOAL):
+        assert model(code, scene=scene_of({"": each}, task))[1] == state_space.birth_colours(each)[1].tolist()

@@ -2,6 +2,7 @@ import base64
 import io
 import re
 import zlib
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -12,11 +13,12 @@ from drawn import hexes, labels
 from PIL import Image, UnidentifiedImageError
 from support import python
 
+import vsp
 from vsp import geometry, show
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.show import state_space, style
-from vsp.show.returns import box_plot, boxes, intervals, ledger_gaps
+from vsp.show.returns import box_plot, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
 
@@ -30,7 +32,7 @@ def drawn(seed=0):
     fig, axes = panels(2)
     x, y, states = state_space.grid(np.zeros(2), np.ones(2), 40)
     codewords = rng.random((5, 2))
-    state_space.cells(axes[0], x, y, geometry.nearest(codewords, states), fill=True)
+    state_space.cells(axes[0], x, y, geometry.nearest(codewords, states), fill=np.arange(5))
     state_space.codewords(state_space.square(axes[0]), codewords, numbers=True)
     coarse = state_space.grid(np.zeros(2), np.ones(2), 6)[2]
     state_space.arrows(axes[0], coarse, rng.uniform(-1, 1, coarse.shape))
@@ -145,7 +147,7 @@ def test_cell_borders_lie_between_the_codewords(ax):
 
 def test_one_cell_has_no_border(ax):
     x, y, states = state_space.grid(np.zeros(2), np.ones(2), 20)
-    state_space.cells(ax, x, y, np.zeros(len(states), int), fill=True)
+    state_space.cells(ax, x, y, np.zeros(len(states), int), fill=np.zeros(1, int))
     assert not ax.collections and len(ax.images) == 1
 
 
@@ -180,15 +182,24 @@ def test_box_plots_show_the_quartiles_and_no_outliers(ax):
     assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
     heights = np.concatenate([line.get_ydata() for line in ax.lines])
     assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
-    box_plot(ax, returns, outliers=True)
-    assert [100] in [line.get_ydata().tolist() for line in ax.lines]
 
 
-def test_returns_stand_under_what_is_possible_and_events_have_ticks(ax):
-    show.histogram(ax, np.array([1.0, 2.0]), bound=np.array([2.0, 3.0]))
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["teacher, mean 1.50", "at most, mean 2.50"]
-    show.ticks(ax, np.array([1, 2]), "splits", row=0)
-    assert ax.lines[0].get_xdata().tolist() == [1, 2]
+def test_a_codeword_has_its_number_and_its_colour_from_birth_to_death(ax):
+    words, history = np.column_stack([0.1 * np.arange(11), np.zeros(11)]), vsp.History()
+
+    def births(at, *run):  # in units of 0.1, so a codeword is as far from another as their numbers are
+        policy = vsp.VoronoiPolicy(words[at], np.zeros((len(at), 3, 2)), task="SimpleGoal-v0", scale=[0.1, 1])
+        return [policy, *(found.tolist() for found in state_space.birth_colours(policy, *run))]
+
+    assert births([*range(10)])[1:] == [[*range(10)], [*range(8), 0, 1]]  # the first is the farthest from the ninth
+    history.observe(0, 0.0, SimpleNamespace(codewords=words[:1], policy=lambda: births([0])[0]))
+    history.add_events(1, "split", [(word, 1.0) for word in words[1:9]])
+    history.add_events(2, "merge", [(words[3], 0.0)])
+    history.add_events(3, "split", [(word, 1.0) for word in words[9:]])
+    assert births([0, 9, 10, 8], history)[1:] == [[0, 9, 10, 8], [0, 3, 1, 0]]  # a colour that is free comes first
+    assert births([0, 3, 8], history, 1)[1:] == [[0, 3, 8], [0, 3, 0]]
+    state_space.codewords(state_space.square(ax), words[:10], numbers=np.arange(5, 15))
+    assert [text.get_text() for text in ax.texts] == [f"{5 + i}" for i in range(10)]
 
 
 def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
@@ -255,26 +266,15 @@ def test_lines_means_letters_and_rows_are_where_they_belong(ax):
     named = "TEACHER DISTILLED OURS GOAL PIT FAILING OTHER".split()
     assert ax.get_title(loc="left") == "(a) one" and len({getattr(style, name) for name in named}) == 7
     show.over_iterations(ax, np.array([3.0, 1.0]), ylabel="cells")
-    show.run_means(ax, np.array([3.0, 1.0]), 2.5)
     show.reference(ax, 7.0, "x")
     drawn = [np.column_stack(line.get_data()).tolist() for line in ax.lines]
-    assert drawn == [[[0, 3], [1, 1]], [[1, 1], [2, 3]], [[0, 2.5], [1, 2.5]], [[7, 0], [7, 1]]]
+    assert drawn == [[[0, 3], [1, 1]], [[7, 0], [7, 1]]]
     show.margin(ax, ["1 %"], "fail")
     assert [text.get_position()[1] for text in ax.texts] == [-1, 0]
-
-
-def test_boxes_lie_from_the_first_quartile_to_the_third(ax):
-    quartiles = {"paper": (1.0, 2.0, 4.0), "here": (3.0, np.nan, 5.0)}
-    boxes(ax, quartiles, colours=[style.TEACHER, style.DISTILLED])
-    corners = [box.get_path().vertices for box in ax.patches]
-    assert [(c[:, 0].min(), c[:, 0].max()) for c in corners] == [(1, 4), (3, 5)]
-    assert [(c[:, 1].min() + c[:, 1].max()) / 2 for c in corners] == pytest.approx([0, 1])
-    assert hexes(box.get_facecolor() for box in ax.patches) == [style.TEACHER, style.DISTILLED]
-    x = [np.asarray(line.get_xdata(), dtype=float) for line in ax.lines]
-    whiskers = {(a, b) for a, b in (sorted(line) for line in x if len(line) == 2) if a < b}
-    assert whiskers == {(-3.5, 1), (4, 8.5), (0, 3), (5, 8)}  # 1.5 lengths of the box
-    assert any((line == 2).all() for line in x) and any(np.isnan(line).all() for line in x)
-    assert labels(ax) == ["paper", "here"] and ax.get_ylim()[0] > 1 > 0 > ax.get_ylim()[1]
+    show.ticks(ax, np.array([1, 2]), "splits", row=0)
+    assert ax.lines[-1].get_xdata().tolist() == [1, 2]
+    show.broken(ax, ax)
+    assert not ax.spines["left"].get_visible() and [line.get_xdata() for line in ax.lines[-2:]] == [[1], [0]]
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "figures").rglob("*.png")), ids=lambda path: path.stem)

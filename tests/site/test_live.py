@@ -29,7 +29,7 @@ def test_each_part_asks_and_nothing_overflows_a_phone(shown):
     for name in ("borders", "by_hand", "passes", "intervals"):
         part = opened(shown, name)
         assert "You said: " in part.locator("[data-say=said]").inner_text() and part.locator(".see").is_hidden()
-        part.locator("canvas").click()
+        part.locator("canvas").first.click()
         for _ in range(int(part.locator(".see").get_attribute("data-after") or 0)):
             part.get_by_role("button").first.click()
         assert part.locator(".see").is_visible()
@@ -47,14 +47,14 @@ def test_cells_by_hand_are_fitted_at_once(shown):
 
 def test_a_run_is_asked_about_told_and_kept(shown):
     part = opened(shown, "passes")
-    part.get_by_role("button", name="next split").click()
-    assert "Both: a new cell here." in part.locator("[data-say=step]").inner_text()
-    run = part.get_by_role("button", name="a whole run")
+    run = part.get_by_role("button", name="distil")
     run.click()
-    assert run.is_disabled()
-    part.get_by_label("above").first.fill("5")
+    part.locator(".runs tr").nth(1).wait_for()
+    assert run.is_disabled() and "100 iterations" in part.inner_text()
+    part.get_by_label("max_pol_loss").fill("5")
     part.get_by_label("I expect").select_option("fewer cells")
     run.click()
+    part.locator(".runs tr").nth(2).wait_for()
     first, second = part.locator(".runs tr").all_inner_texts()[1:]
     assert "fewer cells" in second and int(first.split()[-2]) > int(second.split()[-2]) == 1
 

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from ..evaluation import fences
 from .style import DISTILLED, OTHER, TEACHER
 
 _VERDICTS = {  # marker, and whether it is filled
@@ -15,21 +14,13 @@ _VERDICTS = {  # marker, and whether it is filled
 _SUBJECTS = {"teacher": TEACHER, "distilled": DISTILLED}
 
 
-def box_plot(ax: Axes, returns: dict[str, np.ndarray], *, outliers: bool = False) -> None:
-    """Draw box plots of the returns of the teacher and of the distilled policies, in this order.
-
-    `outliers`: draw them too, as a strip of dots.
-    """
-    returns = {name: values.ravel() for name, values in returns.items()}
+def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> None:
+    """Draw box plots of the returns of the teacher and of the distilled policies, in this order, without outliers."""
     names = [f"{name}\n(n = {values.size:,})" for name, values in returns.items()]
     look = {"widths": 0.5, "patch_artist": True, "medianprops": {"color": "black"}, "showfliers": False}
-    boxes = ax.boxplot([*returns.values()], tick_labels=names, **look)["boxes"]
-    for place, (box, colour, values) in enumerate(zip(boxes, (TEACHER, DISTILLED), returns.values()), start=1):
+    drawn = ax.boxplot([values.ravel() for values in returns.values()], tick_labels=names, **look)
+    for box, colour in zip(drawn["boxes"], (TEACHER, DISTILLED)):
         box.set(facecolor=colour)
-        low, high = fences(*np.quantile(values, [0.25, 0.75]))
-        beyond = values[(values < low) | (values > high)] if outliers else values[:0]
-        jitter = np.random.default_rng(0).uniform(-0.2, 0.2, beyond.size)
-        ax.plot(place + jitter, beyond, ".", color=colour, ms=2, mew=0, alpha=0.5, rasterized=True)
     ax.set(ylabel="return per episode")
 
 
@@ -54,22 +45,12 @@ def phase(ax: Axes, begin: int, name: str) -> None:
     ax.text(begin, 1.0, f" {name}", transform=ax.get_xaxis_transform(), va="bottom", fontsize=7)
 
 
-def run_means(ax: Axes, means: np.ndarray, teacher: float) -> None:
-    """Plot the mean return of each run, sorted, against the teacher's."""
-    ax.plot(np.arange(1, len(means) + 1), np.sort(means), ".", color=DISTILLED, ms=4, label="distilled, one dot a run")
-    ax.axhline(teacher, color=TEACHER, label="teacher")
-    ax.set(xlabel="run, by mean return", ylabel="mean return")
-    ax.legend(frameon=False, loc="lower right")
-
-
-def histogram(ax: Axes, returns: np.ndarray, *, bound: np.ndarray | None = None) -> None:
-    """Draw a histogram of the teacher's returns (n,). `bound` (n,), an outline: the most from the same starts."""
-    drawn = {"teacher": returns} | ({} if bound is None else {"at most": bound})
-    bins = np.histogram_bin_edges(np.concatenate([*drawn.values()]), bins=30)
-    for (name, values), look in zip(drawn.items(), ({"color": TEACHER}, {"histtype": "step", "color": "black"})):
-        ax.hist(values, bins=bins, label=f"{name}, mean {values.mean():.2f}", **look)
-    ax.set(xlabel="return per episode", ylabel="episodes", ymargin=0.3)  # room for the legend
-    ax.legend(frameon=False, loc="upper left")
+def broken(left: Axes, right: Axes) -> None:
+    """Mark that the horizontal axis of `left` goes on in `right` after a gap."""
+    right.spines["left"].set_visible(False)
+    right.tick_params(left=False, labelleft=False)
+    for ax, end in ((left, 1), (right, 0)):
+        ax.plot(end, 0, marker=[(-1, -2), (1, 2)], ms=6, color="black", clip_on=False, transform=ax.transAxes)
 
 
 def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILLED) -> Axes:
@@ -116,19 +97,3 @@ def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> 
     ax.set_xlim(-1.1 * limit, 1.1 * limit)
     ax.set_yticks(np.arange(len(frame)), frame.index)
     ax.set_ylim(len(frame) - 0.5, -0.5)
-
-
-def boxes(ax: Axes, quartiles: dict[str, tuple[float, float, float]], *, colours: list[str]) -> None:
-    """Draw horizontal boxes from Q1, median and Q3; whiskers end at the bounds beyond which a return is an outlier."""
-    stats = [
-        {"label": name, "q1": q1, "med": median, "q3": q3, "fliers": []}
-        | dict(zip(("whislo", "whishi"), fences(q1, q3), strict=True))
-        for name, (q1, median, q3) in quartiles.items()
-    ]
-    places = np.arange(len(stats))
-    drawn = ax.bxp(stats, positions=places, orientation="horizontal", showfliers=False, patch_artist=True, widths=0.5)
-    for box, colour in zip(drawn["boxes"], colours):
-        box.set(facecolor=colour, alpha=0.6)
-    for line in drawn["medians"]:
-        line.set(color="black")
-    ax.set_ylim(len(stats) - 0.4, -0.6)

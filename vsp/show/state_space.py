@@ -9,25 +9,52 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
+from ..history import History
+from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
 from ..tasks import simplegoal
 from ..tasks.base import Task
-from .style import BORDER, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
+from .style import BORDER, CELLS, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
 
-_TINTS = ("#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0")  # of the explorer's cells, too (picture.js)
+PALE = 0.42  # how much of its colour is in a cell; the rest is white
+
+
+def birth_colours(
+    policy: VoronoiPolicy, history: History | None = None, n: float = np.inf
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the number of each codeword and the place of its colour in `CELLS`, which it has for life: (k,) and (k,).
+
+    The number counts the births before. A newborn takes the colour whose nearest living bearer is farthest away; one
+    that nobody has comes first. Codewords are born in their order. With the `history` of a run, `policy` is that after
+    iteration `n`, each split gives birth, and each merge ends a life.
+    """
+    living: dict[tuple, tuple[int, int]] = {}
+    born = 0
+    changes = [("split", word) for word in (history.policy_at(0) if history else policy).codewords]
+    changes += [(kind, word) for when, kind, word, _ in (history.events if history else ()) if when <= n]
+    for kind, word in changes:
+        if kind == "merge":
+            del living[tuple(word)]
+            continue
+        near = np.full(len(CELLS), np.inf)
+        for other, (_, tint) in living.items():
+            near[tint] = min(near[tint], np.linalg.norm((word - other) / policy.scale))
+        living[tuple(word)], born = (born, int(near.argmax())), born + 1
+    numbers, tints = np.array([living[tuple(word)] for word in policy.codewords]).T
+    return numbers, tints
 
 
 def cells(
-    ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: bool = False, width: float = 0.6,
-    color: str = BORDER,
+    ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: np.ndarray | None = None,
+    width: float = 0.6, color: str = BORDER,
 ) -> None:  # fmt: skip
     """Draw the borders of Voronoi cells, `width` points wide.
 
-    `index`: the cell of each grid point; `fill` colours the cells.
+    `index`: the cell of each grid point; `fill`: the place of each cell's colour in `CELLS` (k,).
     """
     index = index.reshape(x.shape)
-    if fill:
-        shades = 1 - 0.4 * (1 - mpl.colors.to_rgba_array(_TINTS)[_colours(index)])  # pale
+    if fill is not None:
+        shades = 1 - PALE * (1 - mpl.colors.to_rgba_array(CELLS)[fill[index]])
         image(ax, x, y, shades, interpolation="nearest", zorder=0)
     for i in np.unique(index):
         inside = (index == i).astype(float)
@@ -35,23 +62,16 @@ def cells(
             ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
 
 
-def _colours(index: np.ndarray) -> np.ndarray:
-    """Return the number of a tint for each point of a grid: by its cell, and if possible other than in cells beside."""
-    near = {*zip(index[1:].flat, index[:-1].flat), *zip(index[:, 1:].flat, index[:, :-1].flat)}
-    chosen: list[int] = []
-    for i in range(index.max() + 1):
-        taken = {chosen[min(pair)] for pair in near if max(pair) == i and min(pair) < i}
-        chosen.append(next((tint for tint in (i % 6, *range(6)) if tint not in taken), i % 6))
-    return np.array(chosen)[index]
-
-
 def codewords(
-    ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool = False, size: float = 14
-) -> None:
-    """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes."""
+    ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool | np.ndarray = False,
+    size: float = 14,
+) -> None:  # fmt: skip
+    """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes:
+    given ones (k,), or their places."""
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
     ax.scatter(*points.T, s=size, label=label, **look)
-    for i, point in enumerate(points if numbers else ()):
+    names = np.arange(len(points)) if numbers is True else () if numbers is False else numbers
+    for i, point in zip(names, points):
         right, up = point < [np.mean(ax.get_xlim()), np.mean(ax.get_ylim())]
         place = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
         offset = (3 if right else -3, 2 if up else -2)
@@ -106,7 +126,8 @@ def force_map(ax: Axes, x: np.ndarray, y: np.ndarray, force: np.ndarray) -> Axes
 
 def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
     """Add one colour bar for all force maps of a figure."""
-    bar = fig.colorbar(drawn, ax=list(axes), label="force", ticks=[-1, 0, 1], aspect=30)
+    bar = fig.colorbar(drawn, ax=list(axes), ticks=[-1, 0, 1], aspect=30)
+    bar.ax.set_title("force", fontsize=7, loc="left")
     bar.ax.set_yticklabels(["−1 (left)", "0", "+1 (right)"])
 
 

@@ -21,18 +21,18 @@ from ..run import atomic
 from .captions import Caption, caption_of, file_of
 
 TEXT_WIDTH = 12.2 / 2.54  # inches; the text width of LNCS
-COLOURS = (  # seaborn's "colorblind" palette, written out: importing seaborn takes a second
-    "#0173b2", "#de8f05", "#029e73", "#d55e00", "#cc78bc", "#ca9161", "#fbafe4", "#949494", "#ece133", "#56b4e9",
-)  # fmt: skip
-# One colour, one meaning. What is none of these has no colour of its own: a shade of grey, a marker, a line style.
+# One colour, one meaning, after seaborn's palette "colorblind". What is none of these has no
+# colour of its own: a shade of grey, a marker, a line style.
 #   TEACHER    blue        the teacher, and what it returns
-#   DISTILLED  orange      policies distilled by the paper's method, and one linear map fitted to the teacher
+#   DISTILLED  light blue  policies distilled by the paper's method, and one linear map fitted to the teacher
 #   OURS       purple      policies of our own method, fitted to the teacher or tuned for the return
 #   GOAL       green       the goal, the flag
 #   PIT        dark grey   the pit
 #   FAILING    vermilion   a start or an episode that fails
 #   OTHER      grey        everything else: trees, small networks, limits
-TEACHER, DISTILLED, GOAL, FAILING, OURS, PIT, BORDER, CODEWORD, OTHER = *COLOURS[:5], "0.35", "0.25", "black", "0.4"
+TEACHER, DISTILLED, GOAL, FAILING, OURS = "#0173b2", "#3a9fd8", "#029e73", "#d55e00", "#cc78bc"
+PIT, BORDER, CODEWORD, OTHER = "0.35", "0.25", "black", "0.4"
+CELLS = ("#56b4e9", "#ece133", "#73502e", "#581799", "#95e6bd", "#732e62", "#86bf4d", "#2222e6")  # of cells, pale
 FORCE_MAP = "PuOr_r"
 
 _STYLE = {

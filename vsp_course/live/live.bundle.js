@@ -2,15 +2,15 @@
 
 // ../vsp/show/explorer/model.js
 var ON_BORDER = 1e-9;
-var TINTS = 6;
+var TINTS = 8;
+var ROUNDED = 1e-4;
 var clip = (value, low, high) => Math.min(Math.max(value, low), high);
-var ORDERS = /* @__PURE__ */ new Map([
-  ["manhattan", 1],
-  ["euclidean", 2],
-  ["chebyshev", null]
-]);
+var sum = (values) => values.reduce((total, value) => total + value, 0);
+var dot = (one2, other) => one2.reduce((total, value, i) => total + value * other[i], 0);
+var less = (one2, other) => one2.map((value, i) => value - other[i]);
+var ORDERS = { manhattan: 1, euclidean: 2, chebyshev: null };
 function ready(policy) {
-  const { codewords, scale, metric, order = ORDERS.get(metric) } = policy;
+  const { codewords, scale, metric, order = ORDERS[metric] } = policy;
   if (order === void 0) throw new Error(`the metric ${metric} has no known order`);
   policy.power = order ?? Infinity;
   policy.scaled = Float64Array.from(
@@ -20,38 +20,32 @@ function ready(policy) {
   policy.far = new Float64Array(codewords.length);
   return policy;
 }
-function distances({ scaled, scale, power, place, far }, seen) {
+function cellOf({ scaled, scale, power, place, far }, seen, slack = 0) {
   const d = scale.length, plain = power === 1 || power === 2 || power === Infinity;
+  let best = 0;
   for (let i = 0; i < d; i++) place[i] = seen[i] / scale[i];
   for (let j = 0, at = 0; j < far.length; j++) {
-    let sum = 0;
+    let sum2 = 0;
     for (let i = 0; i < d; i++, at++) {
       const gap = Math.abs(place[i] - scaled[at]);
-      if (power === 2) sum += gap * gap;
-      else if (power === 1) sum += gap;
-      else if (power !== Infinity) sum += gap ** power;
-      else if (gap > sum) sum = gap;
+      if (power === 2) sum2 += gap * gap;
+      else if (power === 1) sum2 += gap;
+      else if (power !== Infinity) sum2 += gap ** power;
+      else if (gap > sum2) sum2 = gap;
     }
-    far[j] = plain ? sum : sum ** (1 / power);
+    far[j] = plain ? sum2 : sum2 ** (1 / power);
+    if (far[j] < far[best] - slack) best = j;
   }
-  return far;
-}
-function cellOf(policy, seen, slack = 0) {
-  const far = distances(policy, seen);
-  let best = 0;
-  for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j;
   return best;
 }
 function tied(policy, seen) {
-  const cell = cellOf(policy, seen, ON_BORDER), { far } = policy;
-  let other = far.length - 1;
-  while (Math.abs(far[other] - far[cell]) >= ON_BORDER) other--;
-  return [cell, other];
+  const cell = cellOf(policy, seen, ON_BORDER);
+  return [cell, policy.far.findLastIndex((far) => Math.abs(far - policy.far[cell]) < ON_BORDER)];
 }
 function raw(rows, seen, k) {
-  let sum = rows[seen.length][k];
-  for (let i = 0; i < seen.length; i++) sum += seen[i] * rows[i][k];
-  return sum;
+  let sum2 = rows[seen.length][k];
+  for (let i = 0; i < seen.length; i++) sum2 += seen[i] * rows[i][k];
+  return sum2;
 }
 function act({ task }, policy, seen) {
   const cell = policy.layers ? 0 : cellOf(policy, seen);
@@ -59,22 +53,31 @@ function act({ task }, policy, seen) {
   const action = given.map((value, k) => clip(value, task.actionLow[k], task.actionHigh[k]));
   return { cell, raw: given, action };
 }
+var floats = (text) => new Float32Array(Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0)).buffer);
+function network({ sizes, weights }) {
+  const numbers = Float64Array.from(floats(weights));
+  let at = 0;
+  const take = (count2) => numbers.subarray(at, at += count2);
+  const layers = sizes.slice(1).map((n, i) => {
+    const rows = take(n * sizes[i]), turned = rows.map((_, w) => rows[w % n * sizes[i] + Math.floor(w / n)]);
+    return { weights: turned, biases: take(n) };
+  });
+  return { layers };
+}
 function output({ layers }, seen) {
   let values = Float64Array.from(seen, Math.fround);
   layers.forEach(({ weights, biases }, layer) => {
-    const next = new Float64Array(biases);
-    for (let j = 0, at = 0; j < next.length; j++) {
-      let sum = 0;
-      for (let i = 0; i < values.length; i++, at++) sum += weights[at] * values[i];
-      sum += next[j];
-      next[j] = layer === layers.length - 1 ? Math.tanh(sum) : Math.max(sum, 0);
-    }
-    values = next;
+    const sums = biases.slice(), n = sums.length;
+    values.forEach((value, i) => {
+      if (value) for (let j = 0, at = i * n; j < n; j++, at++) sums[j] += weights[at] * value;
+    });
+    values = sums.map((sum2) => layer === layers.length - 1 ? Math.tanh(sum2) : Math.max(sum2, 0));
   });
   return [...values];
 }
 var TASKS = {
   "SimpleGoal-v0": {
+    start: (draw) => [draw(), draw()],
     step([x, y], [dx, dy]) {
       const next = [clip(x + 0.1 * clip(dx, -1, 1), 0, 1), clip(y + 0.1 * clip(dy, -1, 1), 0, 1)];
       if (next[0] < 0.1 && next[1] < 0.1) return [next, 10, 1];
@@ -87,6 +90,7 @@ var TASKS = {
     ]
   },
   "MountainCarContinuous-v0": {
+    start: (draw) => [-0.6 + 0.2 * draw(), 0].map(Math.fround),
     step([x, v], [force]) {
       let speed = clip(v + 15e-4 * clip(force, -1, 1) - 25e-4 * Math.cos(3 * x), -0.07, 0.07);
       const place = clip(x + speed, -1.2, 0.6);
@@ -98,388 +102,317 @@ var TASKS = {
   },
   "Pendulum-v1": {
     see: ([angle, speed]) => [Math.cos(angle), Math.sin(angle), speed],
+    place: ([x, y, speed]) => [Math.atan2(y, x), speed],
     step([angle, speed], [torque]) {
-      const turn2 = 2 * Math.PI, upright = ((angle + Math.PI) % turn2 + turn2) % turn2 - Math.PI;
+      const turn = 2 * Math.PI, upright = ((angle + Math.PI) % turn + turn) % turn - Math.PI;
       const cost = upright ** 2 + 0.1 * speed ** 2 + 1e-3 * torque ** 2;
       const next = clip(speed + (15 * Math.sin(angle) + 3 * clip(torque, -2, 2)) * 0.05, -8, 8);
       return [[angle + next * 0.05, next], -cost, 0];
-    },
-    places: []
+    }
   }
 };
-var dynamics = (name) => ({ see: (state) => state, ...TASKS[name] });
-function rollout(scene, policy, start, keep = false) {
-  const { see, step } = dynamics(scene.task.name), states = [start];
-  let [state, total, outcome, last] = [start, 0, 0, 0];
+var dynamics = (name2) => ({ ...PLAIN, ...TASKS[name2] });
+var PLAIN = { start: () => [], see: (state) => state, place: (seen) => seen, places: [] };
+function random(seed) {
+  let state = seed * 2654435769;
+  return () => {
+    state = state + 1831565813 | 0;
+    let mixed2 = Math.imul(state ^ state >>> 15, state | 1);
+    mixed2 = mixed2 + Math.imul(mixed2 ^ mixed2 >>> 7, mixed2 | 61) ^ mixed2;
+    return ((mixed2 ^ mixed2 >>> 14) >>> 0) / 2 ** 32;
+  };
+}
+function* taught(scene, teacher, draw) {
+  const { see, start } = dynamics(scene.task.name);
+  while (true) {
+    const { states, actions } = rollout(scene, teacher, start(draw));
+    yield { states: states.slice(0, -1).map(see), actions };
+  }
+}
+function rollout(scene, policy, start) {
+  const { see, step: step2 } = dynamics(scene.task.name), states = [start], actions = (
+    /** @type {Vector[]} */
+    []
+  );
+  let [state, total, reward, outcome, last] = [start, 0, 0, 0, 0];
   for (let t = 0; t < scene.task.maxSteps && !outcome; t++) {
     const { cell, action } = act(scene, policy, see(state));
-    let reward;
-    [state, reward, outcome] = step(state, action);
+    [state, reward, outcome] = step2(state, action);
     last = cell;
     total += reward;
-    if (keep) states.push(state);
+    states.push(state);
+    actions.push(action);
   }
-  return { total, outcome, last, states };
+  return { total, outcome, last, states, actions };
 }
 function leastSquares(a, b) {
   const unit = (i) => a[0].map((_, j) => +(i === j));
   const columns = a[0].map((_, i) => [...a.map((row2) => row2[i]), ...unit(i)]);
-  const dot2 = (u, v) => a.reduce((sum, _, row2) => sum + u[row2] * v[row2], 0);
+  const own = (u, v) => a.reduce((total, _, row2) => total + u[row2] * v[row2], 0);
   for (let sweep = 0, turned = true; turned && sweep < 60; sweep++) {
     turned = false;
     for (const [i, u] of columns.entries())
       for (const v of columns.slice(i + 1)) {
-        const [p, q, both] = [dot2(u, u), dot2(v, v), dot2(u, v)];
+        const [p, q, both] = [own(u, u), own(v, v), own(u, v)];
         if (Math.abs(both) <= 1e-16 * Math.sqrt(p * q)) continue;
+        const angle = Math.atan2(2 * both, p - q) / 2, [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
+        for (const [k, x] of u.entries())
+          [u[k], v[k]] = [cosine * x + sine * v[k], cosine * v[k] - sine * x];
         turned = true;
-        turn(u, v, 0.5 * Math.atan2(2 * both, p - q));
       }
   }
-  const sizes = columns.map((u) => Math.sqrt(dot2(u, u))), least = Math.max(...sizes) * Number.EPSILON * Math.max(a.length, a[0].length), solution = a[0].map(() => b[0].map(() => 0));
-  columns.forEach((u, i) => {
-    if (sizes[i] <= least) return;
-    b[0].forEach((_, k) => {
-      const share = b.reduce((sum, values, row2) => sum + u[row2] * values[k], 0) / sizes[i] ** 2;
-      solution.forEach((weights, j) => weights[k] += u[a.length + j] * share);
-    });
-  });
-  return solution;
-}
-function turn(u, v, angle) {
-  const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
-  u.forEach((x, i) => {
-    u[i] = cosine * x + sine * v[i];
-    v[i] = cosine * v[i] - sine * x;
-  });
+  const sizes = columns.map((u) => Math.sqrt(own(u, u))), least = Math.max(...sizes) * Number.EPSILON * Math.max(a.length, a[0].length), whole = columns.filter((_, i) => sizes[i] > least), goals = b[0].map((_, k) => b.map((values) => values[k])), shares = goals.map((goal) => whole.map((u) => own(u, goal) / own(u, u)));
+  return a[0].map((_, i) => shares.map((one2) => dot(whole.map((u) => u[a.length + i]), one2)));
 }
 function refit(policy, { states, actions }, cells = policy.codewords.keys()) {
   const own = states.map((state) => cellOf(policy, state)), maps = structuredClone(policy.coefficients);
   for (const cell of cells) {
-    const [a, b] = [
-      /** @type {Vector[]} */
-      [],
-      /** @type {Vector[]} */
-      []
-    ];
-    own.forEach((at, i) => at === cell && (a.push([...states[i], 1]), b.push(actions[i])));
-    if (a.length) maps[cell] = leastSquares(a, b);
+    const inputs = states.filter((_, i) => own[i] === cell).map((state) => [...state, 1]);
+    const goals = actions.filter((_, i) => own[i] === cell);
+    if (goals.length) maps[cell] = leastSquares(inputs, goals);
   }
   return maps;
 }
-function colouring(cells, n, k, wanted = []) {
-  const near = Array.from({ length: k }, () => (
-    /** @type {Set<number>} */
-    /* @__PURE__ */ new Set()
-  )), colours = (
-    /** @type {number[]} */
+var squares = (ones, others) => sum(ones.map((one2, i) => less(one2, others[i])).map((off) => dot(off, off)));
+var errorOf = (scene, policy, { states, actions }) => squares(states.map((state) => act(scene, policy, state).action), actions);
+function births(scale) {
+  let [living, count2] = [
+    /** @type {Born[]} */
+    [],
+    0
+  ];
+  const tintOf = (codeword) => {
+    const far = Array(TINTS).fill(Infinity);
+    for (const { codeword: other, tint } of living) {
+      const gaps = less(codeword, other).map((gap, i) => gap / scale[i]);
+      far[tint] = Math.min(far[tint], Math.hypot(...gaps));
+    }
+    return far.indexOf(Math.max(...far));
+  };
+  const found = (codeword) => {
+    const near = (gap) => Math.abs(gap) < ROUNDED, known = living.find((one2) => less(one2.codeword, codeword).every(near));
+    if (known) return known;
+    const made = { codeword, born: count2++, tint: tintOf(codeword) };
+    living.push(made);
+    return made;
+  };
+  return (codewords, changes = (
+    /** @type {Change[]} */
     []
-  );
-  const meet = (i, j) => i !== j && (near[i].add(j), near[j].add(i));
-  for (let at = 0; at < n * n; at++) {
-    if (at % n) meet(cells[at], cells[at - 1]);
-    if (at >= n) meet(cells[at], cells[at - n]);
-  }
-  const order = [...near.keys()].sort((i, j) => near[j].size - near[i].size);
-  for (const i of order) {
-    const taken = new Set([...near[i]].map((j) => colours[j])), all = [wanted[i] ?? i % TINTS, ...Array(TINTS).keys()];
-    colours[i] = all.find((colour) => !taken.has(colour)) ?? all[0];
-  }
-  return colours;
+  )) => {
+    const first = count2 ? [] : codewords.slice(0, 1), splits = changes.filter(({ kind }) => kind === "split").map(({ codeword }) => codeword);
+    for (const codeword of [...first, ...splits]) found(codeword);
+    living = codewords.map(found);
+    return { born: living.map(({ born }) => born), tints: living.map(({ tint }) => tint) };
+  };
 }
-
-// ../vsp/show/explorer/algorithms.js
-var RIDGE = 1e-6;
-var dot = (one2, other) => one2.reduce((sum, value, i) => sum + value * other[i], 0);
-var minus = (one2, other) => one2.map((value, i) => value - other[i]);
-var zeros = (rows, columns) => Array.from({ length: rows }, () => Array(columns).fill(0));
-var Partition = class {
-  /** @type {Vector[]} */
-  codewords = [];
-  /** @type {Rows[]} */
-  coefficients = [];
-  /** @type {Sums[]} */
-  sums = [];
-  /** @type {Linear} */
-  look;
-  /** @param {Thresholds} limits @param {number} outputs */
-  constructor(limits, outputs) {
-    this.limits = limits;
-    this.outputs = outputs;
-  }
-  cellOf(state) {
-    return cellOf(this.look, state);
-  }
-  /** For look-ups. */
-  moved() {
-    const { codewords, coefficients } = this, scale = codewords[0].map(() => 1);
-    const about = { name: "", codewords, coefficients, scale, metric: "manhattan" };
-    this.look = ready(
-      /** @type {Linear} */
-      about
-    );
-  }
-  empty() {
-    const size = this.codewords[0].length + 1;
-    return { count: 0, products: zeros(size, size), targets: zeros(size, this.outputs) };
-  }
-  /** A new cell around a state; its map says 0. @param {Vector} state */
-  add(state) {
-    this.codewords.push([...state]);
-    this.coefficients.push(zeros(state.length + 1, this.outputs));
-    this.sums.push(this.empty());
-    this.moved();
-  }
-  /** Put an episode into the buffers of its cells. @param {Visited} episode */
-  observe({ states, actions }) {
-    states.forEach((state, t) => {
-      const sum = this.sums[this.cellOf(state)], inputs = [...state, 1];
-      sum.count += 1;
-      inputs.forEach((value, i) => {
-        inputs.forEach((other, j) => sum.products[i][j] += value * other);
-        actions[t].forEach((action, k) => sum.targets[i][k] += value * action);
-      });
-    });
-  }
-  /** Least squares in each cell with states, pulled a little towards the map that it has. */
-  train() {
-    this.sums.forEach(({ count: count2, products, targets }, cell) => {
-      if (!count2) return;
-      const map = this.coefficients[cell], columns = map[0].map((_, k) => map.map((weights) => weights[k]));
-      const slope = targets.map(
-        (goal, i) => goal.map((value, k) => value - dot(products[i], columns[k]))
-      );
-      const ridged = products.map((line, i) => line.with(i, line[i] + RIDGE));
-      leastSquares(ridged, slope).forEach((line, i) => line.forEach((by, k) => map[i][k] += by));
-    });
-  }
-  /** Algorithm 2, a step of the episode at a time.
-   * @param {Visited} episode @returns {Generator<Step>} */
-  *walk({ states, actions }) {
-    let [previous, losses] = [
-      -1,
-      /** @type {Vector} */
-      []
-    ];
-    for (const [t, state] of states.entries()) {
-      const cell = this.cellOf(state);
-      if (cell !== previous) [previous, losses] = [cell, []];
-      const off = actions[t].map((value, k) => raw(this.coefficients[cell], state, k) - value), loss = dot(off, off) / off.length;
-      losses.push(loss);
-      const mean = losses.reduce((sum, each) => sum + each, 0) / losses.length, gap = minus(state, this.codewords[cell]).reduce((sum, value) => sum + Math.abs(value), 0), known = this.codewords.some((word) => word.every((value, i) => value === state[i])), splits = mean > this.limits.loss && gap > this.limits.distance && !known;
-      if (splits) {
-        const near = this.neighbours()[cell];
-        near.add(cell);
-        this.add(state);
-        for (const i of near) this.sums[i] = this.empty();
-        losses = [];
-      }
-      yield { t, cell, loss, mean, gap, splits };
-    }
-  }
-  /** Algorithm 3. Returns the codewords that went, with the differences of their maps.
-   * @returns {Change[]} */
-  merge() {
-    const gone = (
-      /** @type {Change[]} */
-      []
-    );
-    for (let i = 0; i < this.codewords.length; i++) {
-      const near = this.neighbours()[i], own = this.coefficients[i].flat();
-      const alike = [...near].flatMap((j) => {
-        const apart = minus(this.coefficients[j].flat(), own).map(Math.abs), cause = Math.max(...apart);
-        return cause < this.limits.difference ? [{ j, cause }] : [];
-      });
-      if (!alike.length) continue;
-      for (const j of near.add(i)) this.sums[j] = this.empty();
-      for (const { j, cause } of alike)
-        gone.push({ kind: "merge", codeword: this.codewords[j], cause });
-      const left = [...this.codewords.keys()].filter((j) => !alike.some((one2) => one2.j === j));
-      this.codewords = left.map((j) => this.codewords[j]);
-      this.coefficients = left.map((j) => this.coefficients[j]);
-      this.sums = left.map((j) => this.sums[j]);
-      i = left.indexOf(i);
-    }
-    this.moved();
-    return gone;
-  }
-  neighbours() {
-    return neighbours(this.codewords);
-  }
-};
-function* distil(partition, episodes, { split, merge, freeze }) {
-  partition.add(episodes[0].states[0]);
-  for (const [n, episode] of episodes.entries()) {
-    partition.observe(episode);
-    partition.train();
-    yield { n, episode };
-    if (!n || n >= episodes.length - freeze) continue;
-    if (n % split === 0) for (const step of partition.walk(episode)) yield { n, episode, step };
-    if (n % merge === 0) yield { n, episode, gone: partition.merge() };
-  }
+function name(policy) {
+  if (policy.layers || policy.tints?.length === policy.codewords.length) return;
+  const of = births(policy.scale);
+  for (const moment of policy.replay ?? [])
+    Object.assign(moment, of(moment.codewords, moment.events));
+  Object.assign(policy, of(policy.codewords));
 }
-function neighbours(points) {
-  const near = points.map(() => (
-    /** @type {Set<number>} */
-    /* @__PURE__ */ new Set()
-  ));
-  points.forEach((p, i) => {
-    for (let j = 0; j < i; j++) {
-      const [dx, dy] = minus(points[j], p);
-      let [low, high] = [-Infinity, Infinity];
-      points.forEach((r, k) => {
-        if (k === i || k === j) return;
-        const from = minus(r, p), side = 2 * dot([-dy, dx], from), room = dot(from, minus(r, points[j]));
-        if (side > 0) high = Math.min(high, room / side);
-        else if (side < 0) low = Math.max(low, room / side);
-        else if (room < 0) high = -Infinity;
-      });
-      if (low < high) near[i].add(j), near[j].add(i);
-    }
-  });
-  return near;
-}
+var numberOf = ({ born }, cell) => born?.[cell] ?? cell;
 
 // ../vsp/show/explorer/controls.js
-var SPEEDS = [0.25, 1, 4];
+var [CHANGED, SAME] = [250, 30];
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function")
-      made.addEventListener(
-        name,
-        /** @type {EventListener} */
-        value
-      );
-    else if (value !== false) made.setAttribute(name, value === true ? "" : String(value));
+  for (const [name2, value] of Object.entries(attributes)) {
+    if (typeof value === "function") made.addEventListener(
+      name2,
+      /** @type {any} */
+      value
+    );
+    else if (value !== false) made.setAttribute(name2, value === true ? "" : String(value));
   }
   made.append(...children);
   return made;
 }
+var one = (root, selector) => (
+  /** @type {T} */
+  root.querySelector(selector)
+);
+var textOf = async (inner, file = "") => inner.textContent || (await fetch(file)).text();
 var button = (label, click) => element("button", { type: "button", click }, label);
 var row = (...children) => element("div", { class: "vsp-row" }, ...children);
-var minus2 = (text) => text.replaceAll("-", "−");
+var minus = (text) => text.replaceAll("-", "−");
 var count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
-var digits = (value) => Math.abs(value) < 5e-4 ? "0.000" : minus2(value.toFixed(3));
+var digits = (value) => Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3));
 function table(head, rows) {
-  const line = (first, tag, about, values) => element("tr", {}, first, ...values.map((value) => element(tag, about, value)));
-  const body = rows.map(
-    ([name, ...values]) => line(element("th", { scope: "row" }, name), "td", {}, values)
-  );
-  return element("table", {}, line(element("td"), "th", { scope: "col" }, head), ...body);
+  const cells = (tag, scope, texts) => texts.map((text) => element(tag, { scope }, text));
+  const lines = [[element("td"), ...cells("th", "col", head)]];
+  for (const [name2, ...values] of rows)
+    lines.push([...cells("th", "row", [name2]), ...cells("td", false, values)]);
+  return element("table", {}, ...lines.map((line) => element("tr", {}, ...line)));
 }
-function choice(label, names, take, at = 0) {
-  const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name));
-  const change = () => void take(+list.value);
-  const list = element("select", { change }, ...options);
+function choice(label, options, take, chosen = options[0]) {
+  const lines = options.map((option, value) => {
+    const about = { value, selected: option === chosen };
+    return element("option", about, String(Object(option).name ?? option));
+  });
+  const list = element("select", { change: () => take(options[+list.value]) }, ...lines);
   return element("label", {}, `${label} `, list);
 }
-function field(label, list, i, step, changed) {
-  const value = () => +(+list[i].toFixed(3)).toPrecision(4);
-  const input = () => {
-    const given = made.valueAsNumber;
-    if (!(Math.abs(given) <= 1e6)) return;
+function touched(take, about) {
+  const touch = ({ offsetX, buttons, type, target }) => {
+    const { clientWidth } = (
+      /** @type {Element} */
+      target
+    );
+    if (buttons || type === "pointerdown") take(clip(offsetX / clientWidth, 0, 1));
+  };
+  return element("canvas", { role: "img", pointerdown: touch, pointermove: touch, ...about });
+}
+var LEAST_DRAG = 4;
+var fits = (value, { least = -1e6, most = 1e6, whole }) => value >= least && value <= most && (!whole || Number.isInteger(value));
+function field(label, list, i, changed, range) {
+  const { step: step2, times, whole } = range;
+  let from = { x: 0, value: 0 };
+  const value = () => +(times ? list[i] : +list[i].toFixed(3)).toPrecision(times ? 3 : 4);
+  const take = (given) => {
+    if (!fits(given, range)) return;
     list[i] = given;
     changed();
   };
   const change = () => made.value = String(value());
-  const about = { type: "number", step, value: value(), "aria-label": label };
-  const made = element("input", { ...about, input, change });
+  const pointerdown = ({ clientX: x, pointerId }) => {
+    from = { x, value: list[i] };
+    made.setPointerCapture(pointerId);
+  };
+  const pointermove = ({ clientX, buttons }) => {
+    const by = Math.trunc((clientX - from.x) / LEAST_DRAG);
+    if (!buttons || !by) return;
+    const moved = times ? from.value * 1.1 ** by : from.value + by * step2 / 2;
+    take(whole ? Math.round(moved) : +(times ? moved.toPrecision(2) : moved.toFixed(2)));
+    change();
+  };
+  const about = { type: "number", step: step2, value: value(), "aria-label": label };
+  const acts = { input: () => take(made.valueAsNumber), change, pointerdown, pointermove };
+  const made = element("input", { ...about, ...acts });
   return made;
 }
-function equations({ scene, policy, cell, cells, angular }, changed) {
+function equations({ scene, policy, cells, angular, fixed }, cell, changed) {
   if (policy.layers) return [];
-  const { task, plane } = scene, rows = policy.coefficients[cell], codeword = policy.codewords[cell];
-  const range = (i) => angular ? 2 : plane.high[i] - plane.low[i];
-  const term = (label, list, i, step, before, after = "") => {
-    const written = field(label, list, i, step, changed);
+  const { task, plane } = scene, [rows, codeword] = [policy.coefficients[cell], policy.codewords[cell]];
+  const term = (label, list, i, step2, before, after = "") => {
+    const written = field(label, list, i, changed, { step: step2 });
     return element("span", { class: "vsp-term" }, before, written, after);
   };
-  const line = (name, terms) => element("div", { class: "vsp-equation" }, `${name} `, ...terms);
-  const places = task.inputs.map(
-    (name, i) => term(`codeword: ${name}`, codeword, i, +(range(i) / 50).toPrecision(1), `${name} = `)
-  );
+  const line = (name2, terms) => element("div", { class: "vsp-equation" }, `${name2} `, ...terms);
+  const places = task.inputs.map((name2, i) => {
+    const range = angular ? 2 : plane.high[i] - plane.low[i];
+    return term(`codeword: ${name2}`, codeword, i, +(range / 50).toPrecision(1), `${name2} = `);
+  });
   const lines = task.outputs.map((output2, k) => {
-    const names = [...task.inputs, "bias"];
-    const terms = names.map(
-      (name, i) => term(`${output2}: ${name}`, rows[i], k, 0.1, "", name === "bias" ? "" : `${name} +`)
+    const terms = [...task.inputs, "bias"].map(
+      (name2, i) => term(`${output2}: ${name2}`, rows[i], k, 0.1, "", name2 === "bias" ? "" : `${name2} +`)
     );
     return line(`${output2} =`, terms);
   });
-  return cells > 1 ? [line("codeword", places), ...lines] : lines;
+  return cells > 1 && !fixed ? [line("codeword", places), ...lines] : lines;
 }
 var Player = class {
-  text = "";
-  speed = 1;
   playing = false;
+  slow = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  // one picture a second
+  said = element("span", { class: "vsp-said" });
+  toggle = button("play", () => this.playing ? this.stop(true) : this.start());
   /** @type {HTMLInputElement} */
   slider;
   constructor(view) {
     this.view = view;
-    this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    const go = (way) => (this.stop(), view.jump(way));
-    const input = () => (this.stop(), this.to(+this.slider.value));
-    const settled = { input, change: () => view.soon() };
-    this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled });
-    this.toggle = button("play", () => this.playing ? this.pause() : this.start());
-    this.said = element("span", { class: "vsp-said" });
-    const steps = [button("previous change", () => go(-1)), button("next change", () => go(1))];
-    const names = SPEEDS.map((speed) => `${speed} ×`);
-    const speeds = choice("speed", names, (i) => this.speed = SPEEDS[i], 1);
-    this.row = row(this.toggle, ...steps, speeds, this.slider, this.said);
+    const soon = () => view.soon(), acts = { input: () => this.go(this.at), change: soon };
+    this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
+    this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
+    const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
+    const line = element("div", { class: "vsp-line" }, this.time, this.slider);
+    this.row = row(this.toggle, back, on, line, this.said);
   }
   get at() {
     return +this.slider.value;
   }
-  /** Set the number of moments and go to the last one. */
-  restart(count2) {
-    this.slider.max = String(count2 - 1);
-    this.to(count2 - 1);
+  get last() {
+    return this.view.run.length - 1;
   }
+  /** Show a moment of the run. */
   to(i) {
     this.slider.value = String(i);
-    this.text = this.view.turn(this.at);
+    this.view.put(this.view.run[i]);
+    this.view.afresh();
   }
-  /** Say where it is: with the next frame, as all texts. */
-  tell() {
-    this.said.textContent = this.text;
-    this.slider.setAttribute("aria-valuetext", this.text);
+  /** The same, as a gesture. */
+  go(i) {
+    this.stop();
+    this.to(i);
   }
+  /** The run has more moments, or is another one: go to its end, if `follow`. */
+  grow(follow = this.at === +this.slider.max) {
+    this.slider.max = String(this.last);
+    if (follow) this.to(this.last);
+    else this.view.changed();
+  }
+  /** Go to a share of the run; nearby it takes the moment with the most failures.
+   * @param {number} share */
+  touch(share) {
+    const { run } = this.view, at = Math.round(share * this.last), reach = Math.ceil(this.last / 100), near = [...run.keys()].slice(Math.max(at - reach, 0), at + reach + 1), fails = (i) => run[i].failures ?? 0;
+    this.go(near.reduce((best, i) => fails(i) > fails(best) ? i : best, at));
+  }
+  /** Go to the next change (1) or the one before (-1). */
+  jump(way) {
+    const { run } = this.view, stops = [...run.keys()].filter((i) => (i - this.at) * way > 0 && run[i].events.length);
+    this.go(way > 0 ? stops[0] ?? this.last : stops.at(-1) ?? 0);
+    this.view.settle();
+  }
+  /** Play: a moment with a change stays longer. */
   start() {
-    const last = +this.slider.max;
+    const { run } = this.view, [long, short] = this.slow ? [1e3, 0] : [CHANGED, SAME], lasts = (i) => run[i].events.length ? long : short;
     this.playing = true;
     this.toggle.textContent = "pause";
-    if (this.at === last) this.to(0);
+    if (this.at === this.last) this.to(0);
     let [before, waited] = [performance.now(), 0];
     const frame = (now) => {
       if (!this.playing || !this.slider.isConnected) return;
-      waited += (now - before) * this.speed;
+      waited += now - before;
       before = now;
       let i = this.at;
-      for (; i < last && waited >= this.view.lasts(i); i++) waited -= this.view.lasts(i);
+      for (; i < this.last && waited >= lasts(i); i++) waited -= lasts(i);
       if (i > this.at) this.to(i);
-      if (this.at < last) return requestAnimationFrame(frame);
-      this.pause();
+      if (this.at < this.last) return requestAnimationFrame(frame);
+      this.stop(true);
     };
     requestAnimationFrame(frame);
   }
-  pause() {
-    this.stop();
-    this.view.settle();
-  }
-  stop() {
+  stop(gesture = false) {
     this.playing = false;
     this.toggle.textContent = "play";
+    if (gesture) this.view.settle();
   }
 };
 
 // ../vsp/show/explorer/picture.js
 var ARROWS = 14;
 var STRIPES = 50;
-var FLASH = 900;
-var CELLS = ["#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0"];
+var SMALL = 330;
+var [TIME, END] = [72, 8];
+var CELLS = "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ");
 var [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"];
+var CLEAR = "transparent";
 var rgb = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 var mixed = (colour, ground, share) => colour.map((part, i) => ground[i] + share * (part - ground[i]));
+function begun(canvas, high) {
+  const [wide, ratio] = [canvas.clientWidth || 440, devicePixelRatio], style = getComputedStyle(canvas), ctx = (
+    /** @type {CanvasRenderingContext2D} */
+    canvas.getContext("2d")
+  );
+  canvas.width = Math.round(wide * ratio);
+  canvas.height = Math.round((high ?? wide) * ratio);
+  ctx.scale(ratio, ratio);
+  ctx.font = `${wide < SMALL ? 11 : 13}px ${style.fontFamily}`;
+  const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"], tones = names.map((name2) => [name2, style.getPropertyValue(`--vsp-${name2}`).trim() || "#888888"]);
+  return { ctx, wide, tones: Object.fromEntries(tones) };
+}
 var Picture = class {
   map = new OffscreenCanvas(1, 1);
   edge = { left: 0, right: 0, top: 0, bottom: 0 };
@@ -490,34 +423,25 @@ var Picture = class {
   // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */
   tones = {};
-  /** @type {number[]} */
-  colours = [];
-  // of the cells
-  /** @type {Record<string, number>} */
-  known = {};
-  // those of codewords
-  /** @param {HTMLCanvasElement} canvas @param {Plane} plane */
-  constructor(canvas, plane) {
+  /** @type {CanvasRenderingContext2D} */
+  ctx;
+  /** `bare`: without axes. @param {HTMLCanvasElement} canvas @param {Plane} plane */
+  constructor(canvas, plane, bare = false) {
     this.canvas = canvas;
     this.plane = plane;
-    this.ctx = /** @type {CanvasRenderingContext2D} */
-    canvas.getContext("2d");
+    this.bare = bare;
   }
-  /** Take size and colours from the page, and clear. */
+  /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
-    const ratio = devicePixelRatio, side = this.canvas.clientWidth || 440, size = Math.round(side * ratio), style = getComputedStyle(this.canvas);
-    if (this.canvas.width !== size) this.canvas.width = this.canvas.height = size;
-    const small = side < 330;
-    this.edge = { left: small ? 46 : 54, right: small ? 4 : 8, top: 8, bottom: small ? 32 : 36 };
-    this.ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.side = side;
+    const { ctx, wide: side, tones } = begun(this.canvas), [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36];
+    Object.assign(this, { ctx, side, tones });
+    if (!this.bare) this.edge = { left, right, top: 8, bottom };
     this.wide = side - this.edge.left - this.edge.right;
     this.high = side - this.edge.top - this.edge.bottom;
-    const tone = (name) => style.getPropertyValue(`--vsp-${name}`).trim() || "#888888";
-    const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"];
-    this.tones = Object.fromEntries(names.map((name) => [name, tone(name)]));
-    this.ctx.clearRect(0, 0, side, side);
-    this.ctx.font = `${small ? 11 : 13}px ${style.fontFamily}`;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
+    ctx.clip();
   }
   at([x, y]) {
     const { low, high } = this.plane;
@@ -528,63 +452,68 @@ var Picture = class {
   }
   /** @param {number} px @param {number} py */
   point(px, py) {
-    const { low, high } = this.plane;
-    return [
-      low[0] + (px - this.edge.left) / this.wide * (high[0] - low[0]),
-      high[1] - (py - this.edge.top) / this.high * (high[1] - low[1])
-    ].map((value, i) => clip(value, low[i], high[i]));
-  }
-  shows(point) {
-    const { low, high } = this.plane;
-    return point.every((value, i) => value >= low[i] && value <= high[i]);
+    const { low, high } = this.plane, shares = [(px - this.edge.left) / this.wide, 1 - (py - this.edge.top) / this.high];
+    return this.spot(shares).map((value, i) => {
+      const digits2 = clip(2 - Math.floor(Math.log10(high[i] - low[i])), 2, 12);
+      return +clip(value, low[i], high[i]).toFixed(digits2);
+    });
   }
   /** The middle of one of n by n parts of the plane, counted from the top left.
    * @param {number} at @param {number} n */
   middle(at, n) {
-    const { low, high } = this.plane, shares = [at % n + 0.5, n - 0.5 - Math.floor(at / n)];
-    return shares.map((share, i) => low[i] + share / n * (high[i] - low[i]));
+    return this.spot([(at % n + 0.5) / n, (n - 0.5 - Math.floor(at / n)) / n]);
   }
-  /** Call `draw` with everything cut off at the frame. */
-  inside(draw) {
-    this.ctx.save();
-    this.ctx.beginPath();
-    this.ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
-    this.ctx.clip();
-    draw();
-    this.ctx.restore();
+  /** The point of the plane at shares of its width and height. @param {Vector} shares */
+  spot(shares) {
+    const { low, high } = this.plane;
+    return shares.map((share, i) => low[i] + share * (high[i] - low[i]));
   }
   /** @type {(words: string, x: number, y: number, align?: CanvasTextAlign) => void} */
   text(words, x, y, align = "center") {
-    const { ctx } = this;
+    const { ctx, tones } = this;
+    Object.assign(ctx, { strokeStyle: tones.paper, fillStyle: tones.ink, lineWidth: 3 });
     ctx.textAlign = align;
-    ctx.lineWidth = 3;
-    ctx.strokeStyle = this.tones.paper;
     ctx.strokeText(words, x, y);
-    ctx.fillStyle = this.tones.ink;
     ctx.fillText(words, x, y);
   }
-  place({ name, from, to }) {
+  place({ name: name2, from, to }) {
     const [left, bottom] = this.at(from), [right, top] = this.at(to);
-    this.ctx.fillStyle = (name === "pit" ? this.tones.pit : this.tones.goal) + "77";
+    this.ctx.fillStyle = (name2 === "pit" ? this.tones.pit : this.tones.goal) + "77";
     this.ctx.fillRect(left, top, right - left, bottom - top);
   }
   /** Name a place: at its middle, or at the top of the frame that it fills. */
-  name({ name, from, to }) {
-    const { low, high } = this.plane, fills = from.every((value, i) => value <= low[i] && to[i] >= high[i]), [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)), half = this.ctx.measureText(name).width / 2 + 3;
-    if (fills) this.text(name, this.edge.left + this.wide / 2, this.edge.top + 16);
-    else this.text(name, Math.max(x, this.edge.left + half), y + 4);
+  name({ name: name2, from, to }) {
+    const { low, high } = this.plane, fills = from.every((value, i) => value <= low[i] && to[i] >= high[i]), [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)), half = this.ctx.measureText(name2).width / 2 + 3;
+    if (fills) this.text(name2, this.edge.left + this.wide / 2, this.edge.top + 16);
+    else this.text(name2, Math.max(x, this.edge.left + half), y + 4);
   }
   /** @param {Vector[]} points @param {string} colour */
   line(points, colour, width = 2) {
     const { ctx } = this;
     ctx.beginPath();
-    points.forEach((point, i) => {
-      const [x, y] = this.at(point), far = i && Math.abs(x - this.at(points[i - 1])[0]) > this.wide / 2;
-      if (i && !far) ctx.lineTo(x, y);
-      else ctx.moveTo(x, y);
-    });
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = width;
+    let before = Infinity;
+    for (const [x, y] of points.map((point) => this.at(point))) {
+      const far = Math.abs(x - before) > this.wide / 2;
+      ctx[far ? "moveTo" : "lineTo"](x, y);
+      before = x;
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
+    ctx.stroke();
+  }
+  /** Draw arrows between pixels. @param {Arrow[]} arrows @param {number} head its length
+   * @param {string} colour @param {number} width */
+  arrows(arrows, head, colour, width) {
+    const { ctx } = this;
+    ctx.beginPath();
+    for (const { start, tip: [x, y] } of arrows) {
+      const turn = Math.atan2(y - start[1], x - start[0]);
+      ctx.moveTo(start[0], start[1]);
+      for (const side of [-2.6, 2.6]) {
+        ctx.lineTo(x, y);
+        ctx.lineTo(x + head * Math.cos(turn + side), y + head * Math.sin(turn + side));
+      }
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
     ctx.stroke();
   }
   /** @param {Vector[]} shapes @param {string} colour */
@@ -598,41 +527,34 @@ var Picture = class {
       }
       ctx.closePath();
     }
-    ctx.fillStyle = ctx.strokeStyle = colour;
-    ctx.lineWidth = 0.5;
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 });
     ctx.fill();
     ctx.stroke();
   }
   /** @param {Vector} point @param {number} radius
-   * @param {string | undefined} fill @param {string} [stroke] */
-  dot(point, radius, fill, stroke, width = 1.5) {
+   * @param {string} [fill] @param {string} [stroke] */
+  dot(point, radius, fill = CLEAR, stroke = CLEAR, width = 1.5) {
     const { ctx } = this, [x, y] = this.at(point);
     ctx.beginPath();
     ctx.arc(x, y, radius, 0, 7);
-    if (fill) {
-      ctx.fillStyle = fill;
-      ctx.fill();
-    }
-    if (stroke) {
-      ctx.strokeStyle = stroke;
-      ctx.lineWidth = width;
-      ctx.stroke();
-    }
+    Object.assign(ctx, { fillStyle: fill, strokeStyle: stroke, lineWidth: width });
+    ctx.fill();
+    ctx.stroke();
   }
   axes() {
     const { ctx, plane, edge } = this, { low, high, labels } = plane, bottom = edge.top + this.high, sides = (
       /** @type {const} */
       ["left", "center", "right"]
     );
-    ctx.strokeStyle = this.tones.ink;
-    ctx.lineWidth = 1;
+    ctx.restore();
+    Object.assign(ctx, { strokeStyle: this.tones.ink, lineWidth: 1 });
     ctx.strokeRect(edge.left, edge.top, this.wide, this.high);
     for (const share of [0, 0.5, 1]) {
       const [first, second] = low.map((value, i) => tick(value, high[i] - value, share));
-      const x = edge.left + share * this.wide, y = bottom - share * this.high;
-      this.text(first, x, bottom + 15, sides[2 * share]);
-      if (share !== 0.5 || second.length < 5 && this.side > 330)
-        this.text(second, edge.left - 5, y + [0, 4, 10][2 * share], "right");
+      const y = bottom - share * this.high + [0, 4, 10][2 * share];
+      this.text(first, edge.left + share * this.wide, bottom + 15, sides[2 * share]);
+      if (share !== 0.5 || second.length < 5 && this.side > SMALL)
+        this.text(second, edge.left - 5, y, "right");
     }
     this.text(labels[0], edge.left + this.wide / 2, bottom + 31);
     ctx.save();
@@ -651,9 +573,6 @@ function drawMap(view, n) {
   for (let at = 0; at < n * n && !policy.layers; at++)
     [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)));
   picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1]);
-  const keys = (policy.codewords ?? [0]).map(String), wanted = keys.map((key, i) => picture.known[key] ?? picture.colours[i]);
-  picture.colours = colouring(cells, n, view.cells, wanted);
-  picture.known = Object.fromEntries(keys.map((key, i) => [key, picture.colours[i]]));
   picture.map.width = picture.map.height = n;
   picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0);
 }
@@ -664,176 +583,183 @@ function painted(view, cells, others, n) {
     const plain = mixed(rgb(hue), paper, share);
     return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed);
   };
-  const single = scene.task.outputs.length === 1, tints = picture.colours.map((colour) => shades(CELLS[colour], view.cells > 1 ? 0.34 : 0.1)), pushes = Array.from(
+  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42, tints = (policy.tints ?? [0]).map((tint) => shades(CELLS[tint], full)), pushes = Array.from(
     { length: 129 },
     (_, i) => shades(i < 64 ? LEFT : RIGHT, 0.7 * Math.abs(i - 64) / 64)
   );
   for (let at = 0; at < n * n; at++) {
     const [row2, column] = [Math.floor(at / n), at % n], cell = Math.floor((row2 + column) * STRIPES / n) % 2 ? others[at] : cells[at];
     let hue = tints[cell];
-    if (single && !policy.layers) {
+    if (scene.task.outputs.length === 1 && !policy.layers) {
       const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0);
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
     }
     const edge = column && cells[at - 1] !== cells[at] || row2 && cells[at - n] !== cells[at];
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.cell)];
+    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)];
   }
   return image;
 }
-function drawAll(view) {
-  const { picture } = view;
+function drawAll(view, points) {
+  const { picture, scene, task } = view;
   picture.begin();
-  picture.inside(() => {
-    drawPlane(view);
-    const path = view.played.states.map(view.place), { paper, ink } = picture.tones;
-    picture.line(path, paper, 5);
-    picture.line(path, ink, 2);
-    path.slice(1).forEach((point) => picture.dot(point, 2, ink));
-    drawCodewords(view);
-    drawFlashes(view);
-    picture.dot(view.asked, 9, paper);
-    picture.dot(view.asked, 6.5, void 0, ink);
-    picture.dot(view.asked, 2.5, ink);
-  });
+  if (points) drawMap(view, points);
+  const path = view.played.states.map(view.place), { ctx, edge, wide, high } = picture, { paper, ink, failing, start } = picture.tones;
+  ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  task.places.forEach((place) => picture.place(place));
+  if (view.regions) picture.polygons(view.regions, failing);
+  if (scene.task.outputs.length === 2) drawArrows(view);
+  for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
+    const cell = view.failing.get(i);
+    if (cell === void 0) picture.dot(place, 1.3, start);
+    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
+  }
+  task.places.forEach((place) => picture.name(place));
+  picture.line(path, paper, 5);
+  picture.line(path, ink, 2);
+  path.slice(1).forEach((point) => picture.dot(point, 2, ink));
+  drawCodewords(view);
+  picture.arrows(view.arrows, 9, paper, 6);
+  picture.arrows(view.arrows, 9, ink, 3);
+  if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3);
+  picture.dot(view.asked, 9, paper);
+  picture.dot(view.asked, 6.5, CLEAR, ink);
+  picture.dot(view.asked, 2.5, ink);
   picture.axes();
 }
-function drawPlane(view) {
-  const { picture, scene } = view, { tones, edge } = picture;
-  picture.ctx.drawImage(picture.map, edge.left, edge.top, picture.wide, picture.high);
-  view.task.places.forEach((place) => picture.place(place));
-  if (view.regions) picture.polygons(view.regions, tones.failing);
-  if (scene.task.outputs.length === 2) drawArrows(view);
-  const starts = view.starts ? scene.starts.map(view.place) : [];
-  starts.forEach((start, i) => {
-    const cell = view.failing.get(i);
-    if (cell === void 0) picture.dot(start, 1.3, tones.start);
-    else picture.dot(start, 2.7, cell === view.cell ? tones.failing : tones.paper, tones.failing);
-  });
-  view.task.places.forEach((place) => picture.name(place));
-}
 function drawArrows(view) {
-  const { picture, scene, policy } = view, { ctx } = picture, length = picture.wide / ARROWS * 0.42;
-  ctx.strokeStyle = policy.layers ? picture.tones.teacher : picture.tones.ink;
-  ctx.lineWidth = policy.layers ? 1.4 : 1;
-  ctx.beginPath();
-  for (let i = 0; i < ARROWS * ARROWS; i++) {
-    const point = picture.middle(i, ARROWS);
-    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action;
-    if (!dx && !dy) continue;
-    const [x, y] = picture.at(point), [ex, ey] = [x + dx * length, y - dy * length], turn2 = Math.atan2(-dy, dx);
-    ctx.moveTo(x - dx * length, y + dy * length);
-    ctx.lineTo(ex, ey);
-    for (const side of [-2.6, 2.6]) {
-      ctx.moveTo(ex, ey);
-      ctx.lineTo(ex + 4 * Math.cos(turn2 + side), ey + 4 * Math.sin(turn2 + side));
-    }
-  }
-  ctx.stroke();
+  const { picture, scene, policy } = view, { teacher, ink } = picture.tones, length = picture.wide / ARROWS * 0.42;
+  const arrows = Array.from({ length: ARROWS * ARROWS }, (_, i) => {
+    const point = picture.middle(i, ARROWS), [dx, dy] = (policy.arrows?.[i] ?? act(scene, policy, point).action).map((by) => by * length), [x, y] = picture.at(point);
+    return { start: [x - dx, y + dy], tip: [x + dx, y - dy] };
+  });
+  const moving = arrows.filter(({ start: [x, y], tip }) => x !== tip[0] || y !== tip[1]);
+  picture.arrows(moving, 4, policy.layers ? teacher : ink, policy.layers ? 1.4 : 1);
+}
+function ownArrow({ picture, policy, cells }, cell) {
+  const { codewords = [], coefficients = [] } = policy, word = cells > 1 ? codewords[cell] : picture.spot([0.5, 0.5]), rows = coefficients[cell], [x, y] = picture.at(word), own = picture.wide / 10, [dx, dy] = [0, 1].map((k) => clip(raw(rows, word, k), -1, 1) * own);
+  return { start: [x, y], tip: [x + dx, y - dy], word, rows, own };
 }
 function drawCodewords(view) {
   const { picture, policy } = view, { paper, ink } = picture.tones;
   if (policy.layers || view.cells === 1) return;
   policy.codewords.forEach((codeword, i) => {
-    const point = view.placeSeen(codeword), [x, y] = picture.at(point);
-    picture.dot(point, 5, i === view.cell ? ink : paper, ink);
-    const [inner, below] = [x > picture.side - 40, y < 28];
+    const point = view.task.place(codeword), [x, y] = picture.at(point);
+    picture.dot(point, 5, i === view.marked ? ink : paper, ink);
+    if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2);
     if (view.cells > 30) return;
-    picture.text(String(i), x + (inner ? -9 : 9), y + (below ? 16 : -6), inner ? "right" : "left");
+    const inner = x > picture.side - 40;
+    const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6];
+    picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
   });
 }
-function drawFlashes(view) {
-  const now = performance.now(), { picture } = view;
-  view.flashes = view.flashes.filter(({ since }) => now - since < FLASH);
-  for (const { codeword, kind, since } of view.flashes) {
-    const share = (now - since) / FLASH;
-    const radius = 34 * (kind === "split" ? share : 1 - share);
-    picture.ctx.globalAlpha = 1 - share;
-    picture.dot(view.placeSeen(codeword), radius, void 0, picture.tones.ink, 4);
-  }
-  picture.ctx.globalAlpha = 1;
+function drawTime({ run, replay: { time: canvas, at } }) {
+  const { ctx, wide, tones } = begun(canvas, TIME), failing = run.map(({ failures }) => failures ?? 0), most = Math.max(...failing, 1), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36);
+  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 });
+  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END);
+  run.forEach(({ events }, i) => {
+    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7);
+  });
+  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14);
+  ctx.beginPath();
+  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)));
+  ctx.stroke();
+  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`);
 }
 
 // ../vsp/show/explorer/texts.js
-function resultOf({ scene, results, base, teacher }) {
-  const { played, failures, mean } = results, about = played < scene.starts.length ? "about " : "";
+function resultOf({ scene, policy, results, base }) {
+  const { played, failures, mean } = results, { teacher } = { ...scene, ...policy }, about = played < scene.starts.length ? "about " : "";
   const both = (before, now) => base ? `${before} → ${about}${now}` : about + now;
-  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} starts fail. `;
-  const returned = `Mean return ${both(base?.mean.toFixed(2), mean.toFixed(2))}`;
-  const aim = teacher ? ` (teacher: ${teacher.mean.toFixed(2)})` : "";
-  return minus2(`${scene.lost.length ? fails : ""}${returned}${aim}.`);
+  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} fail, mean return `, aim = teacher && !base && !policy.layers ? ` (teacher ${teacher.mean.toFixed(2)})` : "";
+  const returned = both(base?.mean.toFixed(2), mean.toFixed(2));
+  return minus(`${scene.lost.length ? fails : "mean return "}${returned}${aim}.`);
 }
-function episodeOf({ cell, cells, asked, played, task, picture: { plane } }) {
+function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane } }) {
   if (!played.states.length) return "";
-  const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus2(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), steps = count(played.states.length - 1, "step");
-  const where = cells > 1 ? `, in cell ${cell}` : "";
-  return `From (${at})${where}: ${steps}${end}.`;
+  const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), where = cells > 1 ? `, in cell ${numberOf(policy, cell)}` : "";
+  return `From (${at})${where}: ${count(played.states.length - 1, "step")}${end}.`;
+}
+function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+  if (!run.length) return "";
+  const { n, codewords, failures, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), fails = failures === void 0 ? "" : `, ${failures} of ${starts.length} fail`, lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
+${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
+  const cells = count(codewords.length, "cell");
+  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
-  const at = `${kind} at (${codeword.map((value) => minus2(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
+  const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
   if (kind === "merge")
     return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`;
   return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`;
 }
-function answerOf({ scene, policy, cell, cells, asked, task }) {
+function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return [];
-  const { inputs, outputs } = scene.task, seen = task.see(asked), rows = policy.coefficients[cell], { raw: raw2, action } = act(scene, policy, seen);
-  const adds = [...inputs, "bias"].map((name, i) => {
-    const said = name === "bias" ? "the bias adds" : `${name} = ${digits(seen[i])} adds`;
+  const { inputs, outputs } = scene.task, rows = policy.coefficients[cell], { raw: raw2, action } = act(scene, policy, seen);
+  const adds = [...inputs, "bias"].map((name2, i) => {
+    const said = name2 === "bias" ? "the bias adds" : `${name2} = ${digits(seen[i])} adds`;
     return [said, ...rows[i].map((weight) => weight * (seen[i] ?? 1))];
   });
   const found = [...adds, ["sum", ...raw2], ["action, within the limits", ...action]];
-  const told = found.map(([name, ...values]) => [name, ...values.map(digits)]);
-  const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map";
+  const told = found.map(([name2, ...values]) => [name2, ...values.map(digits)]);
+  const title = cells > 1 ? `Cell ${numberOf(policy, cell)}, one of ${cells}` : "The map";
   return [element("p", {}, element("b", {}, title)), table(outputs, told)];
 }
-var noteOf = ({ angular, cells }) => (angular || cells === 1 ? "" : "Drag a codeword to move its cell. ") + "Click to choose a state; arrow keys move it.";
-function legendOf({ scene, policy, failing, starts, regions, cells, picture, placeSeen }) {
-  const [output2, second] = scene.task.outputs;
-  const mark = (kind, words) => element("li", {}, element("i", { class: `vsp-mark vsp-${kind}` }), words);
-  const fails = starts && failing.size > 0, inside = policy.codewords?.some((word) => picture.shows(placeSeen(word)));
+var noteOf = ({ movable, arrows }) => (movable ? "Drag a codeword to move its cell. " : "") + (arrows.length ? "Drag a thick arrow: its constants follow. " : "") + "Drag a number sideways. Click to choose a state; arrow keys move it.";
+function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
+  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, { low, high } = picture.plane, shows = (at) => at.every((x, i) => x >= low[i] && x <= high[i]), inside = policy.codewords?.some((word) => shows(task.place(word)));
   const marks = [
-    starts && mark("start", "start"),
-    fails && mark("failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"),
-    fails && cells > 1 && mark("elsewhere", "fails; last step in another"),
-    regions && mark("region", "falls into the pit"),
-    second && mark(policy.layers ? "taught" : "step", policy.layers ? "teacher's step" : "step"),
-    !second && mark("below", `${output2} below 0`),
-    !second && mark("above", "above 0"),
-    cells > 1 && inside && mark("codeword", "codeword; filled: of the chosen cell"),
-    picture.ties && mark("tied", "two codewords equally near: the first acts")
+    [starts, "start", "start"],
+    [fails, "failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"],
+    [fails && cells > 1, "elsewhere", "fails; last step in another"],
+    [regions, "region", "falls into the pit"],
+    [second && policy.layers, "taught", "teacher's step"],
+    [second && !policy.layers, "step", "step"],
+    [!second, "below", `${output2} below 0`],
+    [!second, "above", "above 0"],
+    [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
+    [picture.ties, "tied", "two codewords equally near: the first acts"],
+    [true, "chosen", "chosen state, and its episode"]
   ];
-  return [...marks.filter((made) => !!made), mark("chosen", "chosen state, and its episode")];
+  const told = marks.filter(([shown]) => shown);
+  return told.map(([, kind, words]) => element("li", { class: `vsp-${kind}` }, words));
 }
+
+// ../vsp/show/explorer/episodes.js
+var N_STEPS = 150;
+var STEPS = Array.from({ length: N_STEPS }, (_, n) => (n + 1) / N_STEPS).flatMap((x) => [x, -x]);
 
 // ../vsp/show/explorer/explorer.js
 var [COARSE, FINE] = [120, 320];
 var IN_MOTION = 8;
+var ALL = 4;
 var STRIDE = 149;
-var [PLAYS, PAUSE] = [2e4, 400];
+var LABEL = "Map of the policy. Arrow keys move the chosen state.";
+var WAYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
 var Explorer = class {
   /** @type {Map<number, number>} */
   failing = /* @__PURE__ */ new Map();
   // of the starts that fail, by index: the cell of their last step
   /** @type {Partial<Numbers>[]} */
   past = [];
-  // to undo to
-  /** @type {(Change & { since: number })[]} */
-  flashes = [];
-  // changes that have just happened
+  // after each gesture
   /** @type {Vector[] | null} */
   regions = null;
   // polygons to fill
+  /** @type {Vector | null} */
+  ring = null;
+  // a place to mark
+  zooming = 0;
+  // a frame
   starts = true;
   // whether they are drawn
   fixed = false;
-  // whether codewords cannot be moved
+  // whether codewords and arrows cannot be moved
   /** @type {number | null} */
-  dragged = null;
-  // the codeword, or -1 for the state
-  pressed = { x: 0, y: 0, place: [0, 0] };
-  // where a gesture began
-  moment = -1;
-  // of the run
+  lit = null;
+  // the cell whose equations are touched
+  /** @type {Held | null} */
+  held = null;
+  // what is dragged
   /** @type {Policy} */
   policy;
   // with the numbers of the reader
@@ -852,23 +778,17 @@ var Explorer = class {
   /** @type {Judged | null} */
   base;
   // the results before the last gesture
-  /** @type {Partial<Numbers>} */
-  kept;
-  // those before the next gesture
   armed = false;
   // whether the next change begins a gesture
+  writing = false;
+  // whether a finger is on a field, which must stay
   /** @type {number | null} */
   mapped;
-  // the cell that is marked on the map
-  renewed = false;
-  // whether the policy has changed since the last frame
+  // the cell that is marked on the map; null: of another policy
   waiting = 0;
   // for a frame
-  fading = 0;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  still;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  later;
+  /** @type {Record<string, ReturnType<typeof setTimeout>>} */
+  timers = {};
   result = element("p", { class: "vsp-result" });
   from = element("p", { class: "vsp-from" });
   said = element("div", {}, this.result, this.from);
@@ -881,9 +801,13 @@ var Explorer = class {
       if (!this.form.contains(
         /** @type {Node | null} */
         to
-      )) this.changed();
+      )) this.light(null);
     },
     focusin: () => this.armed = true,
+    pointerdown: () => this.writing = this.armed = true,
+    pointerup: () => this.soon(),
+    pointercancel: () => this.soon(),
+    pointerleave: () => this.light(null),
     input: () => this.soon()
   });
   backs = row(
@@ -892,90 +816,84 @@ var Explorer = class {
   );
   replay = new Player(this);
   /** @param {HTMLElement} root @param {Scene} scene @param {Hooks} hooks */
-  constructor(root, scene, { bare, above = [], settled = () => {
-  }, told = () => {
-  } } = {}) {
-    const { low, high } = scene.plane;
+  constructor(root, scene, hooks = {}) {
     this.scene = scene;
-    this.settled = settled;
-    this.told = told;
+    this.hooks = hooks;
     this.task = dynamics(scene.task.name);
-    this.angular = scene.task.name === "Pendulum-v1";
-    this.asked = low.map((value, i) => value + 0.7 * (high[i] - value));
-    this.canvas = this.makeCanvas();
+    this.angular = scene.task.inputs.length > scene.plane.low.length;
+    const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
+    this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
+    this.asked = this.picture.spot([0.7, 0.7]);
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
-    ), held = root.contains(active) && active;
+    ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
-    const under = bare ? this.legend : this.answer, stage = element("div", { class: "vsp-stage" }, this.canvas, this.said, under);
-    root.replaceChildren(stage, ...bare ? [] : [this.panel(above)]);
-    if (held) (held.isConnected ? held : this.canvas).focus();
-    this.listen();
+    const policy = choice("policy", scene.policies, (policy2) => this.show(policy2)), lists = row(...hooks.above ?? [], policy), parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer;
+    root.replaceChildren(
+      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
+      ...hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]
+    );
+    if (focus) (focus.isConnected ? focus : this.canvas).focus();
+    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
     this.show(scene.policies[0]);
   }
-  makeCanvas() {
-    const { pointerdown, pointermove, pointerup, keydown } = this, answers = { pointerdown, pointermove, pointerup, pointercancel: pointerup, keydown }, label = "Map of the policy. Arrow keys move the chosen state.";
-    return element("canvas", { tabindex: 0, role: "application", "aria-label": label, ...answers });
+  // -- What is shown
+  place = (state) => this.task.place(this.task.see(state));
+  /** The cell that stands out. */
+  get marked() {
+    return this.lit !== null && this.lit < this.cells ? this.lit : this.cell;
   }
-  panel(above) {
-    const names = this.scene.policies.map(({ name }) => name);
-    const policy = choice("policy", names, (i) => this.show(this.scene.policies[i]));
-    const parts = [this.replay.row, this.form, this.backs, this.note];
-    return element("div", { class: "vsp-panel" }, this.legend, row(...above, policy), ...parts);
+  /** Whether codewords can be dragged, and the arrows of cells, to drag. */
+  get movable() {
+    return !this.fixed && !this.angular && this.cells > 1;
   }
-  // -- What is shown, and where it lies in the picture
-  place = (state) => {
-    if (!this.angular) return state;
-    const [angle, speed] = state;
-    return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed];
-  };
-  /** @type {(seen: Vector) => Vector} */
-  placeSeen = (seen) => this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen;
-  get teacher() {
-    return "teacher" in this.policy ? this.policy.teacher : this.scene.teacher;
+  get arrows() {
+    const none = this.fixed || this.cells > ALL || this.scene.task.outputs.length !== 2;
+    return none || this.policy.layers ? [] : this.shown.map((i) => ownArrow(this, i));
   }
   get cells() {
     return this.policy.layers ? 1 : this.policy.codewords.length;
+  }
+  /** The cells whose equations are shown: all, or the one that stands out. */
+  get shown() {
+    return this.cells > ALL ? [this.marked] : [...Array(this.cells).keys()];
   }
   /** Show a policy of the scene with its run, if it has one; `numbers` replace its own.
    * @param {Policy} policy @param {Partial<Numbers>} [numbers] */
   show(policy, numbers) {
     this.replay.stop();
+    name(policy);
     const { replay: run = [], ...own } = policy;
     const copy = policy.layers ? policy : structuredClone(own);
-    Object.assign(this.picture, { colours: [], known: {} });
-    Object.assign(this, { original: policy, run, policy: copy, moment: -1, dragged: null });
+    Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null });
     this.replay.row.hidden = !run.length;
     this.backs.hidden = Boolean(policy.layers);
-    if (run.length) this.replay.restart(run.length);
+    if (run.length) this.replay.grow(true);
     if (numbers) this.put(numbers);
     this.afresh();
   }
   // -- Changing the policy
   /** A copy of what a reader can change. */
-  numbers({ codewords, coefficients } = (
-    /** @type {Partial<Numbers>} */
-    this.policy
-  )) {
-    return structuredClone({ codewords, coefficients });
+  numbers(numbers = this.policy) {
+    const { codewords, coefficients, born, tints } = { ...this.policy, ...numbers };
+    return structuredClone({ codewords, coefficients, born, tints });
   }
   put(numbers) {
     Object.assign(this.policy, this.numbers(numbers));
+    name(this.policy);
   }
   /** Forget all gestures. */
   afresh() {
-    Object.assign(this, { base: null, past: [], armed: false, kept: this.numbers() });
+    Object.assign(this, { base: null, past: [this.numbers()], armed: false });
     this.changed(true);
   }
-  /** After every change of a number. Before the first of a gesture, keep what it was. */
+  /** After every change of a number: keep what it is, beside what it was before the gesture. */
   edited() {
-    if (this.armed) {
-      this.past.push(this.kept);
-      Object.assign(this, { armed: false, base: this.results });
-    }
-    this.kept = this.numbers();
+    if (this.armed) Object.assign(this, { armed: false, base: this.results });
+    else this.past.pop();
+    this.past.push(this.numbers());
     this.changed(true);
   }
   /** Take other numbers, as one gesture. */
@@ -987,170 +905,156 @@ var Explorer = class {
     this.settle();
   }
   undo() {
-    const before = this.past.pop();
-    if (!before) return;
-    this.take(before);
-    this.past.pop();
+    if (this.past.length > 1) this.take(this.past.splice(-2)[0]);
   }
   /** A gesture is finished: tell it once the picture shows it. */
   settle() {
-    requestAnimationFrame(() => requestAnimationFrame(() => this.settled(this)));
+    requestAnimationFrame(() => requestAnimationFrame(() => this.hooks.settled?.(this)));
   }
   /** The same once keys rest: the next one begins another gesture. */
   soon() {
-    clearTimeout(this.still);
-    this.still = setTimeout(() => {
-      this.armed = true;
+    clearTimeout(this.timers.still);
+    this.timers.still = setTimeout(() => {
+      Object.assign(this, { armed: true, writing: false });
       this.settle();
     }, 400);
   }
   // -- Everything that depends on policy and state
   /** Schedule an update: of everything if the `policy` changed. */
   changed(policy = false) {
-    this.renewed ||= policy;
-    this.waiting ||= requestAnimationFrame(() => {
-      const { renewed } = this;
-      Object.assign(this, { waiting: 0, renewed: false });
-      this.redo(renewed);
-    });
+    if (policy) this.mapped = null;
+    this.waiting ||= requestAnimationFrame(() => this.redo());
   }
-  redo(renewed = true) {
-    if (renewed) this.judge(IN_MOTION);
-    if (renewed) this.mapped = null;
+  redo() {
+    this.waiting = 0;
+    if (this.mapped === null) this.judge(IN_MOTION);
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell;
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked, true);
-    if (!this.form.contains(document.activeElement)) this.fill();
+    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked);
+    if (!this.writing && !this.form.contains(document.activeElement)) this.fill();
     this.draw();
     this.speak();
   }
   /** Run an episode from every start, or as many as `budget` ms allow. */
   judge(budget = Infinity) {
-    const { scene, policy } = this, n = scene.starts.length, begun = performance.now();
+    const { scene, policy } = this, n = scene.starts.length, begun2 = performance.now();
     this.failing.clear();
-    if (policy.layers) {
-      this.results = { played: n, ...policy.results };
-      return;
-    }
+    if (policy.layers) return Object.assign(this, { results: { played: n, ...policy.results } });
     ready(policy);
-    let [played, sum] = [0, 0];
-    for (; played < n && (!played || performance.now() - begun < budget); played++) {
+    let [played, sum2] = [0, 0];
+    for (; played < n && (!played || performance.now() - begun2 < budget); played++) {
       const i = played * STRIDE % n, { total, outcome, last } = rollout(scene, policy, scene.starts[i]);
       if (scene.lost.includes(outcome)) this.failing.set(i, last);
-      sum += total;
+      sum2 += total;
     }
     const failures = Math.round(this.failing.size / played * n);
-    this.results = { played, failures, mean: sum / played };
+    this.results = { played, failures, mean: sum2 / played };
   }
   fill() {
     if (this.policy.layers) return this.form.replaceChildren();
-    const lines = equations(this, () => this.edited());
-    const title = this.cells > 1 ? `Change cell ${this.cell}` : "Change the map";
-    this.form.replaceChildren(element("fieldset", {}, element("legend", {}, title), ...lines));
+    const parts = this.shown.map((i) => {
+      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
+      return element("fieldset", acts, element("legend", {}, title), ...lines);
+    });
+    this.form.replaceChildren(...parts);
+  }
+  /** Let a cell stand out while its equations are touched. @param {number | null} cell */
+  light(cell) {
+    if (this.held) return;
+    this.lit = cell;
+    this.changed();
   }
   speak() {
-    const moving = this.replay.playing || this.dragged !== null;
-    this.said.setAttribute("aria-live", moving ? "off" : "polite");
+    const { replay } = this, moment = momentOf(this);
+    this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite");
     this.result.textContent = resultOf(this);
     this.from.textContent = episodeOf(this);
-    if (this.answer.isConnected) this.answer.replaceChildren(...answerOf(this));
+    this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)));
     this.legend.replaceChildren(...legendOf(this));
     this.note.textContent = noteOf(this);
-    this.replay.tell();
-    this.told(this);
+    for (const part of this.form.children)
+      part.classList.toggle("vsp-lit", Number(part.getAttribute("data-cell")) === this.marked);
+    replay.said.textContent = moment;
+    replay.slider.setAttribute("aria-valuetext", moment);
+    replay.time.hidden = this.run[0]?.failures === void 0;
+    if (!replay.time.hidden) drawTime(this);
+    this.hooks.told?.(this);
   }
   /** Draw. Until the picture rests, the map has few points, and not all starts are played. */
   draw() {
-    this.picture.begin();
-    if (this.mapped !== this.cell) {
-      drawMap(this, COARSE);
-      this.mapped = this.cell;
-      clearTimeout(this.later);
-      this.later = setTimeout(() => this.finish(), 120);
-    }
-    drawAll(this);
-    const fade = () => {
-      this.fading = 0;
-      if (!this.waiting) this.draw();
-    };
-    if (this.flashes.length) this.fading ||= requestAnimationFrame(fade);
+    if (this.mapped === this.marked) return drawAll(this);
+    drawAll(this, COARSE);
+    this.mapped = this.marked;
+    clearTimeout(this.timers.sharp);
+    this.timers.sharp = setTimeout(() => this.finish(), 120);
   }
   finish() {
     if (this.waiting) return;
     if (this.results.played < this.scene.starts.length) this.judge();
-    drawMap(this, FINE);
-    drawAll(this);
+    drawAll(this, FINE);
     this.speak();
   }
-  // -- The run
-  /** Show moment i of the run, and say what changed. */
-  turn(i) {
-    const { n, codewords } = this.run[i];
-    const moments = this.run.slice(Math.min(this.moment + 1, i), i + 1), happened = moments.flatMap(({ events }) => events), now = performance.now();
-    if (this.moment >= 0 && !this.replay.slow)
-      this.flashes.push(...happened.map((event) => ({ ...event, since: now })));
-    this.moment = i;
-    this.put(this.run[i]);
-    this.afresh();
-    const last = this.run.slice(0, i + 1).findLast(({ events }) => events.length), since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
-${causeOf(event, this.original.limits)}`) ?? [];
-    return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`;
+  /** Show another part of the plane, after a while on the way (by equal factors), or at once.
+   * @param {Box} to */
+  zoom({ low, high }, duration = 0) {
+    const { plane } = this.picture, factor = (high[0] - low[0]) / (plane.high[0] - plane.low[0]), begun2 = performance.now();
+    cancelAnimationFrame(this.zooming);
+    const frame = (now) => {
+      const time = duration && factor !== 1 ? clip((now - begun2) / duration, 0, 1) : 1, way = time < 1 ? (factor ** time - 1) / (factor - 1) : 1;
+      const mean = (from, to) => from.map((value, i) => (1 - way) * value + way * to[i]);
+      this.picture.plane = { ...plane, low: mean(plane.low, low), high: mean(plane.high, high) };
+      this.changed(true);
+      if (time < 1) this.zooming = requestAnimationFrame(frame);
+    };
+    frame(begun2);
   }
-  /** For how many milliseconds a moment of the run stays: with a change, longer. */
-  lasts(i) {
-    const changes = this.run.filter(({ events }) => events.length).length, pause = Math.min(PAUSE, PLAYS / 2 / Math.max(changes, 1)), rest = (PLAYS - pause * changes) / Math.max(this.run.length - changes, 1);
-    const [long, short] = this.replay.slow ? [1e3, 0] : [pause, rest];
-    return this.run[i].events.length ? long : short;
-  }
-  /** Go to the next change (1) or the one before (-1). */
-  jump(way) {
-    const end = way > 0 ? this.run.length - 1 : 0;
-    let i = this.replay.at;
-    do
-      i = i === end ? i : i + way;
-    while (i !== end && !this.run[i].events.length);
-    this.replay.to(i);
-    this.settle();
-  }
-  // -- Size and colours of the page, pointer and keys
-  listen() {
-    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    const recolour = () => this.canvas.isConnected && this.changed(true);
-    const watch = new MutationObserver(recolour);
-    for (const part of [document.documentElement, document.body])
-      watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
-  }
+  // -- Pointer and keys
   pointerdown = (event) => {
     if (event.button || !event.isPrimary) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.focus();
-    const { offsetX: x, offsetY: y } = event, words = this.fixed || this.angular || this.cells === 1 ? [] : this.policy.codewords ?? [], places = words.map((word) => this.picture.at(word)), far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), least = Math.min(...far);
-    this.dragged = least < (event.pointerType === "touch" ? 22 : 12) ? far.indexOf(least) : -1;
-    Object.assign(this, { pressed: { x, y, place: places[this.dragged] ?? [x, y] }, armed: true });
+    const { offsetX: x, offsetY: y } = event, finger = event.pointerType === "touch", words = this.movable ? this.policy.codewords ?? [] : [];
+    const near = (places, turned) => {
+      const far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), cell = far.indexOf(Math.min(...far));
+      if (far[cell] < (finger ? 22 : 12)) return { cell, turned, finger, place: places[cell] };
+    };
+    const word = near(words.map((word2) => this.picture.at(word2)), false), found = word ?? near(this.arrows.map(({ tip }) => tip), true), held = { cell: -1, turned: false, finger, place: [x, y], ...found, from: [x, y] };
+    Object.assign(this, { held, armed: true, lit: found?.cell ?? null });
     this.replay.stop();
-    this.choose(words[this.dragged] ?? this.picture.point(x, y));
+    if (found) this.changed();
+    else this.choose(this.picture.point(x, y));
   };
   pointermove = (event) => {
-    if (this.dragged === null) return;
-    const { codewords } = this.policy, { x, y, place } = this.pressed, [dx, dy] = [event.offsetX - x, event.offsetY - y], point = this.picture.point(place[0] + dx, place[1] + dy);
-    if (this.dragged < 0 || !codewords) return this.choose(point);
+    if (!this.held) return;
+    const { cell, turned, place, from } = this.held, [dx, dy] = [event.offsetX - from[0], event.offsetY - from[1]], [px, py] = [place[0] + dx, place[1] + dy], point = this.picture.point(px, py);
+    if (cell < 0) return this.choose(point);
     if (this.armed && Math.hypot(dx, dy) < 4) return;
-    codewords[this.dragged] = point;
-    this.asked = [...point];
+    if (turned) this.bend(cell, px, py);
+    else this.policy.codewords?.splice(cell, 1, point);
     this.edited();
   };
+  /** Let the arrow of a cell end at a pixel: its constants follow.
+   * @param {number} cell @param {number} px @param {number} py */
+  bend(cell, px, py) {
+    const { start, word, rows, own } = ownArrow(this, cell), wanted = [px - start[0], start[1] - py].map((length) => clip(length / own, -1, 1)), constants = rows[word.length];
+    wanted.forEach((value, k) => {
+      constants[k] = +(constants[k] + value - raw(rows, word, k)).toFixed(2);
+    });
+  }
   choose(point) {
     this.asked = [...point];
-    this.base = null;
+    this.base = this.lit = null;
     this.changed();
   }
   pointerup = () => {
-    if (this.dragged !== null) this.settle();
-    this.dragged = null;
+    if (!this.held) return;
+    const { cell, turned } = this.held, word = this.policy.codewords?.[cell];
+    this.held = null;
+    if (this.armed && word && !turned) this.choose(word);
+    this.light(null);
+    this.settle();
   };
   keydown = (event) => {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
-    const way = { ...ways, " ": [0, 0] }[event.key];
+    const way = { ...WAYS, " ": [0, 0] }[event.key];
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
     const { low, high } = this.picture.plane, by = event.shiftKey ? 0.1 : 0.01;
@@ -1160,44 +1064,394 @@ ${causeOf(event, this.original.limits)}`) ?? [];
   };
 };
 
+// ../vsp/show/explorer/algorithms.js
+var RIDGE = 1e-6;
+var [BETA1, BETA2, EPSILON] = [0.9, 0.999, 1e-8];
+var zeros = (rows, columns) => Array.from({ length: rows }, () => Array(columns).fill(0));
+var Partition = class {
+  /** @type {Cell[]} */
+  cells = [];
+  /** @type {Linear} */
+  look;
+  /** @type {Set<number>[] | null} */
+  graph = null;
+  // while the codewords stay
+  /** `draw(n)` gives n random numbers from 0 to 1, for new maps. @param {Settings} config
+   * @param {Pick<Task, "actionLow" | "actionHigh"> & Box} task @param {Draws} draws */
+  constructor(config, task, draws) {
+    this.config = config;
+    this.task = task;
+    this.draws = draws;
+    const { low, high } = task;
+    this.scale = config.scale === "box" ? less(high, low) : low.map(() => 1);
+    this.shape = /** @type {const} */
+    [low.length + 1, task.actionLow.length];
+  }
+  /** After a change of the codewords. */
+  moved() {
+    const codewords = this.cells.map(({ codeword }) => codeword), coefficients = this.cells.map(({ map }) => map), about = { name: "", codewords, coefficients, scale: this.scale, metric: this.config.metric };
+    this.look = ready(
+      /** @type {Linear} */
+      about
+    );
+    this.graph = null;
+  }
+  /** Make a state the codeword of a new, untrained cell. @param {Vector} state */
+  add(state) {
+    const [p, m] = this.shape, random2 = this.config.initial === "uniform", drawn2 = random2 ? this.draws.map(p * m).map((value) => (2 * value - 1) / Math.sqrt(p - 1)) : [], map = zeros(p, m).map((row2, i) => row2.map((_, k) => drawn2[i * m + k] ?? 0));
+    this.cells.push({ codeword: [...state], map, ...this.unmoved(), ...this.nothing() });
+    this.moved();
+  }
+  /** What an empty buffer holds: rows for minibatches, sums for exact maps. */
+  nothing() {
+    const [p, m] = this.shape;
+    const sums = { products: zeros(p, p), targets: zeros(p, m) };
+    return (
+      /** @type {Filled} */
+      { count: 0, inputs: [], goals: [], sums }
+    );
+  }
+  /** What Adam knows before the first step. */
+  unmoved() {
+    return { moments: [zeros(...this.shape), zeros(...this.shape)], steps: 0 };
+  }
+  /** @param {Iterable<number>} chosen */
+  reset(chosen) {
+    const anew = this.config.adam_on_reset === "restart";
+    for (const i of chosen) Object.assign(this.cells[i], this.nothing(), anew && this.unmoved());
+  }
+  /** Put an episode into the buffers of its cells. @param {Visited} episode */
+  observe({ states, actions }) {
+    states.forEach((state, t) => {
+      const cell = this.cells[cellOf(this.look, state)];
+      cell.count += 1;
+      cell.inputs.push([...state, 1]);
+      cell.goals.push(actions[t]);
+    });
+  }
+  /** Train each cell that has data. Returns the mean loss of the last minibatches, before. */
+  train() {
+    const filled = this.cells.filter(({ count: count2 }) => count2);
+    if (this.config.fit === "closed_form") return void filled.forEach(solve);
+    const { batch_size: size, n_minibatches: n, learning_rate: rate } = this.config;
+    let loss = 0;
+    for (let i = 0; i < n; i++) {
+      const drawn2 = this.draws.rows(filled.length * size), part = (j) => drawn2.slice(j * size, (j + 1) * size);
+      loss = sum(filled.map((cell, j) => step(cell, part(j), rate))) / filled.length;
+    }
+    return loss;
+  }
+  /** How far a state is from the codeword of cell i.
+   * @param {number} i @param {Vector} state */
+  gap(i, state) {
+    const by = less(state, this.cells[i].codeword).map((value, j) => value / this.scale[j]);
+    return this.config.split_metric === "manhattan" ? sum(by.map(Math.abs)) : Math.hypot(...by);
+  }
+  /** @param {number} i @param {Vector} state @param {Vector} action */
+  loss(i, state, action) {
+    const { actionLow, actionHigh } = this.task;
+    const clipped = this.config.split_loss === "clipped";
+    const off = action.map((value, k) => {
+      const given = raw(this.cells[i].map, state, k);
+      return (clipped ? clip(given, actionLow[k], actionHigh[k]) : given) - value;
+    });
+    return dot(off, off) / off.length;
+  }
+  neighbours() {
+    const { codewords, scale } = this.look;
+    return this.graph ??= neighbours(codewords.map((word) => word.map((x, i) => x / scale[i])));
+  }
+  /** Algorithm 2. Returns the codewords that came, with the mean losses that caused them.
+   * @param {Visited} episode @returns {Change[]} */
+  split({ states, actions }) {
+    const { max_pol_loss, min_pol_distance, one_split } = this.config, made = (
+      /** @type {Change[]} */
+      []
+    );
+    let [previous, since, total] = [-1, 0, 0];
+    for (const [t, state] of states.entries()) {
+      const cell = cellOf(this.look, state), same = (word) => word.every((value, i) => value === state[i]);
+      if (cell !== previous) [previous, since, total] = [cell, t, 0];
+      total += this.loss(cell, state, actions[t]);
+      const cause = total / (t - since + 1), far = this.gap(cell, state) > min_pol_distance && !this.look.codewords.some(same);
+      if (!far || !(cause > max_pol_loss)) continue;
+      const near = [...this.neighbours()[cell], cell];
+      this.add(state);
+      this.reset(near);
+      made.push({ kind: "split", codeword: state, cause });
+      if (one_split) break;
+      previous = -1;
+    }
+    return made;
+  }
+  /** Algorithm 3. Returns the codewords that went, with the differences of their maps.
+   * @returns {Change[]} */
+  merge() {
+    const { merge_parameters, min_param_distance } = this.config, gone = (
+      /** @type {Change[]} */
+      []
+    );
+    const compared = ({ map }) => (merge_parameters === "weights" ? map.slice(0, -1) : map).flat();
+    for (let i = 0; i < this.cells.length; i++) {
+      const cell = this.cells[i], near = [...this.neighbours()[i]];
+      const gap = (other) => Math.max(...less(compared(other), compared(cell)).map(Math.abs));
+      const alike = near.map((j) => this.cells[j]).filter((other) => gap(other) < min_param_distance);
+      if (!alike.length) continue;
+      this.reset([...near, i]);
+      for (const other of alike)
+        gone.push({ kind: "merge", codeword: other.codeword, cause: gap(other) });
+      this.cells = this.cells.filter((other) => !alike.includes(other));
+      i = this.cells.indexOf(cell);
+      this.moved();
+    }
+    return gone;
+  }
+};
+function solve({ map, inputs, goals, sums: { products, targets } }) {
+  for (const input of inputs.splice(0)) {
+    const [goal] = goals.splice(0, 1);
+    input.forEach((value, i) => {
+      input.forEach((other, j) => products[i][j] += value * other);
+      goal.forEach((action, k) => targets[i][k] += value * action);
+    });
+  }
+  const columns = map[0].map((_, k) => map.map((weights) => weights[k])), found = products.map((line) => columns.map((column) => dot(line, column))), slope = targets.map((goal, i) => less(goal, found[i]));
+  const ridged = products.map((line, i) => line.with(i, line[i] + RIDGE));
+  leastSquares(ridged, slope).forEach((line, i) => line.forEach((by, k) => map[i][k] += by));
+}
+function step(cell, drawn2, rate) {
+  const { map, moments, inputs, goals, count: count2 } = cell, [p, m] = [map.length, map[0].length], gradient = zeros(p, m);
+  let loss = 0;
+  for (const value of drawn2) {
+    const row2 = Math.trunc(value * count2), input = inputs[row2];
+    for (let k = 0; k < m; k++) {
+      let error = -goals[row2][k];
+      for (let i = 0; i < p; i++) error += input[i] * map[i][k];
+      for (let i = 0; i < p; i++) gradient[i][k] += error * input[i];
+      loss += error * error;
+    }
+  }
+  cell.steps += 1;
+  const [first, second] = [BETA1, BETA2].map((beta) => 1 - beta ** cell.steps);
+  for (let i = 0; i < p; i++)
+    for (let k = 0; k < m; k++) {
+      const slope = 2 / (drawn2.length * m) * gradient[i][k], mean = moments[0][i][k] = BETA1 * moments[0][i][k] + (1 - BETA1) * slope, square = moments[1][i][k] = BETA2 * moments[1][i][k] + (1 - BETA2) * slope ** 2;
+      map[i][k] -= rate / first * mean / (Math.sqrt(square / second) + EPSILON);
+    }
+  return loss / (drawn2.length * m);
+}
+function* distil(partition, episodes) {
+  const { config } = partition, iterations2 = config.n_epochs + Number(config.inclusive);
+  const due = (n2, every) => n2 % every === 0 && (n2 > 0 || config.inclusive);
+  let n = -1;
+  for (const episode of episodes) {
+    if (++n === 0) partition.add(episode.states[0]);
+    partition.observe(episode);
+    const loss = partition.train(), closing = config.freeze === "last_n_split" ? config.n_split : config.n_freeze, thawed = n < (config.freeze === "first_n_freeze" ? config.n_freeze : iterations2 - closing), splits = thawed && due(n, config.n_split) ? partition.split(episode) : [], merges = thawed && due(n, config.n_merge) ? partition.merge() : [], last = n === iterations2 - 1;
+    if (due(n, config.n_reset) && config.periodic_reset === "buffers")
+      partition.reset(partition.cells.keys());
+    yield { n, loss, events: [...splits, ...merges], last };
+    if (last) return;
+  }
+}
+function neighbours(points) {
+  const near = points.map(() => (
+    /** @type {Set<number>} */
+    /* @__PURE__ */ new Set()
+  ));
+  points.forEach((p, i) => {
+    for (let j = 0; j < i; j++) {
+      const [dx, dy] = less(points[j], p);
+      let [low, high] = [-Infinity, Infinity];
+      points.forEach((r, k) => {
+        if (k === i || k === j) return;
+        const from = less(r, p), side = 2 * dot([-dy, dx], from), room = dot(from, less(r, points[j]));
+        if (side > 0) high = Math.min(high, room / side);
+        else if (side < 0) low = Math.max(low, room / side);
+        else if (room < 0) high = -Infinity;
+      });
+      if (low >= high) continue;
+      near[i].add(j);
+      near[j].add(i);
+    }
+  });
+  return near;
+}
+
+// ../vsp/show/explorer/worker.js
+var SLICE = 15;
+var EVERY = 10;
+var QUICK = 100;
+function* drawn(episodes, draw) {
+  while (true) yield episodes[Math.floor(draw() * episodes.length)];
+}
+function* iterations({ scene, network: stored, config, seed }) {
+  const many = (draw) => (n) => Array(n).fill(0).map(draw);
+  const { task, plane, lost } = scene, [starts, maps, rows] = [1, 2, 3].map((i) => random(3 * seed + i)), partition = new Partition(config, { ...task, ...plane }, { map: many(maps), rows: many(rows) }), named = births(partition.scale), played = scene.starts.filter((_, i) => task.maxSteps < QUICK || i % 20 === 0);
+  const episodes = Array.isArray(stored) ? drawn(stored, starts) : taught(
+    scene,
+    /** @type {Network} */
+    network(stored),
+    starts
+  );
+  for (const { n, loss, events, last } of distil(partition, episodes)) {
+    if (!events.length && n % EVERY && !last) yield void 0;
+    else {
+      const { scale, metric, codewords, coefficients } = partition.look, numbers = structuredClone({ codewords, coefficients, ...named(codewords, events) }), ends = played.map((start) => rollout(scene, partition.look, start).outcome), share = ends.filter((outcome) => lost.includes(outcome)).length / ends.length, failures = Math.round(share * scene.starts.length);
+      yield { n, scale, metric, ...numbers, events, loss, failures };
+    }
+  }
+}
+function work() {
+  let begun2;
+  let run;
+  let waiting;
+  let [since, owed] = [0, 0];
+  const go = () => {
+    const now = performance.now(), moments = [];
+    let [made, done] = [0, false];
+    owed = Math.min(owed + (now - since) / 1e3 * begun2.pace, begun2.pace);
+    since = now;
+    for (; owed >= 1 && !done && performance.now() - now < SLICE; owed--, made++) {
+      const next = run.next();
+      done = Boolean(next.done);
+      if (next.value) moments.push(next.value);
+    }
+    postMessage({ moments, done, rate: made / ((performance.now() - now) / 1e3 || 1) });
+    if (!done) waiting = setTimeout(go, begun2.pace < 100 ? 30 : 0);
+  };
+  addEventListener("message", ({ data: { config, ...data } }) => {
+    begun2 = { ...begun2, ...data, config: Object.assign(begun2?.config ?? {}, config) };
+    run ??= iterations(begun2);
+    since = performance.now();
+    clearTimeout(waiting);
+    go();
+  });
+}
+
+// ../vsp/show/explorer/distiller.js
+var nameOf = (pace) => pace < 1e6 ? `${pace} a second` : "as fast as it can";
+var PACES = [300, 1e6, 30, 3].map((pace) => ({ pace, name: nameOf(pace) }));
+var MOST = 1e5;
+var ANEW = "n_epochs metric scale fit inclusive seed".split(" ");
+var rangeOf = (name2, value) => {
+  const whole = Number.isInteger(value), least = name2 === "seed" ? 0 : whole ? 1 : 1e-9;
+  return { step: 1, times: name2 !== "seed", least, most: MOST, whole };
+};
+function control(config, name2, words, changed) {
+  const range = rangeOf(name2, config[name2]);
+  if (!words) return element("label", {}, `${name2} `, field(name2, config, name2, changed, range));
+  const take = (word) => {
+    config[name2] = word;
+    changed();
+  };
+  return choice(name2, words, take, config[name2]);
+}
+var Distiller = class {
+  /** @type {Run} */
+  run = { moments: [], done: true, counted: true, rate: 0 };
+  pace = PACES[0].pace;
+  go = button("distil", () => this.run.done ? this.begin() : this.stop());
+  said = element("p", { class: "vsp-note", role: "status" });
+  /** @param {Explorer} view @param {Settings & { seed?: number }} config @param {Choices} choices
+   * @param {() => Promise<StoredNetwork | Visited[] | undefined>} network
+   * @param {Record<string, string[]>} groups @param {(distiller: Distiller) => void} told */
+  constructor(view, config, choices, network2, groups, told = () => {
+  }) {
+    this.view = view;
+    this.network = network2;
+    this.told = told;
+    this.config = { seed: 0, ...config };
+    const pace = choice("iterations", PACES, ({ pace: pace2 }) => this.tell({ pace: this.pace = pace2 }));
+    const made = (name2) => control(this.config, name2, choices[name2], () => this.changed(name2));
+    const parts = Object.entries(groups).map(([title, names], i) => {
+      const fields = element("div", { class: "vsp-settings" }, ...names.map(made));
+      return element("details", { open: i === 0 }, element("summary", {}, title), fields);
+    });
+    this.row = element("div", {}, row(this.go, pace, made("seed")), this.said, ...parts);
+  }
+  /** @param {string} name */
+  changed(name2) {
+    const later = !this.run.done && ANEW.includes(name2);
+    if (!later) this.tell({ config: { [name2]: Reflect.get(this.config, name2) } });
+    this.say(later ? "This counts from the next run on." : "");
+    this.told(this);
+  }
+  /** @param {ToWorker} changes */
+  tell(changes) {
+    this.run.worker?.postMessage(changes);
+  }
+  stop() {
+    this.run.worker?.terminate();
+    this.run.done = true;
+    this.say();
+  }
+  async begin() {
+    const { config, pace } = this, { n_freeze: freeze, n_epochs: epochs } = config;
+    if (freeze > epochs) return this.say(`n_freeze is ${freeze}: at most n_epochs, ${epochs}.`);
+    const scene = { ...this.view.scene, policies: [] }, script = (
+      /** @type {HTMLScriptElement} */
+      one(document, "#vsp-script")
+    );
+    const run = this.run = { moments: [], done: false, rate: 0 };
+    this.say();
+    const [text, network2] = await Promise.all([textOf(script, script.src), this.network()]);
+    if (run.done) return;
+    if (!network2) return this.stop();
+    const plain = text.replace(/^export \{[^}]*\};?/gm, ""), parts = [plain.replace(/begin\(\)\s*$/, `${work.name}()`)];
+    run.worker = new Worker(URL.createObjectURL(new Blob(parts, { type: "text/javascript" })));
+    run.worker.onmessage = ({ data }) => this.grown(run, data);
+    run.worker.postMessage({ scene, network: network2, config, seed: config.seed, pace });
+  }
+  /** Moments have come. @param {Run} run @param {FromWorker} found */
+  grown(run, { moments, done, rate }) {
+    const { view } = this, { max_pol_loss: split, min_param_distance: merge } = this.config;
+    run.moments.push(...moments);
+    run.rate = rate || run.rate;
+    if (!run.policy && moments.length) {
+      const about = { name: "your run", replay: run.moments };
+      run.policy = /** @type {Linear} */
+      /** @type {Numbers} */
+      { ...moments[0], ...about };
+      view.show(run.policy);
+    } else if (view.original === run.policy && moments.length) view.replay.grow();
+    if (run.policy) run.policy.limits = { split, merge };
+    if (!done) return this.say();
+    this.stop();
+    this.told(this);
+  }
+  say(words = "") {
+    const { done, moments, rate } = this.run, n = moments.at(-1)?.n ?? 0, now = `iteration ${n}: ${Math.round(rate).toLocaleString("en")} a second`;
+    if (moments.length) words ||= done ? `${n + 1} iterations` : now;
+    this.go.textContent = done ? "distil" : "stop";
+    this.said.textContent = words;
+  }
+};
+
 // ../vsp_course/live/studies.js
 var DRAWS = 400;
-function random(seed) {
-  let state = seed * 2654435769;
-  return () => {
-    state = state + 1831565813 | 0;
-    let mixed2 = Math.imul(state ^ state >>> 15, state | 1);
-    mixed2 = mixed2 + Math.imul(mixed2 ^ mixed2 >>> 7, mixed2 | 61) ^ mixed2;
-    return ((mixed2 ^ mixed2 >>> 14) >>> 0) / 2 ** 32;
-  };
-}
 var normal = (draw) => Math.sqrt(-2 * Math.log(1 - draw())) * Math.cos(2 * Math.PI * draw());
 function interval({ means, sds }, p, n, whole, draw) {
-  const chosen = Array.from({ length: p }, () => Math.floor(draw() * means.length)), found = chosen.map((i) => means[i] + sds[i] / Math.sqrt(n) * normal(draw)), mean = found.reduce((sum, value) => sum + value, 0) / p;
+  const any = () => Math.floor(draw() * p), chosen = Array.from({ length: p }, () => Math.floor(draw() * means.length)), found = chosen.map((i) => means[i] + sds[i] / Math.sqrt(n) * normal(draw));
   if (!whole) {
-    const within = chosen.reduce((sum, i) => sum + sds[i] ** 2, 0) / p, between = found.reduce((sum, value) => sum + (value - mean) ** 2, 0) / p, half = 1.96 * Math.sqrt((within + between) / (p * n));
+    const mean = sum(found) / p, within = sum(chosen.map((i) => sds[i] ** 2)) / p, between = sum(found.map((value) => (value - mean) ** 2)) / p, half = 1.96 * Math.sqrt((within + between) / (p * n));
     return [mean - half, mean + half];
   }
-  const drawn = Array.from({ length: DRAWS }, () => {
-    let sum = 0;
-    for (let i = 0; i < p; i++) sum += found[Math.floor(draw() * p)];
-    return sum / p;
-  }).sort((a, b) => a - b);
-  return [drawn[Math.floor(0.025 * DRAWS)], drawn[Math.ceil(0.975 * DRAWS) - 1]];
+  const drawn2 = Array.from({ length: DRAWS }, () => sum(found.map(() => found[any()])) / p);
+  drawn2.sort((a, b) => a - b);
+  return [drawn2[Math.floor(0.025 * DRAWS)], drawn2[Math.ceil(0.975 * DRAWS) - 1]];
 }
 
 // ../vsp_course/live/live.js
-var PERIODS = { split: 1, merge: 5, freeze: 10 };
 var STUDIES = 100;
 var AT_MOST = 8;
 var FAR = 1.5;
-var one = (root, selector) => (
-  /** @type {HTMLElement} */
-  root.querySelector(selector)
-);
-var say = (root, name, words) => one(root, `[data-say=${name}]`).textContent = words;
+var METRICS = ["manhattan", "euclidean", "chebyshev"];
+var DISTANCES = ["Manhattan", "Euclidean", "largest difference"];
+var WAYS2 = ["all episodes, as if independent", "policies, drawn again (3.3)"];
+var say = (root, name2, words) => one(root, `[data-say=${name2}]`).textContent = words;
 function ask(part, open) {
-  const [asked, todo, seen] = [".predict", ".do", ".see"].map((name) => one(part, name));
+  const [asked, todo, seen] = [".predict", ".do", ".see"].map((name2) => one(part, name2));
   asked.addEventListener("change", ({ target }) => {
     const { parentElement: label } = (
       /** @type {HTMLInputElement} */
@@ -1217,40 +1471,27 @@ function ask(part, open) {
       });
   });
 }
-function viewOf(part, { scene }, numbers, hooks = {}) {
-  const policy = { name: "", metric: "manhattan", scale: [1, 1], ...numbers };
-  return new Explorer(
-    one(part, ".view"),
-    { ...scene, policies: [
-      /** @type {Linear} */
-      policy
-    ] },
-    { bare: true, ...hooks }
-  );
-}
-var still = () => [0, 0, 0].map(() => [0, 0]);
-function borders(part, data) {
-  const codewords = [
-    [0.25, 0.35],
-    [0.7, 0.55]
+var still = (codewords) => ({ codewords, coefficients: codewords.map(() => [0, 1, 2].map(rest)) });
+var rest = () => [0, 0];
+function viewOf(part, { scene }, codewords, hooks = {}) {
+  const about = { name: "", metric: "manhattan", scale: [1, 1], ...still(codewords) }, policies = [
+    /** @type {Linear} */
+    about
   ];
-  const view = viewOf(part, data, { codewords, coefficients: codewords.map(still) });
+  return new Explorer(one(part, ".view"), { ...scene, policies }, { bare: true, ...hooks });
+}
+function borders(part, data) {
+  const view = viewOf(part, data, [[0.25, 0.35], [0.7, 0.55]]);
   view.starts = false;
-  const names = ["manhattan", "euclidean", "chebyshev"];
-  const take = (i) => {
-    Object.assign(view.policy, { metric: names[i] });
+  const take = (name2) => {
+    Object.assign(view.policy, { metric: METRICS[DISTANCES.indexOf(name2)] });
     view.changed(true);
   };
-  const list = choice("distance", ["Manhattan", "Euclidean", "largest difference"], take);
-  one(part, ".panel").prepend(list);
+  one(part, ".panel").prepend(choice("distance", DISTANCES, take));
 }
 function by_hand(part, data) {
   const { visited } = data;
   let [fitted, alone] = ["", 0];
-  const error = ({ scene, policy }) => visited.states.reduce((sum, state, i) => {
-    const given = act(scene, policy, state).action;
-    return sum + given.reduce((part2, value, k) => part2 + (value - visited.actions[i][k]) ** 2, 0);
-  }, 0);
   const told = (view2) => {
     const policy = (
       /** @type {Linear} */
@@ -1261,187 +1502,99 @@ function by_hand(part, data) {
       policy.coefficients = refit(policy, visited);
       return view2.changed(true);
     }
-    alone ||= error(view2);
-    say(part, "share", `${(100 * error(view2) / alone).toFixed(0)} %`);
+    const error = errorOf(view2.scene, policy, visited);
+    alone ||= error;
+    say(part, "share", `${(100 * error / alone).toFixed(0)} %`);
     say(part, "failing", String(view2.results.failures));
     say(part, "cells", count(view2.cells, "cell"));
   };
-  const view = viewOf(part, data, { codewords: [[0.5, 0.5]], coefficients: [still()] }, { told });
-  const change = (codewords) => view.take({ codewords, coefficients: codewords.map(still) });
-  const words = () => view.numbers().codewords ?? [];
+  const view = viewOf(part, data, [[0.5, 0.5]], { told }), words = () => view.numbers().codewords ?? [];
   const more = button("add a cell at the chosen state", () => {
     const there = words().some((word) => String(word) === String(view.asked));
-    if (!there && view.cells < AT_MOST) change([...words(), view.asked]);
+    if (!there && view.cells < AT_MOST) view.take(still([...words(), view.asked]));
   });
-  const less = button("remove the last", () => view.cells > 1 && change(words().slice(0, -1)));
-  one(part, ".panel").prepend(more, less);
+  const less2 = button("remove the last", () => {
+    if (view.cells > 1) view.take(still(words().slice(0, -1)));
+  });
+  one(part, ".panel").prepend(more, less2);
 }
-function shuffled(episodes, run) {
-  const draw = random(run), keys = episodes.map(() => draw());
-  return [...keys.keys()].sort((i, j) => keys[i] - keys[j]).map((i) => episodes[i]);
-}
-function toldOf({ n, step, gone }, limits) {
-  const episode = `Episode ${n}`;
-  if (gone) {
-    const causes = gone.map(({ cause }) => digits(cause)).join(", "), none = `no neighbours differ by less than ${limits.difference}`, those = gone.length ? `${count(gone.length, "cell")} gone: maps differ by ${causes}` : none;
-    return `${episode}, merging pass: ${those}.`;
-  }
-  if (!step) return `${episode}: its states are in the buffers, and all maps are fitted again.`;
-  const { t, cell, loss, mean, gap, splits } = step;
-  const far = `distance ${digits(gap)} ${gap > limits.distance ? ">" : "≤"} ${limits.distance}`, bad = `mean so far ${digits(mean)} ${mean > limits.loss ? ">" : "≤"} ${limits.loss}`, then = splits ? "Both: a new cell here." : "Not both: no split.";
-  return `${episode}, step ${t}, cell ${cell}: loss ${digits(loss)}, ${bad}; ${far}. ${then}`;
-}
-var Passes = class {
-  limits = { loss: 0, distance: 0, difference: 0 };
-  partition = new Partition(this.limits, 2);
-  /** @type {Generator<Happening>} */
-  going;
-  /** @type {string[][]} */
-  past = [];
-  // whole runs
-  tries = 0;
-  splits = 0;
-  merges = 0;
-  /** @param {HTMLElement} part @param {Data} data */
-  constructor(part, data) {
-    this.part = part;
-    this.episodes = data.episodes;
-    this.view = viewOf(part, data, { codewords: [[0.5, 0.5]], coefficients: [still()] });
-    this.view.fixed = true;
-    this.fields = /** @type {HTMLInputElement[]} */
-    [...part.querySelectorAll("[data-limit]")];
-    for (const field2 of this.fields) field2.addEventListener("change", () => this.begin());
-    one(part, ".steps").append(
-      button("next step", () => this.go(() => true)),
-      button("next split", () => this.go(({ step }) => step?.splits)),
-      button("next merge", () => this.go(({ gone }) => gone?.length)),
-      button("next episode", () => this.go(({ step, gone }) => !step && !gone)),
-      button("start anew", () => this.begin())
-    );
-    const answers = ["…", "more cells", "as many", "fewer cells"];
-    this.expected = choice("I expect", answers, () => this.wait());
-    this.whole = button("a whole run of 100 episodes", () => this.run());
-    one(part, ".whole").append(this.expected, this.whole);
-    this.wait();
-    this.begin();
-  }
-  get said() {
-    return (
-      /** @type {HTMLSelectElement} */
-      one(this.expected, "select")
-    );
-  }
-  /** Ask before each run but the first. */
-  wait() {
-    this.expected.hidden = !this.past.length;
-    this.whole.disabled = this.past.length > 0 && !this.said.selectedIndex;
-  }
-  begin() {
-    for (const { dataset, valueAsNumber: given } of this.fields)
-      this.limits[
-        /** @type {keyof Thresholds} */
-        dataset.limit
-      ] = Math.max(given || 0, 0);
-    this.tries += 1;
-    this.partition = new Partition({ ...this.limits }, 2);
-    this.going = distil(this.partition, shuffled(this.episodes, this.tries), PERIODS);
-    this.splits = this.merges = 0;
-    this.go(() => true);
-  }
-  /** Go on until `wanted`, and show where that is. @param {(now: Happening) => unknown} wanted */
-  go(wanted) {
-    let last;
-    for (let now = this.going.next(); !now.done; now = this.going.next()) {
-      last = now.value;
-      this.splits += Number(last.step?.splits ?? 0);
-      this.merges += last.gone?.length ?? 0;
-      if (wanted(last)) break;
-    }
-    if (!last) return say(this.part, "step", "This run is over. Start anew.");
-    const { view, part, splits, merges } = this, { codewords, coefficients, limits } = this.partition, states = last.episode.states.slice(0, (last.step?.t ?? Infinity) + 1);
-    Object.assign(view.policy, { episode: { states } });
-    view.asked = states[states.length - 1];
-    view.put({ codewords, coefficients });
-    view.afresh();
-    say(part, "step", toldOf(last, limits));
-    const cells = count(codewords.length, "cell");
-    say(part, "events", `${cells}, ${count(splits, "split")}, ${merges} merged.`);
-  }
-  run() {
-    this.begin();
-    this.go(() => false);
-    this.view.judge();
-    const { past, limits, splits, merges, view, said } = this, numbers = [splits, merges, view.cells, view.results.failures], words = past.length ? said.selectedOptions[0].text : "";
-    const set = Object.values(limits).map(String);
-    past.push([`run ${past.length + 1}`, ...set, words, ...numbers.map(String)]);
-    const head = [...Object.keys(limits), "I expected", "splits", "merged", "cells", "fail"];
-    one(this.part, ".runs").replaceChildren(table(head, past));
-    said.selectedIndex = 0;
-    this.wait();
-  }
-};
-function intervals(part, { reruns }) {
-  const canvas = (
-    /** @type {HTMLCanvasElement} */
-    one(part, "canvas")
-  ), sizes = { policies: 8, episodes: 100, whole: 0 };
+function passes(part, data) {
   const past = (
     /** @type {string[][]} */
     []
+  ), config = JSON.parse(one(part, "script").textContent), view = viewOf(part, data, [[0.5, 0.5]]), expected = choice("I expect", ["…", "more cells", "as many", "fewer cells"], () => wait()), said = (
+    /** @type {HTMLSelectElement} */
+    one(expected, "select")
   );
+  const wait = () => {
+    expected.hidden = !past.length;
+    distiller.go.disabled = past.length > 0 && !said.selectedIndex && distiller.run.done;
+  };
+  const told = ({ run, config: config2 } = distiller) => {
+    if (!run.done || run.counted) return wait();
+    run.counted = true;
+    view.judge();
+    const kinds = run.moments.flatMap(({ events }) => events.map(({ kind }) => kind)), merged = kinds.filter((kind) => kind === "merge").length, numbers = [kinds.length - merged, merged, view.cells, view.results.failures], set = limits.map((name2) => config2[name2]), words = past.length ? said.selectedOptions[0].text : "";
+    past.push([`run ${past.length + 1}`, ...set.map(String), words, ...numbers.map(String)]);
+    const thresholds = ["loss", "distance", "difference"], head = [...thresholds, "I expected", "splits", "merged", "cells", "fail"];
+    one(part, ".runs").replaceChildren(table(head, past));
+    said.selectedIndex = 0;
+    wait();
+  };
+  const limits = (
+    /** @type {Limit[]} */
+    Object.keys(config).slice(0, 3)
+  ), episodes = async () => data.episodes, distiller = new Distiller(view, config, {}, episodes, { thresholds: limits }, told);
+  view.fixed = true;
+  one(part, ".whole").append(distiller.row, expected, view.replay.row);
+  wait();
+}
+function intervals(part, { reruns }) {
+  const sizes = { policies: 8, episodes: 100, way: WAYS2[0] }, past = (
+    /** @type {string[][]} */
+    []
+  ), truth = sum(reruns.means) / reruns.means.length;
   let seed = 0;
-  const truth = reruns.means.reduce((sum, mean) => sum + mean, 0) / reruns.means.length;
   const go = button(`${STUDIES} studies`, () => {
-    const draw = random(++seed), { policies, episodes, whole } = sizes;
-    const found = Array.from(
-      { length: STUDIES },
-      () => interval(reruns, policies, episodes, whole > 0, draw)
+    const draw = random(++seed), { policies, episodes, way } = sizes, study = () => interval(reruns, policies, episodes, way === WAYS2[1], draw), found = Array.from({ length: STUDIES }, study), hold = found.filter(([low, high]) => low <= truth && truth <= high).length, width = sum(found.map(([low, high]) => high - low)) / STUDIES, how = way === WAYS2[1] ? "policies drawn again" : "all episodes";
+    drawIntervals(
+      /** @type {HTMLCanvasElement} */
+      one(part, "canvas"),
+      found,
+      truth
     );
-    const hold = found.filter(([low, high]) => low <= truth && truth <= high).length;
-    drawIntervals(canvas, found, truth);
-    canvas.setAttribute("aria-label", `${STUDIES} intervals; ${hold} hold the true mean`);
-    const how = whole ? "policies drawn again" : "all episodes";
-    const width = found.reduce((sum, [low, high]) => sum + high - low, 0) / STUDIES;
-    past.push([how, ...[policies, episodes].map(String), digits(width), String(hold)]);
+    one(part, "canvas").ariaLabel = `${STUDIES} intervals; ${hold} hold the true mean`;
+    past.push([how, String(policies), String(episodes), digits(width), String(hold)]);
     const head = ["policies", "episodes", "mean width", "hold the truth"];
     one(part, ".runs").replaceChildren(table(head, past.slice(-8)));
   });
-  const pick = (label, name, values, at) => choice(label, values.map(String), (i) => sizes[name] = values[i], at);
-  const ways = ["all episodes, as if independent", "policies, drawn again (3.3)"];
   one(part, ".panel").prepend(
-    pick("policies", "policies", [4, 8, 16, 30], 1),
-    pick("episodes of each", "episodes", [20, 100, 1e3], 1),
-    choice("interval from", ways, (i) => sizes.whole = i),
+    choice("policies", [4, 8, 16, 30], (n) => sizes.policies = n, sizes.policies),
+    choice("episodes of each", [20, 100, 1e3], (n) => sizes.episodes = n, sizes.episodes),
+    choice("interval from", WAYS2, (way) => sizes.way = way),
     go
   );
 }
 function drawIntervals(canvas, found, truth) {
-  const [wide, high, ratio] = [canvas.clientWidth || 440, 440, devicePixelRatio], ctx = (
-    /** @type {CanvasRenderingContext2D} */
-    canvas.getContext("2d")
-  ), style = getComputedStyle(canvas), tone = (name) => style.getPropertyValue(`--vsp-${name}`).trim();
-  Object.assign(canvas, { width: wide * ratio, height: high * ratio });
-  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const x = (value) => wide / 2 + (value - truth) / FAR * (wide / 2 - 12);
-  const sorted = [...found].sort((a, b) => a[0] + a[1] - b[0] - b[1]);
-  sorted.forEach(([low, top], i) => {
+  const { ctx, wide, tones } = begun(canvas, 440), x = (value) => wide / 2 + (value - truth) / FAR * (wide / 2 - 12);
+  found.sort((a, b) => a[0] + a[1] - b[0] - b[1]).forEach(([low, top], i) => {
     const misses = truth < low || truth > top;
-    ctx.fillStyle = tone(misses ? "failing" : "start");
+    ctx.fillStyle = misses ? tones.failing : tones.start;
     ctx.fillRect(x(low), 24 + 4 * i, Math.max(x(top) - x(low), 2), misses ? 3 : 1.5);
   });
-  ctx.fillStyle = tone("ink");
+  ctx.fillStyle = tones.ink;
   ctx.fillRect(x(truth) - 0.75, 20, 1.5, 4 * found.length + 8);
-  ctx.font = `13px ${style.fontFamily}`;
   ctx.textAlign = "center";
   ctx.fillText(`true mean return ${truth.toFixed(2)}`, wide / 2, 14);
   for (const by of [-1, 1]) ctx.fillText(digits(truth + by), x(truth + by), 14);
 }
 function begin() {
-  const data = JSON.parse(one(document, "#live-data").textContent ?? ""), all = (name) => data.episodes.flatMap((episode) => episode[name]);
+  const data = JSON.parse(one(document, "#live-data").textContent);
+  const all = (name2) => data.episodes.flatMap((episode) => episode[name2]);
   data.visited = { states: all("states"), actions: all("actions") };
-  const parts = { borders, by_hand, passes: (part, data2) => new Passes(part, data2), intervals };
-  for (const [name, open] of Object.entries(parts))
-    ask(one(document, `#${name}`), (part) => open(part, data));
+  const parts = { borders, by_hand, passes, intervals };
+  for (const [name2, open] of Object.entries(parts))
+    ask(one(document, `#${name2}`), (part) => open(part, data));
 }
 export {
   begin

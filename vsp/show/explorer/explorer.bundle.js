@@ -1,149 +1,14 @@
 // Made by npm --prefix docs run build
 
-// ../vsp/show/explorer/controls.js
-var SPEEDS = [0.25, 1, 4];
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === "function")
-      made.addEventListener(
-        name,
-        /** @type {EventListener} */
-        value
-      );
-    else if (value !== false) made.setAttribute(name, value === true ? "" : String(value));
-  }
-  made.append(...children);
-  return made;
-}
-var button = (label, click) => element("button", { type: "button", click }, label);
-var row = (...children) => element("div", { class: "vsp-row" }, ...children);
-var minus = (text) => text.replaceAll("-", "−");
-var count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
-var digits = (value) => Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3));
-function table(head, rows) {
-  const line = (first, tag, about, values) => element("tr", {}, first, ...values.map((value) => element(tag, about, value)));
-  const body = rows.map(
-    ([name, ...values]) => line(element("th", { scope: "row" }, name), "td", {}, values)
-  );
-  return element("table", {}, line(element("td"), "th", { scope: "col" }, head), ...body);
-}
-function choice(label, names, take, at = 0) {
-  const options = names.map((name, i) => element("option", { value: i, selected: i === at }, name));
-  const change = () => void take(+list.value);
-  const list = element("select", { change }, ...options);
-  return element("label", {}, `${label} `, list);
-}
-function field(label, list, i, step, changed) {
-  const value = () => +(+list[i].toFixed(3)).toPrecision(4);
-  const input = () => {
-    const given = made.valueAsNumber;
-    if (!(Math.abs(given) <= 1e6)) return;
-    list[i] = given;
-    changed();
-  };
-  const change = () => made.value = String(value());
-  const about = { type: "number", step, value: value(), "aria-label": label };
-  const made = element("input", { ...about, input, change });
-  return made;
-}
-function equations({ scene, policy, cell, cells, angular }, changed) {
-  if (policy.layers) return [];
-  const { task, plane } = scene, rows = policy.coefficients[cell], codeword = policy.codewords[cell];
-  const range = (i) => angular ? 2 : plane.high[i] - plane.low[i];
-  const term = (label, list, i, step, before, after = "") => {
-    const written = field(label, list, i, step, changed);
-    return element("span", { class: "vsp-term" }, before, written, after);
-  };
-  const line = (name, terms) => element("div", { class: "vsp-equation" }, `${name} `, ...terms);
-  const places = task.inputs.map(
-    (name, i) => term(`codeword: ${name}`, codeword, i, +(range(i) / 50).toPrecision(1), `${name} = `)
-  );
-  const lines = task.outputs.map((output2, k) => {
-    const names = [...task.inputs, "bias"];
-    const terms = names.map(
-      (name, i) => term(`${output2}: ${name}`, rows[i], k, 0.1, "", name === "bias" ? "" : `${name} +`)
-    );
-    return line(`${output2} =`, terms);
-  });
-  return cells > 1 ? [line("codeword", places), ...lines] : lines;
-}
-var Player = class {
-  text = "";
-  speed = 1;
-  playing = false;
-  /** @type {HTMLInputElement} */
-  slider;
-  constructor(view) {
-    this.view = view;
-    this.slow = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    const go = (way) => (this.stop(), view.jump(way));
-    const input = () => (this.stop(), this.to(+this.slider.value));
-    const settled = { input, change: () => view.soon() };
-    this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...settled });
-    this.toggle = button("play", () => this.playing ? this.pause() : this.start());
-    this.said = element("span", { class: "vsp-said" });
-    const steps = [button("previous change", () => go(-1)), button("next change", () => go(1))];
-    const names = SPEEDS.map((speed) => `${speed} ×`);
-    const speeds = choice("speed", names, (i) => this.speed = SPEEDS[i], 1);
-    this.row = row(this.toggle, ...steps, speeds, this.slider, this.said);
-  }
-  get at() {
-    return +this.slider.value;
-  }
-  /** Set the number of moments and go to the last one. */
-  restart(count2) {
-    this.slider.max = String(count2 - 1);
-    this.to(count2 - 1);
-  }
-  to(i) {
-    this.slider.value = String(i);
-    this.text = this.view.turn(this.at);
-  }
-  /** Say where it is: with the next frame, as all texts. */
-  tell() {
-    this.said.textContent = this.text;
-    this.slider.setAttribute("aria-valuetext", this.text);
-  }
-  start() {
-    const last = +this.slider.max;
-    this.playing = true;
-    this.toggle.textContent = "pause";
-    if (this.at === last) this.to(0);
-    let [before, waited] = [performance.now(), 0];
-    const frame = (now) => {
-      if (!this.playing || !this.slider.isConnected) return;
-      waited += (now - before) * this.speed;
-      before = now;
-      let i = this.at;
-      for (; i < last && waited >= this.view.lasts(i); i++) waited -= this.view.lasts(i);
-      if (i > this.at) this.to(i);
-      if (this.at < last) return requestAnimationFrame(frame);
-      this.pause();
-    };
-    requestAnimationFrame(frame);
-  }
-  pause() {
-    this.stop();
-    this.view.settle();
-  }
-  stop() {
-    this.playing = false;
-    this.toggle.textContent = "play";
-  }
-};
-
 // ../vsp/show/explorer/model.js
 var ON_BORDER = 1e-9;
-var TINTS = 6;
+var TINTS = 8;
+var ROUNDED = 1e-4;
 var clip = (value, low, high) => Math.min(Math.max(value, low), high);
-var ORDERS = /* @__PURE__ */ new Map([
-  ["manhattan", 1],
-  ["euclidean", 2],
-  ["chebyshev", null]
-]);
+var less = (one, other) => one.map((value, i) => value - other[i]);
+var ORDERS = { manhattan: 1, euclidean: 2, chebyshev: null };
 function ready(policy) {
-  const { codewords, scale, metric, order = ORDERS.get(metric) } = policy;
+  const { codewords, scale, metric, order = ORDERS[metric] } = policy;
   if (order === void 0) throw new Error(`the metric ${metric} has no known order`);
   policy.power = order ?? Infinity;
   policy.scaled = Float64Array.from(
@@ -153,8 +18,9 @@ function ready(policy) {
   policy.far = new Float64Array(codewords.length);
   return policy;
 }
-function distances({ scaled, scale, power, place, far }, seen) {
+function cellOf({ scaled, scale, power, place, far }, seen, slack = 0) {
   const d = scale.length, plain = power === 1 || power === 2 || power === Infinity;
+  let best = 0;
   for (let i = 0; i < d; i++) place[i] = seen[i] / scale[i];
   for (let j = 0, at = 0; j < far.length; j++) {
     let sum = 0;
@@ -166,20 +32,13 @@ function distances({ scaled, scale, power, place, far }, seen) {
       else if (gap > sum) sum = gap;
     }
     far[j] = plain ? sum : sum ** (1 / power);
+    if (far[j] < far[best] - slack) best = j;
   }
-  return far;
-}
-function cellOf(policy, seen, slack = 0) {
-  const far = distances(policy, seen);
-  let best = 0;
-  for (let j = 1; j < far.length; j++) if (far[j] < far[best] - slack) best = j;
   return best;
 }
 function tied(policy, seen) {
-  const cell = cellOf(policy, seen, ON_BORDER), { far } = policy;
-  let other = far.length - 1;
-  while (Math.abs(far[other] - far[cell]) >= ON_BORDER) other--;
-  return [cell, other];
+  const cell = cellOf(policy, seen, ON_BORDER);
+  return [cell, policy.far.findLastIndex((far) => Math.abs(far - policy.far[cell]) < ON_BORDER)];
 }
 function raw(rows, seen, k) {
   let sum = rows[seen.length][k];
@@ -195,19 +54,17 @@ function act({ task }, policy, seen) {
 function output({ layers }, seen) {
   let values = Float64Array.from(seen, Math.fround);
   layers.forEach(({ weights, biases }, layer) => {
-    const next = new Float64Array(biases);
-    for (let j = 0, at = 0; j < next.length; j++) {
-      let sum = 0;
-      for (let i = 0; i < values.length; i++, at++) sum += weights[at] * values[i];
-      sum += next[j];
-      next[j] = layer === layers.length - 1 ? Math.tanh(sum) : Math.max(sum, 0);
-    }
-    values = next;
+    const sums = biases.slice(), n = sums.length;
+    values.forEach((value, i) => {
+      if (value) for (let j = 0, at = i * n; j < n; j++, at++) sums[j] += weights[at] * value;
+    });
+    values = sums.map((sum) => layer === layers.length - 1 ? Math.tanh(sum) : Math.max(sum, 0));
   });
   return [...values];
 }
 var TASKS = {
   "SimpleGoal-v0": {
+    start: (draw) => [draw(), draw()],
     step([x, y], [dx, dy]) {
       const next = [clip(x + 0.1 * clip(dx, -1, 1), 0, 1), clip(y + 0.1 * clip(dy, -1, 1), 0, 1)];
       if (next[0] < 0.1 && next[1] < 0.1) return [next, 10, 1];
@@ -220,6 +77,7 @@ var TASKS = {
     ]
   },
   "MountainCarContinuous-v0": {
+    start: (draw) => [-0.6 + 0.2 * draw(), 0].map(Math.fround),
     step([x, v], [force]) {
       let speed = clip(v + 15e-4 * clip(force, -1, 1) - 25e-4 * Math.cos(3 * x), -0.07, 0.07);
       const place = clip(x + speed, -1.2, 0.6);
@@ -231,58 +89,266 @@ var TASKS = {
   },
   "Pendulum-v1": {
     see: ([angle, speed]) => [Math.cos(angle), Math.sin(angle), speed],
+    place: ([x, y, speed]) => [Math.atan2(y, x), speed],
     step([angle, speed], [torque]) {
       const turn = 2 * Math.PI, upright = ((angle + Math.PI) % turn + turn) % turn - Math.PI;
       const cost = upright ** 2 + 0.1 * speed ** 2 + 1e-3 * torque ** 2;
       const next = clip(speed + (15 * Math.sin(angle) + 3 * clip(torque, -2, 2)) * 0.05, -8, 8);
       return [[angle + next * 0.05, next], -cost, 0];
-    },
-    places: []
+    }
   }
 };
-var dynamics = (name) => ({ see: (state) => state, ...TASKS[name] });
-function rollout(scene, policy, start, keep = false) {
-  const { see, step } = dynamics(scene.task.name), states = [start];
-  let [state, total, outcome, last] = [start, 0, 0, 0];
+var dynamics = (name2) => ({ ...PLAIN, ...TASKS[name2] });
+var PLAIN = { start: () => [], see: (state) => state, place: (seen) => seen, places: [] };
+function rollout(scene, policy, start) {
+  const { see, step } = dynamics(scene.task.name), states = [start], actions = (
+    /** @type {Vector[]} */
+    []
+  );
+  let [state, total, reward, outcome, last] = [start, 0, 0, 0, 0];
   for (let t = 0; t < scene.task.maxSteps && !outcome; t++) {
     const { cell, action } = act(scene, policy, see(state));
-    let reward;
     [state, reward, outcome] = step(state, action);
     last = cell;
     total += reward;
-    if (keep) states.push(state);
+    states.push(state);
+    actions.push(action);
   }
-  return { total, outcome, last, states };
+  return { total, outcome, last, states, actions };
 }
-function colouring(cells, n, k, wanted = []) {
-  const near = Array.from({ length: k }, () => (
-    /** @type {Set<number>} */
-    /* @__PURE__ */ new Set()
-  )), colours = (
-    /** @type {number[]} */
+function births(scale) {
+  let [living, count2] = [
+    /** @type {Born[]} */
+    [],
+    0
+  ];
+  const tintOf = (codeword) => {
+    const far = Array(TINTS).fill(Infinity);
+    for (const { codeword: other, tint } of living) {
+      const gaps = less(codeword, other).map((gap, i) => gap / scale[i]);
+      far[tint] = Math.min(far[tint], Math.hypot(...gaps));
+    }
+    return far.indexOf(Math.max(...far));
+  };
+  const found = (codeword) => {
+    const near = (gap) => Math.abs(gap) < ROUNDED, known = living.find((one) => less(one.codeword, codeword).every(near));
+    if (known) return known;
+    const made = { codeword, born: count2++, tint: tintOf(codeword) };
+    living.push(made);
+    return made;
+  };
+  return (codewords, changes = (
+    /** @type {Change[]} */
     []
-  );
-  const meet = (i, j) => i !== j && (near[i].add(j), near[j].add(i));
-  for (let at = 0; at < n * n; at++) {
-    if (at % n) meet(cells[at], cells[at - 1]);
-    if (at >= n) meet(cells[at], cells[at - n]);
-  }
-  const order = [...near.keys()].sort((i, j) => near[j].size - near[i].size);
-  for (const i of order) {
-    const taken = new Set([...near[i]].map((j) => colours[j])), all = [wanted[i] ?? i % TINTS, ...Array(TINTS).keys()];
-    colours[i] = all.find((colour) => !taken.has(colour)) ?? all[0];
-  }
-  return colours;
+  )) => {
+    const first = count2 ? [] : codewords.slice(0, 1), splits = changes.filter(({ kind }) => kind === "split").map(({ codeword }) => codeword);
+    for (const codeword of [...first, ...splits]) found(codeword);
+    living = codewords.map(found);
+    return { born: living.map(({ born }) => born), tints: living.map(({ tint }) => tint) };
+  };
 }
+function name(policy) {
+  if (policy.layers || policy.tints?.length === policy.codewords.length) return;
+  const of = births(policy.scale);
+  for (const moment of policy.replay ?? [])
+    Object.assign(moment, of(moment.codewords, moment.events));
+  Object.assign(policy, of(policy.codewords));
+}
+var numberOf = ({ born }, cell) => born?.[cell] ?? cell;
+
+// ../vsp/show/explorer/controls.js
+var [CHANGED, SAME] = [250, 30];
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name2, value] of Object.entries(attributes)) {
+    if (typeof value === "function") made.addEventListener(
+      name2,
+      /** @type {any} */
+      value
+    );
+    else if (value !== false) made.setAttribute(name2, value === true ? "" : String(value));
+  }
+  made.append(...children);
+  return made;
+}
+var button = (label, click) => element("button", { type: "button", click }, label);
+var row = (...children) => element("div", { class: "vsp-row" }, ...children);
+var minus = (text) => text.replaceAll("-", "−");
+var count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
+var digits = (value) => Math.abs(value) < 5e-4 ? "0.000" : minus(value.toFixed(3));
+function table(head, rows) {
+  const cells = (tag, scope, texts) => texts.map((text) => element(tag, { scope }, text));
+  const lines = [[element("td"), ...cells("th", "col", head)]];
+  for (const [name2, ...values] of rows)
+    lines.push([...cells("th", "row", [name2]), ...cells("td", false, values)]);
+  return element("table", {}, ...lines.map((line) => element("tr", {}, ...line)));
+}
+function choice(label, options, take, chosen = options[0]) {
+  const lines = options.map((option, value) => {
+    const about = { value, selected: option === chosen };
+    return element("option", about, String(Object(option).name ?? option));
+  });
+  const list = element("select", { change: () => take(options[+list.value]) }, ...lines);
+  return element("label", {}, `${label} `, list);
+}
+function touched(take, about) {
+  const touch = ({ offsetX, buttons, type, target }) => {
+    const { clientWidth } = (
+      /** @type {Element} */
+      target
+    );
+    if (buttons || type === "pointerdown") take(clip(offsetX / clientWidth, 0, 1));
+  };
+  return element("canvas", { role: "img", pointerdown: touch, pointermove: touch, ...about });
+}
+var LEAST_DRAG = 4;
+var fits = (value, { least = -1e6, most = 1e6, whole }) => value >= least && value <= most && (!whole || Number.isInteger(value));
+function field(label, list, i, changed, range) {
+  const { step, times, whole } = range;
+  let from = { x: 0, value: 0 };
+  const value = () => +(times ? list[i] : +list[i].toFixed(3)).toPrecision(times ? 3 : 4);
+  const take = (given) => {
+    if (!fits(given, range)) return;
+    list[i] = given;
+    changed();
+  };
+  const change = () => made.value = String(value());
+  const pointerdown = ({ clientX: x, pointerId }) => {
+    from = { x, value: list[i] };
+    made.setPointerCapture(pointerId);
+  };
+  const pointermove = ({ clientX, buttons }) => {
+    const by = Math.trunc((clientX - from.x) / LEAST_DRAG);
+    if (!buttons || !by) return;
+    const moved = times ? from.value * 1.1 ** by : from.value + by * step / 2;
+    take(whole ? Math.round(moved) : +(times ? moved.toPrecision(2) : moved.toFixed(2)));
+    change();
+  };
+  const about = { type: "number", step, value: value(), "aria-label": label };
+  const acts = { input: () => take(made.valueAsNumber), change, pointerdown, pointermove };
+  const made = element("input", { ...about, ...acts });
+  return made;
+}
+function equations({ scene, policy, cells, angular, fixed }, cell, changed) {
+  if (policy.layers) return [];
+  const { task, plane } = scene, [rows, codeword] = [policy.coefficients[cell], policy.codewords[cell]];
+  const term = (label, list, i, step, before, after = "") => {
+    const written = field(label, list, i, changed, { step });
+    return element("span", { class: "vsp-term" }, before, written, after);
+  };
+  const line = (name2, terms) => element("div", { class: "vsp-equation" }, `${name2} `, ...terms);
+  const places = task.inputs.map((name2, i) => {
+    const range = angular ? 2 : plane.high[i] - plane.low[i];
+    return term(`codeword: ${name2}`, codeword, i, +(range / 50).toPrecision(1), `${name2} = `);
+  });
+  const lines = task.outputs.map((output2, k) => {
+    const terms = [...task.inputs, "bias"].map(
+      (name2, i) => term(`${output2}: ${name2}`, rows[i], k, 0.1, "", name2 === "bias" ? "" : `${name2} +`)
+    );
+    return line(`${output2} =`, terms);
+  });
+  return cells > 1 && !fixed ? [line("codeword", places), ...lines] : lines;
+}
+var Player = class {
+  playing = false;
+  slow = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  // one picture a second
+  said = element("span", { class: "vsp-said" });
+  toggle = button("play", () => this.playing ? this.stop(true) : this.start());
+  /** @type {HTMLInputElement} */
+  slider;
+  constructor(view) {
+    this.view = view;
+    const soon = () => view.soon(), acts = { input: () => this.go(this.at), change: soon };
+    this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
+    this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
+    const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
+    const line = element("div", { class: "vsp-line" }, this.time, this.slider);
+    this.row = row(this.toggle, back, on, line, this.said);
+  }
+  get at() {
+    return +this.slider.value;
+  }
+  get last() {
+    return this.view.run.length - 1;
+  }
+  /** Show a moment of the run. */
+  to(i) {
+    this.slider.value = String(i);
+    this.view.put(this.view.run[i]);
+    this.view.afresh();
+  }
+  /** The same, as a gesture. */
+  go(i) {
+    this.stop();
+    this.to(i);
+  }
+  /** The run has more moments, or is another one: go to its end, if `follow`. */
+  grow(follow = this.at === +this.slider.max) {
+    this.slider.max = String(this.last);
+    if (follow) this.to(this.last);
+    else this.view.changed();
+  }
+  /** Go to a share of the run; nearby it takes the moment with the most failures.
+   * @param {number} share */
+  touch(share) {
+    const { run } = this.view, at = Math.round(share * this.last), reach = Math.ceil(this.last / 100), near = [...run.keys()].slice(Math.max(at - reach, 0), at + reach + 1), fails = (i) => run[i].failures ?? 0;
+    this.go(near.reduce((best, i) => fails(i) > fails(best) ? i : best, at));
+  }
+  /** Go to the next change (1) or the one before (-1). */
+  jump(way) {
+    const { run } = this.view, stops = [...run.keys()].filter((i) => (i - this.at) * way > 0 && run[i].events.length);
+    this.go(way > 0 ? stops[0] ?? this.last : stops.at(-1) ?? 0);
+    this.view.settle();
+  }
+  /** Play: a moment with a change stays longer. */
+  start() {
+    const { run } = this.view, [long, short] = this.slow ? [1e3, 0] : [CHANGED, SAME], lasts = (i) => run[i].events.length ? long : short;
+    this.playing = true;
+    this.toggle.textContent = "pause";
+    if (this.at === this.last) this.to(0);
+    let [before, waited] = [performance.now(), 0];
+    const frame = (now) => {
+      if (!this.playing || !this.slider.isConnected) return;
+      waited += now - before;
+      before = now;
+      let i = this.at;
+      for (; i < this.last && waited >= lasts(i); i++) waited -= lasts(i);
+      if (i > this.at) this.to(i);
+      if (this.at < this.last) return requestAnimationFrame(frame);
+      this.stop(true);
+    };
+    requestAnimationFrame(frame);
+  }
+  stop(gesture = false) {
+    this.playing = false;
+    this.toggle.textContent = "play";
+    if (gesture) this.view.settle();
+  }
+};
 
 // ../vsp/show/explorer/picture.js
 var ARROWS = 14;
 var STRIPES = 50;
-var FLASH = 900;
-var CELLS = ["#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0"];
+var SMALL = 330;
+var [TIME, END] = [72, 8];
+var CELLS = "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ");
 var [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"];
+var CLEAR = "transparent";
 var rgb = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 var mixed = (colour, ground, share) => colour.map((part, i) => ground[i] + share * (part - ground[i]));
+function begun(canvas, high) {
+  const [wide, ratio] = [canvas.clientWidth || 440, devicePixelRatio], style = getComputedStyle(canvas), ctx = (
+    /** @type {CanvasRenderingContext2D} */
+    canvas.getContext("2d")
+  );
+  canvas.width = Math.round(wide * ratio);
+  canvas.height = Math.round((high ?? wide) * ratio);
+  ctx.scale(ratio, ratio);
+  ctx.font = `${wide < SMALL ? 11 : 13}px ${style.fontFamily}`;
+  const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"], tones = names.map((name2) => [name2, style.getPropertyValue(`--vsp-${name2}`).trim() || "#888888"]);
+  return { ctx, wide, tones: Object.fromEntries(tones) };
+}
 var Picture = class {
   map = new OffscreenCanvas(1, 1);
   edge = { left: 0, right: 0, top: 0, bottom: 0 };
@@ -293,34 +359,25 @@ var Picture = class {
   // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */
   tones = {};
-  /** @type {number[]} */
-  colours = [];
-  // of the cells
-  /** @type {Record<string, number>} */
-  known = {};
-  // those of codewords
-  /** @param {HTMLCanvasElement} canvas @param {Plane} plane */
-  constructor(canvas, plane) {
+  /** @type {CanvasRenderingContext2D} */
+  ctx;
+  /** `bare`: without axes. @param {HTMLCanvasElement} canvas @param {Plane} plane */
+  constructor(canvas, plane, bare = false) {
     this.canvas = canvas;
     this.plane = plane;
-    this.ctx = /** @type {CanvasRenderingContext2D} */
-    canvas.getContext("2d");
+    this.bare = bare;
   }
-  /** Take size and colours from the page, and clear. */
+  /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
-    const ratio = devicePixelRatio, side = this.canvas.clientWidth || 440, size = Math.round(side * ratio), style = getComputedStyle(this.canvas);
-    if (this.canvas.width !== size) this.canvas.width = this.canvas.height = size;
-    const small = side < 330;
-    this.edge = { left: small ? 46 : 54, right: small ? 4 : 8, top: 8, bottom: small ? 32 : 36 };
-    this.ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    this.side = side;
+    const { ctx, wide: side, tones } = begun(this.canvas), [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36];
+    Object.assign(this, { ctx, side, tones });
+    if (!this.bare) this.edge = { left, right, top: 8, bottom };
     this.wide = side - this.edge.left - this.edge.right;
     this.high = side - this.edge.top - this.edge.bottom;
-    const tone = (name) => style.getPropertyValue(`--vsp-${name}`).trim() || "#888888";
-    const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"];
-    this.tones = Object.fromEntries(names.map((name) => [name, tone(name)]));
-    this.ctx.clearRect(0, 0, side, side);
-    this.ctx.font = `${small ? 11 : 13}px ${style.fontFamily}`;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
+    ctx.clip();
   }
   at([x, y]) {
     const { low, high } = this.plane;
@@ -331,63 +388,68 @@ var Picture = class {
   }
   /** @param {number} px @param {number} py */
   point(px, py) {
-    const { low, high } = this.plane;
-    return [
-      low[0] + (px - this.edge.left) / this.wide * (high[0] - low[0]),
-      high[1] - (py - this.edge.top) / this.high * (high[1] - low[1])
-    ].map((value, i) => clip(value, low[i], high[i]));
-  }
-  shows(point) {
-    const { low, high } = this.plane;
-    return point.every((value, i) => value >= low[i] && value <= high[i]);
+    const { low, high } = this.plane, shares = [(px - this.edge.left) / this.wide, 1 - (py - this.edge.top) / this.high];
+    return this.spot(shares).map((value, i) => {
+      const digits2 = clip(2 - Math.floor(Math.log10(high[i] - low[i])), 2, 12);
+      return +clip(value, low[i], high[i]).toFixed(digits2);
+    });
   }
   /** The middle of one of n by n parts of the plane, counted from the top left.
    * @param {number} at @param {number} n */
   middle(at, n) {
-    const { low, high } = this.plane, shares = [at % n + 0.5, n - 0.5 - Math.floor(at / n)];
-    return shares.map((share, i) => low[i] + share / n * (high[i] - low[i]));
+    return this.spot([(at % n + 0.5) / n, (n - 0.5 - Math.floor(at / n)) / n]);
   }
-  /** Call `draw` with everything cut off at the frame. */
-  inside(draw) {
-    this.ctx.save();
-    this.ctx.beginPath();
-    this.ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
-    this.ctx.clip();
-    draw();
-    this.ctx.restore();
+  /** The point of the plane at shares of its width and height. @param {Vector} shares */
+  spot(shares) {
+    const { low, high } = this.plane;
+    return shares.map((share, i) => low[i] + share * (high[i] - low[i]));
   }
   /** @type {(words: string, x: number, y: number, align?: CanvasTextAlign) => void} */
   text(words, x, y, align = "center") {
-    const { ctx } = this;
+    const { ctx, tones } = this;
+    Object.assign(ctx, { strokeStyle: tones.paper, fillStyle: tones.ink, lineWidth: 3 });
     ctx.textAlign = align;
-    ctx.lineWidth = 3;
-    ctx.strokeStyle = this.tones.paper;
     ctx.strokeText(words, x, y);
-    ctx.fillStyle = this.tones.ink;
     ctx.fillText(words, x, y);
   }
-  place({ name, from, to }) {
+  place({ name: name2, from, to }) {
     const [left, bottom] = this.at(from), [right, top] = this.at(to);
-    this.ctx.fillStyle = (name === "pit" ? this.tones.pit : this.tones.goal) + "77";
+    this.ctx.fillStyle = (name2 === "pit" ? this.tones.pit : this.tones.goal) + "77";
     this.ctx.fillRect(left, top, right - left, bottom - top);
   }
   /** Name a place: at its middle, or at the top of the frame that it fills. */
-  name({ name, from, to }) {
-    const { low, high } = this.plane, fills = from.every((value, i) => value <= low[i] && to[i] >= high[i]), [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)), half = this.ctx.measureText(name).width / 2 + 3;
-    if (fills) this.text(name, this.edge.left + this.wide / 2, this.edge.top + 16);
-    else this.text(name, Math.max(x, this.edge.left + half), y + 4);
+  name({ name: name2, from, to }) {
+    const { low, high } = this.plane, fills = from.every((value, i) => value <= low[i] && to[i] >= high[i]), [x, y] = this.at(from.map((value, i) => (value + to[i]) / 2)), half = this.ctx.measureText(name2).width / 2 + 3;
+    if (fills) this.text(name2, this.edge.left + this.wide / 2, this.edge.top + 16);
+    else this.text(name2, Math.max(x, this.edge.left + half), y + 4);
   }
   /** @param {Vector[]} points @param {string} colour */
   line(points, colour, width = 2) {
     const { ctx } = this;
     ctx.beginPath();
-    points.forEach((point, i) => {
-      const [x, y] = this.at(point), far = i && Math.abs(x - this.at(points[i - 1])[0]) > this.wide / 2;
-      if (i && !far) ctx.lineTo(x, y);
-      else ctx.moveTo(x, y);
-    });
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = width;
+    let before = Infinity;
+    for (const [x, y] of points.map((point) => this.at(point))) {
+      const far = Math.abs(x - before) > this.wide / 2;
+      ctx[far ? "moveTo" : "lineTo"](x, y);
+      before = x;
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
+    ctx.stroke();
+  }
+  /** Draw arrows between pixels. @param {Arrow[]} arrows @param {number} head its length
+   * @param {string} colour @param {number} width */
+  arrows(arrows, head, colour, width) {
+    const { ctx } = this;
+    ctx.beginPath();
+    for (const { start, tip: [x, y] } of arrows) {
+      const turn = Math.atan2(y - start[1], x - start[0]);
+      ctx.moveTo(start[0], start[1]);
+      for (const side of [-2.6, 2.6]) {
+        ctx.lineTo(x, y);
+        ctx.lineTo(x + head * Math.cos(turn + side), y + head * Math.sin(turn + side));
+      }
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
     ctx.stroke();
   }
   /** @param {Vector[]} shapes @param {string} colour */
@@ -401,41 +463,34 @@ var Picture = class {
       }
       ctx.closePath();
     }
-    ctx.fillStyle = ctx.strokeStyle = colour;
-    ctx.lineWidth = 0.5;
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 });
     ctx.fill();
     ctx.stroke();
   }
   /** @param {Vector} point @param {number} radius
-   * @param {string | undefined} fill @param {string} [stroke] */
-  dot(point, radius, fill, stroke, width = 1.5) {
+   * @param {string} [fill] @param {string} [stroke] */
+  dot(point, radius, fill = CLEAR, stroke = CLEAR, width = 1.5) {
     const { ctx } = this, [x, y] = this.at(point);
     ctx.beginPath();
     ctx.arc(x, y, radius, 0, 7);
-    if (fill) {
-      ctx.fillStyle = fill;
-      ctx.fill();
-    }
-    if (stroke) {
-      ctx.strokeStyle = stroke;
-      ctx.lineWidth = width;
-      ctx.stroke();
-    }
+    Object.assign(ctx, { fillStyle: fill, strokeStyle: stroke, lineWidth: width });
+    ctx.fill();
+    ctx.stroke();
   }
   axes() {
     const { ctx, plane, edge } = this, { low, high, labels } = plane, bottom = edge.top + this.high, sides = (
       /** @type {const} */
       ["left", "center", "right"]
     );
-    ctx.strokeStyle = this.tones.ink;
-    ctx.lineWidth = 1;
+    ctx.restore();
+    Object.assign(ctx, { strokeStyle: this.tones.ink, lineWidth: 1 });
     ctx.strokeRect(edge.left, edge.top, this.wide, this.high);
     for (const share of [0, 0.5, 1]) {
       const [first, second] = low.map((value, i) => tick(value, high[i] - value, share));
-      const x = edge.left + share * this.wide, y = bottom - share * this.high;
-      this.text(first, x, bottom + 15, sides[2 * share]);
-      if (share !== 0.5 || second.length < 5 && this.side > 330)
-        this.text(second, edge.left - 5, y + [0, 4, 10][2 * share], "right");
+      const y = bottom - share * this.high + [0, 4, 10][2 * share];
+      this.text(first, edge.left + share * this.wide, bottom + 15, sides[2 * share]);
+      if (share !== 0.5 || second.length < 5 && this.side > SMALL)
+        this.text(second, edge.left - 5, y, "right");
     }
     this.text(labels[0], edge.left + this.wide / 2, bottom + 31);
     ctx.save();
@@ -454,9 +509,6 @@ function drawMap(view, n) {
   for (let at = 0; at < n * n && !policy.layers; at++)
     [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)));
   picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1]);
-  const keys = (policy.codewords ?? [0]).map(String), wanted = keys.map((key, i) => picture.known[key] ?? picture.colours[i]);
-  picture.colours = colouring(cells, n, view.cells, wanted);
-  picture.known = Object.fromEntries(keys.map((key, i) => [key, picture.colours[i]]));
   picture.map.width = picture.map.height = n;
   picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0);
 }
@@ -467,109 +519,108 @@ function painted(view, cells, others, n) {
     const plain = mixed(rgb(hue), paper, share);
     return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed);
   };
-  const single = scene.task.outputs.length === 1, tints = picture.colours.map((colour) => shades(CELLS[colour], view.cells > 1 ? 0.34 : 0.1)), pushes = Array.from(
+  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42, tints = (policy.tints ?? [0]).map((tint) => shades(CELLS[tint], full)), pushes = Array.from(
     { length: 129 },
     (_, i) => shades(i < 64 ? LEFT : RIGHT, 0.7 * Math.abs(i - 64) / 64)
   );
   for (let at = 0; at < n * n; at++) {
     const [row2, column] = [Math.floor(at / n), at % n], cell = Math.floor((row2 + column) * STRIPES / n) % 2 ? others[at] : cells[at];
     let hue = tints[cell];
-    if (single && !policy.layers) {
+    if (scene.task.outputs.length === 1 && !policy.layers) {
       const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0);
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
     }
     const edge = column && cells[at - 1] !== cells[at] || row2 && cells[at - n] !== cells[at];
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.cell)];
+    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)];
   }
   return image;
 }
-function drawAll(view) {
-  const { picture } = view;
+function drawAll(view, points) {
+  const { picture, scene, task } = view;
   picture.begin();
-  picture.inside(() => {
-    drawPlane(view);
-    const path = view.played.states.map(view.place), { paper, ink } = picture.tones;
-    picture.line(path, paper, 5);
-    picture.line(path, ink, 2);
-    path.slice(1).forEach((point) => picture.dot(point, 2, ink));
-    drawCodewords(view);
-    drawFlashes(view);
-    picture.dot(view.asked, 9, paper);
-    picture.dot(view.asked, 6.5, void 0, ink);
-    picture.dot(view.asked, 2.5, ink);
-  });
+  if (points) drawMap(view, points);
+  const path = view.played.states.map(view.place), { ctx, edge, wide, high } = picture, { paper, ink, failing, start } = picture.tones;
+  ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  task.places.forEach((place) => picture.place(place));
+  if (view.regions) picture.polygons(view.regions, failing);
+  if (scene.task.outputs.length === 2) drawArrows(view);
+  for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
+    const cell = view.failing.get(i);
+    if (cell === void 0) picture.dot(place, 1.3, start);
+    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
+  }
+  task.places.forEach((place) => picture.name(place));
+  picture.line(path, paper, 5);
+  picture.line(path, ink, 2);
+  path.slice(1).forEach((point) => picture.dot(point, 2, ink));
+  drawCodewords(view);
+  picture.arrows(view.arrows, 9, paper, 6);
+  picture.arrows(view.arrows, 9, ink, 3);
+  if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3);
+  picture.dot(view.asked, 9, paper);
+  picture.dot(view.asked, 6.5, CLEAR, ink);
+  picture.dot(view.asked, 2.5, ink);
   picture.axes();
 }
-function drawPlane(view) {
-  const { picture, scene } = view, { tones, edge } = picture;
-  picture.ctx.drawImage(picture.map, edge.left, edge.top, picture.wide, picture.high);
-  view.task.places.forEach((place) => picture.place(place));
-  if (view.regions) picture.polygons(view.regions, tones.failing);
-  if (scene.task.outputs.length === 2) drawArrows(view);
-  const starts = view.starts ? scene.starts.map(view.place) : [];
-  starts.forEach((start, i) => {
-    const cell = view.failing.get(i);
-    if (cell === void 0) picture.dot(start, 1.3, tones.start);
-    else picture.dot(start, 2.7, cell === view.cell ? tones.failing : tones.paper, tones.failing);
-  });
-  view.task.places.forEach((place) => picture.name(place));
-}
 function drawArrows(view) {
-  const { picture, scene, policy } = view, { ctx } = picture, length = picture.wide / ARROWS * 0.42;
-  ctx.strokeStyle = policy.layers ? picture.tones.teacher : picture.tones.ink;
-  ctx.lineWidth = policy.layers ? 1.4 : 1;
-  ctx.beginPath();
-  for (let i = 0; i < ARROWS * ARROWS; i++) {
-    const point = picture.middle(i, ARROWS);
-    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action;
-    if (!dx && !dy) continue;
-    const [x, y] = picture.at(point), [ex, ey] = [x + dx * length, y - dy * length], turn = Math.atan2(-dy, dx);
-    ctx.moveTo(x - dx * length, y + dy * length);
-    ctx.lineTo(ex, ey);
-    for (const side of [-2.6, 2.6]) {
-      ctx.moveTo(ex, ey);
-      ctx.lineTo(ex + 4 * Math.cos(turn + side), ey + 4 * Math.sin(turn + side));
-    }
-  }
-  ctx.stroke();
+  const { picture, scene, policy } = view, { teacher, ink } = picture.tones, length = picture.wide / ARROWS * 0.42;
+  const arrows = Array.from({ length: ARROWS * ARROWS }, (_, i) => {
+    const point = picture.middle(i, ARROWS), [dx, dy] = (policy.arrows?.[i] ?? act(scene, policy, point).action).map((by) => by * length), [x, y] = picture.at(point);
+    return { start: [x - dx, y + dy], tip: [x + dx, y - dy] };
+  });
+  const moving = arrows.filter(({ start: [x, y], tip }) => x !== tip[0] || y !== tip[1]);
+  picture.arrows(moving, 4, policy.layers ? teacher : ink, policy.layers ? 1.4 : 1);
+}
+function ownArrow({ picture, policy, cells }, cell) {
+  const { codewords = [], coefficients = [] } = policy, word = cells > 1 ? codewords[cell] : picture.spot([0.5, 0.5]), rows = coefficients[cell], [x, y] = picture.at(word), own = picture.wide / 10, [dx, dy] = [0, 1].map((k) => clip(raw(rows, word, k), -1, 1) * own);
+  return { start: [x, y], tip: [x + dx, y - dy], word, rows, own };
 }
 function drawCodewords(view) {
   const { picture, policy } = view, { paper, ink } = picture.tones;
   if (policy.layers || view.cells === 1) return;
   policy.codewords.forEach((codeword, i) => {
-    const point = view.placeSeen(codeword), [x, y] = picture.at(point);
-    picture.dot(point, 5, i === view.cell ? ink : paper, ink);
-    const [inner, below] = [x > picture.side - 40, y < 28];
+    const point = view.task.place(codeword), [x, y] = picture.at(point);
+    picture.dot(point, 5, i === view.marked ? ink : paper, ink);
+    if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2);
     if (view.cells > 30) return;
-    picture.text(String(i), x + (inner ? -9 : 9), y + (below ? 16 : -6), inner ? "right" : "left");
+    const inner = x > picture.side - 40;
+    const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6];
+    picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
   });
 }
-function drawFlashes(view) {
-  const now = performance.now(), { picture } = view;
-  view.flashes = view.flashes.filter(({ since }) => now - since < FLASH);
-  for (const { codeword, kind, since } of view.flashes) {
-    const share = (now - since) / FLASH;
-    const radius = 34 * (kind === "split" ? share : 1 - share);
-    picture.ctx.globalAlpha = 1 - share;
-    picture.dot(view.placeSeen(codeword), radius, void 0, picture.tones.ink, 4);
-  }
-  picture.ctx.globalAlpha = 1;
+function drawTime({ run, replay: { time: canvas, at } }) {
+  const { ctx, wide, tones } = begun(canvas, TIME), failing = run.map(({ failures }) => failures ?? 0), most = Math.max(...failing, 1), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36);
+  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 });
+  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END);
+  run.forEach(({ events }, i) => {
+    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7);
+  });
+  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14);
+  ctx.beginPath();
+  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)));
+  ctx.stroke();
+  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`);
 }
 
 // ../vsp/show/explorer/texts.js
-function resultOf({ scene, results, base, teacher }) {
-  const { played, failures, mean } = results, about = played < scene.starts.length ? "about " : "";
+function resultOf({ scene, policy, results, base }) {
+  const { played, failures, mean } = results, { teacher } = { ...scene, ...policy }, about = played < scene.starts.length ? "about " : "";
   const both = (before, now) => base ? `${before} → ${about}${now}` : about + now;
-  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} starts fail. `;
-  const returned = `Mean return ${both(base?.mean.toFixed(2), mean.toFixed(2))}`;
-  const aim = teacher ? ` (teacher: ${teacher.mean.toFixed(2)})` : "";
-  return minus(`${scene.lost.length ? fails : ""}${returned}${aim}.`);
+  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} fail, mean return `, aim = teacher && !base && !policy.layers ? ` (teacher ${teacher.mean.toFixed(2)})` : "";
+  const returned = both(base?.mean.toFixed(2), mean.toFixed(2));
+  return minus(`${scene.lost.length ? fails : "mean return "}${returned}${aim}.`);
 }
-function episodeOf({ cell, cells, asked, played, task, picture: { plane } }) {
+function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane } }) {
   if (!played.states.length) return "";
-  const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), steps = count(played.states.length - 1, "step");
-  const where = cells > 1 ? `, in cell ${cell}` : "";
-  return `From (${at})${where}: ${steps}${end}.`;
+  const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), where = cells > 1 ? `, in cell ${numberOf(policy, cell)}` : "";
+  return `From (${at})${where}: ${count(played.states.length - 1, "step")}${end}.`;
+}
+function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+  if (!run.length) return "";
+  const { n, codewords, failures, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), fails = failures === void 0 ? "" : `, ${failures} of ${starts.length} fail`, lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
+${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
+  const cells = count(codewords.length, "cell");
+  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
   const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
@@ -577,46 +628,48 @@ function causeOf({ kind, codeword, cause }, limits = {}) {
     return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`;
   return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`;
 }
-function answerOf({ scene, policy, cell, cells, asked, task }) {
+function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return [];
-  const { inputs, outputs } = scene.task, seen = task.see(asked), rows = policy.coefficients[cell], { raw: raw2, action } = act(scene, policy, seen);
-  const adds = [...inputs, "bias"].map((name, i) => {
-    const said = name === "bias" ? "the bias adds" : `${name} = ${digits(seen[i])} adds`;
+  const { inputs, outputs } = scene.task, rows = policy.coefficients[cell], { raw: raw2, action } = act(scene, policy, seen);
+  const adds = [...inputs, "bias"].map((name2, i) => {
+    const said = name2 === "bias" ? "the bias adds" : `${name2} = ${digits(seen[i])} adds`;
     return [said, ...rows[i].map((weight) => weight * (seen[i] ?? 1))];
   });
   const found = [...adds, ["sum", ...raw2], ["action, within the limits", ...action]];
-  const told = found.map(([name, ...values]) => [name, ...values.map(digits)]);
-  const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map";
+  const told = found.map(([name2, ...values]) => [name2, ...values.map(digits)]);
+  const title = cells > 1 ? `Cell ${numberOf(policy, cell)}, one of ${cells}` : "The map";
   return [element("p", {}, element("b", {}, title)), table(outputs, told)];
 }
-var noteOf = ({ angular, cells }) => (angular || cells === 1 ? "" : "Drag a codeword to move its cell. ") + "Click to choose a state; arrow keys move it.";
-function legendOf({ scene, policy, failing, starts, regions, cells, picture, placeSeen }) {
-  const [output2, second] = scene.task.outputs;
-  const mark = (kind, words) => element("li", {}, element("i", { class: `vsp-mark vsp-${kind}` }), words);
-  const fails = starts && failing.size > 0, inside = policy.codewords?.some((word) => picture.shows(placeSeen(word)));
+var noteOf = ({ movable, arrows }) => (movable ? "Drag a codeword to move its cell. " : "") + (arrows.length ? "Drag a thick arrow: its constants follow. " : "") + "Drag a number sideways. Click to choose a state; arrow keys move it.";
+function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
+  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, { low, high } = picture.plane, shows = (at) => at.every((x, i) => x >= low[i] && x <= high[i]), inside = policy.codewords?.some((word) => shows(task.place(word)));
   const marks = [
-    starts && mark("start", "start"),
-    fails && mark("failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"),
-    fails && cells > 1 && mark("elsewhere", "fails; last step in another"),
-    regions && mark("region", "falls into the pit"),
-    second && mark(policy.layers ? "taught" : "step", policy.layers ? "teacher's step" : "step"),
-    !second && mark("below", `${output2} below 0`),
-    !second && mark("above", "above 0"),
-    cells > 1 && inside && mark("codeword", "codeword; filled: of the chosen cell"),
-    picture.ties && mark("tied", "two codewords equally near: the first acts")
+    [starts, "start", "start"],
+    [fails, "failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"],
+    [fails && cells > 1, "elsewhere", "fails; last step in another"],
+    [regions, "region", "falls into the pit"],
+    [second && policy.layers, "taught", "teacher's step"],
+    [second && !policy.layers, "step", "step"],
+    [!second, "below", `${output2} below 0`],
+    [!second, "above", "above 0"],
+    [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
+    [picture.ties, "tied", "two codewords equally near: the first acts"],
+    [true, "chosen", "chosen state, and its episode"]
   ];
-  return [...marks.filter((made) => !!made), mark("chosen", "chosen state, and its episode")];
+  const told = marks.filter(([shown]) => shown);
+  return told.map(([, kind, words]) => element("li", { class: `vsp-${kind}` }, words));
 }
 
 // ../vsp/show/explorer/episodes.js
 var [BAND, ROW, TEXT] = [14, 72, 26];
-var STEPS = 150;
+var N_STEPS = 150;
+var STEPS = Array.from({ length: N_STEPS }, (_, n) => (n + 1) / N_STEPS).flatMap((x) => [x, -x]);
 var CLOSE = 0.05;
 var CHANGES = 3;
 var Episodes = class {
   at = 0;
   // the moment
-  /** @type {EpisodeScene["episodes"][number]} */
+  /** @type {Seen} */
   episode;
   /** @type {ReturnType<typeof act>[]} */
   done;
@@ -626,26 +679,22 @@ var Episodes = class {
   text = element("div", { "aria-live": "polite" });
   /** @param {HTMLElement} root @param {EpisodeScene} scene */
   constructor(root, scene) {
-    const { episodes, policies, task } = scene, label = "inputs, actions and cells over time";
+    const { episodes, policies, task } = scene;
     this.scene = scene;
     this.policy = ready(policies[0]);
+    name(this.policy);
     const all = episodes.flatMap(({ states }) => states);
     this.ranges = task.inputs.map((_, i) => ends(all.map((state) => state[i])));
     const input = () => this.show(+this.slider.value);
     this.slider = element("input", { type: "range", min: 0, "aria-label": "moment", input });
-    const touch = ({ clientX, buttons, type }) => {
-      const { left, width } = this.canvas.getBoundingClientRect(), share = (clientX - left) / width;
-      if (buttons || type === "pointerdown") this.show(Math.round(share * +this.slider.max));
-    };
-    const about = { role: "img", "aria-label": label, pointerdown: touch, pointermove: touch };
-    this.canvas = element("canvas", about);
-    const names = episodes.map(({ name }) => name);
-    const list = choice("episode", names, (i) => this.open(episodes[i]));
+    const take = (share) => this.show(Math.round(share * +this.slider.max));
+    this.canvas = touched(take, { "aria-label": "inputs, actions and cells over time" });
+    const list = choice("episode", episodes, (episode) => this.open(episode));
     root.append(row(list), this.canvas, row(this.slider), this.text);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.open(episodes[0]);
   }
-  /** @param {EpisodeScene["episodes"][number]} episode */
+  /** @param {Seen} episode */
   open(episode) {
     this.episode = episode;
     this.done = episode.states.map((state) => act(this.scene, this.policy, state));
@@ -654,82 +703,81 @@ var Episodes = class {
   }
   /** @param {number} at */
   show(at) {
-    this.at = Math.min(Math.max(at, 0), this.episode.states.length - 1);
-    this.slider.value = String(this.at);
+    this.at = at;
+    this.slider.value = String(at);
     this.draw();
     this.text.replaceChildren(...this.said());
   }
   draw() {
-    const { curves, task } = this.scene, { states, agent } = this.episode, ctx = (
-      /** @type {CanvasRenderingContext2D} */
-      this.canvas.getContext("2d")
-    ), style = getComputedStyle(this.canvas), [wide, ratio] = [this.canvas.clientWidth || 600, devicePixelRatio], high = BAND + ROW * (curves.length + agent[0].length), x = (t) => t / Math.max(states.length - 1, 1) * wide, tone = (name) => style.getPropertyValue(`--vsp-${name}`).trim();
-    this.canvas.width = Math.round(wide * ratio);
-    this.canvas.height = Math.round(high * ratio);
+    const { inputs, outputs } = this.scene.task, { states, agent } = this.episode, high = BAND + ROW * (this.scene.curves.length + outputs.length), { ctx, wide, tones } = begun(this.canvas, high), x = (t) => t / Math.max(states.length - 1, 1) * wide;
     this.canvas.style.height = `${high}px`;
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.font = `13px ${style.fontFamily}`;
     ctx.lineJoin = "round";
     this.done.forEach(({ cell }, t) => {
-      ctx.fillStyle = CELLS[cell % CELLS.length];
+      ctx.fillStyle = CELLS[this.policy.tints?.[cell] ?? 0];
       ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND);
-      ctx.fillStyle = tone("ink");
+      ctx.fillStyle = tones.ink;
       if (cell >= CELLS.length) ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND / 3);
     });
-    const plot = (name, place, ...lines) => {
-      const [least, most] = ends(lines.flat()), low = BAND + ROW * (place + 1) - 4;
-      lines.forEach((values, i) => {
-        const y = (v) => (v - least) / (most - least || 1) * (ROW - TEXT);
+    let low = BAND - 4;
+    const plot = (name2, k, ...lines) => {
+      const curves = lines.map((line) => line.map((row2) => row2[k])), [least, most] = ends(curves.flat()), y = (v) => (v - least) / (most - least || 1) * (ROW - TEXT);
+      low += ROW;
+      curves.forEach((values, i) => {
+        const theirs = i < lines.length - 1;
         ctx.beginPath();
         values.forEach((value, t) => ctx.lineTo(x(t), low - y(value)));
-        ctx.lineWidth = i < lines.length - 1 ? 3 : 1.3;
-        ctx.strokeStyle = tone(i < lines.length - 1 ? "teacher" : "ink");
+        ctx.lineWidth = theirs ? 3 : 1.3;
+        ctx.strokeStyle = theirs ? tones.teacher : tones.ink;
         ctx.stroke();
       });
-      ctx.fillStyle = tone("ink");
-      ctx.fillText(`${name}: ${digits(least)} to ${digits(most)}`, 2, low - ROW + TEXT - 4);
+      ctx.fillStyle = tones.ink;
+      ctx.fillText(`${name2}: ${digits(least)} to ${digits(most)}`, 2, low - ROW + TEXT - 4);
     };
-    const of = (rows, i) => rows.map((row2) => row2[i]);
-    const actions = this.done.map(({ action }) => action);
-    curves.forEach((i, place) => plot(task.inputs[i], place, of(states, i)));
-    const after = (k) => curves.length + k;
-    task.outputs.forEach((name, k) => plot(name, after(k), of(agent, k), of(actions, k)));
-    ctx.fillStyle = tone("failing");
+    for (const i of this.scene.curves) plot(inputs[i], i, states);
+    outputs.forEach((name2, k) => plot(name2, k, agent, this.done.map(({ action }) => action)));
+    ctx.fillStyle = tones.failing;
     ctx.fillRect(x(this.at) - 1, 0, 2, high);
   }
   /** The smallest changes of one input for which `changed` holds, by a grid and then by halving.
    * @param {Vector} state @param {(seen: Vector) => string | boolean} changed may add words */
   changes(state, changed) {
-    const found = this.scene.task.inputs.flatMap((name, i) => {
-      const [low, high] = this.ranges[i], moved = (by) => state.with(i, state[i] + by), holds = (by) => moved(by)[i] >= low && moved(by)[i] <= high && changed(moved(by));
-      for (let n = 1; n <= STEPS && low < high; n++)
-        for (const way of [1, -1]) {
-          let [before, by] = [n - 1, n].map((step) => way * step * (high - low) / STEPS);
-          if (!holds(by)) continue;
-          for (let half = 0; half < 20; half++)
-            if (holds((before + by) / 2)) by = (before + by) / 2;
-            else before = (before + by) / 2;
-          const said = holds(by) === true ? "" : holds(by), share = Math.abs(by) / (high - low), enough = digits(Math.ceil(Math.abs(by) * 1e3) / 1e3), words2 = `${name} were ${enough} ${way > 0 ? "more" : "less"}`;
-          return [{ share, words: words2 + said }];
-        }
-      return [];
+    const found = this.scene.task.inputs.flatMap((name2, i) => {
+      const [low, high] = this.ranges[i], wide = high - low;
+      const holds = (by2) => {
+        const moved = state.with(i, state[i] + by2);
+        return moved[i] >= low && moved[i] <= high && changed(moved);
+      };
+      let by = STEPS.map((step) => step * wide).find(holds);
+      if (!by) return [];
+      let before = by - Math.sign(by) * wide / N_STEPS;
+      for (let half = 0; half < 20; half++)
+        if (holds((before + by) / 2)) by = (before + by) / 2;
+        else before = (before + by) / 2;
+      const said = holds(by) === true ? "" : holds(by), enough = digits(Math.ceil(Math.abs(by) * 1e3) / 1e3), words2 = `${name2} were ${enough} ${by > 0 ? "more" : "less"}${said}`;
+      return [{ share: Math.abs(by) / wide, words: words2 }];
     });
     const nearest = found.sort((a, b) => a.share - b.share).slice(0, CHANGES);
     const words = nearest.map(({ words: words2 }) => words2).join(", or ");
     return words || "no change of one input within its range in these episodes";
   }
   said() {
-    const { scene, policy, at, episode } = this, { outputs, actionLow, actionHigh } = scene.task, state = episode.states[at], { cell, action } = this.done[at], cells = policy.codewords.length, theirs = episode.agent[at].map((value, k) => `${outputs[k]} = ${digits(value)}`).join(", "), then = (seen) => act(scene, policy, seen);
+    const { scene, policy, at, episode } = this, { outputs, actionLow, actionHigh } = scene.task, [state, agent] = [episode.states[at], episode.agent[at]], { cell, action } = this.done[at], cells = policy.codewords.length, theirs = agent.map((value, k) => `${outputs[k]} = ${digits(value)}`).join(", "), differ = outputs.filter((_, k) => differs(action[k], agent[k], actionLow[k], actionHigh[k]));
     const line = (what, told) => element("p", {}, element("b", {}, `${what}: `), `${told}.`);
-    const why = answerOf({ scene, policy, cell, cells, asked: state, task: { see: (seen) => seen } });
-    const step = line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`), lines = [step, ...why], cellAt = (seen) => then(seen).cell, moved = (seen) => cellAt(seen) !== cell && ` (cell ${cellAt(seen)})`, middles = actionLow.map((low, k) => (low + actionHigh[k]) / 2), above = (one, k) => one[k] >= middles[k], agent = episode.agent[at], differ = outputs.filter((_, k) => differs(action[k], agent[k], actionLow[k], actionHigh[k]));
+    const lines = [line(`Step ${at * episode.every}`, `here the agent's action is ${theirs}`)];
     const only = `it differs in ${differ.join(", ")}, so what follows explains the policy alone`;
-    if (differ.length) lines.splice(1, 0, line("Not as the agent", only));
+    if (differ.length) lines.push(line("Not as the agent", only));
+    lines.push(...answerOf({ scene, policy, cell, cells }, state));
+    const moved = (seen) => {
+      const other = act(scene, policy, seen).cell;
+      return other !== cell && ` (cell ${other})`;
+    };
     if (cells > 1) lines.push(line("Another cell would act if", this.changes(state, moved)));
-    outputs.forEach((name, k) => {
-      const turned = (seen) => above(then(seen).action, k) !== above(action, k) && (moved(seen) || true);
-      const other = this.changes(state, turned), side = `${above(action, k) ? "below" : "above"} ${minus(String(middles[k]))}`;
-      lines.push(line(`${name} would be ${side} if`, other));
+    outputs.forEach((name2, k) => {
+      const middle = (actionLow[k] + actionHigh[k]) / 2, above = action[k] >= middle;
+      const other = (seen) => act(scene, policy, seen).action[k] >= middle !== above;
+      const turned = (seen) => other(seen) && (moved(seen) || true);
+      const side = `${above ? "below" : "above"} ${minus(String(middle))}`;
+      lines.push(line(`${name2} would be ${side} if`, this.changes(state, turned)));
     });
     return lines;
   }
@@ -738,41 +786,40 @@ function differs(ours, theirs, low, high) {
   const middle = (low + high) / 2;
   return Math.abs(ours - theirs) > CLOSE * (high - low) || ours >= middle !== theirs >= middle;
 }
-function ends(values) {
-  let [least, most] = [Infinity, -Infinity];
-  for (const value of values) [least, most] = [Math.min(least, value), Math.max(most, value)];
-  return [least, most];
-}
+var ends = (values) => [Math.min(...values), Math.max(...values)];
 
 // ../vsp/show/explorer/explorer.js
 var [COARSE, FINE] = [120, 320];
 var IN_MOTION = 8;
+var ALL = 4;
 var STRIDE = 149;
-var [PLAYS, PAUSE] = [2e4, 400];
+var LABEL = "Map of the policy. Arrow keys move the chosen state.";
+var WAYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
 var Explorer = class {
   /** @type {Map<number, number>} */
   failing = /* @__PURE__ */ new Map();
   // of the starts that fail, by index: the cell of their last step
   /** @type {Partial<Numbers>[]} */
   past = [];
-  // to undo to
-  /** @type {(Change & { since: number })[]} */
-  flashes = [];
-  // changes that have just happened
+  // after each gesture
   /** @type {Vector[] | null} */
   regions = null;
   // polygons to fill
+  /** @type {Vector | null} */
+  ring = null;
+  // a place to mark
+  zooming = 0;
+  // a frame
   starts = true;
   // whether they are drawn
   fixed = false;
-  // whether codewords cannot be moved
+  // whether codewords and arrows cannot be moved
   /** @type {number | null} */
-  dragged = null;
-  // the codeword, or -1 for the state
-  pressed = { x: 0, y: 0, place: [0, 0] };
-  // where a gesture began
-  moment = -1;
-  // of the run
+  lit = null;
+  // the cell whose equations are touched
+  /** @type {Held | null} */
+  held = null;
+  // what is dragged
   /** @type {Policy} */
   policy;
   // with the numbers of the reader
@@ -791,23 +838,17 @@ var Explorer = class {
   /** @type {Judged | null} */
   base;
   // the results before the last gesture
-  /** @type {Partial<Numbers>} */
-  kept;
-  // those before the next gesture
   armed = false;
   // whether the next change begins a gesture
+  writing = false;
+  // whether a finger is on a field, which must stay
   /** @type {number | null} */
   mapped;
-  // the cell that is marked on the map
-  renewed = false;
-  // whether the policy has changed since the last frame
+  // the cell that is marked on the map; null: of another policy
   waiting = 0;
   // for a frame
-  fading = 0;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  still;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  later;
+  /** @type {Record<string, ReturnType<typeof setTimeout>>} */
+  timers = {};
   result = element("p", { class: "vsp-result" });
   from = element("p", { class: "vsp-from" });
   said = element("div", {}, this.result, this.from);
@@ -820,9 +861,13 @@ var Explorer = class {
       if (!this.form.contains(
         /** @type {Node | null} */
         to
-      )) this.changed();
+      )) this.light(null);
     },
     focusin: () => this.armed = true,
+    pointerdown: () => this.writing = this.armed = true,
+    pointerup: () => this.soon(),
+    pointercancel: () => this.soon(),
+    pointerleave: () => this.light(null),
     input: () => this.soon()
   });
   backs = row(
@@ -831,90 +876,84 @@ var Explorer = class {
   );
   replay = new Player(this);
   /** @param {HTMLElement} root @param {Scene} scene @param {Hooks} hooks */
-  constructor(root, scene, { bare, above = [], settled = () => {
-  }, told = () => {
-  } } = {}) {
-    const { low, high } = scene.plane;
+  constructor(root, scene, hooks = {}) {
     this.scene = scene;
-    this.settled = settled;
-    this.told = told;
+    this.hooks = hooks;
     this.task = dynamics(scene.task.name);
-    this.angular = scene.task.name === "Pendulum-v1";
-    this.asked = low.map((value, i) => value + 0.7 * (high[i] - value));
-    this.canvas = this.makeCanvas();
+    this.angular = scene.task.inputs.length > scene.plane.low.length;
+    const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
+    this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
+    this.asked = this.picture.spot([0.7, 0.7]);
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
-    ), held = root.contains(active) && active;
+    ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
-    const under = bare ? this.legend : this.answer, stage = element("div", { class: "vsp-stage" }, this.canvas, this.said, under);
-    root.replaceChildren(stage, ...bare ? [] : [this.panel(above)]);
-    if (held) (held.isConnected ? held : this.canvas).focus();
-    this.listen();
+    const policy = choice("policy", scene.policies, (policy2) => this.show(policy2)), lists = row(...hooks.above ?? [], policy), parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer;
+    root.replaceChildren(
+      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
+      ...hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]
+    );
+    if (focus) (focus.isConnected ? focus : this.canvas).focus();
+    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
     this.show(scene.policies[0]);
   }
-  makeCanvas() {
-    const { pointerdown, pointermove, pointerup, keydown } = this, answers = { pointerdown, pointermove, pointerup, pointercancel: pointerup, keydown }, label = "Map of the policy. Arrow keys move the chosen state.";
-    return element("canvas", { tabindex: 0, role: "application", "aria-label": label, ...answers });
+  // -- What is shown
+  place = (state) => this.task.place(this.task.see(state));
+  /** The cell that stands out. */
+  get marked() {
+    return this.lit !== null && this.lit < this.cells ? this.lit : this.cell;
   }
-  panel(above) {
-    const names = this.scene.policies.map(({ name }) => name);
-    const policy = choice("policy", names, (i) => this.show(this.scene.policies[i]));
-    const parts = [this.replay.row, this.form, this.backs, this.note];
-    return element("div", { class: "vsp-panel" }, this.legend, row(...above, policy), ...parts);
+  /** Whether codewords can be dragged, and the arrows of cells, to drag. */
+  get movable() {
+    return !this.fixed && !this.angular && this.cells > 1;
   }
-  // -- What is shown, and where it lies in the picture
-  place = (state) => {
-    if (!this.angular) return state;
-    const [angle, speed] = state;
-    return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed];
-  };
-  /** @type {(seen: Vector) => Vector} */
-  placeSeen = (seen) => this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen;
-  get teacher() {
-    return "teacher" in this.policy ? this.policy.teacher : this.scene.teacher;
+  get arrows() {
+    const none = this.fixed || this.cells > ALL || this.scene.task.outputs.length !== 2;
+    return none || this.policy.layers ? [] : this.shown.map((i) => ownArrow(this, i));
   }
   get cells() {
     return this.policy.layers ? 1 : this.policy.codewords.length;
+  }
+  /** The cells whose equations are shown: all, or the one that stands out. */
+  get shown() {
+    return this.cells > ALL ? [this.marked] : [...Array(this.cells).keys()];
   }
   /** Show a policy of the scene with its run, if it has one; `numbers` replace its own.
    * @param {Policy} policy @param {Partial<Numbers>} [numbers] */
   show(policy, numbers) {
     this.replay.stop();
+    name(policy);
     const { replay: run = [], ...own } = policy;
     const copy = policy.layers ? policy : structuredClone(own);
-    Object.assign(this.picture, { colours: [], known: {} });
-    Object.assign(this, { original: policy, run, policy: copy, moment: -1, dragged: null });
+    Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null });
     this.replay.row.hidden = !run.length;
     this.backs.hidden = Boolean(policy.layers);
-    if (run.length) this.replay.restart(run.length);
+    if (run.length) this.replay.grow(true);
     if (numbers) this.put(numbers);
     this.afresh();
   }
   // -- Changing the policy
   /** A copy of what a reader can change. */
-  numbers({ codewords, coefficients } = (
-    /** @type {Partial<Numbers>} */
-    this.policy
-  )) {
-    return structuredClone({ codewords, coefficients });
+  numbers(numbers = this.policy) {
+    const { codewords, coefficients, born, tints } = { ...this.policy, ...numbers };
+    return structuredClone({ codewords, coefficients, born, tints });
   }
   put(numbers) {
     Object.assign(this.policy, this.numbers(numbers));
+    name(this.policy);
   }
   /** Forget all gestures. */
   afresh() {
-    Object.assign(this, { base: null, past: [], armed: false, kept: this.numbers() });
+    Object.assign(this, { base: null, past: [this.numbers()], armed: false });
     this.changed(true);
   }
-  /** After every change of a number. Before the first of a gesture, keep what it was. */
+  /** After every change of a number: keep what it is, beside what it was before the gesture. */
   edited() {
-    if (this.armed) {
-      this.past.push(this.kept);
-      Object.assign(this, { armed: false, base: this.results });
-    }
-    this.kept = this.numbers();
+    if (this.armed) Object.assign(this, { armed: false, base: this.results });
+    else this.past.pop();
+    this.past.push(this.numbers());
     this.changed(true);
   }
   /** Take other numbers, as one gesture. */
@@ -926,53 +965,43 @@ var Explorer = class {
     this.settle();
   }
   undo() {
-    const before = this.past.pop();
-    if (!before) return;
-    this.take(before);
-    this.past.pop();
+    if (this.past.length > 1) this.take(this.past.splice(-2)[0]);
   }
   /** A gesture is finished: tell it once the picture shows it. */
   settle() {
-    requestAnimationFrame(() => requestAnimationFrame(() => this.settled(this)));
+    requestAnimationFrame(() => requestAnimationFrame(() => this.hooks.settled?.(this)));
   }
   /** The same once keys rest: the next one begins another gesture. */
   soon() {
-    clearTimeout(this.still);
-    this.still = setTimeout(() => {
-      this.armed = true;
+    clearTimeout(this.timers.still);
+    this.timers.still = setTimeout(() => {
+      Object.assign(this, { armed: true, writing: false });
       this.settle();
     }, 400);
   }
   // -- Everything that depends on policy and state
   /** Schedule an update: of everything if the `policy` changed. */
   changed(policy = false) {
-    this.renewed ||= policy;
-    this.waiting ||= requestAnimationFrame(() => {
-      const { renewed } = this;
-      Object.assign(this, { waiting: 0, renewed: false });
-      this.redo(renewed);
-    });
+    if (policy) this.mapped = null;
+    this.waiting ||= requestAnimationFrame(() => this.redo());
   }
-  redo(renewed = true) {
-    if (renewed) this.judge(IN_MOTION);
-    if (renewed) this.mapped = null;
+  redo() {
+    this.waiting = 0;
+    if (this.mapped === null) this.judge(IN_MOTION);
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell;
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked, true);
-    if (!this.form.contains(document.activeElement)) this.fill();
+    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked);
+    if (!this.writing && !this.form.contains(document.activeElement)) this.fill();
     this.draw();
     this.speak();
   }
   /** Run an episode from every start, or as many as `budget` ms allow. */
   judge(budget = Infinity) {
-    const { scene, policy } = this, n = scene.starts.length, begun = performance.now();
+    const { scene, policy } = this, n = scene.starts.length, begun2 = performance.now();
     this.failing.clear();
-    if (policy.layers) {
-      this.results = { played: n, ...policy.results };
-      return;
-    }
+    if (policy.layers) return Object.assign(this, { results: { played: n, ...policy.results } });
     ready(policy);
     let [played, sum] = [0, 0];
-    for (; played < n && (!played || performance.now() - begun < budget); played++) {
+    for (; played < n && (!played || performance.now() - begun2 < budget); played++) {
       const i = played * STRIDE % n, { total, outcome, last } = rollout(scene, policy, scene.starts[i]);
       if (scene.lost.includes(outcome)) this.failing.set(i, last);
       sum += total;
@@ -982,114 +1011,110 @@ var Explorer = class {
   }
   fill() {
     if (this.policy.layers) return this.form.replaceChildren();
-    const lines = equations(this, () => this.edited());
-    const title = this.cells > 1 ? `Change cell ${this.cell}` : "Change the map";
-    this.form.replaceChildren(element("fieldset", {}, element("legend", {}, title), ...lines));
+    const parts = this.shown.map((i) => {
+      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
+      return element("fieldset", acts, element("legend", {}, title), ...lines);
+    });
+    this.form.replaceChildren(...parts);
+  }
+  /** Let a cell stand out while its equations are touched. @param {number | null} cell */
+  light(cell) {
+    if (this.held) return;
+    this.lit = cell;
+    this.changed();
   }
   speak() {
-    const moving = this.replay.playing || this.dragged !== null;
-    this.said.setAttribute("aria-live", moving ? "off" : "polite");
+    const { replay } = this, moment = momentOf(this);
+    this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite");
     this.result.textContent = resultOf(this);
     this.from.textContent = episodeOf(this);
-    if (this.answer.isConnected) this.answer.replaceChildren(...answerOf(this));
+    this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)));
     this.legend.replaceChildren(...legendOf(this));
     this.note.textContent = noteOf(this);
-    this.replay.tell();
-    this.told(this);
+    for (const part of this.form.children)
+      part.classList.toggle("vsp-lit", Number(part.getAttribute("data-cell")) === this.marked);
+    replay.said.textContent = moment;
+    replay.slider.setAttribute("aria-valuetext", moment);
+    replay.time.hidden = this.run[0]?.failures === void 0;
+    if (!replay.time.hidden) drawTime(this);
+    this.hooks.told?.(this);
   }
   /** Draw. Until the picture rests, the map has few points, and not all starts are played. */
   draw() {
-    this.picture.begin();
-    if (this.mapped !== this.cell) {
-      drawMap(this, COARSE);
-      this.mapped = this.cell;
-      clearTimeout(this.later);
-      this.later = setTimeout(() => this.finish(), 120);
-    }
-    drawAll(this);
-    const fade = () => {
-      this.fading = 0;
-      if (!this.waiting) this.draw();
-    };
-    if (this.flashes.length) this.fading ||= requestAnimationFrame(fade);
+    if (this.mapped === this.marked) return drawAll(this);
+    drawAll(this, COARSE);
+    this.mapped = this.marked;
+    clearTimeout(this.timers.sharp);
+    this.timers.sharp = setTimeout(() => this.finish(), 120);
   }
   finish() {
     if (this.waiting) return;
     if (this.results.played < this.scene.starts.length) this.judge();
-    drawMap(this, FINE);
-    drawAll(this);
+    drawAll(this, FINE);
     this.speak();
   }
-  // -- The run
-  /** Show moment i of the run, and say what changed. */
-  turn(i) {
-    const { n, codewords } = this.run[i];
-    const moments = this.run.slice(Math.min(this.moment + 1, i), i + 1), happened = moments.flatMap(({ events }) => events), now = performance.now();
-    if (this.moment >= 0 && !this.replay.slow)
-      this.flashes.push(...happened.map((event) => ({ ...event, since: now })));
-    this.moment = i;
-    this.put(this.run[i]);
-    this.afresh();
-    const last = this.run.slice(0, i + 1).findLast(({ events }) => events.length), since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
-${causeOf(event, this.original.limits)}`) ?? [];
-    return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`;
+  /** Show another part of the plane, after a while on the way (by equal factors), or at once.
+   * @param {Box} to */
+  zoom({ low, high }, duration = 0) {
+    const { plane } = this.picture, factor = (high[0] - low[0]) / (plane.high[0] - plane.low[0]), begun2 = performance.now();
+    cancelAnimationFrame(this.zooming);
+    const frame = (now) => {
+      const time = duration && factor !== 1 ? clip((now - begun2) / duration, 0, 1) : 1, way = time < 1 ? (factor ** time - 1) / (factor - 1) : 1;
+      const mean = (from, to) => from.map((value, i) => (1 - way) * value + way * to[i]);
+      this.picture.plane = { ...plane, low: mean(plane.low, low), high: mean(plane.high, high) };
+      this.changed(true);
+      if (time < 1) this.zooming = requestAnimationFrame(frame);
+    };
+    frame(begun2);
   }
-  /** For how many milliseconds a moment of the run stays: with a change, longer. */
-  lasts(i) {
-    const changes = this.run.filter(({ events }) => events.length).length, pause = Math.min(PAUSE, PLAYS / 2 / Math.max(changes, 1)), rest = (PLAYS - pause * changes) / Math.max(this.run.length - changes, 1);
-    const [long, short] = this.replay.slow ? [1e3, 0] : [pause, rest];
-    return this.run[i].events.length ? long : short;
-  }
-  /** Go to the next change (1) or the one before (-1). */
-  jump(way) {
-    const end = way > 0 ? this.run.length - 1 : 0;
-    let i = this.replay.at;
-    do
-      i = i === end ? i : i + way;
-    while (i !== end && !this.run[i].events.length);
-    this.replay.to(i);
-    this.settle();
-  }
-  // -- Size and colours of the page, pointer and keys
-  listen() {
-    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    const recolour = () => this.canvas.isConnected && this.changed(true);
-    const watch = new MutationObserver(recolour);
-    for (const part of [document.documentElement, document.body])
-      watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
-  }
+  // -- Pointer and keys
   pointerdown = (event) => {
     if (event.button || !event.isPrimary) return;
     this.canvas.setPointerCapture(event.pointerId);
     this.canvas.focus();
-    const { offsetX: x, offsetY: y } = event, words = this.fixed || this.angular || this.cells === 1 ? [] : this.policy.codewords ?? [], places = words.map((word) => this.picture.at(word)), far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), least = Math.min(...far);
-    this.dragged = least < (event.pointerType === "touch" ? 22 : 12) ? far.indexOf(least) : -1;
-    Object.assign(this, { pressed: { x, y, place: places[this.dragged] ?? [x, y] }, armed: true });
+    const { offsetX: x, offsetY: y } = event, finger = event.pointerType === "touch", words = this.movable ? this.policy.codewords ?? [] : [];
+    const near = (places, turned) => {
+      const far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), cell = far.indexOf(Math.min(...far));
+      if (far[cell] < (finger ? 22 : 12)) return { cell, turned, finger, place: places[cell] };
+    };
+    const word = near(words.map((word2) => this.picture.at(word2)), false), found = word ?? near(this.arrows.map(({ tip }) => tip), true), held = { cell: -1, turned: false, finger, place: [x, y], ...found, from: [x, y] };
+    Object.assign(this, { held, armed: true, lit: found?.cell ?? null });
     this.replay.stop();
-    this.choose(words[this.dragged] ?? this.picture.point(x, y));
+    if (found) this.changed();
+    else this.choose(this.picture.point(x, y));
   };
   pointermove = (event) => {
-    if (this.dragged === null) return;
-    const { codewords } = this.policy, { x, y, place } = this.pressed, [dx, dy] = [event.offsetX - x, event.offsetY - y], point = this.picture.point(place[0] + dx, place[1] + dy);
-    if (this.dragged < 0 || !codewords) return this.choose(point);
+    if (!this.held) return;
+    const { cell, turned, place, from } = this.held, [dx, dy] = [event.offsetX - from[0], event.offsetY - from[1]], [px, py] = [place[0] + dx, place[1] + dy], point = this.picture.point(px, py);
+    if (cell < 0) return this.choose(point);
     if (this.armed && Math.hypot(dx, dy) < 4) return;
-    codewords[this.dragged] = point;
-    this.asked = [...point];
+    if (turned) this.bend(cell, px, py);
+    else this.policy.codewords?.splice(cell, 1, point);
     this.edited();
   };
+  /** Let the arrow of a cell end at a pixel: its constants follow.
+   * @param {number} cell @param {number} px @param {number} py */
+  bend(cell, px, py) {
+    const { start, word, rows, own } = ownArrow(this, cell), wanted = [px - start[0], start[1] - py].map((length) => clip(length / own, -1, 1)), constants = rows[word.length];
+    wanted.forEach((value, k) => {
+      constants[k] = +(constants[k] + value - raw(rows, word, k)).toFixed(2);
+    });
+  }
   choose(point) {
     this.asked = [...point];
-    this.base = null;
+    this.base = this.lit = null;
     this.changed();
   }
   pointerup = () => {
-    if (this.dragged !== null) this.settle();
-    this.dragged = null;
+    if (!this.held) return;
+    const { cell, turned } = this.held, word = this.policy.codewords?.[cell];
+    this.held = null;
+    if (this.armed && word && !turned) this.choose(word);
+    this.light(null);
+    this.settle();
   };
   keydown = (event) => {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
-    const way = { ...ways, " ": [0, 0] }[event.key];
+    const way = { ...WAYS, " ": [0, 0] }[event.key];
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
     const { low, high } = this.picture.plane, by = event.shiftKey ? 0.1 : 0.01;
@@ -1122,33 +1147,26 @@ async function reveal([{ isIntersecting, target }], watch) {
     /** @type {HTMLElement} */
     target
   ), files = JSON.parse(root.dataset.scenes ?? "{}"), names = Object.keys(files);
-  let wanted = 0;
-  const open = async (i) => {
-    wanted = i;
-    const found = await (await fetch(files[names[i]])).json();
-    if (wanted === i) new Explorer(root, found, { above });
+  let wanted = "";
+  const open = async (name2) => {
+    wanted = name2;
+    const scene = await (await fetch(files[name2])).json();
+    if (wanted === name2) new Explorer(root, scene, { above });
   };
   const above = names.length > 1 ? [choice("task", names, open)] : [];
-  await open(0);
+  await open(names[0]);
 }
 function mountAll() {
-  for (const found of document.querySelectorAll(".vsp-episodes > script"))
-    new Episodes(
-      /** @type {HTMLElement} */
-      found.parentElement,
-      JSON.parse(found.textContent)
-    );
-  const bare = ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])";
-  for (const found of document.querySelectorAll(bare)) {
+  for (const script of document.querySelectorAll(":is(.vsp-episodes, .vsp-explorer) > script")) {
     const root = (
       /** @type {HTMLElement} */
-      found
-    );
-    root.dataset.mounted = "true";
-    const inner = root.querySelector("script");
-    if (inner) new Explorer(root, JSON.parse(inner.textContent));
-    else new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root);
+      script.parentElement
+    ), scene = JSON.parse(script.textContent);
+    if (root.matches(".vsp-episodes")) new Episodes(root, scene);
+    else new Explorer(root, scene);
   }
+  for (const root of document.querySelectorAll("[data-scenes]"))
+    new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root);
 }
 export {
   Explorer,

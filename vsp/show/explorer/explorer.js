@@ -1,17 +1,21 @@
 // @ts-check
 // The explorer: replay a distillation, query a policy at a state, change the policy and watch its
-// episodes. It draws a scene, which scene.py describes. "Cell 3" here is cell 3 in Python.
+// episodes. It draws a scene, which scene.py describes. "Cell 3" is cell 3 in Python, or, where a
+// run is replayed, the cell whose codeword was born as the fourth.
 
-import { Player, button, choice, count, element, equations, row } from "./controls.js"
+import { Player, button, choice, element, equations, row } from "./controls.js"
 import { Episodes } from "./episodes.js"
-import { act, clip, dynamics, ready, rollout } from "./model.js"
-import { Picture, drawAll, drawMap } from "./picture.js"
-import { answerOf, causeOf, episodeOf, legendOf, noteOf, resultOf } from "./texts.js"
+import { act, clip, dynamics, name, numberOf, raw, ready, rollout } from "./model.js"
+import { CELLS, Picture, drawAll, drawTime, ownArrow } from "./picture.js"
+import { answerOf, episodeOf, legendOf, momentOf, noteOf, resultOf } from "./texts.js"
 
 const [COARSE, FINE] = [120, 320] // points per axis of the map: in motion, and at rest
 const IN_MOTION = 8 // milliseconds for episodes; at rest all are played
+const ALL = 4 // cells whose equations stand below each other
 const STRIDE = 149 // a prime, so the first are spread over all
-const [PLAYS, PAUSE] = [20_000, 400] // milliseconds: of a run, and at most of one of its changes
+const LABEL = "Map of the policy. Arrow keys move the chosen state."
+/** @type {Record<string, Vector>} */
+const WAYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }
 
 /** A view of a policy, a chosen state, and texts about them. With `bare`, the page arranges the
  * controls; `above` stands above the panel. `settled(view)` is called after each gesture,
@@ -19,14 +23,14 @@ const [PLAYS, PAUSE] = [20_000, 400] // milliseconds: of a run, and at most of o
 export class Explorer {
   /** @type {Map<number, number>} */
   failing = new Map() // of the starts that fail, by index: the cell of their last step
-  /** @type {Partial<Numbers>[]} */ past = [] // to undo to
-  /** @type {(Change & { since: number })[]} */ flashes = [] // changes that have just happened
+  /** @type {Partial<Numbers>[]} */ past = [] // after each gesture
   /** @type {Vector[] | null} */ regions = null // polygons to fill
+  /** @type {Vector | null} */ ring = null // a place to mark
+  zooming = 0 // a frame
   starts = true // whether they are drawn
-  fixed = false // whether codewords cannot be moved
-  /** @type {number | null} */ dragged = null // the codeword, or -1 for the state
-  pressed = { x: 0, y: 0, place: [0, 0] } // where a gesture began
-  moment = -1 // of the run
+  fixed = false // whether codewords and arrows cannot be moved
+  /** @type {number | null} */ lit = null // the cell whose equations are touched
+  /** @type {Held | null} */ held = null // what is dragged
   /** @type {Policy} */ policy // with the numbers of the reader
   /** @type {Policy} */ original
   /** @type {Moment[]} */ run
@@ -34,14 +38,13 @@ export class Explorer {
   /** @type {number} */ cell // that acts there
   /** @type {Judged} */ results
   /** @type {Judged | null} */ base // the results before the last gesture
-  /** @type {Partial<Numbers>} */ kept // those before the next gesture
+
   armed = false // whether the next change begins a gesture
-  /** @type {number | null} */ mapped // the cell that is marked on the map
-  renewed = false // whether the policy has changed since the last frame
+  writing = false // whether a finger is on a field, which must stay
+  /** @type {number | null} */ mapped // the cell that is marked on the map; null: of another policy
+
   waiting = 0 // for a frame
-  fading = 0
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ still
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ later
+  /** @type {Record<string, ReturnType<typeof setTimeout>>} */ timers = {}
 
   result = element("p", { class: "vsp-result" })
   from = element("p", { class: "vsp-from" })
@@ -52,9 +55,13 @@ export class Explorer {
   // Kept while a reader writes
   form = element("div", {
     focusout: ({ relatedTarget: to }) => {
-      if (!this.form.contains(/** @type {Node | null} */ (to))) this.changed()
+      if (!this.form.contains(/** @type {Node | null} */ (to))) this.light(null)
     },
     focusin: () => (this.armed = true),
+    pointerdown: () => (this.writing = this.armed = true),
+    pointerup: () => this.soon(),
+    pointercancel: () => this.soon(),
+    pointerleave: () => this.light(null),
     input: () => this.soon(),
   })
   backs = row(
@@ -64,88 +71,90 @@ export class Explorer {
   replay = new Player(this)
 
   /** @param {HTMLElement} root @param {Scene} scene @param {Hooks} hooks */
-  constructor(root, scene, { bare, above = [], settled = () => {}, told = () => {} } = {}) {
-    const { low, high } = scene.plane
+  constructor(root, scene, hooks = {}) {
     this.scene = scene
-    this.settled = settled
-    this.told = told
+    this.hooks = hooks
     this.task = dynamics(scene.task.name)
-    this.angular = scene.task.name === "Pendulum-v1"
-    this.asked = low.map((value, i) => value + 0.7 * (high[i] - value))
-    this.canvas = this.makeCanvas()
+    this.angular = scene.task.inputs.length > scene.plane.low.length
+    const { pointerdown, pointermove, pointerup, keydown } = this,
+      about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown },
+      acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup },
+      transitionend = () => this.changed(true) // of the page's colours, or of JupyterLab's
+    this.canvas = element("canvas", { ...about, ...acts, transitionend })
     this.picture = new Picture(this.canvas, scene.plane)
+    this.asked = this.picture.spot([0.7, 0.7])
     const active = /** @type {HTMLElement | null} */ (document.activeElement),
-      held = root.contains(active) && active
+      focus = root.contains(active) && active
     root.classList.add("vsp-explorer")
-    const under = bare ? this.legend : this.answer,
-      stage = element("div", { class: "vsp-stage" }, this.canvas, this.said, under)
-    root.replaceChildren(stage, ...(bare ? [] : [this.panel(above)]))
-    if (held) (held.isConnected ? held : this.canvas).focus()
-    this.listen()
+    const policy = choice("policy", scene.policies, policy => this.show(policy)),
+      lists = row(...(hooks.above ?? []), policy),
+      parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note],
+      under = hooks.bare ? this.legend : this.answer
+    root.replaceChildren(
+      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
+      ...(hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]),
+    )
+    if (focus) (focus.isConnected ? focus : this.canvas).focus()
+    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
     this.show(scene.policies[0])
   }
-  makeCanvas() {
-    const { pointerdown, pointermove, pointerup, keydown } = this,
-      answers = { pointerdown, pointermove, pointerup, pointercancel: pointerup, keydown },
-      label = "Map of the policy. Arrow keys move the chosen state."
-    return element("canvas", { tabindex: 0, role: "application", "aria-label": label, ...answers })
-  }
-  panel(/** @type {Node[]} */ above) {
-    const names = this.scene.policies.map(({ name }) => name)
-    const policy = choice("policy", names, i => this.show(this.scene.policies[i]))
-    const parts = [this.replay.row, this.form, this.backs, this.note]
-    return element("div", { class: "vsp-panel" }, this.legend, row(...above, policy), ...parts)
-  }
 
-  // -- What is shown, and where it lies in the picture
-  place = (/** @type {Vector} */ state) => {
-    if (!this.angular) return state
-    const [angle, speed] = state
-    return [angle - 2 * Math.PI * Math.round(angle / 2 / Math.PI), speed]
+  // -- What is shown
+  place = (/** @type {Vector} */ state) => this.task.place(this.task.see(state))
+  /** The cell that stands out. */
+  get marked() {
+    return this.lit !== null && this.lit < this.cells ? this.lit : this.cell
   }
-  /** @type {(seen: Vector) => Vector} */
-  placeSeen = seen => (this.angular ? [Math.atan2(seen[1], seen[0]), seen[2]] : seen)
-  get teacher() {
-    return "teacher" in this.policy ? this.policy.teacher : this.scene.teacher
+  /** Whether codewords can be dragged, and the arrows of cells, to drag. */
+  get movable() {
+    return !this.fixed && !this.angular && this.cells > 1
+  }
+  get arrows() {
+    const none = this.fixed || this.cells > ALL || this.scene.task.outputs.length !== 2
+    return none || this.policy.layers ? [] : this.shown.map(i => ownArrow(this, i))
   }
   get cells() {
     return this.policy.layers ? 1 : this.policy.codewords.length
+  }
+  /** The cells whose equations are shown: all, or the one that stands out. */
+  get shown() {
+    return this.cells > ALL ? [this.marked] : [...Array(this.cells).keys()]
   }
   /** Show a policy of the scene with its run, if it has one; `numbers` replace its own.
    * @param {Policy} policy @param {Partial<Numbers>} [numbers] */
   show(policy, numbers) {
     this.replay.stop()
+    name(policy)
     const { replay: run = [], ...own } = policy
     const copy = policy.layers ? policy : structuredClone(own)
-    Object.assign(this.picture, { colours: [], known: {} })
-    Object.assign(this, { original: policy, run, policy: copy, moment: -1, dragged: null })
+    Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null })
     this.replay.row.hidden = !run.length
     this.backs.hidden = Boolean(policy.layers)
-    if (run.length) this.replay.restart(run.length)
+    if (run.length) this.replay.grow(true)
     if (numbers) this.put(numbers)
     this.afresh()
   }
 
   // -- Changing the policy
   /** A copy of what a reader can change. */
-  numbers({ codewords, coefficients } = /** @type {Partial<Numbers>} */ (this.policy)) {
-    return structuredClone({ codewords, coefficients })
+  numbers(/** @type {Partial<Numbers>} */ numbers = this.policy) {
+    const { codewords, coefficients, born, tints } = { ...this.policy, ...numbers }
+    return structuredClone({ codewords, coefficients, born, tints })
   }
   put(/** @type {Partial<Numbers>} */ numbers) {
     Object.assign(this.policy, this.numbers(numbers))
+    name(this.policy)
   }
   /** Forget all gestures. */
   afresh() {
-    Object.assign(this, { base: null, past: [], armed: false, kept: this.numbers() })
+    Object.assign(this, { base: null, past: [this.numbers()], armed: false })
     this.changed(true)
   }
-  /** After every change of a number. Before the first of a gesture, keep what it was. */
+  /** After every change of a number: keep what it is, beside what it was before the gesture. */
   edited() {
-    if (this.armed) {
-      this.past.push(this.kept)
-      Object.assign(this, { armed: false, base: this.results })
-    }
-    this.kept = this.numbers()
+    if (this.armed) Object.assign(this, { armed: false, base: this.results })
+    else this.past.pop()
+    this.past.push(this.numbers())
     this.changed(true)
   }
   /** Take other numbers, as one gesture. */
@@ -157,21 +166,17 @@ export class Explorer {
     this.settle()
   }
   undo() {
-    const before = this.past.pop()
-    if (!before) return
-    this.take(before)
-    this.past.pop() // going back is no gesture of its own
+    if (this.past.length > 1) this.take(this.past.splice(-2)[0])
   }
   /** A gesture is finished: tell it once the picture shows it. */
   settle() {
-    requestAnimationFrame(() => requestAnimationFrame(() => this.settled(this)))
+    requestAnimationFrame(() => requestAnimationFrame(() => this.hooks.settled?.(this)))
   }
-
   /** The same once keys rest: the next one begins another gesture. */
   soon() {
-    clearTimeout(this.still)
-    this.still = setTimeout(() => {
-      this.armed = true
+    clearTimeout(this.timers.still)
+    this.timers.still = setTimeout(() => {
+      Object.assign(this, { armed: true, writing: false })
       this.settle()
     }, 400)
   }
@@ -179,20 +184,16 @@ export class Explorer {
   // -- Everything that depends on policy and state
   /** Schedule an update: of everything if the `policy` changed. */
   changed(policy = false) {
-    this.renewed ||= policy
-    this.waiting ||= requestAnimationFrame(() => {
-      const { renewed } = this
-      Object.assign(this, { waiting: 0, renewed: false })
-      this.redo(renewed)
-    })
+    if (policy) this.mapped = null
+    this.waiting ||= requestAnimationFrame(() => this.redo())
   }
-  redo(renewed = true) {
-    if (renewed) this.judge(IN_MOTION)
-    if (renewed) this.mapped = null
+  redo() {
+    this.waiting = 0
+    if (this.mapped === null) this.judge(IN_MOTION)
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell
     // Of a network that is not loaded yet, one episode is known
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked, true)
-    if (!this.form.contains(document.activeElement)) this.fill() // else a reader writes
+    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked)
+    if (!this.writing && !this.form.contains(document.activeElement)) this.fill()
     this.draw()
     this.speak()
   }
@@ -202,10 +203,7 @@ export class Explorer {
       n = scene.starts.length,
       begun = performance.now()
     this.failing.clear()
-    if (policy.layers) {
-      this.results = { played: n, ...policy.results }
-      return
-    }
+    if (policy.layers) return Object.assign(this, { results: { played: n, ...policy.results } })
     ready(policy)
     let [played, sum] = [0, 0]
     for (; played < n && (!played || performance.now() - begun < budget); played++) {
@@ -219,128 +217,133 @@ export class Explorer {
   }
   fill() {
     if (this.policy.layers) return this.form.replaceChildren()
-    const lines = equations(this, () => this.edited())
-    const title = this.cells > 1 ? `Change cell ${this.cell}` : "Change the map"
-    this.form.replaceChildren(element("fieldset", {}, element("legend", {}, title), ...lines))
+    const parts = this.shown.map(i => {
+      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map",
+        tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)",
+        light = () => this.lit === i || this.light(i),
+        lines = equations(this, i, () => this.edited()),
+        acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` }
+      return element("fieldset", acts, element("legend", {}, title), ...lines)
+    })
+    this.form.replaceChildren(...parts)
+  }
+  /** Let a cell stand out while its equations are touched. @param {number | null} cell */
+  light(cell) {
+    if (this.held) return
+    this.lit = cell
+    this.changed()
   }
   speak() {
-    const moving = this.replay.playing || this.dragged !== null
-    this.said.setAttribute("aria-live", moving ? "off" : "polite") // else too much to hear
+    const { replay } = this,
+      moment = momentOf(this)
+    // While it moves, it would be too much to hear
+    this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite")
     this.result.textContent = resultOf(this)
     this.from.textContent = episodeOf(this)
-    if (this.answer.isConnected) this.answer.replaceChildren(...answerOf(this))
+    this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)))
     this.legend.replaceChildren(...legendOf(this))
     this.note.textContent = noteOf(this)
-    this.replay.tell()
-    this.told(this)
+    for (const part of this.form.children)
+      part.classList.toggle("vsp-lit", Number(part.getAttribute("data-cell")) === this.marked)
+    replay.said.textContent = moment
+    replay.slider.setAttribute("aria-valuetext", moment)
+    replay.time.hidden = this.run[0]?.failures === undefined
+    if (!replay.time.hidden) drawTime(this)
+    this.hooks.told?.(this)
   }
   /** Draw. Until the picture rests, the map has few points, and not all starts are played. */
   draw() {
-    this.picture.begin()
-    if (this.mapped !== this.cell) {
-      drawMap(this, COARSE)
-      this.mapped = this.cell
-      clearTimeout(this.later)
-      this.later = setTimeout(() => this.finish(), 120)
-    }
-    drawAll(this)
-    const fade = () => {
-      this.fading = 0
-      if (!this.waiting) this.draw()
-    }
-    if (this.flashes.length) this.fading ||= requestAnimationFrame(fade)
+    if (this.mapped === this.marked) return drawAll(this)
+    drawAll(this, COARSE)
+    this.mapped = this.marked
+    clearTimeout(this.timers.sharp)
+    this.timers.sharp = setTimeout(() => this.finish(), 120)
   }
   finish() {
     if (this.waiting) return // a change comes, and its own timer
     if (this.results.played < this.scene.starts.length) this.judge()
-    drawMap(this, FINE)
-    drawAll(this)
+    drawAll(this, FINE)
     this.speak()
   }
-
-  // -- The run
-  /** Show moment i of the run, and say what changed. */
-  turn(/** @type {number} */ i) {
-    const { n, codewords } = this.run[i]
-    const moments = this.run.slice(Math.min(this.moment + 1, i), i + 1),
-      happened = moments.flatMap(({ events }) => events),
-      now = performance.now()
-    if (this.moment >= 0 && !this.replay.slow)
-      this.flashes.push(...happened.map(event => ({ ...event, since: now })))
-    this.moment = i
-    this.put(this.run[i])
-    this.afresh()
-    const last = this.run.slice(0, i + 1).findLast(({ events }) => events.length),
-      since = last && last.n < n ? `, since iteration ${last.n}` : "",
-      why = last?.events.map(event => `\n${causeOf(event, this.original.limits)}`) ?? []
-    return `iteration ${n}: ${count(codewords.length, "cell")}${since}${why.join("")}`
-  }
-  /** For how many milliseconds a moment of the run stays: with a change, longer. */
-  lasts(/** @type {number} */ i) {
-    const changes = this.run.filter(({ events }) => events.length).length,
-      pause = Math.min(PAUSE, PLAYS / 2 / Math.max(changes, 1)),
-      rest = (PLAYS - pause * changes) / Math.max(this.run.length - changes, 1)
-    const [long, short] = this.replay.slow ? [1000, 0] : [pause, rest]
-    return this.run[i].events.length ? long : short
-  }
-  /** Go to the next change (1) or the one before (-1). */
-  jump(/** @type {1 | -1} */ way) {
-    const end = way > 0 ? this.run.length - 1 : 0
-    let i = this.replay.at
-    do i = i === end ? i : i + way
-    while (i !== end && !this.run[i].events.length)
-    this.replay.to(i)
-    this.settle()
+  /** Show another part of the plane, after a while on the way (by equal factors), or at once.
+   * @param {Box} to */
+  zoom({ low, high }, duration = 0) {
+    const { plane } = this.picture,
+      factor = (high[0] - low[0]) / (plane.high[0] - plane.low[0]),
+      begun = performance.now()
+    cancelAnimationFrame(this.zooming)
+    const frame = (/** @type {number} */ now) => {
+      const time = duration && factor !== 1 ? clip((now - begun) / duration, 0, 1) : 1,
+        way = time < 1 ? (factor ** time - 1) / (factor - 1) : 1
+      /** @type {(from: Vector, to: Vector) => Vector} */
+      const mean = (from, to) => from.map((value, i) => (1 - way) * value + way * to[i])
+      this.picture.plane = { ...plane, low: mean(plane.low, low), high: mean(plane.high, high) }
+      this.changed(true)
+      if (time < 1) this.zooming = requestAnimationFrame(frame)
+    }
+    frame(begun)
   }
 
-  // -- Size and colours of the page, pointer and keys
-  listen() {
-    new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
-    const recolour = () => this.canvas.isConnected && this.changed(true)
-    const watch = new MutationObserver(recolour) // of the site's theme, and of JupyterLab's
-    for (const part of [document.documentElement, document.body])
-      watch.observe(part, { attributeFilter: ["data-theme", "data-jp-theme-light"] })
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour)
-  }
+  // -- Pointer and keys
   pointerdown = (/** @type {PointerEvent} */ event) => {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
     this.canvas.focus() // a finger does not
     const { offsetX: x, offsetY: y } = event,
-      words = this.fixed || this.angular || this.cells === 1 ? [] : (this.policy.codewords ?? []),
-      places = words.map(word => this.picture.at(word)),
-      far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
-      least = Math.min(...far)
-    this.dragged = least < (event.pointerType === "touch" ? 22 : 12) ? far.indexOf(least) : -1
-    Object.assign(this, { pressed: { x, y, place: places[this.dragged] ?? [x, y] }, armed: true })
+      finger = event.pointerType === "touch",
+      words = this.movable ? (this.policy.codewords ?? []) : []
+    /** @type {(places: Vector[], turned: boolean) => Omit<Held, "from"> | undefined} the nearest */
+    const near = (places, turned) => {
+      const far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
+        cell = far.indexOf(Math.min(...far))
+      if (far[cell] < (finger ? 22 : 12)) return { cell, turned, finger, place: places[cell] }
+    }
+    const word = near(words.map(word => this.picture.at(word)), false),
+      found = word ?? near(this.arrows.map(({ tip }) => tip), true),
+      held = { cell: -1, turned: false, finger, place: [x, y], ...found, from: [x, y] }
+    Object.assign(this, { held, armed: true, lit: found?.cell ?? null })
     this.replay.stop()
-    this.choose(words[this.dragged] ?? this.picture.point(x, y))
+    if (found) this.changed()
+    else this.choose(this.picture.point(x, y))
   }
   pointermove = (/** @type {PointerEvent} */ event) => {
-    if (this.dragged === null) return
-    const { codewords } = this.policy,
-      { x, y, place } = this.pressed,
-      [dx, dy] = [event.offsetX - x, event.offsetY - y],
-      point = this.picture.point(place[0] + dx, place[1] + dy)
-    if (this.dragged < 0 || !codewords) return this.choose(point)
+    if (!this.held) return
+    const { cell, turned, place, from } = this.held,
+      [dx, dy] = [event.offsetX - from[0], event.offsetY - from[1]],
+      [px, py] = [place[0] + dx, place[1] + dy],
+      point = this.picture.point(px, py)
+    if (cell < 0) return this.choose(point)
     if (this.armed && Math.hypot(dx, dy) < 4) return // a finger that rests
-    codewords[this.dragged] = point
-    this.asked = [...point]
+    if (turned) this.bend(cell, px, py)
+    else this.policy.codewords?.splice(cell, 1, point)
     this.edited()
+  }
+  /** Let the arrow of a cell end at a pixel: its constants follow.
+   * @param {number} cell @param {number} px @param {number} py */
+  bend(cell, px, py) {
+    const { start, word, rows, own } = ownArrow(this, cell),
+      wanted = [px - start[0], start[1] - py].map(length => clip(length / own, -1, 1)),
+      constants = rows[word.length]
+    wanted.forEach((value, k) => {
+      constants[k] = +(constants[k] + value - raw(rows, word, k)).toFixed(2)
+    })
   }
   choose(/** @type {Vector} */ point) {
     this.asked = [...point]
-    this.base = null
+    this.base = this.lit = null
     this.changed()
   }
   pointerup = () => {
-    if (this.dragged !== null) this.settle()
-    this.dragged = null
+    if (!this.held) return
+    const { cell, turned } = this.held,
+      word = this.policy.codewords?.[cell]
+    this.held = null
+    if (this.armed && word && !turned) this.choose(word) // not moved, so clicked
+    this.light(null)
+    this.settle()
   }
   keydown = (/** @type {KeyboardEvent} */ event) => {
-    /** @type {Record<string, Vector>} */
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] }
-    const way = { ...ways, " ": [0, 0] }[event.key] // a space would scroll
+    const way = { ...WAYS, " ": [0, 0] }[event.key] // a space would scroll
     if (!way || event.altKey || event.ctrlKey || event.metaKey) return
     event.preventDefault()
     const { low, high } = this.picture.plane,
@@ -380,26 +383,24 @@ async function reveal([{ isIntersecting, target }], watch) {
   const root = /** @type {HTMLElement} */ (target),
     files = JSON.parse(root.dataset.scenes ?? "{}"),
     names = Object.keys(files)
-  let wanted = 0
-  const open = async (/** @type {number} */ i) => {
-    wanted = i
-    const found = await (await fetch(files[names[i]])).json()
-    if (wanted === i) new Explorer(root, found, { above })
+  let wanted = ""
+  const open = async (/** @type {string} */ name) => {
+    wanted = name
+    const scene = await (await fetch(files[name])).json()
+    if (wanted === name) new Explorer(root, scene, { above })
   }
   const above = names.length > 1 ? [choice("task", names, open)] : []
-  await open(0)
+  await open(names[0])
 }
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
 export function mountAll() {
-  for (const found of document.querySelectorAll(".vsp-episodes > script"))
-    new Episodes(/** @type {HTMLElement} */ (found.parentElement), JSON.parse(found.textContent))
-  const bare = ".vsp-explorer:is([data-scenes], :has(> script)):not([data-mounted])"
-  for (const found of document.querySelectorAll(bare)) {
-    const root = /** @type {HTMLElement} */ (found)
-    root.dataset.mounted = "true"
-    const inner = root.querySelector("script")
-    if (inner) new Explorer(root, JSON.parse(inner.textContent))
-    else new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root)
+  for (const script of document.querySelectorAll(":is(.vsp-episodes, .vsp-explorer) > script")) {
+    const root = /** @type {HTMLElement} */ (script.parentElement),
+      scene = JSON.parse(script.textContent)
+    if (root.matches(".vsp-episodes")) new Episodes(root, scene)
+    else new Explorer(root, scene)
   }
+  for (const root of document.querySelectorAll("[data-scenes]"))
+    new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root)
 }

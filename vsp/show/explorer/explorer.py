@@ -11,43 +11,26 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ...config import PAPER_TASKS
 from ...history import History
 from ...policy import PiecewisePolicy, VoronoiPolicy
 from ...rollouts import Policy
 from ...run import atomic
 from .. import page, state_space, style
-from .scene import scene_of, to_json
-from .scripts import SCRIPT, STYLE
+from .scene import bench_of, scene_of, to_json
+from .scripts import BENCH, PAGE, SCRIPT, STYLE
 
 # A browser runs what a page contains, and loads nothing from another host
 SECURITY = """<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline';
-script-src 'unsafe-inline'; img-src data:; connect-src 'self'; base-uri 'none'; form-action 'none'">"""
-_PAGE = """<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-{security}
-<title>{title}</title>
-<style>
-:root {{ color-scheme: light dark }}
-body {{ max-width: 60rem }}
-h1 {{ overflow-wrap: anywhere }}
-{style}</style>
-<body class="vsp-page">
-<h1>{title}</h1>
-{body}
-<script type="module">
-{script}
-mountAll()
-</script>
-</html>
-"""
+script-src 'unsafe-inline' blob:; worker-src blob:; img-src data:; connect-src 'self'; base-uri 'none';
+form-action 'none'">"""
 
 
-def standalone(title: str, body: str, style: str = "") -> str:
-    """Return a whole page with the script that draws explorers: `title` is text, `body` HTML, `style` CSS.
-
-    A browser loads nothing from elsewhere for it."""
+def standalone(title: str, body: str, style: str = "", script: str = f"{SCRIPT}\nmountAll") -> str:
+    """Return a whole page: `title` is text, `body` HTML, `style` CSS, `script` ends with the function that it calls, by
+    default one that draws explorers. A browser loads nothing from elsewhere for it."""
     style = STYLE + style
-    return _PAGE.format(title=html.escape(title), body=body, style=style, script=SCRIPT, security=SECURITY)
+    return PAGE.format(title=html.escape(title), body=body, style=style, script=script, security=SECURITY)
 
 
 class Explorer:
@@ -71,7 +54,7 @@ class Explorer:
         self.policies, (self.task,), first = policies, tasks.values(), next(iter(policies.values()))
         if history and not np.array_equal(history.policy_at(len(history.cells) - 1).codewords, first.codewords):
             raise ValueError("history is of another run than the first policy, expected the one that gave it")
-        self.scene = scene_of(policies, self.task, teacher, history)
+        self.history, self.scene = history, scene_of(policies, self.task, teacher, history)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write a standalone HTML file, which opens from disk and needs no other file or host."""
@@ -109,7 +92,8 @@ class Explorer:
         if single:
             actions = policy.predict(self.task.see(points))[0][:, 0] / self.task.action_high[0]
             state_space.force_map(ax, x, y, actions)
-        state_space.cells(ax, x, y, policy.cells(self.task.see(points)), fill=not single)
+        fill = None if single else state_space.birth_colours(policy, self.history)[1]
+        state_space.cells(ax, x, y, policy.cells(self.task.see(points)), fill=fill)
         if not single:
             coarse = state_space.grid(np.array(low), np.array(high), 15)[2]
             state_space.arrows(ax, coarse, policy.predict(coarse)[0], color=style.OTHER)
@@ -120,15 +104,36 @@ class Explorer:
         return file.getvalue()
 
 
+class Workbench:
+    """The paper's method, run in the browser: its tasks, every setting that a picture can show, runs side by side."""
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write a standalone HTML file, which opens from disk and needs no other file or host."""
+        atomic.write_text(path, self.page())
+
+    def page(self) -> str:
+        """Return that file's text."""
+        data = to_json([bench_of(task) for task in PAPER_TASKS])
+        body = f'<div class="vsp-explorer" data-bench><script type="application/json">{data}</script></div>'
+        return standalone("Distil a network", body, ".vsp-page { max-width: 110rem }", f"{BENCH}\nbegin")
+
+    def _repr_html_(self) -> str:
+        style = "border: 0; width: 100%; height: 50rem"
+        return f'<iframe srcdoc="{html.escape(self.page())}" style="{style}"></iframe>'
+
+
 def explore(
-    policies: PiecewisePolicy | dict[str, VoronoiPolicy], *, teacher: Policy | None = None,
+    policies: PiecewisePolicy | dict[str, VoronoiPolicy] | None = None, *, teacher: Policy | None = None,
     history: History | None = None,
-) -> Explorer:  # fmt: skip
+) -> Explorer | Workbench:  # fmt: skip
     """Replay, query and change a policy in a browser: shown by JupyterLab, or saved as a standalone HTML file.
 
-    `policies`: one policy with linear maps, or several by name. `teacher`: its mean return is shown beside theirs.
-    `history`: replays the distillation of the first policy. The browser plays SimpleGoal, MountainCarContinuous and
-    Pendulum. Raises ValueError for other policies and tasks, and for a history of another method or task.
+    `policies`: one policy with linear maps, or several by name; None: a `Workbench`, which distils in the browser.
+    `teacher`: its mean return is shown beside theirs. `history`: replays the distillation of the first policy. The
+    browser plays SimpleGoal, MountainCarContinuous and Pendulum. Raises ValueError for other policies and tasks, and
+    for a history of another method or task.
     """
+    if policies is None:
+        return Workbench()
     shown: dict[str, Any] = policies if isinstance(policies, dict) else {"policy": policies}
     return Explorer(shown, teacher=teacher, history=history)

@@ -1,20 +1,40 @@
 // @ts-check
 // A canvas with the coordinates of a plane, and what an explorer draws on it.
 
-import { act, clip, colouring, raw, tied } from "./model.js"
+import { act, clip, numberOf, raw, tied } from "./model.js"
 
 const ARROWS = 14 // along each axis
 const STRIPES = 50 // along each axis: where two codewords are equally near, both colours alternate
-const FLASH = 900 // milliseconds
+const SMALL = 330 // pixels: narrower pictures have small letters
+const [TIME, END] = [72, 8] // pixels: the height of a curve, and half of a slider's knob
 // Colours without a meaning of their own (vsp/show/style.py), as pale tints
-export const CELLS = ["#56b4e9", "#ece133", "#ca9161", "#b0b0b0", "#fbafe4", "#8a7fd0"]
+export const CELLS =
+  "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ")
 const [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"] // the force maps of the figures
+
+const CLEAR = "transparent"
 
 /** @type {(colour: string) => number[]} */
 const rgb = colour => [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16))
 /** @type {(colour: number[], ground: number[], share: number) => number[]} */
 const mixed = (colour, ground, share) =>
   colour.map((part, i) => ground[i] + share * (part - ground[i]))
+
+/** Begin to draw on a canvas, as wide as the page makes it, `high` pixels high (by default as high
+ * as wide): its context, its width and the page's colours.
+ * @param {HTMLCanvasElement} canvas @param {number} [high] */
+export function begun(canvas, high) {
+  const [wide, ratio] = [canvas.clientWidth || 440, devicePixelRatio],
+    style = getComputedStyle(canvas),
+    ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"))
+  canvas.width = Math.round(wide * ratio)
+  canvas.height = Math.round((high ?? wide) * ratio)
+  ctx.scale(ratio, ratio)
+  ctx.font = `${wide < SMALL ? 11 : 13}px ${style.fontFamily}`
+  const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"],
+    tones = names.map(name => [name, style.getPropertyValue(`--vsp-${name}`).trim() || "#888888"])
+  return { ctx, wide, tones: Object.fromEntries(tones) }
+}
 
 /** The canvas. `plane` is the part of the plane that it shows; `tones` are the page's colours. */
 export class Picture {
@@ -25,34 +45,26 @@ export class Picture {
   high = 0
   ties = false // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */ tones = {}
-  /** @type {number[]} */ colours = [] // of the cells
-  /** @type {Record<string, number>} */ known = {} // those of codewords
+  /** @type {CanvasRenderingContext2D} */ ctx
 
-  /** @param {HTMLCanvasElement} canvas @param {Plane} plane */
-  constructor(canvas, plane) {
+  /** `bare`: without axes. @param {HTMLCanvasElement} canvas @param {Plane} plane */
+  constructor(canvas, plane, bare = false) {
     this.canvas = canvas
     this.plane = plane
-    this.ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"))
+    this.bare = bare
   }
-  /** Take size and colours from the page, and clear. */
+  /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
-    const ratio = devicePixelRatio,
-      side = this.canvas.clientWidth || 440,
-      size = Math.round(side * ratio),
-      style = getComputedStyle(this.canvas)
-    if (this.canvas.width !== size) this.canvas.width = this.canvas.height = size
-    const small = side < 330
-    this.edge = { left: small ? 46 : 54, right: small ? 4 : 8, top: 8, bottom: small ? 32 : 36 }
-    this.ctx.setTransform(ratio, 0, 0, ratio, 0, 0)
-    this.side = side
+    const { ctx, wide: side, tones } = begun(this.canvas),
+      [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36]
+    Object.assign(this, { ctx, side, tones })
+    if (!this.bare) this.edge = { left, right, top: 8, bottom }
     this.wide = side - this.edge.left - this.edge.right
     this.high = side - this.edge.top - this.edge.bottom
-    const tone = (/** @type {string} */ name) =>
-      style.getPropertyValue(`--vsp-${name}`).trim() || "#888888"
-    const names = ["paper", "ink", "start", "goal", "pit", "failing", "teacher"]
-    this.tones = Object.fromEntries(names.map(name => [name, tone(name)]))
-    this.ctx.clearRect(0, 0, side, side)
-    this.ctx.font = `${small ? 11 : 13}px ${style.fontFamily}`
+    ctx.save()
+    ctx.beginPath()
+    ctx.rect(this.edge.left, this.edge.top, this.wide, this.high)
+    ctx.clip()
   }
   at(/** @type {Vector} */ [x, y]) {
     const { low, high } = this.plane
@@ -63,40 +75,30 @@ export class Picture {
   }
   /** @param {number} px @param {number} py */
   point(px, py) {
-    const { low, high } = this.plane
-    return [
-      low[0] + ((px - this.edge.left) / this.wide) * (high[0] - low[0]),
-      high[1] - ((py - this.edge.top) / this.high) * (high[1] - low[1]),
-    ].map((value, i) => clip(value, low[i], high[i]))
+    const { low, high } = this.plane,
+      shares = [(px - this.edge.left) / this.wide, 1 - (py - this.edge.top) / this.high]
+    return this.spot(shares).map((value, i) => {
+      const digits = clip(2 - Math.floor(Math.log10(high[i] - low[i])), 2, 12) // that one sees
+      return +clip(value, low[i], high[i]).toFixed(digits)
+    })
   }
-  shows(/** @type {Vector} */ point) {
-    const { low, high } = this.plane
-    return point.every((value, i) => value >= low[i] && value <= high[i])
-  }
+
   /** The middle of one of n by n parts of the plane, counted from the top left.
    * @param {number} at @param {number} n */
   middle(at, n) {
-    const { low, high } = this.plane,
-      shares = [(at % n) + 0.5, n - 0.5 - Math.floor(at / n)]
-    return shares.map((share, i) => low[i] + (share / n) * (high[i] - low[i]))
+    return this.spot([((at % n) + 0.5) / n, (n - 0.5 - Math.floor(at / n)) / n])
   }
-  /** Call `draw` with everything cut off at the frame. */
-  inside(/** @type {() => void} */ draw) {
-    this.ctx.save()
-    this.ctx.beginPath()
-    this.ctx.rect(this.edge.left, this.edge.top, this.wide, this.high)
-    this.ctx.clip()
-    draw()
-    this.ctx.restore()
+  /** The point of the plane at shares of its width and height. @param {Vector} shares */
+  spot(shares) {
+    const { low, high } = this.plane
+    return shares.map((share, i) => low[i] + share * (high[i] - low[i]))
   }
   /** @type {(words: string, x: number, y: number, align?: CanvasTextAlign) => void} */
   text(words, x, y, align = "center") {
-    const { ctx } = this
+    const { ctx, tones } = this
+    Object.assign(ctx, { strokeStyle: tones.paper, fillStyle: tones.ink, lineWidth: 3 })
     ctx.textAlign = align
-    ctx.lineWidth = 3
-    ctx.strokeStyle = this.tones.paper
     ctx.strokeText(words, x, y)
-    ctx.fillStyle = this.tones.ink
     ctx.fillText(words, x, y)
   }
   place(/** @type {Place} */ { name, from, to }) {
@@ -118,14 +120,29 @@ export class Picture {
   line(points, colour, width = 2) {
     const { ctx } = this
     ctx.beginPath()
-    points.forEach((point, i) => {
-      const [x, y] = this.at(point),
-        far = i && Math.abs(x - this.at(points[i - 1])[0]) > this.wide / 2
-      if (i && !far) ctx.lineTo(x, y)
-      else ctx.moveTo(x, y) // no line where an angle wraps around
-    })
-    ctx.strokeStyle = colour
-    ctx.lineWidth = width
+    let before = Infinity
+    for (const [x, y] of points.map(point => this.at(point))) {
+      const far = Math.abs(x - before) > this.wide / 2 // where an angle wraps around
+      ctx[far ? "moveTo" : "lineTo"](x, y)
+      before = x
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width })
+    ctx.stroke()
+  }
+  /** Draw arrows between pixels. @param {Arrow[]} arrows @param {number} head its length
+   * @param {string} colour @param {number} width */
+  arrows(arrows, head, colour, width) {
+    const { ctx } = this
+    ctx.beginPath()
+    for (const { start, tip: [x, y] } of arrows) {
+      const turn = Math.atan2(y - start[1], x - start[0])
+      ctx.moveTo(start[0], start[1])
+      for (const side of [-2.6, 2.6]) {
+        ctx.lineTo(x, y)
+        ctx.lineTo(x + head * Math.cos(turn + side), y + head * Math.sin(turn + side))
+      }
+    }
+    Object.assign(ctx, { strokeStyle: colour, lineWidth: width })
     ctx.stroke()
   }
   /** @param {Vector[]} shapes @param {string} colour */
@@ -139,43 +156,36 @@ export class Picture {
       }
       ctx.closePath()
     }
-    ctx.fillStyle = ctx.strokeStyle = colour
-    ctx.lineWidth = 0.5 // else gaps show between neighbours
+    // Without lines gaps show between neighbours
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 })
     ctx.fill()
     ctx.stroke()
   }
   /** @param {Vector} point @param {number} radius
-   * @param {string | undefined} fill @param {string} [stroke] */
-  dot(point, radius, fill, stroke, width = 1.5) {
+   * @param {string} [fill] @param {string} [stroke] */
+  dot(point, radius, fill = CLEAR, stroke = CLEAR, width = 1.5) {
     const { ctx } = this,
       [x, y] = this.at(point)
     ctx.beginPath()
     ctx.arc(x, y, radius, 0, 7)
-    if (fill) {
-      ctx.fillStyle = fill
-      ctx.fill()
-    }
-    if (stroke) {
-      ctx.strokeStyle = stroke
-      ctx.lineWidth = width
-      ctx.stroke()
-    }
+    Object.assign(ctx, { fillStyle: fill, strokeStyle: stroke, lineWidth: width })
+    ctx.fill()
+    ctx.stroke()
   }
   axes() {
     const { ctx, plane, edge } = this,
       { low, high, labels } = plane,
       bottom = edge.top + this.high,
       sides = /** @type {const} */ (["left", "center", "right"])
-    ctx.strokeStyle = this.tones.ink
-    ctx.lineWidth = 1
+    ctx.restore()
+    Object.assign(ctx, { strokeStyle: this.tones.ink, lineWidth: 1 })
     ctx.strokeRect(edge.left, edge.top, this.wide, this.high)
     for (const share of [0, 0.5, 1]) {
       const [first, second] = low.map((value, i) => tick(value, high[i] - value, share))
-      const x = edge.left + share * this.wide,
-        y = bottom - share * this.high
-      this.text(first, x, bottom + 15, sides[2 * share])
-      if (share !== 0.5 || (second.length < 5 && this.side > 330))
-        this.text(second, edge.left - 5, y + [0, 4, 10][2 * share], "right")
+      const y = bottom - share * this.high + [0, 4, 10][2 * share]
+      this.text(first, edge.left + share * this.wide, bottom + 15, sides[2 * share])
+      if (share !== 0.5 || (second.length < 5 && this.side > SMALL))
+        this.text(second, edge.left - 5, y, "right")
     }
     this.text(labels[0], edge.left + this.wide / 2, bottom + 31)
     ctx.save()
@@ -193,8 +203,8 @@ function tick(low, range, share) {
   return String(+(low + share * range).toFixed(digits)).replace("-", "−")
 }
 
-/** Make the policy's map: the action where it is a single one, else the cells; and borders.
- * @param {Explorer} view @param {number} n */
+/** Make the map, of n by n points: the action where it is a single one, else the cells; and
+ * borders. @param {Mapped} view @param {number} n */
 export function drawMap(view, n) {
   const { picture, policy } = view,
     cells = new Int16Array(n * n),
@@ -202,17 +212,12 @@ export function drawMap(view, n) {
   for (let at = 0; at < n * n && !policy.layers; at++)
     [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)))
   picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1])
-  // A cell keeps its colour by its codeword, because numbers move up when a cell goes
-  const keys = (policy.codewords ?? [0]).map(String),
-    wanted = keys.map((key, i) => picture.known[key] ?? picture.colours[i])
-  picture.colours = colouring(cells, n, view.cells, wanted)
-  picture.known = Object.fromEntries(keys.map((key, i) => [key, picture.colours[i]]))
   picture.map.width = picture.map.height = n
   picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0)
 }
 
 /** The image of a map whose pixels lie in `cells`, or as near to those in `others`.
- * @param {Explorer} view @param {Int16Array} cells @param {Int16Array} others @param {number} n */
+ * @param {Mapped} view @param {Int16Array} cells @param {Int16Array} others @param {number} n */
 function painted(view, cells, others, n) {
   const { picture, scene, policy } = view,
     [paper, ink] = [picture.tones.paper, picture.tones.ink].map(rgb),
@@ -225,8 +230,9 @@ function painted(view, cells, others, n) {
     const plain = mixed(rgb(hue), paper, share)
     return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed)
   }
-  const single = scene.task.outputs.length === 1,
-    tints = picture.colours.map(colour => shades(CELLS[colour], view.cells > 1 ? 0.34 : 0.1)),
+  // On a dark page colours are less unlike
+  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42,
+    tints = (policy.tints ?? [0]).map(tint => shades(CELLS[tint], full)),
     pushes = Array.from({ length: 129 }, (_, i) =>
       shades(i < 64 ? LEFT : RIGHT, (0.7 * Math.abs(i - 64)) / 64),
     )
@@ -234,77 +240,75 @@ function painted(view, cells, others, n) {
     const [row, column] = [Math.floor(at / n), at % n],
       cell = Math.floor(((row + column) * STRIPES) / n) % 2 ? others[at] : cells[at]
     let hue = tints[cell]
-    if (single && !policy.layers) {
+    if (scene.task.outputs.length === 1 && !policy.layers) {
       const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0)
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))]
     }
     const edge = (column && cells[at - 1] !== cells[at]) || (row && cells[at - n] !== cells[at])
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.cell)]
+    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)]
   }
   return image
 }
 
-/** Draw everything. @param {Explorer} view */
-export function drawAll(view) {
-  const { picture } = view
+/** Draw everything, and before that the map anew if it shall have other points.
+ * @param {Explorer} view @param {number} [points] of the map, along each axis */
+export function drawAll(view, points) {
+  const { picture, scene, task } = view
   picture.begin()
-  picture.inside(() => {
-    drawPlane(view)
-    const path = view.played.states.map(view.place),
-      { paper, ink } = picture.tones
-    picture.line(path, paper, 5)
-    picture.line(path, ink, 2)
-    path.slice(1).forEach(point => picture.dot(point, 2, ink))
-    drawCodewords(view)
-    drawFlashes(view)
-    picture.dot(view.asked, 9, paper)
-    picture.dot(view.asked, 6.5, undefined, ink)
-    picture.dot(view.asked, 2.5, ink)
-  })
-  picture.axes()
-}
-
-/** @param {Explorer} view */
-function drawPlane(view) {
-  const { picture, scene } = view,
-    { tones, edge } = picture
-  picture.ctx.drawImage(picture.map, edge.left, edge.top, picture.wide, picture.high)
-  view.task.places.forEach(place => picture.place(place))
-  if (view.regions) picture.polygons(view.regions, tones.failing)
+  if (points) drawMap(view, points)
+  const path = view.played.states.map(view.place),
+    { ctx, edge, wide, high } = picture,
+    { paper, ink, failing, start } = picture.tones
+  ctx.drawImage(picture.map, edge.left, edge.top, wide, high)
+  task.places.forEach(place => picture.place(place))
+  if (view.regions) picture.polygons(view.regions, failing)
   if (scene.task.outputs.length === 2) drawArrows(view)
-  const starts = view.starts ? scene.starts.map(view.place) : []
-  starts.forEach((start, i) => {
+  for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
     const cell = view.failing.get(i)
-    if (cell === undefined) picture.dot(start, 1.3, tones.start)
-    else picture.dot(start, 2.7, cell === view.cell ? tones.failing : tones.paper, tones.failing)
-  })
-  view.task.places.forEach(place => picture.name(place))
+    if (cell === undefined) picture.dot(place, 1.3, start)
+    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing)
+  }
+  task.places.forEach(place => picture.name(place))
+  picture.line(path, paper, 5)
+  picture.line(path, ink, 2)
+  path.slice(1).forEach(point => picture.dot(point, 2, ink))
+  drawCodewords(view)
+  picture.arrows(view.arrows, 9, paper, 6)
+  picture.arrows(view.arrows, 9, ink, 3)
+  if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3)
+  picture.dot(view.asked, 9, paper)
+  picture.dot(view.asked, 6.5, CLEAR, ink)
+  picture.dot(view.asked, 2.5, ink)
+  picture.axes()
 }
 
 /** Draw the actions as arrows: the teacher's in its colour. @param {Explorer} view */
 function drawArrows(view) {
   const { picture, scene, policy } = view,
-    { ctx } = picture,
+    { teacher, ink } = picture.tones,
     length = (picture.wide / ARROWS) * 0.42
-  ctx.strokeStyle = policy.layers ? picture.tones.teacher : picture.tones.ink
-  ctx.lineWidth = policy.layers ? 1.4 : 1
-  ctx.beginPath()
-  for (let i = 0; i < ARROWS * ARROWS; i++) {
-    const point = picture.middle(i, ARROWS)
-    const [dx, dy] = policy.arrows?.[i] ?? act(scene, policy, point).action
-    if (!dx && !dy) continue // it stands still
-    const [x, y] = picture.at(point),
-      [ex, ey] = [x + dx * length, y - dy * length],
-      turn = Math.atan2(-dy, dx)
-    ctx.moveTo(x - dx * length, y + dy * length)
-    ctx.lineTo(ex, ey)
-    for (const side of [-2.6, 2.6]) {
-      ctx.moveTo(ex, ey)
-      ctx.lineTo(ex + 4 * Math.cos(turn + side), ey + 4 * Math.sin(turn + side))
-    }
-  }
-  ctx.stroke()
+  const arrows = Array.from({ length: ARROWS * ARROWS }, (_, i) => {
+    const point = picture.middle(i, ARROWS),
+      [dx, dy] = (policy.arrows?.[i] ?? act(scene, policy, point).action).map(by => by * length),
+      [x, y] = picture.at(point)
+    return { start: [x - dx, y + dy], tip: [x + dx, y - dy] }
+  })
+  const moving = arrows.filter(({ start: [x, y], tip }) => x !== tip[0] || y !== tip[1])
+  picture.arrows(moving, 4, policy.layers ? teacher : ink, policy.layers ? 1.4 : 1)
 }
+
+/** Where the arrow of a cell begins and ends, in pixels: its action at the codeword, to be dragged.
+ * @param {Explorer} view @param {number} cell */
+export function ownArrow({ picture, policy, cells }, cell) {
+  const { codewords = [], coefficients = [] } = policy,
+    word = cells > 1 ? codewords[cell] : picture.spot([0.5, 0.5]),
+    rows = coefficients[cell],
+    [x, y] = picture.at(word),
+    own = picture.wide / 10, // pixels for an action of 1: a step
+    [dx, dy] = [0, 1].map(k => clip(raw(rows, word, k), -1, 1) * own)
+  return { start: [x, y], tip: [x + dx, y - dy], word, rows, own }
+}
+
 
 /** @param {Explorer} view */
 function drawCodewords(view) {
@@ -312,25 +316,34 @@ function drawCodewords(view) {
     { paper, ink } = picture.tones
   if (policy.layers || view.cells === 1) return
   policy.codewords.forEach((codeword, i) => {
-    const point = view.placeSeen(codeword),
+    const point = view.task.place(codeword),
       [x, y] = picture.at(point)
-    picture.dot(point, 5, i === view.cell ? ink : paper, ink)
-    const [inner, below] = [x > picture.side - 40, y < 28] // else the frame cuts the number off
+    picture.dot(point, 5, i === view.marked ? ink : paper, ink)
+    // Else it would lie under the finger
+    if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2)
     if (view.cells > 30) return
-    picture.text(String(i), x + (inner ? -9 : 9), y + (below ? 16 : -6), inner ? "right" : "left")
+    const inner = x > picture.side - 40 // else the frame cuts the number off
+    const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6]
+    picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left")
   })
 }
 
-/** A ring grows around a new codeword, or closes in on a lost one. @param {Explorer} view */
-function drawFlashes(view) {
-  const now = performance.now(),
-    { picture } = view
-  view.flashes = view.flashes.filter(({ since }) => now - since < FLASH)
-  for (const { codeword, kind, since } of view.flashes) {
-    const share = (now - since) / FLASH
-    const radius = 34 * (kind === "split" ? share : 1 - share)
-    picture.ctx.globalAlpha = 1 - share
-    picture.dot(view.placeSeen(codeword), radius, undefined, picture.tones.ink, 4)
-  }
-  picture.ctx.globalAlpha = 1
+/** Draw how many starts fail along a run, on a scale of roots, so that small changes show. Ticks: a
+ * split above, a merge below. @param {Explorer} view */
+export function drawTime({ run, replay: { time: canvas, at } }) {
+  const { ctx, wide, tones } = begun(canvas, TIME),
+    failing = run.map(({ failures }) => failures ?? 0),
+    most = Math.max(...failing, 1),
+    x = (/** @type {number} */ i) => END + (i / Math.max(run.length - 1, 1)) * (wide - 2 * END),
+    y = (/** @type {number} */ value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36)
+  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 })
+  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END)
+  run.forEach(({ events }, i) => {
+    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7)
+  })
+  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14)
+  ctx.beginPath()
+  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)))
+  ctx.stroke()
+  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`)
 }

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections import defaultdict
+from typing import get_args
 
 import numpy as np
 
+from ...config import kinds_of, paper_preset
 from ...geometry import METRICS
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
 from ...tasks import PIT, RUNNING
 from ...tasks.base import Task
+from ...tasks.registry import get_task
+from ...teachers.teacher import Teacher, load_teacher
 
 # The tasks that the script plays: lower and upper limits of the plane, and its axis labels
 PLANES: dict[str, tuple[list, list, list[str]]] = {
@@ -21,6 +26,7 @@ PLANES: dict[str, tuple[list, list, list[str]]] = {
     "Pendulum-v1": ([-np.pi, -8.0], [np.pi, 8.0], ["angle (rad)", "angular velocity (rad/s)"]),
 }
 N_STARTS = 400
+UNSHOWN = ("neighbours", "sub_policy")  # settings that the browser's method does not have
 N_MOMENTS = 80  # of a replay, beside those with a split or merge
 
 
@@ -49,6 +55,36 @@ def scene_of(
     if teacher is not None:
         scene["teacher"] = {"mean": float(rollout(teacher, task, starts).returns.mean())}
     return scene
+
+
+def bench_of(name: str) -> dict:
+    """Return what the script needs to distil the teacher of a task: scene, network, the preset's settings that a
+    picture can show, and the values of those that are no numbers."""
+    preset, task, teacher = paper_preset(name), get_task(name), load_teacher(name)
+    kinds = {what: kind for what, kind in kinds_of(type(preset)).items() if what not in UNSHOWN}
+    words = {what: [False, True] if kind is bool else list(get_args(kind)) for what, kind in kinds.items()}
+    words["metric"] = list(METRICS)
+    still = VoronoiPolicy(
+        np.array([(task.low + task.high) / 2]), np.zeros((1, len(task.low) + 1, len(task.outputs))), task=task
+    )
+    return {
+        "scene": scene_of({"one cell that stands still": still}, task, teacher),
+        "network": network_of(teacher),
+        "preset": {what: getattr(preset, what) for what in kinds},
+        "choices": {what: values for what, values in words.items() if values},
+    }
+
+
+def network_of(teacher: Teacher) -> dict:
+    """Return the sizes of a network's layers; of each the weights (outputs, inputs), row by row, then the biases."""
+    layers = teacher.actor.layers
+    sizes = [layers[0][0].shape[0], *(len(bias) for _, bias in layers)]
+    return {"sizes": sizes, "weights": encoded([part for weight, bias in layers for part in (weight.T, bias)])}
+
+
+def encoded(arrays: list[np.ndarray]) -> str:
+    """Return the numbers of some arrays, one array after the other, as base64 of little-endian float32."""
+    return base64.b64encode(b"".join(np.ascontiguousarray(each, "<f4").tobytes() for each in arrays)).decode()
 
 
 def to_json(scene: object) -> str:

@@ -1,5 +1,7 @@
-"""The scripts of the explorer as one, which `npm --prefix docs run build` makes of the modules, and their style."""
+"""The page of the explorer, its style, and two scripts, each made of the modules by `npm --prefix docs run build`: that
+of the explorer and that of the workbench."""
 
 from pathlib import Path
 
-SCRIPT, STYLE = (Path(__file__).with_name(f"explorer.{name}").read_text("utf-8") for name in ("bundle.js", "css"))
+_FILES = ("page.html", "explorer.css", "explorer.bundle.js", "workbench.bundle.js")
+PAGE, STYLE, SCRIPT, BENCH = (Path(__file__).with_name(name).read_text("utf-8") for name in _FILES)

@@ -2,32 +2,47 @@
 // What an explorer says: how its policy does, why it acts as it does, what its marks mean.
 
 import { count, digits, element, minus, table } from "./controls.js"
-import { act } from "./model.js"
+import { act, numberOf } from "./model.js"
 
-/** How a policy does from all starts, and how it did before the last gesture ("8 → 31 of 400 starts
+/** How a policy does from all starts, and how it did before the last gesture ("8 → 31 of 400
  * fail"). Of a part of the starts, the number of failures is an estimate. @param {Explorer} view */
-export function resultOf({ scene, results, base, teacher }) {
+export function resultOf({ scene, policy, results, base }) {
   const { played, failures, mean } = results,
+    { teacher } = { ...scene, ...policy },
     about = played < scene.starts.length ? "about " : ""
   /** @type {(before: number | string | undefined, now: number | string) => string} */
   const both = (before, now) => (base ? `${before} → ${about}${now}` : about + now)
-  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} starts fail. `
-  const returned = `Mean return ${both(base?.mean.toFixed(2), mean.toFixed(2))}`
-  const aim = teacher ? ` (teacher: ${teacher.mean.toFixed(2)})` : ""
-  return minus(`${scene.lost.length ? fails : ""}${returned}${aim}.`)
+  const fails = `${both(base?.failures, failures)} of ${scene.starts.length} fail, mean return `,
+    aim = teacher && !base && !policy.layers ? ` (teacher ${teacher.mean.toFixed(2)})` : ""
+  const returned = both(base?.mean.toFixed(2), mean.toFixed(2))
+  return minus(`${scene.lost.length ? fails : "mean return "}${returned}${aim}.`)
 }
 
 /** How the episode from the chosen state goes. @param {Explorer} view */
-export function episodeOf({ cell, cells, asked, played, task, picture: { plane } }) {
+export function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane } }) {
   if (!played.states.length) return ""
   const [goal] = task.places,
     place = task.places[(played.outcome ?? 0) - 1],
     end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "",
     size = (/** @type {number} */ i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])),
     at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "),
-    steps = count(played.states.length - 1, "step")
-  const where = cells > 1 ? `, in cell ${cell}` : ""
-  return `From (${at})${where}: ${steps}${end}.`
+    where = cells > 1 ? `, in cell ${numberOf(policy, cell)}` : ""
+  return `From (${at})${where}: ${count(played.states.length - 1, "step")}${end}.`
+}
+
+/** Which moment of the run is shown, and what changed then or last. @param {Explorer} view */
+export function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+  if (!run.length) return ""
+  const { n, codewords, failures, loss } = run[at],
+    last = run.slice(0, at + 1).findLast(({ events }) => events.length),
+    fails = failures === undefined ? "" : `, ${failures} of ${starts.length} fail`,
+    lossy = loss === undefined ? "" : `, loss ${loss.toPrecision(2)}`,
+    since = last && last.n < n ? `, since iteration ${last.n}` : "",
+    why = last?.events.map(event => `\n${causeOf(event, limits)}`).join("") ?? "",
+    fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"),
+    untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : ""
+  const cells = count(codewords.length, "cell")
+  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`
 }
 
 /** What caused a split or a merge; `limits`: the thresholds, where known.
@@ -41,11 +56,10 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds.
- * @param {Asked} view */
-export function answerOf({ scene, policy, cell, cells, asked, task }) {
+ * @param {Asked} view @param {Vector} seen */
+export function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return []
   const { inputs, outputs } = scene.task,
-    seen = task.see(asked),
     rows = policy.coefficients[cell],
     { raw, action } = act(scene, policy, seen)
   /** @type {Said[]} */
@@ -56,34 +70,38 @@ export function answerOf({ scene, policy, cell, cells, asked, task }) {
   /** @type {Said[]} */
   const found = [...adds, ["sum", ...raw], ["action, within the limits", ...action]]
   const told = found.map(([name, ...values]) => [name, ...values.map(digits)])
-  const title = cells > 1 ? `Cell ${cell} of ${cells}, counted from 0` : "The map"
+  const title = cells > 1 ? `Cell ${numberOf(policy, cell)}, one of ${cells}` : "The map"
   return [element("p", {}, element("b", {}, title)), table(outputs, told)]
 }
 
 /** What one can do. @type {(view: Explorer) => string} */
-export const noteOf = ({ angular, cells }) =>
-  (angular || cells === 1 ? "" : "Drag a codeword to move its cell. ") +
-  "Click to choose a state; arrow keys move it."
+export const noteOf = ({ movable, arrows }) =>
+  (movable ? "Drag a codeword to move its cell. " : "") +
+  (arrows.length ? "Drag a thick arrow: its constants follow. " : "") +
+  "Drag a number sideways. Click to choose a state; arrow keys move it."
 
 /** What colours and marks mean: only those that are in the picture. @param {Explorer} view */
-export function legendOf({ scene, policy, failing, starts, regions, cells, picture, placeSeen }) {
-  const [output, second] = scene.task.outputs
-  /** @type {(kind: string, words: string) => Node} */
-  const mark = (kind, words) =>
-    element("li", {}, element("i", { class: `vsp-mark vsp-${kind}` }), words)
-  const fails = starts && failing.size > 0,
-    inside = policy.codewords?.some(word => picture.shows(placeSeen(word)))
+export function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
+  const [output, second] = scene.task.outputs,
+    fails = starts && failing.size > 0,
+
+    { low, high } = picture.plane,
+    shows = (/** @type {Vector} */ at) => at.every((x, i) => x >= low[i] && x <= high[i]),
+    inside = policy.codewords?.some(word => shows(task.place(word)))
+  /** @type {[shown: unknown, kind: string, words: string][]} */
   const marks = [
-    starts && mark("start", "start"),
-    fails &&
-      mark("failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"),
-    fails && cells > 1 && mark("elsewhere", "fails; last step in another"),
-    regions && mark("region", "falls into the pit"),
-    second && mark(policy.layers ? "taught" : "step", policy.layers ? "teacher's step" : "step"),
-    !second && mark("below", `${output} below 0`),
-    !second && mark("above", "above 0"),
-    cells > 1 && inside && mark("codeword", "codeword; filled: of the chosen cell"),
-    picture.ties && mark("tied", "two codewords equally near: the first acts"),
+    [starts, "start", "start"],
+    [fails, "failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"],
+    [fails && cells > 1, "elsewhere", "fails; last step in another"],
+    [regions, "region", "falls into the pit"],
+    [second && policy.layers, "taught", "teacher's step"],
+    [second && !policy.layers, "step", "step"],
+    [!second, "below", `${output} below 0`],
+    [!second, "above", "above 0"],
+    [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
+    [picture.ties, "tied", "two codewords equally near: the first acts"],
+    [true, "chosen", "chosen state, and its episode"],
   ]
-  return [...marks.filter(made => !!made), mark("chosen", "chosen state, and its episode")]
+  const told = marks.filter(([shown]) => shown)
+  return told.map(([, kind, words]) => element("li", { class: `vsp-${kind}` }, words))
 }
