@@ -1279,7 +1279,7 @@ function neighbours(points) {
 }
 
 // ../vsp/show/explorer/worker.js
-var SLICE = 15;
+var SLICE = 40;
 var EVERY = 10;
 var QUICK = 100;
 function* drawn(episodes, draw) {
@@ -1317,8 +1317,9 @@ function work() {
       done = Boolean(next.done);
       if (next.value) moments.push(next.value);
     }
-    postMessage({ moments, done, rate: made / ((performance.now() - now) / 1e3 || 1) });
-    if (!done) waiting = setTimeout(go, begun2.pace < 100 ? 30 : 0);
+    const rate = Math.min(begun2.pace, made / ((performance.now() - now) / 1e3 || 1));
+    postMessage({ moments, done, rate });
+    if (!done) waiting = setTimeout(go, begun2.pace < 1e5 ? SLICE : 0);
   };
   addEventListener("message", ({ data: { config, ...data } }) => {
     begun2 = { ...begun2, ...data, config: Object.assign(begun2?.config ?? {}, config) };
