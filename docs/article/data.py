@@ -266,7 +266,6 @@ def about_run() -> dict[str, float | str]:
     (policy, history), worst = distilled(), int(failing_cells().argmax())
     cured = failing(policy) & ~failing(repaired()["run_worst_refitted"]) & (policy.cells(starts_of(TASK)) == worst)
     return {
-        "run_episodes": len(history.cells),
         "run_cells": len(policy),
         "run_worst_cell": int(state_space.birth_colours(policy, history)[0][worst]),
         "run_worst_cell_failures": int(failing_cells()[worst]),

@@ -66,8 +66,7 @@ def codewords(
     ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool | np.ndarray = False,
     size: float = 14,
 ) -> None:  # fmt: skip
-    """Draw codewords (k, 2) as black dots with a white rim. `numbers` stand towards the middle, so inside the axes:
-    given ones (k,), or their places."""
+    """Draw codewords (k, 2) as black dots with a white rim, and inside the axes `numbers` (k,), or their places."""
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
     ax.scatter(*points.T, s=size, label=label, **look)
     names = np.arange(len(points)) if numbers is True else () if numbers is False else numbers

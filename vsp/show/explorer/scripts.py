@@ -1,5 +1,4 @@
-"""The page of the explorer, its style, and two scripts, each made of the modules by `npm --prefix docs run build`: that
-of the explorer and that of the workbench."""
+"""The explorer's page and style, and its script and the workbench's, which `npm --prefix docs run build` makes."""
 
 from pathlib import Path
 
