@@ -46,7 +46,7 @@ unexport MPLBACKEND MATPLOTLIBRC JUPYTER_PATH PIP_USER PIP_TARGET PIP_PREFIX
 unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
-ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-site-test
+ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-train-site-test
 .PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents proofs course article site test \
   test-js test-long test-tries lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
@@ -147,7 +147,7 @@ test-js: ##- tests the scripts of explorer, article and site without a browser, 
 lint: venv-test-train ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
-test-site: site venv-site-test ##- tests site and JupyterLab in a browser, which needs Chromium: 7 to 15 minutes
+test-site: site venv-train-site-test ##- tests site and JupyterLab in a browser, which needs Chromium: 7 to 15 minutes
 	@$(PYTEST) tests/site
 
 manifest: venv ##- accepts the files of data/ as they are, after you changed one on purpose: at once

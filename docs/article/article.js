@@ -107,10 +107,8 @@ class Article {
     const slider = /** @type {HTMLInputElement} */ (one(root, "[data-stops]")),
       stops = words(slider.dataset.stops)
     slider.addEventListener("input", () => this.act(slider, "policy", stops[+slider.value]))
-    canvas.addEventListener("pointerdown", () => this.wake())
     canvas.addEventListener("keydown", ({ key }) => {
-      if (key !== "Escape") this.wake()
-      else if (this.section) one(this.section, ".skip").focus()
+      if (key === "Escape" && this.section) one(this.section, ".skip").focus()
     })
     for (const task of all(root, ".do")) {
       const skip = button("to the picture (arrows; Escape: back)", () => canvas.focus())
@@ -135,15 +133,6 @@ class Article {
     })
     return /** @type {Promise<Parts[N] | undefined>} */ (this.parts[name])
   }
-  /** Load the network when a reader asks it. Before that, its arrows and one episode are known. */
-  async wake() {
-    const { teacher } = this.policies
-    if (this.section?.id !== "teacher" || !teacher.episode) return
-    teacher.episode = { states: [] } // of another start nothing is known yet
-    const stored = await this.part("teacher")
-    if (stored && teacher.episode) Object.assign(teacher, network(stored), { episode: null })
-    this.view.changed()
-  }
 
   // -- Scenes
   /** Show a section's scene: as `state` says, as the reader left it, or as it is at first.
@@ -163,10 +152,13 @@ class Article {
     const { view, scene } = this
     /** @type {<N extends keyof Parts>(name: N) => Promise<Parts[N] | undefined> | null} */
     const load = name => (words(section.dataset.needs).includes(name) ? this.part(name) : null)
-    const loaded = await Promise.all([load("run"), load("visited"), load("proofs")])
-    if (policy === "teacher" && String(at) !== section.dataset.at) await this.wake()
+    const loaded = await Promise.all(
+      /** @type {const} */ ([load("run"), load("visited"), load("proofs"), load("teacher")]),
+    )
     if (this.section !== section || loaded.includes(undefined)) return // gone on, or without them
-    const [run, visited, proofs] = loaded
+    const [run, visited, proofs, teacher] = loaded
+    // Before that, its arrows and one episode are known
+    if (teacher) Object.assign(this.policies.teacher, network(teacher), { episode: null })
     if (visited) this.visited ??= { states: pairs(visited.states), actions: pairs(visited.actions) }
     if (run) this.takeRun(run)
     const proof = proofs?.[policy]
@@ -207,10 +199,7 @@ class Article {
     run.replay = replayOf(stored)
     Object.assign(run.replay[run.replay.length - 1], this.view.numbers(run)) // exact, not as others
     run.limits = { split, merge }
-    const names = "max_pol_loss min_pol_distance min_param_distance n_split n_merge n_reset",
-      more = "learning_rate n_minibatches",
-      groups = { "thresholds and periods": words(names), "step size, minibatches": words(more) }
-    this.distiller = new Distiller(this.view, stored.config, {}, () => this.part("teacher"), groups)
+    this.distiller = new Distiller(this.view, stored.config, {}, () => this.part("teacher"))
   }
   /** What a section tells comes after a gesture, or after the one that it names.
    * @param {string} done */
@@ -272,7 +261,7 @@ class Article {
       await scene({ at: (await this.part("proofs"))?.[what].at, zoomed: true })
     else if (verb === "reset") view.take(view.original)
     else if (verb === "refit") this.refit(what === "cell")
-    else if (verb === "copy") await this.copy(pressed)
+    else if (verb === "copy") this.copy(pressed)
     else if (verb === "guess") {
       section.dataset.guess = what
       one(section, ".guess").textContent = `You said: the ${what}. `
@@ -286,13 +275,10 @@ class Article {
     view.take({ coefficients: refit(view.policy, visited, here ? [view.cell] : undefined) })
   }
   /** @param {HTMLElement} pressed */
-  async copy(pressed) {
-    try {
-      await navigator.clipboard.writeText(location.href)
-      pressed.textContent = "link copied"
-    } catch {
-      this.status.textContent = location.href
-    }
+  copy(pressed) {
+    const copied = () => (pressed.textContent = "link copied")
+    this.status.textContent = location.href // where a browser forbids to copy
+    navigator.clipboard?.writeText(location.href).then(copied, () => {})
   }
 
   // -- What the text says of the picture

@@ -88,20 +88,17 @@ def card(policy: VoronoiPolicy) -> str:
 
 
 def cut() -> str:
-    """Return a moving picture of how a proof cuts the square of starts, as SVG: one stage after the other."""
-    stages, drawn = cuts(), ""
-    for i, pieces in enumerate(stages):
-        drawn += f'<g style="--at: {i}">'
+    """Return pictures of how a proof cuts the square of starts, as SVG: one stage after the other."""
+    drawn = ""
+    for i, pieces in enumerate(cuts()):
+        paths, words = "", f"{len(pieces)} piece{'s' * (len(pieces) > 1)}"
         for cell, corners in pieces:
             way = " ".join(f"{100 * x:.1f} {100 - 100 * y:.1f}" for x, y in corners)
-            drawn += f'<path fill="{style.CELLS[cell]}" d="M{way}z"/>'
-        drawn += "</g>"
-    n = ", ".join(str(len(pieces)) for pieces in stages[1:])
-    words = f"The square after 1, 2, 3 steps: {n} pieces."
-    return (
-        f'<figure class="cut"><svg viewBox="0 0 100 100" role="img" aria-label="{words}">{drawn}</svg>'
-        f"<figcaption>{words}</figcaption></figure>"
-    )
+            paths += f'<path fill="{style.CELLS[cell]}" d="M{way}z"/>'
+        about = f'role="img" aria-label="The square, cut into {words}."'
+        drawn += f'<span style="--at: {i}"><svg viewBox="0 0 100 100" {about}>{paths}</svg>{words}</span>'
+    caption = "<figcaption>The square of starts, and after 1, 2, 3 steps.</figcaption>"
+    return f'<figure class="cut">{drawn}{caption}</figure>'
 
 
 def page(data: dict[str, dict], pictures: dict[str, tuple[bytes, str]]) -> str:

@@ -320,7 +320,7 @@ def run() -> dict:
     codewords, before = [], np.zeros((0, 2))
     for i, each in enumerate(snapshots):
         if not np.array_equal(each.codewords, before):
-            codewords.append([i, each.codewords.round(6).tolist()])
+            codewords.append([i, each.codewords.tolist()])  # rounded, ties of Manhattan distances end otherwise
         before = each.codewords
     events = [
         {"n": e.iteration, "kind": e.kind, "codeword": e.codeword.round(6).tolist(), "cause": e.cause}

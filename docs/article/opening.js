@@ -3,10 +3,10 @@
 
 import { one } from "../../vsp/show/explorer/controls.js"
 import { clip, dynamics, name, ready, rollout } from "../../vsp/show/explorer/model.js"
-import { Picture, drawMap } from "../../vsp/show/explorer/picture.js"
+import { Picture, drawCells } from "../../vsp/show/explorer/picture.js"
 
 const [STEP, REST] = [450, 1500] // milliseconds: of a step, and at the end
-const POINTS = 200 // of the map of the cells, along each axis
+const THERE = 0.95 // of all walkers, before they rest and begin again
 
 /** The stored ways of the teacher. @param {Walks} walks @returns {Vector[][]} */
 function ways({ lengths, states }) {
@@ -28,7 +28,8 @@ export class Opening {
       task = dynamics(scene.task.name)
     this.own = { policy, scene, task, picture, cells: policy.codewords.length, marked: -1 }
     this.ways = [ways(scene.walks), scene.starts.map(start => rollout(scene, policy, start).states)]
-    this.steps = Math.max(...this.ways.flat().map(way => way.length)) - 1
+    const lengths = this.ways.flat().map(way => way.length - 1).sort((a, b) => a - b)
+    this.steps = lengths[Math.floor(lengths.length * THERE)]
     this.count = one(root, ".count")
     this.toggle = one(root, ".walk")
     this.toggle.addEventListener("click", () => this.play(!this.playing))
@@ -53,20 +54,19 @@ export class Opening {
   }
   draw() {
     const [first, second] = this.pictures.map((picture, i) => this.walkers(picture, i)),
-      step = Math.floor(Math.min(this.time, this.steps))
+      step = Math.floor(this.time)
     this.count.textContent = `step ${step}: ${first} and ${second} of 400 at the goal`
   }
   /** Draw all walkers where they are now, and count those at the goal.
    * @param {Picture} picture @param {number} i */
   walkers(picture, i) {
     const ways = this.ways[i],
-      before = picture.tones.paper
+      { places } = this.own.task
     picture.begin()
-    const { ctx, wide, high, tones } = picture,
+    const { ctx, tones } = picture,
       colour = i ? tones.ink : tones.teacher
-    if (i && tones.paper !== before) drawMap(this.own, POINTS)
-    if (i) ctx.drawImage(picture.map, 0, 0, wide, high)
-    this.own.task.places.forEach(place => picture.place(place))
+    if (i) drawCells(this.own)
+    places.forEach(place => picture.place(place))
     for (const way of ways) {
       const now = Math.min(this.time, way.length - 1),
         [from, to] = [way[Math.floor(now)], way[Math.ceil(now)]],
@@ -76,6 +76,7 @@ export class Opening {
       ctx.globalAlpha = 1
       picture.dot(place, 1.6, colour)
     }
+    places.forEach(place => picture.name(place))
     return ways.filter(way => this.time >= way.length - 1).length
   }
 }

@@ -17,18 +17,6 @@ addEventListener("DOMContentLoaded", async () => {
     (await import(new URL("explorer.bundle.js", folder).href)).mountAll()
 })
 
-// Tables, code and mathematics that go on beyond their right edge are marked, and fade there.
-const LONG = "article :is(pre, .pst-scrollable-table-container, div.math)"
-const mark = (/** @type {Element} */ box) =>
-  box.classList.toggle("more", box.scrollWidth - box.clientWidth - box.scrollLeft > 2)
-addEventListener("load", () => {
-  const sizes = new ResizeObserver(entries => entries.forEach(entry => mark(entry.target)))
-  for (const box of document.querySelectorAll(LONG)) {
-    sizes.observe(box)
-    box.addEventListener("scroll", () => mark(box), { passive: true })
-  }
-})
-
 // A letter by itself would find every name that has it somewhere; ∞ is no letter.
 // (Sphinx's search takes this for its own.)
 var splitQuery = (/** @type {string} */ query) =>

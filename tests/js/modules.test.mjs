@@ -26,7 +26,7 @@ const textOf = path => readFileSync(at(path), "utf8")
 const npm = (...words) =>
   execFileSync("npm", ["--prefix", fileURLToPath(at("docs")), "run", "-s", ...words])
 
-const [model, controls, , texts, { Episodes, differs }, , algorithms, , , workbench, address, studies] = await Promise.all(
+const [model, controls, picture, texts, { Episodes, differs }, , algorithms, , , workbench, address, studies] = await Promise.all(
   [...EXPLORER, ARTICLE[0], LIVE[0]].map(path => import(at(path))),
 )
 
@@ -52,14 +52,14 @@ function nearest({ codewords, scale }, seen, p) {
 // What the model computes
 
 for (const order of [0.5, 1, 1.5, 2, 3, 10, null])
-  test(`the nearest codeword by the Minkowski distance of order ${order}, and no false tie`, () => {
+  test(`the nearest codeword by the Minkowski distance of order ${order}`, () => {
     const draw = random(1)
     for (const k of [1, 2, 30]) {
       const policy = model.ready(voronoi(draw, k, { metric: "minkowski", order }))
       for (let n = 0; n < 2000; n++) {
         const seen = [draw(), draw(), draw()],
           cell = nearest(policy, seen, order ?? Infinity)
-        assert.deepEqual(model.tied(policy, seen), [cell, cell])
+        for (const slack of [0, 1e-9]) assert.equal(model.cellOf(policy, seen, slack), cell)
       }
     }
   })
@@ -69,10 +69,28 @@ test("a metric without an order is one of three, and gives the same distances to
     const [named, ordered] = [{ metric }, { metric, order }].map(about =>
       model.ready(voronoi(random(2), 9, about)),
     )
-    for (const policy of [named, ordered]) model.tied(policy, [0.3, 0.4, 0.5])
+    for (const policy of [named, ordered]) model.cellOf(policy, [0.3, 0.4, 0.5])
     assert.deepEqual(named.far, ordered.far)
   }
   assert.throws(() => model.ready(voronoi(random(2), 9, { metric: "cosine" })), /cosine/)
+})
+
+test("the polygon of a cell holds the states that are nearest to its codeword, and no others", () => {
+  const draw = random(3),
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+  for (const k of [2, 3, 12]) {
+    const words = Array.from({ length: k }, () => [3 * draw() - 1, draw()]), // also outside
+      policy = model.ready({ codewords: words, scale: [0.5, 2], metric: "euclidean" })
+    const shapes = words.map(word =>
+      words.reduce((left, other) => picture.nearer(left, word, other, policy.scale), square),
+    )
+    for (let n = 0; n < 1000; n++) {
+      const [x, y] = [draw(), draw()],
+        left = ([ax, ay], [bx, by]) => (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0,
+        inside = shape => shape.length > 0 && shape.every((a, i) => left(a, shape[(i + 1) % shape.length]))
+      assert.deepEqual(shapes.map(inside).indexOf(true), model.cellOf(policy, [x, y]))
+    }
+  }
 })
 
 test("a codeword keeps its number and colour for life, unlike those that live nearby", () => {

@@ -1,7 +1,7 @@
 // For test_modules.py: how often steps and cells differ from Python's, and all episodes.
 
 import { readFileSync } from "fs"
-import { act, dynamics, ready, rollout, tied } from "../../vsp/show/explorer/model.js"
+import { act, cellOf, dynamics, ready, rollout } from "../../vsp/show/explorer/model.js"
 
 /** `file`: per step state (2), cell, next state (2), reward and outcome, as float64. */
 export function compare(file, scene, policy) {
@@ -12,7 +12,8 @@ export function compare(file, scene, policy) {
   ready(policy)
   for (let i = 0; i < numbers.length; i += 7) {
     const [x, y, cell, ...expected] = numbers.subarray(i, i + 7),
-      [near, other] = tied(policy, see([x, y]))
+      near = cellOf(policy, see([x, y]), 1e-9),
+      other = policy.far.findLastIndex(far => Math.abs(far - policy.far[near]) < 1e-9)
     found.steps += 1
     found.ties += near !== other
     if (near !== other) continue

@@ -7,7 +7,9 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
 import vsp
+from vsp.rollouts import rollout
 from vsp.show.explorer import SCRIPT, STYLE, scene_of
+from vsp.show.explorer.scene import starts_of
 
 TWO = vsp.VoronoiPolicy([[0.25, 0.25], [0.75, 0.75]], -np.ones((2, 3, 2)), task=SIMPLEGOAL)
 
@@ -32,7 +34,8 @@ def test_a_replay_has_every_change_with_its_cause_and_ends_with_the_policy(run):
     _, policy, history = run
     moments = scene_of({"run": policy}, policy.task, history=history)["policies"][0]["replay"]
     assert moments[0]["n"] == 0 and moments[-1]["n"] == len(history.cells) - 1
-    assert all(set(moment) == {"n", "codewords", "coefficients", "events"} for moment in moments)
+    assert all(set(moment) == {"n", "codewords", "coefficients", "events", "failures"} for moment in moments)
+    assert moments[-1]["failures"] == sum(rollout(policy, policy.task, starts_of(policy.task)).outcomes != 1)
     told = [(moment["n"], *event.values()) for moment in moments for event in moment["events"]]
     for (n, kind, codeword, cause), event in zip(told, history.events, strict=True):
         assert (n, kind, cause) == (event.iteration, event.kind, event.cause)

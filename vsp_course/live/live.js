@@ -117,15 +117,15 @@ function passes(part, data) {
       set = limits.map(name => config[name]),
       words = past.length ? said.selectedOptions[0].text : ""
     past.push([`run ${past.length + 1}`, ...set.map(String), words, ...numbers.map(String)])
-    const thresholds = ["loss", "distance", "difference"],
-      head = [...thresholds, "I expected", "splits", "merged", "cells", "fail"]
+    const head = "loss,distance,difference,I expected,splits,merged,cells,fail".split(",")
     one(part, ".runs").replaceChildren(table(head, past))
     said.selectedIndex = 0
     wait()
   }
   const limits = /** @type {Limit[]} */ (Object.keys(config).slice(0, 3)), // the thresholds
+    thresholds = Object.fromEntries(limits.map(name => [name, ""])),
     episodes = async () => data.episodes,
-    distiller = new Distiller(view, config, {}, episodes, { thresholds: limits }, told)
+    distiller = new Distiller(view, config, {}, episodes, told, { thresholds })
   view.fixed = true
   one(part, ".whole").append(distiller.row, expected, view.replay.row)
   wait()
@@ -144,11 +144,10 @@ function intervals(part, { reruns }) {
       study = () => interval(reruns, policies, episodes, way === WAYS[1], draw),
       found = Array.from({ length: STUDIES }, study),
       hold = found.filter(([low, high]) => low <= truth && truth <= high).length,
-      width = sum(found.map(([low, high]) => high - low)) / STUDIES,
-      how = way === WAYS[1] ? "policies drawn again" : "all episodes"
+      width = sum(found.map(([low, high]) => high - low)) / STUDIES
     drawIntervals(/** @type {HTMLCanvasElement} */ (one(part, "canvas")), found, truth)
     one(part, "canvas").ariaLabel = `${STUDIES} intervals; ${hold} hold the true mean`
-    past.push([how, String(policies), String(episodes), digits(width), String(hold)])
+    past.push([way, String(policies), String(episodes), digits(width), String(hold)])
     const head = ["policies", "episodes", "mean width", "hold the truth"]
     one(part, ".runs").replaceChildren(table(head, past.slice(-8)))
   })

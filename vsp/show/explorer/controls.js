@@ -25,8 +25,9 @@ export const one = (root, selector) => /** @type {T} */ (root.querySelector(sele
 /** The text of an element, or else of a file. @param {Element} inner @param {string} [file] */
 export const textOf = async (inner, file = "") => inner.textContent || (await fetch(file)).text()
 
-/** @type {(label: string, click: () => void) => HTMLButtonElement} */
-export const button = (label, click) => element("button", { type: "button", click }, label)
+/** @type {(label: string, click: () => void, name?: string) => HTMLButtonElement} */
+export const button = (label, click, name = "") =>
+  element("button", { type: "button", class: name, click }, label)
 /** @type {(...children: Node[]) => HTMLElement} */
 export const row = (...children) => element("div", { class: "vsp-row" }, ...children)
 /** @type {(text: string) => string} */
@@ -147,8 +148,8 @@ export class Player {
     this.time = touched(share => this.touch(share), { class: "vsp-time", pointerup: soon })
     const back = button("previous change", () => this.jump(-1)),
       on = button("next change", () => this.jump(1))
-    const line = element("div", { class: "vsp-line" }, this.time, this.slider)
-    this.row = row(this.toggle, back, on, line, this.said)
+    this.line = element("div", { class: "vsp-line" }, this.time, this.slider)
+    this.row = row(this.toggle, back, on, this.said)
   }
   get at() {
     return +this.slider.value

@@ -4,6 +4,7 @@
 
 import { button, choice, element, field, fits, one, row, textOf } from "./controls.js"
 import { work } from "./worker.js"
+import SETTINGS from "./settings.json" with { type: "json" }
 
 /** @type {(pace: number) => string} */
 const nameOf = pace => (pace < 1e6 ? `${pace} a second` : "as fast as it can")
@@ -28,47 +29,53 @@ export function allowed(choices, preset, name, value) {
 }
 
 /** A control for a setting: a number, or one of some words.
- * @param {Record<string, any>} config @param {string} name
- * @param {(string | boolean)[] | undefined} words @param {() => void} changed */
-function control(config, name, words, changed) {
-  const range = rangeOf(name, config[name])
-  if (!words) return element("label", {}, `${name} `, field(name, config, name, changed, range))
-  const take = (/** @type {string | boolean} */ word) => {
-    config[name] = word
-    changed()
-  }
-  return choice(name, words, take, config[name])
+ * @param {Record<string, any>} config @param {string} name @param {string} meaning
+ * @param {(string | boolean)[] | undefined} words @param {(value?: unknown) => void} changed */
+function control(config, name, meaning, words, changed) {
+  const range = rangeOf(name, config[name]),
+    take = (/** @type {string | boolean} */ word) => changed((config[name] = word)),
+    list = words && choice("", words, take, config[name]),
+    part = list ?? element("label", {}, field(name, config, name, changed, range))
+  part.prepend(`${meaning} `, element("code", {}, name))
+  return part
 }
 
 /** Distils into a view. `choices`: the words of settings that are no numbers; `network()` loads the
- * teacher; `groups`: names of settings by a title; `told(this)` is called after each change. */
+ * teacher; `told(this)` is called after each change; `groups`: what settings mean. */
 export class Distiller {
   /** @type {Run} */ run = { moments: [], done: true, counted: true, rate: 0 }
   pace = PACES[0].pace
-  go = button("distil", () => (this.run.done ? this.begin() : this.stop()))
+  go = button("distil", () => (this.run.done ? this.begin() : this.stop()), "vsp-go")
   said = element("p", { class: "vsp-note", role: "status" })
   /** @param {Explorer} view @param {Settings & { seed?: number }} config @param {Choices} choices
    * @param {() => Promise<StoredNetwork | Visited[] | undefined>} network
-   * @param {Record<string, string[]>} groups @param {(distiller: Distiller) => void} told */
-  constructor(view, config, choices, network, groups, told = () => {}) {
+   * @param {(distiller: Distiller) => void} told @param {Record<string, object>} groups */
+  constructor(view, config, choices, network, told = () => {}, groups = SETTINGS) {
     this.view = view
     this.network = network
     this.told = told
     this.config = { seed: 0, ...config }
     const pace = choice("iterations", PACES, ({ pace }) => this.tell({ pace: (this.pace = pace) }))
-    /** @type {(name: string) => Node} */
-    const made = name => control(this.config, name, choices[name], () => this.changed(name))
-    const parts = Object.entries(groups).map(([title, names], i) => {
-      const fields = element("div", { class: "vsp-settings" }, ...names.map(made))
+    /** @type {(setting: [name: string, meaning: string]) => Node} */
+    const made = ([name, meaning]) =>
+      control(this.config, name, meaning, choices[name], () => this.changed(name))
+    /** @param {[string, string]} setting */
+    const known = ([name]) => choices[name] || typeof Reflect.get(config, name) === "number"
+    const parts = Object.entries(groups).map(([title, settings], i) => {
+      const shown = Object.entries(settings).filter(known).map(made),
+        fields = element("div", { class: "vsp-settings" }, ...shown)
       return element("details", { open: i === 0 }, element("summary", {}, title), fields)
     })
-    this.row = element("div", {}, row(this.go, pace, made("seed")), this.said, ...parts)
+    this.row = element("div", {}, row(this.go, pace, made(["seed", ""])), this.said, ...parts)
   }
 
   /** @param {string} name */
   changed(name) {
     const later = !this.run.done && ANEW.includes(name)
-    if (!later) this.tell({ config: { [name]: Reflect.get(this.config, name) } })
+    const value = Reflect.get(this.config, name),
+      now = this.run.moments.at(-1)
+    if (!later) this.tell({ config: { [name]: value } })
+    if (!later && now && !this.run.done) now.set = `${name} = ${value}`
     this.say(later ? "This counts from the next run on." : "")
     this.told(this)
   }

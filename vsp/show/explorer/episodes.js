@@ -64,8 +64,6 @@ export class Episodes {
     this.done.forEach(({ cell }, t) => {
       ctx.fillStyle = CELLS[this.policy.tints?.[cell] ?? 0]
       ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND)
-      ctx.fillStyle = tones.ink // an edge, where a colour comes again
-      if (cell >= CELLS.length) ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND / 3)
     })
     let low = BAND - 4
     /** @type {(name: string, k: number, ...lines: Vector[][]) => void} the agent's line first */

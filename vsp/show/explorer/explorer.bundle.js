@@ -1,10 +1,10 @@
 // Made by npm --prefix docs run build
 
 // ../vsp/show/explorer/model.js
-var ON_BORDER = 1e-9;
 var TINTS = 8;
 var ROUNDED = 1e-4;
 var clip = (value, low, high) => Math.min(Math.max(value, low), high);
+var dot = (one, other) => one.reduce((total, value, i) => total + value * other[i], 0);
 var less = (one, other) => one.map((value, i) => value - other[i]);
 var ORDERS = { manhattan: 1, euclidean: 2, chebyshev: null };
 function ready(policy) {
@@ -35,10 +35,6 @@ function cellOf({ scaled, scale, power, place, far }, seen, slack = 0) {
     if (far[j] < far[best] - slack) best = j;
   }
   return best;
-}
-function tied(policy, seen) {
-  const cell = cellOf(policy, seen, ON_BORDER);
-  return [cell, policy.far.findLastIndex((far) => Math.abs(far - policy.far[cell]) < ON_BORDER)];
 }
 function raw(rows, seen, k) {
   let sum = rows[seen.length][k];
@@ -171,7 +167,7 @@ function element(tag, attributes = {}, ...children) {
   made.append(...children);
   return made;
 }
-var button = (label, click) => element("button", { type: "button", click }, label);
+var button = (label, click, name2 = "") => element("button", { type: "button", class: name2, click }, label);
 var row = (...children) => element("div", { class: "vsp-row" }, ...children);
 var minus = (text) => text.replaceAll("-", "−");
 var count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
@@ -263,8 +259,8 @@ var Player = class {
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
     this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
     const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
-    const line = element("div", { class: "vsp-line" }, this.time, this.slider);
-    this.row = row(this.toggle, back, on, line, this.said);
+    this.line = element("div", { class: "vsp-line" }, this.time, this.slider);
+    this.row = row(this.toggle, back, on, this.said);
   }
   get at() {
     return +this.slider.value;
@@ -329,14 +325,15 @@ var Player = class {
 
 // ../vsp/show/explorer/picture.js
 var ARROWS = 14;
-var STRIPES = 50;
+var ON_BORDER = 1e-9;
 var SMALL = 330;
-var [TIME, END] = [72, 8];
+var [TICK, END] = [10, 8];
 var CELLS = "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ");
 var [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"];
 var CLEAR = "transparent";
 var rgb = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 var mixed = (colour, ground, share) => colour.map((part, i) => ground[i] + share * (part - ground[i]));
+var css = (colour) => `rgb(${colour.join(" ")})`;
 function begun(canvas, high) {
   const [wide, ratio] = [canvas.clientWidth || 440, devicePixelRatio], style = getComputedStyle(canvas), ctx = (
     /** @type {CanvasRenderingContext2D} */
@@ -355,8 +352,6 @@ var Picture = class {
   side = 0;
   wide = 0;
   high = 0;
-  ties = false;
-  // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */
   tones = {};
   /** @type {CanvasRenderingContext2D} */
@@ -369,15 +364,19 @@ var Picture = class {
   }
   /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
-    const { ctx, wide: side, tones } = begun(this.canvas), [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36];
+    const { ctx, wide: side, tones } = begun(this.canvas), [left, right] = side < SMALL ? [46, 4] : [54, 8];
     Object.assign(this, { ctx, side, tones });
-    if (!this.bare) this.edge = { left, right, top: 8, bottom };
+    if (!this.bare) this.edge = { left, right, top: right, bottom: left };
     this.wide = side - this.edge.left - this.edge.right;
     this.high = side - this.edge.top - this.edge.bottom;
     ctx.save();
     ctx.beginPath();
     ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
     ctx.clip();
+  }
+  shows(at) {
+    const { low, high } = this.plane;
+    return at.length === 2 && at.every((value, i) => value >= low[i] && value <= high[i]);
   }
   at([x, y]) {
     const { low, high } = this.plane;
@@ -452,8 +451,8 @@ var Picture = class {
     Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
     ctx.stroke();
   }
-  /** @param {Vector[]} shapes @param {string} colour */
-  polygons(shapes, colour) {
+  /** @param {Vector[]} shapes @param {string} colour @param {string} [border] */
+  polygons(shapes, colour, border = colour, width = 0.5) {
     const { ctx } = this;
     ctx.beginPath();
     for (const shape of shapes) {
@@ -463,7 +462,7 @@ var Picture = class {
       }
       ctx.closePath();
     }
-    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 });
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: border, lineWidth: width });
     ctx.fill();
     ctx.stroke();
   }
@@ -505,42 +504,52 @@ function tick(low, range, share) {
   return String(+(low + share * range).toFixed(digits2)).replace("-", "−");
 }
 function drawMap(view, n) {
-  const { picture, policy } = view, cells = new Int16Array(n * n), others = new Int16Array(n * n);
-  for (let at = 0; at < n * n && !policy.layers; at++)
-    [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)));
-  picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1]);
-  picture.map.width = picture.map.height = n;
-  picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0);
-}
-function painted(view, cells, others, n) {
-  const { picture, scene, policy } = view, [paper, ink] = [picture.tones.paper, picture.tones.ink].map(rgb), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer);
-  const packed = ([red, green, blue]) => 255 << 24 | blue << 16 | green << 8 | red;
-  const shades = (hue, share) => {
-    const plain = mixed(rgb(hue), paper, share);
-    return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed);
-  };
-  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42, tints = (policy.tints ?? [0]).map((tint) => shades(CELLS[tint], full)), pushes = Array.from(
-    { length: 129 },
-    (_, i) => shades(i < 64 ? LEFT : RIGHT, 0.7 * Math.abs(i - 64) / 64)
-  );
+  const { picture, scene, policy } = view, cells = new Int16Array(n * n), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer), bent = !straight(view), tints = tintsOf(view), by = [...Array(129).keys()].map((i) => (i - 64) / 64), pushes = by.map((by2) => shades(view, by2 < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by2)));
   for (let at = 0; at < n * n; at++) {
-    const [row2, column] = [Math.floor(at / n), at % n], cell = Math.floor((row2 + column) * STRIPES / n) % 2 ? others[at] : cells[at];
+    const seen = view.task.see(picture.middle(at, n)), cell = cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER);
     let hue = tints[cell];
     if (scene.task.outputs.length === 1 && !policy.layers) {
-      const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0);
+      const push = raw(policy.coefficients[cell], seen, 0);
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
     }
-    const edge = column && cells[at - 1] !== cells[at] || row2 && cells[at - n] !== cells[at];
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)];
+    const edge = at % n && cells[at - 1] !== cell || at >= n && cells[at - n] !== cell, [red, green, blue] = hue[edge && bent ? 2 : Number(view.cells > 1 && cell === view.marked)];
+    pixels[at] = 255 << 24 | blue << 16 | green << 8 | red;
   }
-  return image;
+  picture.map.width = picture.map.height = n;
+  picture.map.getContext("2d")?.putImageData(image, 0, 0);
+}
+function shades({ picture: { tones } }, hue, share) {
+  const [paper, ink] = [tones.paper, tones.ink].map(rgb), plain = mixed(rgb(hue), paper, share);
+  return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, 0.5)];
+}
+function tintsOf(view) {
+  const full = view.cells === 1 ? 0.1 : rgb(view.picture.tones.paper)[0] < 128 ? 0.6 : 0.42;
+  return (view.policy.tints ?? [0]).map((tint) => shades(view, CELLS[tint], full));
+}
+var straight = ({ policy, scene: { task, plane } }) => !policy.layers && policy.power === 2 && task.inputs.length === plane.low.length;
+function drawCells(view, points) {
+  const { picture, policy, scene } = view, { edge, wide, high } = picture, { low: [left, low], high: [right, top] } = picture.plane, plain = straight(view) && scene.task.outputs.length === 2;
+  if (points && !plain) drawMap(view, points);
+  if (!plain) picture.ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  if (policy.layers || !straight(view)) return;
+  const all = [[left, low], [right, low], [right, top], [left, top]], { codewords, scale } = policy;
+  tintsOf(view).forEach((hue, i) => {
+    const fill = plain ? css(hue[Number(i === view.marked && view.cells > 1)]) : CLEAR, shape = codewords.reduce((left2, other) => nearer(left2, codewords[i], other, scale), all);
+    picture.polygons([shape.flat()], fill, css(hue[2]), 1.5);
+  });
+}
+function nearer(shape, one, other, scale) {
+  const normal = one.map((value, i) => (other[i] - value) / scale[i] ** 2), middle = one.map((value, i) => (value + other[i]) / 2), beyond = shape.map((corner) => dot(normal, corner) - dot(normal, middle));
+  return shape.flatMap((corner, i) => {
+    const [before, from, to] = [shape.at(i - 1) ?? corner, beyond.at(i - 1) ?? 0, beyond[i]], cut = before.map((value, k) => value + from / (from - to) * (corner[k] - value));
+    return [...from * to < 0 ? [cut] : [], ...to <= 0 ? [corner] : []];
+  });
 }
 function drawAll(view, points) {
   const { picture, scene, task } = view;
   picture.begin();
-  if (points) drawMap(view, points);
-  const path = view.played.states.map(view.place), { ctx, edge, wide, high } = picture, { paper, ink, failing, start } = picture.tones;
-  ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  drawCells(view, points);
+  const path = view.played.states.map(view.place), { paper, ink, failing, start } = picture.tones;
   task.places.forEach((place) => picture.place(place));
   if (view.regions) picture.polygons(view.regions, failing);
   if (scene.task.outputs.length === 2) drawArrows(view);
@@ -549,16 +558,15 @@ function drawAll(view, points) {
     if (cell === void 0) picture.dot(place, 1.3, start);
     else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
   }
-  task.places.forEach((place) => picture.name(place));
   picture.line(path, paper, 5);
   picture.line(path, ink, 2);
   path.slice(1).forEach((point) => picture.dot(point, 2, ink));
   drawCodewords(view);
   picture.arrows(view.arrows, 9, paper, 6);
   picture.arrows(view.arrows, 9, ink, 3);
+  task.places.forEach((place) => picture.name(place));
   if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3);
-  picture.dot(view.asked, 9, paper);
-  picture.dot(view.asked, 6.5, CLEAR, ink);
+  picture.dot(view.asked, 7, paper, ink);
   picture.dot(view.asked, 2.5, ink);
   picture.axes();
 }
@@ -588,18 +596,25 @@ function drawCodewords(view) {
     picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
   });
 }
-function drawTime({ run, replay: { time: canvas, at } }) {
-  const { ctx, wide, tones } = begun(canvas, TIME), failing = run.map(({ failures }) => failures ?? 0), most = Math.max(...failing, 1), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36);
-  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 });
-  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END);
-  run.forEach(({ events }, i) => {
-    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7);
+function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
+  const high = canvas.clientHeight, { ctx, wide, tones } = begun(canvas, high), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (share) => high - TICK - 4 - Math.sqrt(share) * (high - 2 * TICK - 14);
+  Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing });
+  for (const share of [0, 1 / 4, 1]) {
+    ctx.fillRect(END, y(share), wide - 2 * END, 0.3);
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3);
+  }
+  run.forEach(({ events, set }, i) => {
+    for (const { kind } of events)
+      ctx.fillRect(x(i) - 0.5, kind === "split" ? 0 : high - TICK, 1, TICK);
+    ctx.fillRect(x(i) - 0.5, 0, set ? 1.5 : 0, high);
+    ctx.fillText(set ?? "", Math.max(x(i) - 4, 160), 36);
   });
-  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14);
+  ctx.fillRect(x(at) - 1, 0, 2, high);
   ctx.beginPath();
-  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)));
+  run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)));
+  ctx.lineWidth = 1.5;
   ctx.stroke();
-  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`);
+  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`);
 }
 
 // ../vsp/show/explorer/texts.js
@@ -615,12 +630,12 @@ function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane 
   const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), where = cells > 1 ? `, in cell ${numberOf(policy, cell)}` : "";
   return `From (${at})${where}: ${count(played.states.length - 1, "step")}${end}.`;
 }
-function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return "";
-  const { n, codewords, failures, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), fails = failures === void 0 ? "" : `, ${failures} of ${starts.length} fail`, lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
+  const { n, codewords, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
 ${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
   const cells = count(codewords.length, "cell");
-  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`;
+  return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
   const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
@@ -642,7 +657,7 @@ function answerOf({ scene, policy, cell, cells }, seen) {
 }
 var noteOf = ({ movable, arrows }) => (movable ? "Drag a codeword to move its cell. " : "") + (arrows.length ? "Drag a thick arrow: its constants follow. " : "") + "Drag a number sideways. Click to choose a state; arrow keys move it.";
 function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
-  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, { low, high } = picture.plane, shows = (at) => at.every((x, i) => x >= low[i] && x <= high[i]), inside = policy.codewords?.some((word) => shows(task.place(word)));
+  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, inside = policy.codewords?.some((word) => picture.shows(task.place(word)));
   const marks = [
     [starts, "start", "start"],
     [fails, "failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"],
@@ -653,7 +668,6 @@ function legendOf({ scene, policy, failing, starts, regions, cells, picture, tas
     [!second, "below", `${output2} below 0`],
     [!second, "above", "above 0"],
     [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
-    [picture.ties, "tied", "two codewords equally near: the first acts"],
     [true, "chosen", "chosen state, and its episode"]
   ];
   const told = marks.filter(([shown]) => shown);
@@ -715,8 +729,6 @@ var Episodes = class {
     this.done.forEach(({ cell }, t) => {
       ctx.fillStyle = CELLS[this.policy.tints?.[cell] ?? 0];
       ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND);
-      ctx.fillStyle = tones.ink;
-      if (cell >= CELLS.length) ctx.fillRect(x(t - 0.5), 0, x(1) + 0.5, BAND / 3);
     });
     let low = BAND - 4;
     const plot = (name2, k, ...lines) => {
@@ -789,7 +801,7 @@ function differs(ours, theirs, low, high) {
 var ends = (values) => [Math.min(...values), Math.max(...values)];
 
 // ../vsp/show/explorer/explorer.js
-var [COARSE, FINE] = [120, 320];
+var [COARSE, FINE] = [240, 480];
 var IN_MOTION = 8;
 var ALL = 4;
 var STRIDE = 149;
@@ -884,20 +896,19 @@ var Explorer = class {
     const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
     this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
-    this.asked = this.picture.spot([0.7, 0.7]);
+    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]);
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
-    const policy = choice("policy", scene.policies, (policy2) => this.show(policy2)), lists = row(...hooks.above ?? [], policy), parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer;
-    root.replaceChildren(
-      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
-      ...hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]
-    );
+    this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
+    const { first = {} } = hooks, shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], at = String(first.at).split(",").map(Number), take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    this.show(scene.policies[0]);
+    if (this.picture.shows(at)) this.asked = at;
+    this.show(shown);
   }
   // -- What is shown
   place = (state) => this.task.place(this.task.see(state));
@@ -928,7 +939,7 @@ var Explorer = class {
     const { replay: run = [], ...own } = policy;
     const copy = policy.layers ? policy : structuredClone(own);
     Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null });
-    this.replay.row.hidden = !run.length;
+    this.replay.row.hidden = this.replay.line.hidden = !run.length;
     this.backs.hidden = Boolean(policy.layers);
     if (run.length) this.replay.grow(true);
     if (numbers) this.put(numbers);
@@ -1028,6 +1039,7 @@ var Explorer = class {
     this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite");
     this.result.textContent = resultOf(this);
     this.from.textContent = episodeOf(this);
+    this.drawing.style.setProperty("--at", String(this.asked[0]));
     this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)));
     this.legend.replaceChildren(...legendOf(this));
     this.note.textContent = noteOf(this);
@@ -1071,8 +1083,8 @@ var Explorer = class {
   pointerdown = (event) => {
     if (event.button || !event.isPrimary) return;
     this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus();
     const { offsetX: x, offsetY: y } = event, finger = event.pointerType === "touch", words = this.movable ? this.policy.codewords ?? [] : [];
+    if (finger) this.canvas.focus();
     const near = (places, turned) => {
       const far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), cell = far.indexOf(Math.min(...far));
       if (far[cell] < (finger ? 22 : 12)) return { cell, turned, finger, place: places[cell] };
@@ -1140,21 +1152,20 @@ var explorer_default = {
     });
   }
 };
-async function reveal([{ isIntersecting, target }], watch) {
-  if (!isIntersecting) return;
-  watch.disconnect();
-  const root = (
-    /** @type {HTMLElement} */
-    target
-  ), files = JSON.parse(root.dataset.scenes ?? "{}"), names = Object.keys(files);
+async function reveal(root) {
+  const files = JSON.parse(root.dataset.scenes ?? "{}"), names = Object.keys(files), address = Object.fromEntries(new URLSearchParams(location.search));
   let wanted = "";
-  const open = async (name2) => {
-    wanted = name2;
-    const scene = await (await fetch(files[name2])).json();
-    if (wanted === name2) new Explorer(root, scene, { above });
+  const open = async (task2, first = {}) => {
+    wanted = task2;
+    const scene = await (await fetch(files[task2])).json();
+    const settled = ({ original: { name: policy }, asked }) => {
+      const query = new URLSearchParams({ task: task2, policy, at: String(asked) });
+      history.replaceState(null, "", `?${query}${location.hash}`);
+    };
+    if (wanted === task2) new Explorer(root, scene, above[0] ? { above, settled, first } : {});
   };
-  const above = names.length > 1 ? [choice("task", names, open)] : [];
-  await open(names[0]);
+  const task = names.find((name2) => name2 === address.task) ?? names[0], above = names.length > 1 ? [choice("task", names, (task2) => open(task2), task)] : [];
+  await open(task, address);
 }
 function mountAll() {
   for (const script of document.querySelectorAll(":is(.vsp-episodes, .vsp-explorer) > script")) {
@@ -1166,7 +1177,10 @@ function mountAll() {
     else new Explorer(root, scene);
   }
   for (const root of document.querySelectorAll("[data-scenes]"))
-    new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root);
+    reveal(
+      /** @type {HTMLElement} */
+      root
+    );
 }
 export {
   Explorer,

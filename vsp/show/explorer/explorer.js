@@ -9,7 +9,7 @@ import { act, clip, dynamics, name, numberOf, raw, ready, rollout } from "./mode
 import { CELLS, Picture, drawAll, drawTime, ownArrow } from "./picture.js"
 import { answerOf, episodeOf, legendOf, momentOf, noteOf, resultOf } from "./texts.js"
 
-const [COARSE, FINE] = [120, 320] // points per axis of the map: in motion, and at rest
+const [COARSE, FINE] = [240, 480] // points per axis of the map: in motion, and at rest
 const IN_MOTION = 8 // milliseconds for episodes; at rest all are played
 const ALL = 4 // cells whose equations stand below each other
 const STRIDE = 149 // a prime, so the first are spread over all
@@ -82,21 +82,28 @@ export class Explorer {
       transitionend = () => this.changed(true) // of the page's colours, or of JupyterLab's
     this.canvas = element("canvas", { ...about, ...acts, transitionend })
     this.picture = new Picture(this.canvas, scene.plane)
-    this.asked = this.picture.spot([0.7, 0.7])
+    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]) // in SimpleGoal beyond the pit
     const active = /** @type {HTMLElement | null} */ (document.activeElement),
       focus = root.contains(active) && active
     root.classList.add("vsp-explorer")
-    const policy = choice("policy", scene.policies, policy => this.show(policy)),
+    // Of the car or the pendulum
+    this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name })
+    const { first = {} } = hooks,
+      shown = scene.policies.find(({ name }) => name === first.policy) ?? scene.policies[0],
+      at = String(first.at).split(",").map(Number),
+      take = (/** @type {Policy} */ policy) => (this.show(policy), this.settle()),
+      policy = choice("policy", scene.policies, take, shown),
       lists = row(...(hooks.above ?? []), policy),
-      parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note],
-      under = hooks.bare ? this.legend : this.answer
-    root.replaceChildren(
-      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
-      ...(hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]),
-    )
+      parts = [this.legend, this.replay.row, this.form, this.backs, this.note],
+      under = hooks.bare ? this.legend : this.answer,
+      seen = [this.canvas, this.drawing, this.said, this.replay.line, under],
+      stage = element("div", { class: "vsp-stage" }, ...seen),
+      panel = element("div", { class: "vsp-panel" }, ...parts)
+    root.replaceChildren(...(hooks.bare ? [stage] : [lists, stage, panel]))
     if (focus) (focus.isConnected ? focus : this.canvas).focus()
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
-    this.show(scene.policies[0])
+    if (this.picture.shows(at)) this.asked = at
+    this.show(shown)
   }
 
   // -- What is shown
@@ -128,7 +135,7 @@ export class Explorer {
     const { replay: run = [], ...own } = policy
     const copy = policy.layers ? policy : structuredClone(own)
     Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null })
-    this.replay.row.hidden = !run.length
+    this.replay.row.hidden = this.replay.line.hidden = !run.length
     this.backs.hidden = Boolean(policy.layers)
     if (run.length) this.replay.grow(true)
     if (numbers) this.put(numbers)
@@ -240,6 +247,7 @@ export class Explorer {
     this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite")
     this.result.textContent = resultOf(this)
     this.from.textContent = episodeOf(this)
+    this.drawing.style.setProperty("--at", String(this.asked[0]))
     this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)))
     this.legend.replaceChildren(...legendOf(this))
     this.note.textContent = noteOf(this)
@@ -288,10 +296,10 @@ export class Explorer {
   pointerdown = (/** @type {PointerEvent} */ event) => {
     if (event.button || !event.isPrimary) return
     this.canvas.setPointerCapture(event.pointerId)
-    this.canvas.focus() // a finger does not
     const { offsetX: x, offsetY: y } = event,
       finger = event.pointerType === "touch",
       words = this.movable ? (this.policy.codewords ?? []) : []
+    if (finger) this.canvas.focus() // else a field would keep it
     /** @type {(places: Vector[], turned: boolean) => Omit<Held, "from"> | undefined} the nearest */
     const near = (places, turned) => {
       const far = places.map(place => Math.hypot(place[0] - x, place[1] - y)),
@@ -375,22 +383,26 @@ export default {
   },
 }
 
-/** Load the scene of an explorer in view; of several the first, with a choice.
- * @type {IntersectionObserverCallback} */
-async function reveal([{ isIntersecting, target }], watch) {
-  if (!isIntersecting) return
-  watch.disconnect()
-  const root = /** @type {HTMLElement} */ (target),
-    files = JSON.parse(root.dataset.scenes ?? "{}"),
-    names = Object.keys(files)
+/** Load the scene of an explorer; of several the one that the address names, with a choice.
+ * @param {HTMLElement} root */
+async function reveal(root) {
+  const files = JSON.parse(root.dataset.scenes ?? "{}"),
+    names = Object.keys(files),
+    address = Object.fromEntries(new URLSearchParams(location.search))
   let wanted = ""
-  const open = async (/** @type {string} */ name) => {
-    wanted = name
-    const scene = await (await fetch(files[name])).json()
-    if (wanted === name) new Explorer(root, scene, { above })
+  const open = async (/** @type {string} */ task, first = {}) => {
+    wanted = task
+    const scene = await (await fetch(files[task])).json()
+    /** @param {Explorer} view */
+    const settled = ({ original: { name: policy }, asked }) => {
+      const query = new URLSearchParams({ task, policy, at: String(asked) })
+      history.replaceState(null, "", `?${query}${location.hash}`)
+    }
+    if (wanted === task) new Explorer(root, scene, above[0] ? { above, settled, first } : {})
   }
-  const above = names.length > 1 ? [choice("task", names, open)] : []
-  await open(names[0])
+  const task = names.find(name => name === address.task) ?? names[0],
+    above = names.length > 1 ? [choice("task", names, task => open(task), task)] : []
+  await open(task, address)
 }
 
 /** Mount all explorers of a page: each contains its scene, or loads it when in view. */
@@ -402,5 +414,5 @@ export function mountAll() {
     else new Explorer(root, scene)
   }
   for (const root of document.querySelectorAll("[data-scenes]"))
-    new IntersectionObserver(reveal, { rootMargin: "200px" }).observe(root)
+    reveal(/** @type {HTMLElement} */ (root))
 }

@@ -1,7 +1,6 @@
 // @ts-check
 // Policies, tasks and the teacher, computed as Python does. Nothing here knows a page or picture.
 
-const ON_BORDER = 1e-9 // distances that differ by less are equal, or rounding makes a checkerboard
 const TINTS = 8 // colours of cells
 const ROUNDED = 1e-4 // as codewords of a run are stored
 
@@ -55,13 +54,6 @@ export function cellOf({ scaled, scale, power, place, far }, seen, slack = 0) {
     if (far[j] < far[best] - slack) best = j
   }
   return best
-}
-
-/** The nearest codeword, and the last other one that is as near (or the same again).
- * @param {Linear} policy @param {Vector} seen */
-export function tied(policy, seen) {
-  const cell = cellOf(policy, seen, ON_BORDER)
-  return [cell, policy.far.findLastIndex(far => Math.abs(far - policy.far[cell]) < ON_BORDER)]
 }
 
 /** The output of a linear map for action k: rows are the weights of the inputs, then the bias.

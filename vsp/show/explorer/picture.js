@@ -1,12 +1,12 @@
 // @ts-check
 // A canvas with the coordinates of a plane, and what an explorer draws on it.
 
-import { act, clip, numberOf, raw, tied } from "./model.js"
+import { act, cellOf, clip, dot, numberOf, raw } from "./model.js"
 
 const ARROWS = 14 // along each axis
-const STRIPES = 50 // along each axis: where two codewords are equally near, both colours alternate
+const ON_BORDER = 1e-9 // distances that differ by less are equal, or rounding makes a checkerboard
 const SMALL = 330 // pixels: narrower pictures have small letters
-const [TIME, END] = [72, 8] // pixels: the height of a curve, and half of a slider's knob
+const [TICK, END] = [10, 8] // pixels: of a tick, and half of a slider's knob
 // Colours without a meaning of their own (vsp/show/style.py), as pale tints
 export const CELLS =
   "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ")
@@ -19,6 +19,8 @@ const rgb = colour => [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16))
 /** @type {(colour: number[], ground: number[], share: number) => number[]} */
 const mixed = (colour, ground, share) =>
   colour.map((part, i) => ground[i] + share * (part - ground[i]))
+/** @type {(colour: number[]) => string} */
+const css = colour => `rgb(${colour.join(" ")})`
 
 /** Begin to draw on a canvas, as wide as the page makes it, `high` pixels high (by default as high
  * as wide): its context, its width and the page's colours.
@@ -43,7 +45,6 @@ export class Picture {
   side = 0
   wide = 0
   high = 0
-  ties = false // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */ tones = {}
   /** @type {CanvasRenderingContext2D} */ ctx
 
@@ -56,15 +57,19 @@ export class Picture {
   /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
     const { ctx, wide: side, tones } = begun(this.canvas),
-      [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36]
+      [left, right] = side < SMALL ? [46, 4] : [54, 8] // the rest is a square
     Object.assign(this, { ctx, side, tones })
-    if (!this.bare) this.edge = { left, right, top: 8, bottom }
+    if (!this.bare) this.edge = { left, right, top: right, bottom: left }
     this.wide = side - this.edge.left - this.edge.right
     this.high = side - this.edge.top - this.edge.bottom
     ctx.save()
     ctx.beginPath()
     ctx.rect(this.edge.left, this.edge.top, this.wide, this.high)
     ctx.clip()
+  }
+  shows(/** @type {Vector} */ at) {
+    const { low, high } = this.plane
+    return at.length === 2 && at.every((value, i) => value >= low[i] && value <= high[i])
   }
   at(/** @type {Vector} */ [x, y]) {
     const { low, high } = this.plane
@@ -145,8 +150,8 @@ export class Picture {
     Object.assign(ctx, { strokeStyle: colour, lineWidth: width })
     ctx.stroke()
   }
-  /** @param {Vector[]} shapes @param {string} colour */
-  polygons(shapes, colour) {
+  /** @param {Vector[]} shapes @param {string} colour @param {string} [border] */
+  polygons(shapes, colour, border = colour, width = 0.5) {
     const { ctx } = this
     ctx.beginPath()
     for (const shape of shapes) {
@@ -156,8 +161,7 @@ export class Picture {
       }
       ctx.closePath()
     }
-    // Without lines gaps show between neighbours
-    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 })
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: border, lineWidth: width })
     ctx.fill()
     ctx.stroke()
   }
@@ -204,62 +208,90 @@ function tick(low, range, share) {
 }
 
 /** Make the map, of n by n points: the action where it is a single one, else the cells; and
- * borders. @param {Mapped} view @param {number} n */
-export function drawMap(view, n) {
-  const { picture, policy } = view,
-    cells = new Int16Array(n * n),
-    others = new Int16Array(n * n)
-  for (let at = 0; at < n * n && !policy.layers; at++)
-    [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)))
-  picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1])
-  picture.map.width = picture.map.height = n
-  picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0)
-}
-
-/** The image of a map whose pixels lie in `cells`, or as near to those in `others`.
- * @param {Mapped} view @param {Int16Array} cells @param {Int16Array} others @param {number} n */
-function painted(view, cells, others, n) {
+ * borders that bend. @param {Mapped} view @param {number} n */
+function drawMap(view, n) {
   const { picture, scene, policy } = view,
-    [paper, ink] = [picture.tones.paper, picture.tones.ink].map(rgb),
+    cells = new Int16Array(n * n),
     image = new ImageData(n, n),
-    pixels = new Uint32Array(image.data.buffer)
-  /** @type {(colour: number[]) => number} */
-  const packed = ([red, green, blue]) => (255 << 24) | (blue << 16) | (green << 8) | red
-  /** @type {(hue: string, share: number) => number[]} */
-  const shades = (hue, share) => {
-    const plain = mixed(rgb(hue), paper, share)
-    return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed)
-  }
-  // On a dark page colours are less unlike
-  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42,
-    tints = (policy.tints ?? [0]).map(tint => shades(CELLS[tint], full)),
-    pushes = Array.from({ length: 129 }, (_, i) =>
-      shades(i < 64 ? LEFT : RIGHT, (0.7 * Math.abs(i - 64)) / 64),
-    )
+    pixels = new Uint32Array(image.data.buffer),
+    bent = !straight(view),
+    tints = tintsOf(view),
+    by = [...Array(129).keys()].map(i => (i - 64) / 64),
+    pushes = by.map(by => shades(view, by < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by)))
   for (let at = 0; at < n * n; at++) {
-    const [row, column] = [Math.floor(at / n), at % n],
-      cell = Math.floor(((row + column) * STRIPES) / n) % 2 ? others[at] : cells[at]
+    const seen = view.task.see(picture.middle(at, n)),
+      cell = (cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER))
     let hue = tints[cell]
     if (scene.task.outputs.length === 1 && !policy.layers) {
-      const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0)
+      const push = raw(policy.coefficients[cell], seen, 0)
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))]
     }
-    const edge = (column && cells[at - 1] !== cells[at]) || (row && cells[at - n] !== cells[at])
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)]
+    const edge = (at % n && cells[at - 1] !== cell) || (at >= n && cells[at - n] !== cell),
+      [red, green, blue] = hue[edge && bent ? 2 : Number(view.cells > 1 && cell === view.marked)]
+    pixels[at] = (255 << 24) | (blue << 16) | (green << 8) | red
   }
-  return image
+  picture.map.width = picture.map.height = n
+  picture.map.getContext("2d")?.putImageData(image, 0, 0)
 }
 
-/** Draw everything, and before that the map anew if it shall have other points.
- * @param {Explorer} view @param {number} [points] of the map, along each axis */
+/** A colour on the page's paper: in a cell, in the cell that stands out, on a border.
+ * @param {Mapped} view @param {string} hue @param {number} share */
+function shades({ picture: { tones } }, hue, share) {
+  const [paper, ink] = [tones.paper, tones.ink].map(rgb),
+    plain = mixed(rgb(hue), paper, share)
+  return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, 0.5)]
+}
+/** Those of each cell; on a dark page colours are less unlike. @param {Mapped} view */
+function tintsOf(view) {
+  const full = view.cells === 1 ? 0.1 : rgb(view.picture.tones.paper)[0] < 128 ? 0.6 : 0.42
+  return (view.policy.tints ?? [0]).map(tint => shades(view, CELLS[tint], full))
+}
+
+/** Whether borders are straight lines of the plane. @param {Mapped} view */
+const straight = ({ policy, scene: { task, plane } }) =>
+  !policy.layers && policy.power === 2 && task.inputs.length === plane.low.length
+
+/** Draw the cells: as polygons where they are, else as a map, made anew if it shall have other
+ * points. @param {Mapped} view @param {number} [points] of the map, along each axis */
+export function drawCells(view, points) {
+  const { picture, policy, scene } = view,
+    { edge, wide, high } = picture,
+    { low: [left, low], high: [right, top] } = picture.plane,
+    plain = straight(view) && scene.task.outputs.length === 2
+  if (points && !plain) drawMap(view, points)
+  if (!plain) picture.ctx.drawImage(picture.map, edge.left, edge.top, wide, high)
+  if (policy.layers || !straight(view)) return
+  const all = [[left, low], [right, low], [right, top], [left, top]],
+    { codewords, scale } = policy
+  tintsOf(view).forEach((hue, i) => {
+    const fill = plain ? css(hue[Number(i === view.marked && view.cells > 1)]) : CLEAR,
+      shape = codewords.reduce((left, other) => nearer(left, codewords[i], other, scale), all)
+    picture.polygons([shape.flat()], fill, css(hue[2]), 1.5)
+  })
+}
+
+/** The part of a polygon that is nearer to one point than to another, by the scaled Euclidean
+ * distance.
+ * @param {Vector[]} shape @param {Vector} one @param {Vector} other @param {Vector} scale */
+export function nearer(shape, one, other, scale) {
+  const normal = one.map((value, i) => (other[i] - value) / scale[i] ** 2),
+    middle = one.map((value, i) => (value + other[i]) / 2),
+    beyond = shape.map(corner => dot(normal, corner) - dot(normal, middle))
+  return shape.flatMap((corner, i) => {
+    const [before, from, to] = [shape.at(i - 1) ?? corner, beyond.at(i - 1) ?? 0, beyond[i]],
+      cut = before.map((value, k) => value + (from / (from - to)) * (corner[k] - value))
+    return [...(from * to < 0 ? [cut] : []), ...(to <= 0 ? [corner] : [])]
+  })
+}
+
+/** Draw everything.
+ * @param {Explorer} view @param {number} [points] of a new map, along each axis */
 export function drawAll(view, points) {
   const { picture, scene, task } = view
   picture.begin()
-  if (points) drawMap(view, points)
+  drawCells(view, points)
   const path = view.played.states.map(view.place),
-    { ctx, edge, wide, high } = picture,
     { paper, ink, failing, start } = picture.tones
-  ctx.drawImage(picture.map, edge.left, edge.top, wide, high)
   task.places.forEach(place => picture.place(place))
   if (view.regions) picture.polygons(view.regions, failing)
   if (scene.task.outputs.length === 2) drawArrows(view)
@@ -268,16 +300,15 @@ export function drawAll(view, points) {
     if (cell === undefined) picture.dot(place, 1.3, start)
     else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing)
   }
-  task.places.forEach(place => picture.name(place))
   picture.line(path, paper, 5)
   picture.line(path, ink, 2)
   path.slice(1).forEach(point => picture.dot(point, 2, ink))
   drawCodewords(view)
   picture.arrows(view.arrows, 9, paper, 6)
   picture.arrows(view.arrows, 9, ink, 3)
+  task.places.forEach(place => picture.name(place))
   if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3)
-  picture.dot(view.asked, 9, paper)
-  picture.dot(view.asked, 6.5, CLEAR, ink)
+  picture.dot(view.asked, 7, paper, ink)
   picture.dot(view.asked, 2.5, ink)
   picture.axes()
 }
@@ -329,21 +360,27 @@ function drawCodewords(view) {
 }
 
 /** Draw how many starts fail along a run, on a scale of roots, so that small changes show. Ticks: a
- * split above, a merge below. @param {Explorer} view */
-export function drawTime({ run, replay: { time: canvas, at } }) {
-  const { ctx, wide, tones } = begun(canvas, TIME),
-    failing = run.map(({ failures }) => failures ?? 0),
-    most = Math.max(...failing, 1),
+ * split above, a merge below. Lines: settings that a reader changed. @param {Explorer} view */
+export function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
+  const high = canvas.clientHeight,
+    { ctx, wide, tones } = begun(canvas, high),
     x = (/** @type {number} */ i) => END + (i / Math.max(run.length - 1, 1)) * (wide - 2 * END),
-    y = (/** @type {number} */ value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36)
-  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 })
-  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END)
-  run.forEach(({ events }, i) => {
-    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7)
+    y = (/** @type {number} */ share) => high - TICK - 4 - Math.sqrt(share) * (high - 2 * TICK - 14)
+  Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing })
+  for (const share of [0, 1 / 4, 1]) {
+    ctx.fillRect(END, y(share), wide - 2 * END, 0.3)
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3)
+  }
+  run.forEach(({ events, set }, i) => {
+    for (const { kind } of events)
+      ctx.fillRect(x(i) - 0.5, kind === "split" ? 0 : high - TICK, 1, TICK)
+    ctx.fillRect(x(i) - 0.5, 0, set ? 1.5 : 0, high)
+    ctx.fillText(set ?? "", Math.max(x(i) - 4, 160), 36)
   })
-  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14)
+  ctx.fillRect(x(at) - 1, 0, 2, high)
   ctx.beginPath()
-  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)))
+  run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)))
+  ctx.lineWidth = 1.5
   ctx.stroke()
-  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`)
+  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`)
 }

@@ -14,7 +14,7 @@ from ...geometry import METRICS
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
-from ...tasks import PIT, RUNNING
+from ...tasks import GOAL, PIT, RUNNING
 from ...tasks.base import Task
 from ...tasks.registry import get_task
 from ...teachers.teacher import Teacher, load_teacher
@@ -27,6 +27,7 @@ PLANES: dict[str, tuple[list, list, list[str]]] = {
 }
 N_STARTS = 400
 UNSHOWN = ("neighbours", "sub_policy")  # settings that the browser's method does not have
+QUICK = 100  # steps of an episode
 N_MOMENTS = 80  # of a replay, beside those with a split or merge
 
 
@@ -49,17 +50,14 @@ def scene_of(
         "policies": [numbers_of(policy, name) for name, policy in policies.items()],
     }
     if history is not None:
-        first = scene["policies"][0]
-        first["replay"] = _replay(history)
-        first["replay"][-1] |= {name: first[name] for name in ("codewords", "coefficients")}  # snapshots may be older
+        scene["policies"][0]["replay"] = _replay(history, next(iter(policies.values())))
     if teacher is not None:
         scene["teacher"] = {"mean": float(rollout(teacher, task, starts).returns.mean())}
     return scene
 
 
 def bench_of(name: str) -> dict:
-    """Return what the script needs to distil the teacher of a task: scene, network, the preset's settings that a
-    picture can show, and the values of those that are no numbers."""
+    """Return what the script needs to distil the teacher of a task: scene, network, settings that a picture can show."""
     preset, task, teacher = paper_preset(name), get_task(name), load_teacher(name)
     kinds = {what: kind for what, kind in kinds_of(type(preset)).items() if what not in UNSHOWN}
     words = {what: [False, True] if kind is bool else list(get_args(kind)) for what, kind in kinds.items()}
@@ -116,15 +114,20 @@ def numbers_of(policy: VoronoiPolicy, name: str) -> dict:
     return about | {"codewords": policy.codewords.tolist(), "coefficients": policy.coefficients.tolist()}
 
 
-def _replay(history: History) -> list[dict]:
-    """Return the run at every change and at moments between: iteration, codewords, coefficients, and what changed."""
-    last, events = len(history.cells) - 1, defaultdict(list)
+def _replay(history: History, final: VoronoiPolicy) -> list[dict]:
+    """Return the run at every change and at moments between, and `final`, because snapshots may be older: iteration,
+    codewords, coefficients, what changed, and in a task of short episodes how many starts fail."""
+    last, events, task = len(history.cells) - 1, defaultdict(list), final.task
     for event in history.events:
         about = {"kind": event.kind, "codeword": event.codeword.round(4).tolist(), "cause": event.cause}
         events[event.iteration].append(about)
     replay = []
     for n in sorted({*np.linspace(0, last, N_MOMENTS).astype(int).tolist(), *events}):
-        policy = history.policy_at(n)
-        numbers = {name: getattr(policy, name).round(4).tolist() for name in ("codewords", "coefficients")}
-        replay.append({"n": n, **numbers, "events": events.get(n, [])})
+        policy = history.policy_at(n) if n < last else final
+        maps = policy.coefficients.round(4) if n < last else policy.coefficients
+        # Codewords are not rounded, because ties of Manhattan distances would end otherwise
+        numbers = {"codewords": policy.codewords.tolist(), "coefficients": maps.tolist()}
+        replay.append({"n": n, **numbers, "events": events[n]})
+        if task.max_steps < QUICK:
+            replay[-1]["failures"] = int((rollout(policy, task, starts_of(task)).outcomes != GOAL).sum())
     return replay

@@ -31,18 +31,17 @@ export function episodeOf({ policy, cell, cells, asked, played, task, picture: {
 }
 
 /** Which moment of the run is shown, and what changed then or last. @param {Explorer} view */
-export function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+export function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return ""
-  const { n, codewords, failures, loss } = run[at],
+  const { n, codewords, loss } = run[at],
     last = run.slice(0, at + 1).findLast(({ events }) => events.length),
-    fails = failures === undefined ? "" : `, ${failures} of ${starts.length} fail`,
     lossy = loss === undefined ? "" : `, loss ${loss.toPrecision(2)}`,
     since = last && last.n < n ? `, since iteration ${last.n}` : "",
     why = last?.events.map(event => `\n${causeOf(event, limits)}`).join("") ?? "",
     fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"),
     untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : ""
   const cells = count(codewords.length, "cell")
-  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`
+  return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`
 }
 
 /** What caused a split or a merge; `limits`: the thresholds, where known.
@@ -84,10 +83,7 @@ export const noteOf = ({ movable, arrows }) =>
 export function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
   const [output, second] = scene.task.outputs,
     fails = starts && failing.size > 0,
-
-    { low, high } = picture.plane,
-    shows = (/** @type {Vector} */ at) => at.every((x, i) => x >= low[i] && x <= high[i]),
-    inside = policy.codewords?.some(word => shows(task.place(word)))
+    inside = policy.codewords?.some(word => picture.shows(task.place(word)))
   /** @type {[shown: unknown, kind: string, words: string][]} */
   const marks = [
     [starts, "start", "start"],
@@ -99,7 +95,6 @@ export function legendOf({ scene, policy, failing, starts, regions, cells, pictu
     [!second, "below", `${output} below 0`],
     [!second, "above", "above 0"],
     [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
-    [picture.ties, "tied", "two codewords equally near: the first acts"],
     [true, "chosen", "chosen state, and its episode"],
   ]
   const told = marks.filter(([shown]) => shown)

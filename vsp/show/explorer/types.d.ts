@@ -20,7 +20,7 @@ type Task = {
 }
 type Plane = { low: Vector; high: Vector; labels: string[] }
 type Change = { kind: "split" | "merge"; codeword: Vector; cause: number }
-type Moment = Numbers & { n: number; events: Change[]; loss?: number; failures?: number }
+type Moment = Numbers & { n: number; events: Change[]; loss?: number; failures?: number; set?: string }
 type Made = Moment & Metric
 type Results = { mean: number; failures: number }
 type About = { name: string; id?: string; replay?: Moment[]; limits?: Limits; r2?: number }
@@ -117,6 +117,7 @@ type Judged = Results & { played: number }
 type Hooks = {
   bare?: boolean
   above?: Node[]
+  first?: { policy?: string; at?: string } // what is shown and chosen
   settled?: (view: Explorer) => void
   told?: (view: Explorer) => void
 }

@@ -1,7 +1,6 @@
 // Made by npm --prefix docs run build
 
 // ../vsp/show/explorer/model.js
-var ON_BORDER = 1e-9;
 var TINTS = 8;
 var ROUNDED = 1e-4;
 var clip = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -37,10 +36,6 @@ function cellOf({ scaled, scale, power, place, far }, seen, slack = 0) {
     if (far[j] < far[best] - slack) best = j;
   }
   return best;
-}
-function tied(policy, seen) {
-  const cell = cellOf(policy, seen, ON_BORDER);
-  return [cell, policy.far.findLastIndex((far) => Math.abs(far - policy.far[cell]) < ON_BORDER)];
 }
 function raw(rows, seen, k) {
   let sum2 = rows[seen.length][k];
@@ -224,7 +219,7 @@ var one = (root, selector) => (
   root.querySelector(selector)
 );
 var textOf = async (inner, file = "") => inner.textContent || (await fetch(file)).text();
-var button = (label, click) => element("button", { type: "button", click }, label);
+var button = (label, click, name2 = "") => element("button", { type: "button", class: name2, click }, label);
 var row = (...children) => element("div", { class: "vsp-row" }, ...children);
 var minus = (text) => text.replaceAll("-", "−");
 var count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
@@ -316,8 +311,8 @@ var Player = class {
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
     this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
     const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
-    const line = element("div", { class: "vsp-line" }, this.time, this.slider);
-    this.row = row(this.toggle, back, on, line, this.said);
+    this.line = element("div", { class: "vsp-line" }, this.time, this.slider);
+    this.row = row(this.toggle, back, on, this.said);
   }
   get at() {
     return +this.slider.value;
@@ -646,6 +641,41 @@ function work() {
   });
 }
 
+// ../vsp/show/explorer/settings.json
+var settings_default = {
+  "when a cell splits": {
+    max_pol_loss: "its loss is above",
+    min_pol_distance: "the codeword is farther than",
+    n_split: "looked at every … iterations",
+    one_split: "at most one split each time",
+    split_metric: "how far: the distance",
+    split_loss: "loss of raw or of clipped actions"
+  },
+  "when neighbours merge": {
+    min_param_distance: "all numbers differ by less than",
+    n_merge: "looked at every … iterations",
+    merge_parameters: "which numbers: with constants, or weights alone"
+  },
+  "how long, how maps are trained": {
+    n_epochs: "iterations",
+    learning_rate: "step size",
+    n_minibatches: "minibatches an iteration",
+    batch_size: "states a minibatch",
+    fit: "steps of Adam, or exact least squares",
+    initial: "a new map is random, or 0"
+  },
+  "what the paper leaves open, or says twice": {
+    freeze: "when cells stay as they are",
+    n_freeze: "that phase, in iterations",
+    n_reset: "data forgotten every … iterations",
+    periodic_reset: "forget the data, or nothing",
+    adam_on_reset: "Adam's memory then",
+    metric: "distance that makes the cells",
+    scale: "divide it by the width of the box",
+    inclusive: "one iteration more, changes in the first"
+  }
+};
+
 // ../vsp/show/explorer/distiller.js
 var nameOf = (pace) => pace < 1e6 ? `${pace} a second` : "as fast as it can";
 var PACES = [300, 1e6, 30, 3].map((pace) => ({ pace, name: nameOf(pace) }));
@@ -660,42 +690,41 @@ function allowed(choices, preset, name2, value) {
   if (typeof value !== "number" || typeof preset[name2] !== "number") return false;
   return fits(value, rangeOf(name2, preset[name2]));
 }
-function control(config, name2, words, changed) {
-  const range = rangeOf(name2, config[name2]);
-  if (!words) return element("label", {}, `${name2} `, field(name2, config, name2, changed, range));
-  const take = (word) => {
-    config[name2] = word;
-    changed();
-  };
-  return choice(name2, words, take, config[name2]);
+function control(config, name2, meaning, words, changed) {
+  const range = rangeOf(name2, config[name2]), take = (word) => changed(config[name2] = word), list = words && choice("", words, take, config[name2]), part = list ?? element("label", {}, field(name2, config, name2, changed, range));
+  part.prepend(`${meaning} `, element("code", {}, name2));
+  return part;
 }
 var Distiller = class {
   /** @type {Run} */
   run = { moments: [], done: true, counted: true, rate: 0 };
   pace = PACES[0].pace;
-  go = button("distil", () => this.run.done ? this.begin() : this.stop());
+  go = button("distil", () => this.run.done ? this.begin() : this.stop(), "vsp-go");
   said = element("p", { class: "vsp-note", role: "status" });
   /** @param {Explorer} view @param {Settings & { seed?: number }} config @param {Choices} choices
    * @param {() => Promise<StoredNetwork | Visited[] | undefined>} network
-   * @param {Record<string, string[]>} groups @param {(distiller: Distiller) => void} told */
-  constructor(view, config, choices, network2, groups, told = () => {
-  }) {
+   * @param {(distiller: Distiller) => void} told @param {Record<string, object>} groups */
+  constructor(view, config, choices, network2, told = () => {
+  }, groups = settings_default) {
     this.view = view;
     this.network = network2;
     this.told = told;
     this.config = { seed: 0, ...config };
     const pace = choice("iterations", PACES, ({ pace: pace2 }) => this.tell({ pace: this.pace = pace2 }));
-    const made = (name2) => control(this.config, name2, choices[name2], () => this.changed(name2));
-    const parts = Object.entries(groups).map(([title, names], i) => {
-      const fields = element("div", { class: "vsp-settings" }, ...names.map(made));
+    const made = ([name2, meaning]) => control(this.config, name2, meaning, choices[name2], () => this.changed(name2));
+    const known = ([name2]) => choices[name2] || typeof Reflect.get(config, name2) === "number";
+    const parts = Object.entries(groups).map(([title, settings], i) => {
+      const shown = Object.entries(settings).filter(known).map(made), fields = element("div", { class: "vsp-settings" }, ...shown);
       return element("details", { open: i === 0 }, element("summary", {}, title), fields);
     });
-    this.row = element("div", {}, row(this.go, pace, made("seed")), this.said, ...parts);
+    this.row = element("div", {}, row(this.go, pace, made(["seed", ""])), this.said, ...parts);
   }
   /** @param {string} name */
   changed(name2) {
     const later = !this.run.done && ANEW.includes(name2);
-    if (!later) this.tell({ config: { [name2]: Reflect.get(this.config, name2) } });
+    const value = Reflect.get(this.config, name2), now = this.run.moments.at(-1);
+    if (!later) this.tell({ config: { [name2]: value } });
+    if (!later && now && !this.run.done) now.set = `${name2} = ${value}`;
     this.say(later ? "This counts from the next run on." : "");
     this.told(this);
   }
@@ -752,14 +781,15 @@ var Distiller = class {
 
 // ../vsp/show/explorer/picture.js
 var ARROWS = 14;
-var STRIPES = 50;
+var ON_BORDER = 1e-9;
 var SMALL = 330;
-var [TIME, END] = [72, 8];
+var [TICK, END] = [10, 8];
 var CELLS = "#56b4e9 #ece133 #73502e #581799 #95e6bd #732e62 #86bf4d #2222e6".split(" ");
 var [LEFT, RIGHT] = ["#7f4fa8", "#c9730f"];
 var CLEAR = "transparent";
 var rgb = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 var mixed = (colour, ground, share) => colour.map((part, i) => ground[i] + share * (part - ground[i]));
+var css = (colour) => `rgb(${colour.join(" ")})`;
 function begun(canvas, high) {
   const [wide, ratio] = [canvas.clientWidth || 440, devicePixelRatio], style = getComputedStyle(canvas), ctx = (
     /** @type {CanvasRenderingContext2D} */
@@ -778,8 +808,6 @@ var Picture = class {
   side = 0;
   wide = 0;
   high = 0;
-  ties = false;
-  // whether the map has points that are equally near to two codewords
   /** @type {Record<string, string>} */
   tones = {};
   /** @type {CanvasRenderingContext2D} */
@@ -792,15 +820,19 @@ var Picture = class {
   }
   /** Take size and colours from the page, and clear: all is cut off at the frame, but `axes`. */
   begin() {
-    const { ctx, wide: side, tones } = begun(this.canvas), [left, right, bottom] = side < SMALL ? [46, 4, 32] : [54, 8, 36];
+    const { ctx, wide: side, tones } = begun(this.canvas), [left, right] = side < SMALL ? [46, 4] : [54, 8];
     Object.assign(this, { ctx, side, tones });
-    if (!this.bare) this.edge = { left, right, top: 8, bottom };
+    if (!this.bare) this.edge = { left, right, top: right, bottom: left };
     this.wide = side - this.edge.left - this.edge.right;
     this.high = side - this.edge.top - this.edge.bottom;
     ctx.save();
     ctx.beginPath();
     ctx.rect(this.edge.left, this.edge.top, this.wide, this.high);
     ctx.clip();
+  }
+  shows(at) {
+    const { low, high } = this.plane;
+    return at.length === 2 && at.every((value, i) => value >= low[i] && value <= high[i]);
   }
   at([x, y]) {
     const { low, high } = this.plane;
@@ -875,8 +907,8 @@ var Picture = class {
     Object.assign(ctx, { strokeStyle: colour, lineWidth: width });
     ctx.stroke();
   }
-  /** @param {Vector[]} shapes @param {string} colour */
-  polygons(shapes, colour) {
+  /** @param {Vector[]} shapes @param {string} colour @param {string} [border] */
+  polygons(shapes, colour, border = colour, width = 0.5) {
     const { ctx } = this;
     ctx.beginPath();
     for (const shape of shapes) {
@@ -886,7 +918,7 @@ var Picture = class {
       }
       ctx.closePath();
     }
-    Object.assign(ctx, { fillStyle: colour, strokeStyle: colour, lineWidth: 0.5 });
+    Object.assign(ctx, { fillStyle: colour, strokeStyle: border, lineWidth: width });
     ctx.fill();
     ctx.stroke();
   }
@@ -928,42 +960,52 @@ function tick(low, range, share) {
   return String(+(low + share * range).toFixed(digits2)).replace("-", "−");
 }
 function drawMap(view, n) {
-  const { picture, policy } = view, cells = new Int16Array(n * n), others = new Int16Array(n * n);
-  for (let at = 0; at < n * n && !policy.layers; at++)
-    [cells[at], others[at]] = tied(policy, view.task.see(picture.middle(at, n)));
-  picture.ties = cells.some((cell, at) => cell !== others[at] && cells[at - 1] !== others[at - 1]);
-  picture.map.width = picture.map.height = n;
-  picture.map.getContext("2d")?.putImageData(painted(view, cells, others, n), 0, 0);
-}
-function painted(view, cells, others, n) {
-  const { picture, scene, policy } = view, [paper, ink] = [picture.tones.paper, picture.tones.ink].map(rgb), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer);
-  const packed = ([red, green, blue]) => 255 << 24 | blue << 16 | green << 8 | red;
-  const shades = (hue, share) => {
-    const plain = mixed(rgb(hue), paper, share);
-    return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, Math.min(n / 400, 0.6))].map(packed);
-  };
-  const full = view.cells === 1 ? 0.1 : paper[0] < 128 ? 0.6 : 0.42, tints = (policy.tints ?? [0]).map((tint) => shades(CELLS[tint], full)), pushes = Array.from(
-    { length: 129 },
-    (_, i) => shades(i < 64 ? LEFT : RIGHT, 0.7 * Math.abs(i - 64) / 64)
-  );
+  const { picture, scene, policy } = view, cells = new Int16Array(n * n), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer), bent = !straight(view), tints = tintsOf(view), by = [...Array(129).keys()].map((i) => (i - 64) / 64), pushes = by.map((by2) => shades(view, by2 < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by2)));
   for (let at = 0; at < n * n; at++) {
-    const [row2, column] = [Math.floor(at / n), at % n], cell = Math.floor((row2 + column) * STRIPES / n) % 2 ? others[at] : cells[at];
+    const seen = view.task.see(picture.middle(at, n)), cell = cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER);
     let hue = tints[cell];
     if (scene.task.outputs.length === 1 && !policy.layers) {
-      const push = raw(policy.coefficients[cell], view.task.see(picture.middle(at, n)), 0);
+      const push = raw(policy.coefficients[cell], seen, 0);
       hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
     }
-    const edge = column && cells[at - 1] !== cells[at] || row2 && cells[at - n] !== cells[at];
-    pixels[at] = hue[edge ? 2 : Number(view.cells > 1 && cells[at] === view.marked)];
+    const edge = at % n && cells[at - 1] !== cell || at >= n && cells[at - n] !== cell, [red, green, blue] = hue[edge && bent ? 2 : Number(view.cells > 1 && cell === view.marked)];
+    pixels[at] = 255 << 24 | blue << 16 | green << 8 | red;
   }
-  return image;
+  picture.map.width = picture.map.height = n;
+  picture.map.getContext("2d")?.putImageData(image, 0, 0);
+}
+function shades({ picture: { tones } }, hue, share) {
+  const [paper, ink] = [tones.paper, tones.ink].map(rgb), plain = mixed(rgb(hue), paper, share);
+  return [plain, mixed(ink, plain, 0.13), mixed(ink, plain, 0.5)];
+}
+function tintsOf(view) {
+  const full = view.cells === 1 ? 0.1 : rgb(view.picture.tones.paper)[0] < 128 ? 0.6 : 0.42;
+  return (view.policy.tints ?? [0]).map((tint) => shades(view, CELLS[tint], full));
+}
+var straight = ({ policy, scene: { task, plane } }) => !policy.layers && policy.power === 2 && task.inputs.length === plane.low.length;
+function drawCells(view, points) {
+  const { picture, policy, scene } = view, { edge, wide, high } = picture, { low: [left, low], high: [right, top] } = picture.plane, plain = straight(view) && scene.task.outputs.length === 2;
+  if (points && !plain) drawMap(view, points);
+  if (!plain) picture.ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  if (policy.layers || !straight(view)) return;
+  const all = [[left, low], [right, low], [right, top], [left, top]], { codewords, scale } = policy;
+  tintsOf(view).forEach((hue, i) => {
+    const fill = plain ? css(hue[Number(i === view.marked && view.cells > 1)]) : CLEAR, shape = codewords.reduce((left2, other) => nearer(left2, codewords[i], other, scale), all);
+    picture.polygons([shape.flat()], fill, css(hue[2]), 1.5);
+  });
+}
+function nearer(shape, one2, other, scale) {
+  const normal = one2.map((value, i) => (other[i] - value) / scale[i] ** 2), middle = one2.map((value, i) => (value + other[i]) / 2), beyond = shape.map((corner) => dot(normal, corner) - dot(normal, middle));
+  return shape.flatMap((corner, i) => {
+    const [before, from, to] = [shape.at(i - 1) ?? corner, beyond.at(i - 1) ?? 0, beyond[i]], cut = before.map((value, k) => value + from / (from - to) * (corner[k] - value));
+    return [...from * to < 0 ? [cut] : [], ...to <= 0 ? [corner] : []];
+  });
 }
 function drawAll(view, points) {
   const { picture, scene, task } = view;
   picture.begin();
-  if (points) drawMap(view, points);
-  const path = view.played.states.map(view.place), { ctx, edge, wide, high } = picture, { paper, ink, failing, start } = picture.tones;
-  ctx.drawImage(picture.map, edge.left, edge.top, wide, high);
+  drawCells(view, points);
+  const path = view.played.states.map(view.place), { paper, ink, failing, start } = picture.tones;
   task.places.forEach((place) => picture.place(place));
   if (view.regions) picture.polygons(view.regions, failing);
   if (scene.task.outputs.length === 2) drawArrows(view);
@@ -972,16 +1014,15 @@ function drawAll(view, points) {
     if (cell === void 0) picture.dot(place, 1.3, start);
     else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
   }
-  task.places.forEach((place) => picture.name(place));
   picture.line(path, paper, 5);
   picture.line(path, ink, 2);
   path.slice(1).forEach((point) => picture.dot(point, 2, ink));
   drawCodewords(view);
   picture.arrows(view.arrows, 9, paper, 6);
   picture.arrows(view.arrows, 9, ink, 3);
+  task.places.forEach((place) => picture.name(place));
   if (view.ring) picture.dot(view.ring, 14, CLEAR, failing, 3);
-  picture.dot(view.asked, 9, paper);
-  picture.dot(view.asked, 6.5, CLEAR, ink);
+  picture.dot(view.asked, 7, paper, ink);
   picture.dot(view.asked, 2.5, ink);
   picture.axes();
 }
@@ -1011,18 +1052,25 @@ function drawCodewords(view) {
     picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
   });
 }
-function drawTime({ run, replay: { time: canvas, at } }) {
-  const { ctx, wide, tones } = begun(canvas, TIME), failing = run.map(({ failures }) => failures ?? 0), most = Math.max(...failing, 1), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (value) => TIME - 12 - Math.sqrt(value / most) * (TIME - 36);
-  Object.assign(ctx, { fillStyle: tones.ink, strokeStyle: tones.failing, lineWidth: 1.5 });
-  ctx.fillText(`failures, at most ${most}; splits above, merges below`, END, 11, wide - 2 * END);
-  run.forEach(({ events }, i) => {
-    for (const { kind } of events) ctx.fillRect(x(i) - 0.5, kind === "split" ? 15 : TIME - 8, 1, 7);
+function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
+  const high = canvas.clientHeight, { ctx, wide, tones } = begun(canvas, high), x = (i) => END + i / Math.max(run.length - 1, 1) * (wide - 2 * END), y = (share) => high - TICK - 4 - Math.sqrt(share) * (high - 2 * TICK - 14);
+  Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing });
+  for (const share of [0, 1 / 4, 1]) {
+    ctx.fillRect(END, y(share), wide - 2 * END, 0.3);
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3);
+  }
+  run.forEach(({ events, set }, i) => {
+    for (const { kind } of events)
+      ctx.fillRect(x(i) - 0.5, kind === "split" ? 0 : high - TICK, 1, TICK);
+    ctx.fillRect(x(i) - 0.5, 0, set ? 1.5 : 0, high);
+    ctx.fillText(set ?? "", Math.max(x(i) - 4, 160), 36);
   });
-  ctx.fillRect(x(at) - 1, 14, 2, TIME - 14);
+  ctx.fillRect(x(at) - 1, 0, 2, high);
   ctx.beginPath();
-  failing.forEach((value, i) => ctx.lineTo(x(i), y(value)));
+  run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)));
+  ctx.lineWidth = 1.5;
   ctx.stroke();
-  canvas.setAttribute("aria-label", `starts that fail along the run, at most ${most}`);
+  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`);
 }
 
 // ../vsp/show/explorer/texts.js
@@ -1038,12 +1086,12 @@ function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane 
   const [goal] = task.places, place = task.places[(played.outcome ?? 0) - 1], end = place ? ` to the ${place.name}` : goal ? `, not to the ${goal.name}` : "", size = (i) => Math.floor(Math.log10(plane.high[i] - plane.low[i])), at = asked.map((value, i) => minus(value.toFixed(2 - Math.min(size(i), 0)))).join(", "), where = cells > 1 ? `, in cell ${numberOf(policy, cell)}` : "";
   return `From (${at})${where}: ${count(played.states.length - 1, "step")}${end}.`;
 }
-function momentOf({ run, replay: { at }, original: { limits }, scene: { starts } }) {
+function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return "";
-  const { n, codewords, failures, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), fails = failures === void 0 ? "" : `, ${failures} of ${starts.length} fail`, lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
+  const { n, codewords, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
 ${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
   const cells = count(codewords.length, "cell");
-  return `iteration ${n}: ${cells}${fails}${lossy}${since}${why}${untrained}`;
+  return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
   const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
@@ -1065,7 +1113,7 @@ function answerOf({ scene, policy, cell, cells }, seen) {
 }
 var noteOf = ({ movable, arrows }) => (movable ? "Drag a codeword to move its cell. " : "") + (arrows.length ? "Drag a thick arrow: its constants follow. " : "") + "Drag a number sideways. Click to choose a state; arrow keys move it.";
 function legendOf({ scene, policy, failing, starts, regions, cells, picture, task }) {
-  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, { low, high } = picture.plane, shows = (at) => at.every((x, i) => x >= low[i] && x <= high[i]), inside = policy.codewords?.some((word) => shows(task.place(word)));
+  const [output2, second] = scene.task.outputs, fails = starts && failing.size > 0, inside = policy.codewords?.some((word) => picture.shows(task.place(word)));
   const marks = [
     [starts, "start", "start"],
     [fails, "failing", cells > 1 ? "fails; last step in the chosen cell" : "start that fails"],
@@ -1076,7 +1124,6 @@ function legendOf({ scene, policy, failing, starts, regions, cells, picture, tas
     [!second, "below", `${output2} below 0`],
     [!second, "above", "above 0"],
     [cells > 1 && inside, "codeword", "codeword; filled: of the chosen cell"],
-    [picture.ties, "tied", "two codewords equally near: the first acts"],
     [true, "chosen", "chosen state, and its episode"]
   ];
   const told = marks.filter(([shown]) => shown);
@@ -1088,7 +1135,7 @@ var N_STEPS = 150;
 var STEPS = Array.from({ length: N_STEPS }, (_, n) => (n + 1) / N_STEPS).flatMap((x) => [x, -x]);
 
 // ../vsp/show/explorer/explorer.js
-var [COARSE, FINE] = [120, 320];
+var [COARSE, FINE] = [240, 480];
 var IN_MOTION = 8;
 var ALL = 4;
 var STRIDE = 149;
@@ -1183,20 +1230,19 @@ var Explorer = class {
     const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
     this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
-    this.asked = this.picture.spot([0.7, 0.7]);
+    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]);
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
-    const policy = choice("policy", scene.policies, (policy2) => this.show(policy2)), lists = row(...hooks.above ?? [], policy), parts = [this.legend, lists, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer;
-    root.replaceChildren(
-      element("div", { class: "vsp-stage" }, this.canvas, this.said, under),
-      ...hooks.bare ? [] : [element("div", { class: "vsp-panel" }, ...parts)]
-    );
+    this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
+    const { first = {} } = hooks, shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], at = String(first.at).split(",").map(Number), take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    this.show(scene.policies[0]);
+    if (this.picture.shows(at)) this.asked = at;
+    this.show(shown);
   }
   // -- What is shown
   place = (state) => this.task.place(this.task.see(state));
@@ -1227,7 +1273,7 @@ var Explorer = class {
     const { replay: run = [], ...own } = policy;
     const copy = policy.layers ? policy : structuredClone(own);
     Object.assign(this, { original: policy, run, policy: copy, held: null, lit: null });
-    this.replay.row.hidden = !run.length;
+    this.replay.row.hidden = this.replay.line.hidden = !run.length;
     this.backs.hidden = Boolean(policy.layers);
     if (run.length) this.replay.grow(true);
     if (numbers) this.put(numbers);
@@ -1327,6 +1373,7 @@ var Explorer = class {
     this.said.setAttribute("aria-live", replay.playing || this.held ? "off" : "polite");
     this.result.textContent = resultOf(this);
     this.from.textContent = episodeOf(this);
+    this.drawing.style.setProperty("--at", String(this.asked[0]));
     this.answer.replaceChildren(...answerOf(this, this.task.see(this.asked)));
     this.legend.replaceChildren(...legendOf(this));
     this.note.textContent = noteOf(this);
@@ -1370,8 +1417,8 @@ var Explorer = class {
   pointerdown = (event) => {
     if (event.button || !event.isPrimary) return;
     this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus();
     const { offsetX: x, offsetY: y } = event, finger = event.pointerType === "touch", words = this.movable ? this.policy.codewords ?? [] : [];
+    if (finger) this.canvas.focus();
     const near = (places, turned) => {
       const far = places.map((place) => Math.hypot(place[0] - x, place[1] - y)), cell = far.indexOf(Math.min(...far));
       if (far[cell] < (finger ? 22 : 12)) return { cell, turned, finger, place: places[cell] };
@@ -1424,7 +1471,7 @@ var Explorer = class {
 };
 
 // ../vsp/show/explorer/workbench.js
-var MOST2 = 4;
+var MOST2 = [1, 2, 3, 4];
 var written = (config, preset) => differing(config, { seed: 0, ...preset }).map((name2) => `${name2}=${config[name2]}`).join("&");
 function read(text, preset, choices) {
   const known = { seed: 0, ...preset }, config = { ...known };
@@ -1452,62 +1499,53 @@ var Workbench = class {
   /** @type {Distiller[]} */
   runs = [];
   columns = element("div", { class: "vsp-bench" });
-  more = button("a run beside", () => this.add(String(this.written().at(-1))));
+  beside = choice("runs beside each other", MOST2, (n) => this.open(this.task, this.written(), n));
   /** @param {HTMLElement} root @param {BenchScene[]} tasks */
   constructor(root, tasks) {
     this.tasks = tasks;
     this.task = tasks[0];
-    const options = tasks.map((task) => ({ name: task.scene.task.name, task }));
-    this.list = choice("task", options, ({ task }) => this.open(task, [""]));
-    root.replaceChildren(row(this.list, this.more), this.columns);
-    addEventListener("popstate", () => this.follow());
-    this.follow();
+    const options = tasks.map((task2) => ({ name: task2.scene.task.name, task: task2 }));
+    this.list = choice("task", options, ({ task: task2 }) => this.open(task2, [""]));
+    root.replaceChildren(row(this.list, this.beside), this.columns);
+    const [name2, ...runs] = location.hash.slice(1).split("/"), task = tasks.find(({ scene }) => scene.task.name === name2) ?? tasks[0];
+    this.open(task, runs.length ? runs : [""]);
   }
-  /** Show what the address says: "#task/run/run", a run being what differs from the paper. */
-  follow() {
-    const [name2, ...runs] = location.hash.slice(1).split("/"), task = this.tasks.find(({ scene }) => scene.task.name === name2) ?? this.tasks[0];
-    this.open(task, runs.length ? runs.slice(0, MOST2) : [""]);
-  }
-  /** @param {BenchScene} task @param {string[]} runs */
-  open(task, runs) {
-    for (const run of this.runs) run.stop();
-    Object.assign(this, { task, runs: [] });
+  /** Show n runs of a task, the last ones alike; those that are there stay.
+   * @param {BenchScene} task @param {string[]} runs */
+  open(task, runs, n = Math.min(runs.length, MOST2.length)) {
+    const stay = task === this.task && runs.join() === this.written().join() ? n : 0;
+    for (const run of this.runs.splice(stay)) run.stop();
+    this.columns.replaceChildren(...[...this.columns.children].slice(0, stay));
+    this.task = task;
+    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? String(runs.at(-1)));
     Object.assign(one(this.list, "select"), { selectedIndex: this.tasks.indexOf(task) });
-    this.columns.replaceChildren();
-    for (const run of runs) this.add(run);
+    Object.assign(one(this.beside, "select"), { selectedIndex: n - 1 });
+    this.keep();
   }
   written() {
     return this.runs.map(({ config }) => written(config, this.task.preset));
   }
   keep() {
-    this.more.disabled = this.runs.length === MOST2;
     const { name: name2 } = this.task.scene.task;
     history.replaceState(null, "", `#${[name2, ...this.written()].join("/")}`);
   }
   /** @param {string} text */
   add(text) {
-    const { scene, network: network2, preset, choices } = this.task, numbers = Object.keys(preset).filter((name2) => !choices[name2]), groups = { "Table T2": numbers, readings: Object.keys(choices) }, root = element("div", { class: "vsp-explorer" }), config = (
+    const { scene, network: network2, preset, choices } = this.task, root = element("div", { class: "vsp-explorer" }), config = (
       /** @type {Settings & { seed: number }} */
       read(text, preset, choices)
-    ), view = new Explorer(root, scene, { bare: true }), run = new Distiller(view, config, choices, async () => network2, groups, () => this.keep()), copied = element("pre", { class: "vsp-code" });
+    ), view = new Explorer(root, scene, { bare: true }), run = new Distiller(view, config, choices, async () => network2, () => this.keep()), copied = element("pre", { class: "vsp-code" });
     const copy = button("copy as Python", () => {
       copied.textContent = python(scene.task.name, run.config, preset);
       navigator.clipboard?.writeText(copied.textContent).catch(() => {
       });
     });
-    const drop = button("remove", () => {
-      if (this.runs.length === 1) return;
-      run.stop();
-      root.remove();
-      this.runs = this.runs.filter((other) => other !== run);
-      this.keep();
-    });
-    const parts = [run.row, view.replay.row, row(copy, drop), copied];
     view.fixed = true;
-    root.append(element("div", { class: "vsp-panel" }, ...parts));
+    run.row.firstElementChild?.append(copy);
+    const panel = element("div", { class: "vsp-panel" }, run.row, copied, view.replay.row);
+    root.append(panel);
     this.columns.append(root);
     this.runs.push(run);
-    this.keep();
   }
 };
 async function begin() {

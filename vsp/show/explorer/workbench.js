@@ -5,8 +5,7 @@ import { button, choice, element, one, row, textOf } from "./controls.js"
 import { Distiller, allowed } from "./distiller.js"
 import { Explorer } from "./explorer.js"
 
-
-const MOST = 4 // runs
+const MOST = [1, 2, 3, 4] // runs
 
 /** What of a run's settings differs from the paper's, as "name=value", and back. A name or a value
  * that is not known is left out: addresses come from anywhere.
@@ -47,66 +46,56 @@ policy, history = vsp.distill(vsp.load_teacher("${task}"), "${task}", config, se
 export class Workbench {
   /** @type {Distiller[]} */ runs = []
   columns = element("div", { class: "vsp-bench" })
-  more = button("a run beside", () => this.add(String(this.written().at(-1))))
+  beside = choice("runs beside each other", MOST, n => this.open(this.task, this.written(), n))
   /** @param {HTMLElement} root @param {BenchScene[]} tasks */
   constructor(root, tasks) {
     this.tasks = tasks
     this.task = tasks[0]
     const options = tasks.map(task => ({ name: task.scene.task.name, task }))
     this.list = choice("task", options, ({ task }) => this.open(task, [""]))
-    root.replaceChildren(row(this.list, this.more), this.columns)
-    addEventListener("popstate", () => this.follow())
-    this.follow()
-  }
-  /** Show what the address says: "#task/run/run", a run being what differs from the paper. */
-  follow() {
+    root.replaceChildren(row(this.list, this.beside), this.columns)
+    // Of the address: "#task/run/run", a run being what differs from the paper
     const [name, ...runs] = location.hash.slice(1).split("/"),
-      task = this.tasks.find(({ scene }) => scene.task.name === name) ?? this.tasks[0]
-    this.open(task, runs.length ? runs.slice(0, MOST) : [""])
+      task = tasks.find(({ scene }) => scene.task.name === name) ?? tasks[0]
+    this.open(task, runs.length ? runs : [""])
   }
-  /** @param {BenchScene} task @param {string[]} runs */
-  open(task, runs) {
-    for (const run of this.runs) run.stop()
-    Object.assign(this, { task, runs: [] })
+  /** Show n runs of a task, the last ones alike; those that are there stay.
+   * @param {BenchScene} task @param {string[]} runs */
+  open(task, runs, n = Math.min(runs.length, MOST.length)) {
+    const stay = task === this.task && runs.join() === this.written().join() ? n : 0
+    for (const run of this.runs.splice(stay)) run.stop()
+    this.columns.replaceChildren(...[...this.columns.children].slice(0, stay))
+    this.task = task
+    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? String(runs.at(-1)))
     Object.assign(one(this.list, "select"), { selectedIndex: this.tasks.indexOf(task) })
-    this.columns.replaceChildren()
-    for (const run of runs) this.add(run)
+    Object.assign(one(this.beside, "select"), { selectedIndex: n - 1 })
+    this.keep()
   }
   written() {
     return this.runs.map(({ config }) => written(config, this.task.preset))
   }
   keep() {
-    this.more.disabled = this.runs.length === MOST
     const { name } = this.task.scene.task
     history.replaceState(null, "", `#${[name, ...this.written()].join("/")}`)
   }
   /** @param {string} text */
   add(text) {
     const { scene, network, preset, choices } = this.task,
-      numbers = Object.keys(preset).filter(name => !choices[name]),
-      groups = { "Table T2": numbers, readings: Object.keys(choices) },
       root = element("div", { class: "vsp-explorer" }),
       config = /** @type {Settings & { seed: number }} */ (read(text, preset, choices)),
       view = new Explorer(root, scene, { bare: true }),
-      run = new Distiller(view, config, choices, async () => network, groups, () => this.keep()),
+      run = new Distiller(view, config, choices, async () => network, () => this.keep()),
       copied = element("pre", { class: "vsp-code" })
     const copy = button("copy as Python", () => {
       copied.textContent = python(scene.task.name, run.config, preset)
       navigator.clipboard?.writeText(copied.textContent).catch(() => {})
     })
-    const drop = button("remove", () => {
-      if (this.runs.length === 1) return
-      run.stop()
-      root.remove()
-      this.runs = this.runs.filter(other => other !== run)
-      this.keep()
-    })
-    const parts = [run.row, view.replay.row, row(copy, drop), copied]
     view.fixed = true
-    root.append(element("div", { class: "vsp-panel" }, ...parts))
+    run.row.firstElementChild?.append(copy)
+    const panel = element("div", { class: "vsp-panel" }, run.row, copied, view.replay.row)
+    root.append(panel)
     this.columns.append(root)
     this.runs.push(run)
-    this.keep()
   }
 }
 
