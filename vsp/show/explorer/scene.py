@@ -57,7 +57,7 @@ def scene_of(
 
 
 def bench_of(name: str) -> dict:
-    """Return what the script needs to distil the teacher of a task: scene, network, settings that a picture can show."""
+    """Return what the script needs to distil the teacher of a task: scene, network, settings that pictures can show."""
     preset, task, teacher = paper_preset(name), get_task(name), load_teacher(name)
     kinds = {what: kind for what, kind in kinds_of(type(preset)).items() if what not in UNSHOWN}
     words = {what: [False, True] if kind is bool else list(get_args(kind)) for what, kind in kinds.items()}
