@@ -8,7 +8,7 @@ import importlib
 from .captions import Caption, caption_of
 from .returns import box_plot, broken, intervals, ledger_gaps, margin, over_iterations, phase, reference, ticks
 from .state_space import actions, arrows, cells, codewords, error_map, force_bar, force_map, grid, plane, square, trail
-from .style import DISTILLED, FAILING, GOAL, OTHER, OURS, TEACHER, Picture, legend_below, letter, panels, save_figure
+from .style import DISTILLED, FAILING, GOAL, OTHER, OURS, TEACHER, Picture, label, letter, panels, save_figure
 
 
 def __getattr__(name: str) -> type:

@@ -37,7 +37,7 @@ def _parsed(path: Path) -> dict[str, dict]:
 
 @cache
 def headings() -> dict[str, dict[str, str]]:
-    """Return the headings of columns in notebooks/headings.toml: of shares ("percent"), and of others ("words")."""
+    """Return notebooks/headings.toml: headings of columns ("words", of shares "percent"), and names of "rows"."""
     return {"words": {}, "percent": {}} | _parsed(HEADINGS)
 
 

@@ -58,8 +58,7 @@ def intervals(ax: Axes, frame: pd.DataFrame, *, color: str | list[str] = DISTILL
     rows = np.arange(len(frame))
     ax.hlines(rows, frame["low"], frame["high"], color=color, lw=1.2)
     ax.scatter(frame["here"], rows, color=color, s=10, zorder=3)
-    ax.set_yticks(rows, frame.index)
-    ax.set_ylim(len(frame) - 0.5, -0.5)
+    ax.set(yticks=rows, yticklabels=frame.index, ylim=(len(frame) - 0.5, -0.5))
     ax.grid(axis="x", color="0.9", lw=0.5)
     ax.set_axisbelow(True)
     return ax
@@ -94,6 +93,5 @@ def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> 
     for row in np.flatnonzero(gaps != frame["gap"]):
         text = f"{frame['gap'].iloc[row]:.0f}".replace("-", "−")
         ax.text(0.9 * gaps[row], row, text, va="center", ha="left" if gaps[row] < 0 else "right", fontsize=7)
-    ax.set_xlim(-1.1 * limit, 1.1 * limit)
-    ax.set_yticks(np.arange(len(frame)), frame.index)
-    ax.set_ylim(len(frame) - 0.5, -0.5)
+    places = {"yticks": np.arange(len(frame)), "yticklabels": frame.index, "ylim": (len(frame) - 0.5, -0.5)}
+    ax.set(xlim=(-1.1 * limit, 1.1 * limit), **places)

@@ -14,7 +14,7 @@ from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
 from ..tasks import simplegoal
 from ..tasks.base import Task
-from .style import BORDER, CELLS, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER
+from .style import BORDER, CELLS, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER, label
 
 PALE = 0.42  # how much of its colour is in a cell; the rest is white
 
@@ -62,13 +62,10 @@ def cells(
             ax.contour(x, y, inside, levels=[0.5], colors=color, linewidths=width)
 
 
-def codewords(
-    ax: Axes, points: np.ndarray, *, label: str | None = "codeword", numbers: bool | np.ndarray = False,
-    size: float = 14,
-) -> None:  # fmt: skip
+def codewords(ax: Axes, points: np.ndarray, *, numbers: bool | np.ndarray = False, size: float = 14) -> None:
     """Draw codewords (k, 2) as black dots with a white rim, and inside the axes `numbers` (k,), or their places."""
     look = {"color": CODEWORD, "edgecolor": "white", "linewidth": 0.04 * size, "zorder": 5, "clip_on": False}
-    ax.scatter(*points.T, s=size, label=label, **look)
+    ax.scatter(*points.T, s=size, **look)
     names = np.arange(len(points)) if numbers is True else () if numbers is False else numbers
     for i, point in zip(names, points):
         right, up = point < [np.mean(ax.get_xlim()), np.mean(ax.get_ylim())]
@@ -84,6 +81,12 @@ def square(ax: Axes) -> Axes:
     ax.add_patch(Rectangle((simplegoal.PIT_LOW,) * 2, pit, pit, color=PIT, alpha=0.4, lw=0, zorder=1, label="pit"))
     ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="x", ylabel="y", aspect="equal", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
     return ax
+
+
+def name_places(ax: Axes) -> None:
+    """Name goal and pit, if the axes are the `square`."""
+    for place in ax.patches:
+        label(ax, place.get_bbox().x1 + 0.02, place.get_bbox().y0 + 0.01, place.get_label())
 
 
 def plane(ax: Axes, task: Task) -> Axes:
@@ -141,13 +144,12 @@ def error_map(
     ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
 
 
-def trail(ax: Axes, episode: Episode, task: Task, *, color: str, label: str | None = None) -> None:
-    """Draw the states of one episode as a line, from a ring (labelled "start") to the state after the last action."""
+def trail(ax: Axes, episode: Episode, task: Task, *, color: str) -> None:
+    """Draw the states of one episode as a line, from a ring to the state after the last action."""
     last, _, _ = task.step(episode.states[-1:], episode.actions[-1:])
     way = np.concatenate([episode.states, last])
-    ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4, label=label)
-    named = any(line.get_label() == "start" for line in ax.lines)
-    ax.plot(*way[0], ls="", color=color, marker="o", mfc="white", ms=5, zorder=5, label=None if named else "start")
+    ax.plot(*way.T, color=color, marker=".", ms=3, lw=0.9, zorder=4)
+    ax.plot(*way[0], ls="", color=color, marker="o", mfc="white", ms=5, zorder=5)
 
 
 def grid(low: np.ndarray, high: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from PIL import Image
 
 from ..run import atomic
@@ -110,12 +111,13 @@ def save_figure(fig: Figure, name: str, *, out: str | os.PathLike, quick: bool =
     return Picture(drawn.getvalue(), about)
 
 
+def label(ax: Axes, x: float, y: float, text: object, **look) -> None:
+    """Write a small text into a picture, on a white halo, so that it can be read on anything."""
+    halo = [withStroke(linewidth=2.4, foreground="white")]
+    ax.text(x, y, str(text), **{"fontsize": 7, "path_effects": halo, "zorder": 7} | look)
+
+
 def letter(axes: np.ndarray, titles: list[str]) -> None:
     """Title the panels (a), (b), ..."""
     for ax, mark, title in zip(axes, "abcdefgh", titles):
         ax.set_title(f"({mark}) {title}", loc="left")
-
-
-def legend_below(fig: Figure, ax: Axes, *, ncol: int = 3) -> None:
-    """Put a legend for `ax` below the whole figure."""
-    fig.legend(*ax.get_legend_handles_labels(), frameon=False, loc="outside lower center", ncol=ncol)
