@@ -209,10 +209,10 @@ def by_the_paper(agent: Teacher) -> list[dict]:
     return rows
 
 
-def plane(task: str | Task) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def plane(task: str | Task, points: int = POINTS) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a grid over the two variables of a task in `PLANES`: x (r, r), y (r, r), observations (r * r, d)."""
     low, high, observed = PLANES[get_task(task).name]
-    x, y = np.meshgrid(*(np.linspace(*ends, POINTS) for ends in zip(low, high)))
+    x, y = np.meshgrid(*(np.linspace(*ends, points) for ends in zip(low, high)))
     return x, y, observed(x.ravel(), y.ravel())
 
 

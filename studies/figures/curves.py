@@ -12,14 +12,14 @@ from vsp.show.style import OTHER, OURS, TEACHER
 # stand at the ends of the lines, `up` points above them
 TUNING: dict[str, dict] = {
     "our cells": {"color": OURS, "lw": 1.8, "zorder": 5, "label": "our cells", "up": -4},
-    "oblique tree, linear leaves, DAgger": {"color": OTHER, "marker": "^", "label": "oblique tree", "up": 4},
-    "small network, DAgger": {"color": "0.6", "marker": "P", "label": "small network"},
+    "oblique tree, linear leaves, DAgger": {"color": "0.2", "marker": "^", "label": "oblique tree", "up": 5},
+    "small network, DAgger": {"color": "0.6", "marker": "P", "label": "small network", "up": 5},
 }
 
 # Our policies, by where their search begins
 LIMITS: dict[str, dict] = {
     "at the limit": {"color": OURS, "lw": 1.8, "zorder": 6, "label": "from the best policy"},
-    "our cells, tuned": {"color": OURS, "ls": "--", "label": "from the teacher"},
+    "our cells, tuned": {"color": OURS, "ls": "--", "label": "from the teacher", "up": 8},
 }
 
 # Policies of robots, in the order of their returns with sixteen cells or leaves
@@ -30,19 +30,16 @@ ROBOTS: dict[str, dict] = {
     "cells": {"color": OURS, "ls": "--", "label": "our cells, imitation alone"},
 }
 
-# Marks of `fidelity_map`: label, its side of the mark, colour and marker
+# Marks of `fidelity_map`: label, its place beside the mark in points, colour and marker
 MARKED = {
-    "teacher": ("teacher", "right", TEACHER, "D"),
-    "faithful": ("ours, most alike and as good", "corner", OURS, "o"),
-    "faithful, R² 0.9": ("ours, with an R² of 0.9", "above", OURS, "o"),
-    "our cells, tuned": ("ours, tuned for the return", "below", OURS, "o"),
-    "oblique tree, linear leaves, DAgger": ("tree, fitted to the teacher", "left", OTHER, "^"),
-    "oblique tree, our fit": ("tree, fitted as our cells are", "left", OTHER, "^"),
-    "oblique tree, linear leaves, DAgger, tuned": ("tree, tuned for the return", "right", OTHER, "^"),
+    "teacher": ("teacher", (6, -1), TEACHER, "D"),
+    "faithful": ("ours, most alike", (-6, -1), OURS, "o"),
+    "faithful, R² 0.9": ("ours, R² of 0.9", (-6, 4), OURS, "o"),
+    "our cells, tuned": ("ours, tuned for the return", (4, -8), OURS, "o"),
+    "oblique tree, linear leaves, DAgger": ("tree, fitted to the teacher", (-6, -1), OTHER, "^"),
+    "oblique tree, our fit": ("tree, fitted as our cells are", (-6, -1), OTHER, "^"),
+    "oblique tree, linear leaves, DAgger, tuned": ("tree, tuned for the return", (6, -1), OTHER, "^"),
 }
-SIDES = {"left": ((-6, 0), "right", "center"), "right": ((6, 0), "left", "center"),
-         "above": ((5, 6), "right", "bottom"), "below": ((6, -5), "left", "top"),
-         "corner": ((-2, -6), "right", "top")}  # fmt: skip
 
 
 def fidelity_map(ax: Axes, points: pd.DataFrame) -> Axes:
@@ -51,14 +48,12 @@ def fidelity_map(ax: Axes, points: pd.DataFrame) -> Axes:
     `points` has the columns method, mean and r2. Methods in `MARKED` are drawn; a line joins ours.
     """
     ax.axvline(0, color="0.8", lw=0.8)
-    ax.text(-0.02, 0.05, "a constant action", transform=ax.get_xaxis_transform(), ha="right", fontsize=7, color=OTHER)
     places = points.set_index("method").loc[list(MARKED), ["r2", "mean"]]
     ax.plot(*places[places.index.str.match("faithful|our cells")].sort_values("r2").T.to_numpy(), color=OURS)
-    for method, (label, side, color, marker) in MARKED.items():
-        place, (away, ha, va) = places.loc[method], SIDES[side]
+    for method, (label, away, color, marker) in MARKED.items():
+        place, ha = places.loc[method], "left" if away[0] > 0 else "right"
         ax.plot(*place, marker, color=color, mec="white", mew=0.4, ms=6, zorder=5)
-        ax.annotate(label, place, away, textcoords="offset points", ha=ha, va=va, fontsize=7, color=color)
-    ax.set(xlabel="R² of the actions", ylabel="mean return")
+        ax.annotate(label, place, away, textcoords="offset points", ha=ha, va="center", fontsize=7, color=color)
     return ax
 
 

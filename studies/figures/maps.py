@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from vsp.show.state_space import cells, image
-from vsp.show.style import FORCE_MAP
+from vsp.show.style import BORDER, FORCE_MAP
 from vsp.tasks import get_task
 
 from ..zoo import actions_of, plane, policy_of
@@ -14,24 +14,29 @@ from ..zoo import actions_of, plane, policy_of
 COLUMNS = 4
 
 
-def agent_maps(axes: np.ndarray, task: str, algorithms: list[str], labels: tuple[str, str]) -> Axes:
+def agent_maps(axes: np.ndarray, task: str, algorithms: list[str], labels: tuple[str, str, str]) -> Axes:
     """Draw a task's agents in every other row of `axes` (r * 4,), and below each its policy with the borders of cells.
 
-    `labels` of the two variables stand in the last axes, which are free. Returns the axes of the first map.
+    The two free axes show the colours and the `labels` of action and variables. Returns the first axes.
     """
-    x, y, states = plane(task)
-    high, grid = get_task(task).action_high, axes.reshape(-1, COLUMNS)
+    x, y, _ = plane(task)
+    (fine_x, fine_y, states), high, grid = plane(task, 301), get_task(task).action_high, axes.reshape(-1, COLUMNS)
+    look = {"cmap": FORCE_MAP, "vmin": -1, "vmax": 1, "interpolation": "bilinear"}
     for ax in axes:
-        ax.set_axis_off()
+        ax.set(xticks=[], yticks=[], aspect="auto")
+        ax.spines[:].set_visible(ax is axes[-1])
     for i, algorithm in enumerate(algorithms):
         row, column = 2 * (i // COLUMNS), i % COLUMNS
         policy, (above, below) = policy_of(algorithm, task), grid[row : row + 2, column]
-        for ax, actions in ((above, actions_of(algorithm, task)), (below, policy.predict(states)[0])):
-            image(ax, x, y, (actions / high).reshape(x.shape), cmap=FORCE_MAP, vmin=-1, vmax=1)
-            ax.set(xticks=[], yticks=[], aspect="auto")
-            ax.set_axis_on()
-        cells(below, x, y, policy.cells(states), width=1.0)
-        above.set_title(algorithm.upper())
-        below.set_xlabel(f"{len(policy)} cell{'s' * (len(policy) > 1)}")
-    grid[-1, -1].text(0.5, 0.5, "across: {}\nup: {}".format(*labels), ha="center", va="center")
+        image(above, x, y, (actions_of(algorithm, task) / high).reshape(x.shape), **look)
+        image(below, fine_x, fine_y, (policy.predict(states)[0] / high).reshape(fine_x.shape), **look)
+        for color, width in ((BORDER, 1.9), ("white", 0.8)):  # white in the dark, with a dark rim in the light
+            cells(below, fine_x, fine_y, policy.cells(states), width=width, color=color)
+        above.set(title=algorithm.upper(), ylabel="" if column else "agent")
+        below.set(xlabel=f"{len(policy)} cell{'s' * (len(policy) > 1)}", ylabel="" if column else "ours")
+    key = grid[-2, -1].inset_axes([0.1, 0.4, 0.8, 0.14], title=labels[0])
+    bar = axes[0].figure.colorbar(axes[0].images[0], cax=key, orientation="horizontal", ticks=[-1, 0, 1])
+    bar.set_ticklabels([f"{high[0] * end:g}".replace("-", "−") for end in (-1, 0, 1)])
+    axes[-1].set_xlabel(f"{labels[1]} →")
+    axes[-1].text(0.06, 0.5, f"{labels[2]} →", rotation=90, va="center")
     return axes[0]
