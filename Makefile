@@ -120,7 +120,7 @@ site test-site: export SITE := $(OUT)/build/site
 site: begin venv-site ## the companion as pages for a browser, into build/site/: 1 to 3 minutes
 	@$(PY) -m vsp_course.build --pages --out="$$OUT"
 	@rm -rf "$$SITE-work"; source="$$SITE-work/source"; mkdir -p "$$source/notebooks/course" "$$source/data"; \
-	cp docs/*.md README.md CITATION.cff "$$source"; cp -R figures "$$source"; \
+	cp docs/*.md docs/*.svg README.md CITATION.cff "$$source"; cp -R figures "$$source"; \
 	cp figures/executed/*.ipynb figures/beyond/executed/*.ipynb "$$source/notebooks"; \
 	rm -r "$$source/figures/executed" "$$source/figures/beyond/executed"; \
 	cp data/README.md "$$source/data"; \

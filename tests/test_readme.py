@@ -20,6 +20,7 @@ PAGES = [ROOT / "README.md", ROOT / "data" / "README.md", *sorted((ROOT / "docs"
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = PAGES[0].read_text("utf-8")
 RESULTS = (ROOT / "docs" / "results.md").read_text("utf-8")
+README_LINE, RESULTS_LINE = (" ".join(text.split()) for text in (README, RESULTS))
 
 
 def test_the_readme_is_short():
@@ -91,35 +92,32 @@ def rows_of(text, width):
 
 
 def test_counts_and_the_mean_are_those_of_the_ledger():
-    book = read_table("ledger")
+    book = read_table("ledger", index_col="id")
     facts = book[book["fact"] & (book["subject"] == "Ours")]
     same, differ, untold = (int((facts["verdict"] == one).sum()) for one in ("reproduced", "differs", "cannot be told"))
     begin = f"Of {same + differ + untold} facts about its distilled policies {same} reproduce"
-    mean = book.set_index("id").loc["sg_spread_ours_mean", ["here", "low", "high"]]
-    interval = "{:.1f} (95 %: {:.1f} to {:.1f})".format(*mean)
-    readme, results = (" ".join(text.split()) for text in (README, RESULTS))
-    assert f"{begin}, {differ} differ, and {untold} cannot be told." in readme and interval in readme
-    assert f"{begin} and {differ} differ; {untold} cannot be told" in results and interval in results
+    interval = "{:.1f} (95 %: {:.1f} to {:.1f})".format(*book.loc["sg_spread_ours_mean", ["here", "low", "high"]])
+    assert f"{begin}, {differ} differ, and {untold} cannot be told." in README_LINE and interval in README_LINE
+    assert f"{begin} and {differ} differ; {untold} cannot be told" in RESULTS_LINE and interval in RESULTS_LINE
 
 
 def test_what_the_nearest_settings_reproduce_is_that_of_the_table():
     facts = read_table("hidden_facts").query("verdict != 'contradicts itself'")
     same = (facts["verdict"] == "reproduced").groupby([facts["choice"], facts["task"]]).agg(["sum", "size"])
     goal, car = "SimpleGoal-v0", "MountainCarContinuous-v0"
-    first, second = same.loc[("nearest, SimpleGoal", goal)], same.loc[("nearest, MountainCar", car)]
-    usual, both = ([same.at[(choice, task), "sum"] for task in (goal, car)] for choice in ("default", "nearest, both"))
-    readme, results = (" ".join(text.split()) for text in (README, RESULTS))
-    said = "the nearest reproduces {} of {} facts there, another {} of {} on MountainCar"
-    assert said.format(*first, *second) in readme
+    first, other = same.loc[("nearest, SimpleGoal", goal)], same.loc[("nearest, MountainCar", car)]
+    own, both = ([same.at[(choice, task), "sum"] for task in (goal, car)] for choice in ("default", "nearest, both"))
+    said = "the nearest reproduces {} of SimpleGoal's {} facts, another {} of MountainCar's {}"
+    assert said.format(*first, *other) in README_LINE
     said = "the nearest reproduces {} of SimpleGoal's {} facts (the default {}), another {} of MountainCar's {} ({}); "
-    assert said.format(*first, usual[0], *second, usual[1]) + "the nearest to both, {} and {}.".format(*both) in results
+    assert said.format(*first, own[0], *other, own[1]) + "the nearest to both, {} and {}.".format(*both) in RESULTS_LINE
 
 
 def test_lost_landings_are_those_of_the_tables():
     lost = table_of("LunarLanderContinuous-v3").set_index(["method", "size"])["failing"]
     faithful = read_table("beyond/faithful").set_index("task")["failing"]["LunarLander"]
     said = f"{faithful:.2%} of the landings fail; with the teacher {lost['teacher', 0]:.2%} do".replace("%", " %")
-    assert said in " ".join(RESULTS.split())
+    assert said in RESULTS_LINE
 
 
 def test_the_printed_policy_is_that_of_the_table():

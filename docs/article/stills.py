@@ -7,9 +7,11 @@ from collections.abc import Callable
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from PIL import Image
 
 import data
@@ -20,6 +22,7 @@ from vsp.show.explorer.scene import starts_of
 from vsp.tasks.simplegoal import TASK
 
 WIDTH, PIXELS = 3.2, 880  # inches and pixels: shown 440 pixels wide, a type of 8 points is 15 pixels high
+OPENING = 4.4  # inches: it is the README's picture too, twice as wide and as fine
 N_COLOURS = 24  # of the palette of a PNG
 N_GRID = 403  # points on an axis: few lie on a border, where cells are tied
 WAYS = np.array([[0.95, 0.62], [0.62, 0.95], [0.85, 0.85]])  # starts of the teacher's ways
@@ -38,15 +41,15 @@ def stills() -> dict[str, tuple[bytes, str]]:
     made = {}
     for name, make in makers.items():
         figure, alt = make()
-        made[name] = _png(figure), alt
+        made[name] = _png(figure, (2 if name == "opening" else 1) * PIXELS), alt
     return made
 
 
 def _opening() -> tuple[Figure, str]:
     policy, said = data.policies()["faithful_3"], []
-    fig, axes = _boards(2, height=2.75)
+    fig, axes = _boards(2, height=3.05, width=OPENING)
     says = data.says()
-    names = f"network: {says['weights']:,} numbers", f"three equations: {says['three_numbers']}"
+    names = f"network: {says['weights']:,} numbers", f"three equations: {says['three_numbers']} numbers"
     _tiles(axes[1], policy)
     for ax, each, name, colour in zip(axes, (data.teacher(), policy), names, (style.TEACHER, "black")):
         there = 0
@@ -54,14 +57,19 @@ def _opening() -> tuple[Figure, str]:
             way = np.concatenate([episode.states, TASK.step(episode.states[-1:], episode.actions[-1:])[0]])
             there += len(way) <= HALFWAY + 1
             way = way[: HALFWAY + 1][-2:]
-            ax.plot(*way.T, color=colour, lw=0.5, alpha=0.5, zorder=3)
-            ax.plot(*way[-1], ls="", marker=".", ms=2.5, color=colour, zorder=4)
+            ax.plot(*way.T, color=colour, lw=0.4, alpha=0.5, zorder=3)
+            ax.plot(*way[-1], ls="", marker=".", ms=3.4, mew=0, color=colour, zorder=4)
         said.append(there)
-        ax.set_title(name, loc="left")
+        ax.set_title(name, loc="left", fontsize=8)
+        for place, xy in {"pit": (0.5, 0.48), "goal": (0.075, 0.115)}.items():
+            halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+            ax.text(*xy, place, ha="center", fontsize=8, zorder=5, path_effects=halo)
     for i, colour in enumerate(style.CELLS[: len(policy)]):
-        text, box = "   ".join(policy.equations(i)).replace("-", "−"), {"fc": _pale(colour), "ec": "none", "pad": 2}
-        fig.text(0.02, 0.17 - 0.065 * i, text, fontsize=6, bbox=box)
-    fig.get_layout_engine().set(rect=(0, 0.22, 1, 0.78))
+        y = 0.165 - 0.064 * i
+        fig.add_artist(Rectangle((0.012, y - 0.03), 0.976, 0.06, color=_pale(colour)))
+        for x, text in zip((0.03, 0.52), policy.equations(i)):
+            fig.text(x, y, text.replace("-", "−"), fontsize=8, va="center")
+    fig.get_layout_engine().set(rect=(0, 0.195, 1, 0.795), h_pad=0.02)
     return fig, (
         "Two squares with goal and pit. 400 dots walk to the goal and around the pit, left led by a network, right by "
         f"three equations, each in its cell's colour. After {HALFWAY} steps {said[0]} and {said[1]} are at the goal."
@@ -185,9 +193,9 @@ def _you() -> tuple[Figure, str]:
 # Parts of a picture
 
 
-def _boards(n: int, *, height: float, rows: int = 1) -> tuple[Figure, np.ndarray]:
+def _boards(n: int, *, height: float, rows: int = 1, width: float = WIDTH) -> tuple[Figure, np.ndarray]:
     """Make a figure of n squares with goal and pit, in thin frames without numbers."""
-    fig, axes = style.panels(n, width=WIDTH, height=height, rows=rows)
+    fig, axes = style.panels(n, width=width, height=height, rows=rows)
     fig.get_layout_engine().set(h_pad=0.07)
     for ax in axes:
         state_space.square(ax).set(xlabel="", ylabel="", xticks=[], yticks=[])
@@ -237,17 +245,17 @@ def _legend(fig: Figure, ax: Axes) -> None:
     fig.legend([*named.values()], [*named], frameon=False, loc="outside lower center", ncol=2 + (len(named) == 3))
 
 
-def _png(figure: Figure) -> bytes:
+def _png(figure: Figure, pixels: int) -> bytes:
     """Return a figure as a PNG with its most frequent colours, and close it. What it says is drawn in these."""
     drawn, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, format="png", dpi=PIXELS / WIDTH, metadata={"Software": None})
+    figure.savefig(drawn, format="png", dpi=pixels / figure.get_figwidth(), metadata={"Software": None})
     plt.close(figure)
-    pixels = np.asarray(Image.open(drawn).convert("RGB")).astype(int)
-    codes, places, counts = np.unique(pixels @ [1 << 16, 1 << 8, 1], return_inverse=True, return_counts=True)
+    shown = np.asarray(Image.open(drawn).convert("RGB")).astype(int)
+    codes, places, counts = np.unique(shown @ [1 << 16, 1 << 8, 1], return_inverse=True, return_counts=True)
     colours = np.column_stack([codes >> 16, codes >> 8 & 255, codes & 255])
     palette = colours[np.argsort(-counts, kind="stable")[:N_COLOURS]]
     nearest = np.square(colours[:, None] - palette).sum(axis=2).argmin(axis=1)
-    image = Image.fromarray(nearest[places].reshape(pixels.shape[:2]).astype(np.uint8))
+    image = Image.fromarray(nearest[places].reshape(shown.shape[:2]).astype(np.uint8))
     image.putpalette(palette.astype(np.uint8).tobytes())
     image.save(small, "png", optimize=True)
     return small.getvalue()

@@ -27,7 +27,9 @@ def _outputs(app, doctree, docname):
             text = _improve(node.astext(), app.outdir, top)
             node.replace_self(nodes.raw("", text, format="html", classes=node["classes"]))
     for node in list(doctree.findall(nodes.image)):
-        if Path(node["uri"]).suffix == ".png":
+        if Path(node["uri"]).suffix == ".svg":  # drawn in the page's colours
+            node.replace_self(nodes.raw("", (app.srcdir / node["uri"]).read_text("utf-8"), format="html"))
+        else:
             soup = BeautifulSoup(f'<img alt="{html.escape(node["alt"])}">', "html.parser")
             _picture(soup.img, (app.srcdir / node["uri"]).read_bytes(), app.outdir, top)
             node.replace_self(nodes.raw("", str(soup), format="html"))

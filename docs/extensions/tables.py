@@ -1,8 +1,9 @@
-"""The directives `measured`, what missed its target, `artefacts`, what notebooks make, and `gallery`, their figures."""
+"""Directives: `measured`, what missed its target, `facts`, what reproduces; `artefacts` and `gallery` of notebooks."""
 
 import html
 import re
 import tomllib
+from itertools import groupby
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,13 @@ from vsp.show.captions import BOOK, caption_of
 
 ROOT = Path(__file__).resolve().parents[2]
 _SAVES = {"figures": "save_figure", "tables": "save_table"}
+_FILLED = {"reproduced": 1, "cannot be told": 0.5, "differs": 0}  # how much of its square
+_CHOICES = {
+    "default": "With our defaults",
+    "nearest, SimpleGoal": "Nearest on SimpleGoal",
+    "nearest, MountainCar": "Nearest on MountainCar",
+    "nearest, both": "Nearest on both",
+}
 
 
 def measured(frame: pd.DataFrame) -> str:
@@ -43,15 +51,48 @@ def artefacts() -> str:
     return "\n".join(lines)
 
 
-def gallery() -> list[tuple[str, str, str]]:
-    """Every figure of notebooks/captions.toml: its file, its alternative text, and its caption as HTML, in brief."""
+def facts() -> str:
+    """The verdicts on the paper's facts as HTML: for each choice of settings a line of squares, one a fact."""
+    text = "".join(f"<span>{_squares([(name, name)])}{name}</span>" for name in _FILLED)
+    text = f'<figure class="facts"><figcaption>{text}</figcaption>'
+    table = pd.read_csv(ROOT / "figures/tables/hidden_facts.csv").query("verdict in @_FILLED")
+    table = table.sort_values("verdict", key=lambda verdicts: verdicts.map(_FILLED), ascending=False, kind="stable")
+    for choice, label in _CHOICES.items():
+        chosen = table[table["choice"] == choice]
+        text += f"<p>{label}: {_share(chosen)}</p>"
+        for task in ("SimpleGoal", "MountainCar"):
+            here = chosen[chosen["task"].str.startswith(task)]
+            said = f"{task}: {_share(here)}"
+            text += f"<div>{_squares([*zip(here['quantity'], here['verdict'])], said)}<span>{said}</span></div>"
+    return f"{text}</figure>"
+
+
+def _share(facts: pd.DataFrame) -> str:
+    return f"{(facts['verdict'] == 'reproduced').sum()} of {len(facts)}"
+
+
+def _squares(facts: list[tuple[str, str]], said: str = "") -> str:
+    """Draw a square for each name and verdict, which a pointer over it tells."""
+    drawn = "".join(
+        f'<g transform="translate({12 * i} 0)"><title>{html.escape(f"{name}: {verdict}")}</title>'
+        f'<rect class="is" x="1" y="{1 + 9 - 9 * _FILLED[verdict]}" width="9" height="{9 * _FILLED[verdict]}"/>'
+        '<rect x="1" y="1" width="9" height="9"/></g>'
+        for i, (name, verdict) in enumerate(facts)
+    )
+    told = f'role="img" aria-label="{said}"' if said else 'aria-hidden="true"'
+    return f'<svg viewBox="0 0 {12 * len(facts)} 11" style="--n: {len(facts)}" {told}>{drawn}</svg>'
+
+
+def gallery() -> list[tuple[str, str, str, str]]:
+    """Every figure of notebooks/captions.toml: its file, alternative text, caption as HTML, in brief, and notebook."""
     shown = []
     for notebook, kinds in tomllib.loads(BOOK.read_text("utf-8")).items():
         for name in kinds.get("figures", {}):
             caption = caption_of("figures", name)
             link = f'<a href="notebooks/{notebook}.html#{anchor(caption.label)}">{caption.label}</a>'
             brief = re.match(r".*?\.(?=\s|$)", caption.text)[0]
-            shown.append((f"figures/{name}.png", caption.alt, f"{link}. {html.escape(brief, quote=False)}"))
+            text = f"{link}. {html.escape(brief, quote=False)}"
+            shown.append((f"figures/{name}.png", caption.alt, text, notebook))
     return shown
 
 
@@ -71,16 +112,27 @@ class Artefacts(_Table):
         return self.parse_text_to_nodes(artefacts())
 
 
+class Facts(_Table):
+    def run(self):
+        return [nodes.raw("", facts(), format="html")]
+
+
 class Gallery(_Table):
     def run(self):
-        box = nodes.container(classes=["gallery"])
-        for file, alt, caption in gallery():
-            text = nodes.caption("", "", nodes.raw("", caption, format="html"))
-            box += nodes.figure("", nodes.image(uri=file, alt=alt), text)
-        return [box]
+        sections = []
+        for notebook, figures in groupby(gallery(), key=lambda row: row[-1]):
+            title = nbformat.read(ROOT / "notebooks" / f"{notebook}.ipynb", as_version=4).cells[0].source
+            section, box = nodes.section(ids=[notebook.replace("_", "-")]), nodes.container(classes=["gallery"])
+            for file, alt, caption, _ in figures:
+                text = nodes.caption("", "", nodes.raw("", caption, format="html"))
+                box += nodes.figure("", nodes.image(uri=file, alt=alt), text)
+            section += [nodes.title("", title.splitlines()[0].removeprefix("# ")), box]
+            sections.append(section)
+        return sections
 
 
 def setup(app):
+    app.add_directive("facts", Facts)
     app.add_directive("gallery", Gallery)
     app.add_directive("measured", Measured)
     app.add_directive("artefacts", Artefacts)

@@ -80,9 +80,10 @@ def test_code_that_only_draws_lists_or_sets_up_is_folded():
     assert not folded("policy, _ = vsp.distill(teacher, task)\nshow.save_figure(fig, 'x')")
 
 
-def test_the_table_of_artefacts_names_files_that_are_there_and_the_gallery_its_figures():
+def test_the_table_of_artefacts_names_files_that_are_there_the_gallery_its_figures_and_squares_the_facts():
     tables = importlib.import_module("tables")
-    lines = tables.artefacts().splitlines()[2:]
-    paths = [re.search(r"`(figures/[\w/]+)`", line)[1] for line in lines]
+    paths = re.findall(r"`(figures/[\w/]+)`", tables.artefacts())
     assert len(set(paths)) == len(paths) > 30 and all(list(ROOT.glob(f"{path}.*")) for path in paths)
     assert [file for file, *_ in tables.gallery()] == [f"{path}.png" for path in paths if "/tables/" not in path]
+    squares = tables.facts()
+    assert "<p>With our defaults: 2 of 25</p>" in squares and squares.count("<title>") == 3 + 4 * 25
