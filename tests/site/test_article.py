@@ -40,7 +40,7 @@ class Shown(Gestures):
         folder, _, name = where.rpartition("/")
         self.visit = Visit(browser, folder + "/", name + hash_, reduced_motion="reduce", **context)
         self.page = self.visit.page
-        self.page.locator(".vsp-article.live .vsp-stage canvas").wait_for()
+        self.page.locator(".vsp-article.live .vsp-stage > canvas").wait_for()
         self.rest()
 
     def rest(self):
@@ -61,7 +61,7 @@ class Shown(Gestures):
         """Picture, and what the sentences say."""
         self.rest()
         said = self.page.locator(".vsp-article section.active, [aria-live]").all_inner_texts()
-        return self.page.locator(".vsp-stage canvas").evaluate("canvas => canvas.toDataURL()"), said
+        return self.page.locator(".vsp-stage > canvas").evaluate("canvas => canvas.toDataURL()"), said
 
 
 @pytest.fixture(scope="module", params=["site", "file"])
@@ -179,7 +179,7 @@ def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown)
 
 def test_keys_alone_lead_through_all_sections(shown):
     article, seen = shown(), []
-    article.page.locator(".vsp-stage canvas").focus()
+    article.page.locator(".vsp-stage > canvas").focus()
     before = article.looks()
     article.page.keyboard.press("Shift+ArrowLeft")
     assert article.looks() != before
@@ -206,7 +206,7 @@ def test_it_is_there_within_a_second_answers_at_once_and_plays_smoothly(browser,
     page.locator("#you.active").wait_for()
     page.wait_for_timeout(500)
     answers = """async () => {
-        const canvas = document.querySelector(".vsp-stage canvas"), times = []
+        const canvas = document.querySelector(".vsp-stage > canvas"), times = []
         const {left, top} = canvas.getBoundingClientRect()
         canvas.setPointerCapture = () => {}
         for (let i = 0; i < 40; i++) {

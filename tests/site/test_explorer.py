@@ -37,7 +37,7 @@ class Shown(Gestures):
 
     def __init__(self, visit):
         self.page, self.root = visit.page, visit.page.locator(".vsp-explorer").first
-        self.canvas, self.result = self.root.locator(".vsp-stage canvas"), self.root.locator(".vsp-result")
+        self.canvas, self.result = self.root.locator(".vsp-stage > canvas"), self.root.locator(".vsp-result")
         self.canvas.wait_for()
         self.page.wait_for_timeout(400)
 
@@ -153,7 +153,7 @@ def test_the_workbench_distils_beside_each_other_and_answers_meanwhile(browser, 
         run.get_by_role("button", name="distil").click()
     first.get_by_text("300 iterations").wait_for()
     gestures = """async () => {
-        const canvas = document.querySelector(".vsp-stage canvas"), times = []
+        const canvas = document.querySelector(".vsp-stage > canvas"), times = []
         const {left, top} = canvas.getBoundingClientRect()
         canvas.setPointerCapture = () => {}
         for (let i = 0; i < 60; i++) {

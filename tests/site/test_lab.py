@@ -133,7 +133,7 @@ def _reads(place, text):
 @pytest.fixture(scope="module")
 def explorer(notebook):
     """That of SimpleGoal, the first."""
-    _below(notebook, ".vsp-explorer.vsp-controls .vsp-stage canvas")
+    _below(notebook, ".vsp-explorer.vsp-controls .vsp-stage > canvas")
     return notebook.locator(".vsp-explorer.vsp-controls").first
 
 
@@ -144,7 +144,7 @@ def laboratory(notebook, explorer):  # further down
 
 def _drawn(explorer):
     explorer.page.wait_for_timeout(500)
-    return explorer.locator(".vsp-stage canvas").evaluate("canvas => canvas.toDataURL()")
+    return explorer.locator(".vsp-stage > canvas").evaluate("canvas => canvas.toDataURL()")
 
 
 def test_the_explorer_replays_and_answers(explorer):
@@ -152,7 +152,7 @@ def test_the_explorer_replays_and_answers(explorer):
     pictures = [_drawn(explorer)]
     for act in (
         lambda: explorer.get_by_label("iteration").press("Home"),
-        lambda: explorer.locator(".vsp-stage canvas").click(position={"x": 100, "y": 100}),
+        lambda: explorer.locator(".vsp-stage > canvas").click(position={"x": 100, "y": 100}),
         lambda: explorer.get_by_label("Δx: bias").fill("2"),
     ):
         act()
