@@ -72,7 +72,8 @@ def _opening() -> tuple[Figure, str]:
     fig.get_layout_engine().set(rect=(0, 0.195, 1, 0.795), h_pad=0.02)
     return fig, (
         "Two squares with goal and pit. 400 dots walk to the goal and around the pit, left led by a network, right by "
-        f"three pairs of equations in the colours of their cells. After {HALFWAY} steps {said[0]} and {said[1]} are at the goal."
+        f"three pairs of equations in the colours of their cells. After {HALFWAY} steps {said[0]} and {said[1]} are at "
+        "the goal."
     )
 
 
