@@ -49,7 +49,7 @@ def _opening() -> tuple[Figure, str]:
     policy, said = data.policies()["faithful_3"], []
     fig, axes = _boards(2, height=3.05, width=OPENING)
     says = data.says()
-    names = f"network: {says['weights']:,} numbers", f"three equations: {says['three_numbers']} numbers"
+    names = f"network: {says['weights']:,} numbers", f"3 pairs of equations: {says['three_numbers']} numbers"
     _tiles(axes[1], policy)
     for ax, each, name, colour in zip(axes, (data.teacher(), policy), names, (style.TEACHER, "black")):
         there = 0
@@ -72,7 +72,8 @@ def _opening() -> tuple[Figure, str]:
     fig.get_layout_engine().set(rect=(0, 0.195, 1, 0.795), h_pad=0.02)
     return fig, (
         "Two squares with goal and pit. 400 dots walk to the goal and around the pit, left led by a network, right by "
-        f"three equations, each in its cell's colour. After {HALFWAY} steps {said[0]} and {said[1]} are at the goal."
+        f"three pairs of equations in the colours of their cells. After {HALFWAY} steps {said[0]} and {said[1]} are at "
+        "the goal."
     )
 
 
