@@ -324,7 +324,7 @@ var Player = class {
     this.view = view;
     const soon = () => view.soon(), acts = { input: () => this.go(this.at), change: soon };
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
-    this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
+    this.time = touched((share) => this.touch(share), { "aria-label": "failures", pointerup: soon });
     const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
     this.line = element("div", { class: "vsp-line" }, this.time, this.slider);
     this.row = row(this.toggle, back, on, this.said);
@@ -681,7 +681,6 @@ function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
   run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)));
   ctx.lineWidth = 1.5;
   ctx.stroke();
-  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`);
 }
 
 // ../vsp/show/explorer/texts.js
@@ -705,10 +704,10 @@ ${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events
   return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
-  const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
+  const { max_pol_loss: most, min_param_distance: least } = limits, at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
   if (kind === "merge")
-    return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`;
-  return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`;
+    return `${at}: maps differ by ${found}${least ? `, below ${least}` : ""}`;
+  return `${at}: loss ${found}${most ? `, above ${most}` : ""}`;
 }
 function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return [];
@@ -841,18 +840,18 @@ var Explorer = class {
     const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
     this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
-    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]);
+    const { first = {} } = hooks, at = String(first.at).split(",").map(Number), start = this.place(scene.starts.at(-63) ?? scene.starts[0]);
+    this.asked = this.picture.shows(at) ? at : start;
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const { first = {} } = hooks, shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], at = String(first.at).split(",").map(Number), take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    if (this.picture.shows(at)) this.asked = at;
     this.show(shown);
   }
   // -- What is shown
@@ -945,7 +944,8 @@ var Explorer = class {
     this.waiting = 0;
     if (this.mapped === null) this.judge(IN_MOTION);
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell;
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked);
+    const { episode } = this.policy, other = episode && String(episode.states[0]) !== String(this.asked);
+    this.played = other ? { states: [] } : episode ?? rollout(this.scene, this.policy, this.asked);
     if (!this.writing && !this.form.contains(document.activeElement)) this.fill();
     this.draw();
     this.speak();
@@ -1457,7 +1457,7 @@ var Distiller = class {
   }
   /** Moments have come. @param {Run} run @param {FromWorker} found */
   grown(run, { moments, done, rate }) {
-    const { view } = this, { max_pol_loss: split, min_param_distance: merge } = this.config;
+    const { view } = this;
     run.moments.push(...moments);
     run.rate = rate || run.rate;
     if (!run.policy && moments.length) {
@@ -1467,7 +1467,7 @@ var Distiller = class {
       { ...moments[0], ...about };
       view.show(run.policy);
     } else if (view.original === run.policy && moments.length) view.replay.grow();
-    if (run.policy) run.policy.limits = { split, merge };
+    if (run.policy) run.policy.limits = this.config;
     if (!done) return this.say();
     this.stop();
     this.told(this);
@@ -1523,7 +1523,7 @@ var Opening = class {
     this.ways = [ways(scene.walks), scene.starts.map((start) => rollout(scene, policy, start).states)];
     const lengths = this.ways.flat().map((way) => way.length - 1).sort((a, b) => a - b);
     this.steps = lengths[Math.floor(lengths.length * THERE)];
-    this.count = one(root, ".count");
+    this.told = one(root, ".count");
     this.toggle = one(root, ".walk");
     this.toggle.addEventListener("click", () => this.play(!this.playing));
     new ResizeObserver(() => this.draw()).observe(root);
@@ -1546,8 +1546,8 @@ var Opening = class {
     if (on) requestAnimationFrame(frame);
   }
   draw() {
-    const [first, second] = this.pictures.map((picture, i) => this.walkers(picture, i)), step2 = Math.floor(this.time);
-    this.count.textContent = `step ${step2}: ${first} and ${second} of 400 at the goal`;
+    const [left, right] = this.pictures.map((picture, i) => this.walkers(picture, i));
+    this.told.textContent = `step ${Math.floor(this.time)}: ${left} and ${right} of 400 at the goal`;
   }
   /** Draw all walkers where they are now, and count those at the goal.
    * @param {Picture} picture @param {number} i */
@@ -1670,6 +1670,7 @@ var Article = class {
       one(root, "[data-stops]")
     ), stops = words(slider.dataset.stops);
     slider.addEventListener("input", () => this.act(slider, "policy", stops[+slider.value]));
+    canvas.addEventListener("focus", () => this.section ?? this.enter(sections[0]));
     canvas.addEventListener("keydown", ({ key }) => {
       if (key === "Escape" && this.section) one(this.section, ".skip").focus();
     });
@@ -1756,11 +1757,11 @@ var Article = class {
     }
   }
   takeRun(stored) {
-    const { run } = this.policies, { max_pol_loss: split, min_param_distance: merge } = stored.config;
+    const { run } = this.policies;
     if (run.replay) return;
     run.replay = replayOf(stored);
     Object.assign(run.replay[run.replay.length - 1], this.view.numbers(run));
-    run.limits = { split, merge };
+    run.limits = stored.config;
     this.distiller = new Distiller(this.view, stored.config, {}, () => this.part("teacher"));
   }
   /** What a section tells comes after a gesture, or after the one that it names.
@@ -1793,7 +1794,8 @@ var Article = class {
   follow() {
     const hash = location.hash.replaceAll("%2C", ","), policies = this.sections.map(({ id, dataset }) => [id, words(dataset.policies)]), state = read(hash, Object.fromEntries(policies), this.scene.moments), named = state?.section ?? hash.slice(1), known = this.sections.find(({ id }) => id === named), section = known ?? this.sections[0];
     if (!known && document.getElementById(named)) return this.section ?? this.enter(section);
-    if (hash || this.section) section.scrollIntoView();
+    if (!hash && !this.section) return;
+    section.scrollIntoView();
     if (this.section) this.held = performance.now();
     this.enter(section, state ?? firstOf(section), history.replaceState);
     if (hash && !known) this.status.textContent = UNREAD;

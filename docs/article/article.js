@@ -107,6 +107,7 @@ class Article {
     const slider = /** @type {HTMLInputElement} */ (one(root, "[data-stops]")),
       stops = words(slider.dataset.stops)
     slider.addEventListener("input", () => this.act(slider, "policy", stops[+slider.value]))
+    canvas.addEventListener("focus", () => this.section ?? this.enter(sections[0]))
     canvas.addEventListener("keydown", ({ key }) => {
       if (key === "Escape" && this.section) one(this.section, ".skip").focus()
     })
@@ -193,12 +194,11 @@ class Article {
     }
   }
   takeRun(/** @type {StoredRun} */ stored) {
-    const { run } = this.policies,
-      { max_pol_loss: split, min_param_distance: merge } = stored.config
+    const { run } = this.policies
     if (run.replay) return
     run.replay = replayOf(stored)
     Object.assign(run.replay[run.replay.length - 1], this.view.numbers(run)) // exact, not as others
-    run.limits = { split, merge }
+    run.limits = stored.config
     this.distiller = new Distiller(this.view, stored.config, {}, () => this.part("teacher"))
   }
   /** What a section tells comes after a gesture, or after the one that it names.
@@ -240,7 +240,8 @@ class Article {
       section = known ?? this.sections[0]
     // Another part of the page
     if (!known && document.getElementById(named)) return this.section ?? this.enter(section)
-    if (hash || this.section) section.scrollIntoView()
+    if (!hash && !this.section) return // nothing loads before it is read
+    section.scrollIntoView()
     if (this.section) this.held = performance.now()
     this.enter(section, state ?? firstOf(section), history.replaceState)
     if (hash && !known) this.status.textContent = UNREAD

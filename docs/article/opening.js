@@ -30,7 +30,7 @@ export class Opening {
     this.ways = [ways(scene.walks), scene.starts.map(start => rollout(scene, policy, start).states)]
     const lengths = this.ways.flat().map(way => way.length - 1).sort((a, b) => a - b)
     this.steps = lengths[Math.floor(lengths.length * THERE)]
-    this.count = one(root, ".count")
+    this.told = one(root, ".count")
     this.toggle = one(root, ".walk")
     this.toggle.addEventListener("click", () => this.play(!this.playing))
     new ResizeObserver(() => this.draw()).observe(root)
@@ -53,9 +53,8 @@ export class Opening {
     if (on) requestAnimationFrame(frame)
   }
   draw() {
-    const [first, second] = this.pictures.map((picture, i) => this.walkers(picture, i)),
-      step = Math.floor(this.time)
-    this.count.textContent = `step ${step}: ${first} and ${second} of 400 at the goal`
+    const [left, right] = this.pictures.map((picture, i) => this.walkers(picture, i))
+    this.told.textContent = `step ${Math.floor(this.time)}: ${left} and ${right} of 400 at the goal`
   }
   /** Draw all walkers where they are now, and count those at the goal.
    * @param {Picture} picture @param {number} i */

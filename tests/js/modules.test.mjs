@@ -132,8 +132,8 @@ test("what is said of results and changes", () => {
       "mean return about −1.50.",
     ],
     [texts.causeOf(split), `split ${where}loss 0.0123`],
-    [texts.causeOf(split, { split: 0.01 }), `split ${where}loss 0.0123, above 0.01`],
-    [texts.causeOf(merge, { merge: 0.02 }), `merge ${where}maps differ by 0.0123, below 0.02`],
+    [texts.causeOf(split, { max_pol_loss: 0.01 }), `split ${where}loss 0.0123, above 0.01`],
+    [texts.causeOf(merge, { min_param_distance: 0.02 }), `merge ${where}maps differ by 0.0123, below 0.02`],
   ])
     assert.equal(said, expected)
 })

@@ -12,8 +12,8 @@ import { interval } from "./studies.js"
 const STUDIES = 100
 const AT_MOST = 8 // cells by hand
 const FAR = 1.5 // from the true mean to the edge of the picture
-const METRICS = ["manhattan", "euclidean", "chebyshev"]
-const DISTANCES = ["Manhattan", "Euclidean", "largest difference"]
+/** @type {Record<string, string>} */
+const KINDS = { Manhattan: "manhattan", Euclidean: "euclidean", "largest difference": "chebyshev" }
 const WAYS = ["all episodes, as if independent", "policies, drawn again (3.3)"]
 
 /** @type {(root: ParentNode, name: string, words: string) => void} */
@@ -57,10 +57,10 @@ function borders(part, data) {
   const view = viewOf(part, data, [[0.25, 0.35], [0.7, 0.55]])
   view.starts = false
   const take = (/** @type {string} */ name) => {
-    Object.assign(view.policy, { metric: METRICS[DISTANCES.indexOf(name)] })
+    Object.assign(view.policy, { metric: KINDS[name] })
     view.changed(true)
   }
-  one(part, ".panel").prepend(choice("distance", DISTANCES, take))
+  one(part, ".panel").prepend(choice("distance", Object.keys(KINDS), take))
 }
 
 /** Lesson 1: cells by hand, with maps by least squares.

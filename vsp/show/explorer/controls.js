@@ -145,7 +145,7 @@ export class Player {
     const soon = () => view.soon(),
       acts = { input: () => this.go(this.at), change: soon }
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts })
-    this.time = touched(share => this.touch(share), { class: "vsp-time", pointerup: soon })
+    this.time = touched(share => this.touch(share), { "aria-label": "failures", pointerup: soon })
     const back = button("previous change", () => this.jump(-1)),
       on = button("next change", () => this.jump(1))
     this.line = element("div", { class: "vsp-line" }, this.time, this.slider)

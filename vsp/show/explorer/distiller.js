@@ -108,8 +108,7 @@ export class Distiller {
   }
   /** Moments have come. @param {Run} run @param {FromWorker} found */
   grown(run, { moments, done, rate }) {
-    const { view } = this,
-      { max_pol_loss: split, min_param_distance: merge } = this.config
+    const { view } = this
     run.moments.push(...moments)
     run.rate = rate || run.rate
     if (!run.policy && moments.length) {
@@ -117,7 +116,7 @@ export class Distiller {
       run.policy = /** @type {Linear} */ (/** @type {Numbers} */ ({ ...moments[0], ...about }))
       view.show(run.policy)
     } else if (view.original === run.policy && moments.length) view.replay.grow()
-    if (run.policy) run.policy.limits = { split, merge }
+    if (run.policy) run.policy.limits = this.config
     if (!done) return this.say()
     this.stop()
     this.told(this)

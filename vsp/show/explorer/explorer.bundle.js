@@ -257,7 +257,7 @@ var Player = class {
     this.view = view;
     const soon = () => view.soon(), acts = { input: () => this.go(this.at), change: soon };
     this.slider = element("input", { type: "range", min: 0, "aria-label": "iteration", ...acts });
-    this.time = touched((share) => this.touch(share), { class: "vsp-time", pointerup: soon });
+    this.time = touched((share) => this.touch(share), { "aria-label": "failures", pointerup: soon });
     const back = button("previous change", () => this.jump(-1)), on = button("next change", () => this.jump(1));
     this.line = element("div", { class: "vsp-line" }, this.time, this.slider);
     this.row = row(this.toggle, back, on, this.said);
@@ -614,7 +614,6 @@ function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
   run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)));
   ctx.lineWidth = 1.5;
   ctx.stroke();
-  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`);
 }
 
 // ../vsp/show/explorer/texts.js
@@ -638,10 +637,10 @@ ${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events
   return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
-  const at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
+  const { max_pol_loss: most, min_param_distance: least } = limits, at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
   if (kind === "merge")
-    return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`;
-  return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`;
+    return `${at}: maps differ by ${found}${least ? `, below ${least}` : ""}`;
+  return `${at}: loss ${found}${most ? `, above ${most}` : ""}`;
 }
 function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return [];
@@ -896,18 +895,18 @@ var Explorer = class {
     const { pointerdown, pointermove, pointerup, keydown } = this, about = { tabindex: 0, role: "application", "aria-label": LABEL, keydown }, acts = { pointerdown, pointermove, pointerup, pointercancel: pointerup }, transitionend = () => this.changed(true);
     this.canvas = element("canvas", { ...about, ...acts, transitionend });
     this.picture = new Picture(this.canvas, scene.plane);
-    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]);
+    const { first = {} } = hooks, at = String(first.at).split(",").map(Number), start = this.place(scene.starts.at(-63) ?? scene.starts[0]);
+    this.asked = this.picture.shows(at) ? at : start;
     const active = (
       /** @type {HTMLElement | null} */
       document.activeElement
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const { first = {} } = hooks, shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], at = String(first.at).split(",").map(Number), take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
-    if (this.picture.shows(at)) this.asked = at;
     this.show(shown);
   }
   // -- What is shown
@@ -1000,7 +999,8 @@ var Explorer = class {
     this.waiting = 0;
     if (this.mapped === null) this.judge(IN_MOTION);
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell;
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked);
+    const { episode } = this.policy, other = episode && String(episode.states[0]) !== String(this.asked);
+    this.played = other ? { states: [] } : episode ?? rollout(this.scene, this.policy, this.asked);
     if (!this.writing && !this.form.contains(document.activeElement)) this.fill();
     this.draw();
     this.speak();

@@ -82,15 +82,16 @@ export class Explorer {
       transitionend = () => this.changed(true) // of the page's colours, or of JupyterLab's
     this.canvas = element("canvas", { ...about, ...acts, transitionend })
     this.picture = new Picture(this.canvas, scene.plane)
-    this.asked = this.place(scene.starts.at(-63) ?? scene.starts[0]) // in SimpleGoal beyond the pit
+    const { first = {} } = hooks,
+      at = String(first.at).split(",").map(Number),
+      start = this.place(scene.starts.at(-63) ?? scene.starts[0]) // in SimpleGoal beyond the pit
+    this.asked = this.picture.shows(at) ? at : start
     const active = /** @type {HTMLElement | null} */ (document.activeElement),
       focus = root.contains(active) && active
     root.classList.add("vsp-explorer")
     // Of the car or the pendulum
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name })
-    const { first = {} } = hooks,
-      shown = scene.policies.find(({ name }) => name === first.policy) ?? scene.policies[0],
-      at = String(first.at).split(",").map(Number),
+    const shown = scene.policies.find(({ name }) => name === first.policy) ?? scene.policies[0],
       take = (/** @type {Policy} */ policy) => (this.show(policy), this.settle()),
       policy = choice("policy", scene.policies, take, shown),
       lists = row(...(hooks.above ?? []), policy),
@@ -102,7 +103,6 @@ export class Explorer {
     root.replaceChildren(...(hooks.bare ? [stage] : [lists, stage, panel]))
     if (focus) (focus.isConnected ? focus : this.canvas).focus()
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
-    if (this.picture.shows(at)) this.asked = at
     this.show(shown)
   }
 
@@ -199,7 +199,9 @@ export class Explorer {
     if (this.mapped === null) this.judge(IN_MOTION)
     this.cell = act(this.scene, this.policy, this.task.see(this.asked)).cell
     // Of a network that is not loaded yet, one episode is known
-    this.played = this.policy.episode ?? rollout(this.scene, this.policy, this.asked)
+    const { episode } = this.policy,
+      other = episode && String(episode.states[0]) !== String(this.asked)
+    this.played = other ? { states: [] } : (episode ?? rollout(this.scene, this.policy, this.asked))
     if (!this.writing && !this.form.contains(document.activeElement)) this.fill()
     this.draw()
     this.speak()

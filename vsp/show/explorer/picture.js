@@ -382,5 +382,4 @@ export function drawTime({ run, scene: { starts }, replay: { time: canvas, at } 
   run.forEach(({ failures = 0 }, i) => ctx.lineTo(x(i), y(failures / starts.length)))
   ctx.lineWidth = 1.5
   ctx.stroke()
-  canvas.setAttribute("aria-label", `starts that fail along the run, of ${starts.length}`)
 }

@@ -47,11 +47,12 @@ export function momentOf({ run, replay: { at }, original: { limits } }) {
 /** What caused a split or a merge; `limits`: the thresholds, where known.
  * @param {Change} change @param {Limits} limits */
 export function causeOf({ kind, codeword, cause }, limits = {}) {
-  const at = `${kind} at (${codeword.map(value => minus(value.toFixed(2))).join(", ")})`,
+  const { max_pol_loss: most, min_param_distance: least } = limits,
+    at = `${kind} at (${codeword.map(value => minus(value.toFixed(2))).join(", ")})`,
     found = cause.toPrecision(3)
   if (kind === "merge")
-    return `${at}: maps differ by ${found}${limits.merge ? `, below ${limits.merge}` : ""}`
-  return `${at}: loss ${found}${limits.split ? `, above ${limits.split}` : ""}`
+    return `${at}: maps differ by ${found}${least ? `, below ${least}` : ""}`
+  return `${at}: loss ${found}${most ? `, above ${most}` : ""}`
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds.

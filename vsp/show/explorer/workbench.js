@@ -75,8 +75,8 @@ export class Workbench {
     return this.runs.map(({ config }) => written(config, this.task.preset))
   }
   keep() {
-    const { name } = this.task.scene.task
-    history.replaceState(null, "", `#${[name, ...this.written()].join("/")}`)
+    const parts = [this.task.scene.task.name, ...this.written()]
+    history.replaceState(null, "", `#${parts.join("/")}`)
   }
   /** @param {string} text */
   add(text) {
