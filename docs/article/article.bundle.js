@@ -848,7 +848,7 @@ var Explorer = class {
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], panel = element("div", { class: "vsp-panel" }, ...parts), under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
@@ -1794,7 +1794,7 @@ var Article = class {
   follow() {
     const hash = location.hash.replaceAll("%2C", ","), policies = this.sections.map(({ id, dataset }) => [id, words(dataset.policies)]), state = read(hash, Object.fromEntries(policies), this.scene.moments), named = state?.section ?? hash.slice(1), known = this.sections.find(({ id }) => id === named), section = known ?? this.sections[0];
     if (!known && document.getElementById(named)) return this.section ?? this.enter(section);
-    if (!hash && !this.section) return;
+    if (!hash && !this.section) return void (this.begun = true);
     section.scrollIntoView();
     if (this.section) this.held = performance.now();
     this.enter(section, state ?? firstOf(section), history.replaceState);

@@ -240,7 +240,7 @@ class Article {
       section = known ?? this.sections[0]
     // Another part of the page
     if (!known && document.getElementById(named)) return this.section ?? this.enter(section)
-    if (!hash && !this.section) return // nothing loads before it is read
+    if (!hash && !this.section) return void (this.begun = true) // nothing loads
     section.scrollIntoView()
     if (this.section) this.held = performance.now()
     this.enter(section, state ?? firstOf(section), history.replaceState)

@@ -40,7 +40,7 @@ def test_each_part_asks_and_nothing_overflows_a_phone(shown):
 def test_cells_by_hand_are_fitted_at_once(shown):
     part = opened(shown, "by_hand")
     part.locator("p", has_text="With 1 cell: 100 % of the squared error of one map; 52 of 400").wait_for()
-    part.locator("canvas").click(position={"x": 80, "y": 250})
+    part.locator(".vsp-stage > canvas").click(position={"x": 80, "y": 250})
     part.get_by_role("button", name="add a cell").click()
     part.locator("p", has_text=re.compile(r"With 2 cells: \d\d % of the squared error")).wait_for()
 

@@ -39,9 +39,9 @@ class Gestures:
     def at(self, x, y):
         """Where a point of the unit square is on the page."""
         box = self.page.locator(".vsp-stage > canvas").first.bounding_box()
-        left, right, bottom = (46, 4, 32) if box["width"] < 330 else (54, 8, 36)
-        across, down = box["width"] - left - right, box["height"] - 8 - bottom
-        return box["x"] + left + x * across, box["y"] + 8 + (1 - y) * down
+        left, right = (46, 4) if box["width"] < 330 else (54, 8)
+        side = box["width"] - left - right
+        return box["x"] + left + x * side, box["y"] + right + (1 - y) * side
 
     def drag(self, *places):
         start, end = self.at(*places[0]), self.at(*places[-1])

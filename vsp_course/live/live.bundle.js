@@ -844,7 +844,7 @@ var Explorer = class {
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen), panel = element("div", { class: "vsp-panel" }, ...parts);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], panel = element("div", { class: "vsp-panel" }, ...parts), under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
@@ -1611,7 +1611,7 @@ function intervals(part, { reruns }) {
       truth
     );
     one(part, "canvas").ariaLabel = `${STUDIES} intervals; ${hold} hold the true mean`;
-    past.push([way, String(policies), String(episodes), digits(width), String(hold)]);
+    past.push([way.split(",")[0], String(policies), String(episodes), digits(width), String(hold)]);
     const head = ["policies", "episodes", "mean width", "hold the truth"];
     one(part, ".runs").replaceChildren(table(head, past.slice(-8)));
   });

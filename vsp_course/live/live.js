@@ -147,7 +147,7 @@ function intervals(part, { reruns }) {
       width = sum(found.map(([low, high]) => high - low)) / STUDIES
     drawIntervals(/** @type {HTMLCanvasElement} */ (one(part, "canvas")), found, truth)
     one(part, "canvas").ariaLabel = `${STUDIES} intervals; ${hold} hold the true mean`
-    past.push([way, String(policies), String(episodes), digits(width), String(hold)])
+    past.push([way.split(",")[0], String(policies), String(episodes), digits(width), String(hold)])
     const head = ["policies", "episodes", "mean width", "hold the truth"]
     one(part, ".runs").replaceChildren(table(head, past.slice(-8)))
   })

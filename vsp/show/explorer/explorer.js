@@ -96,10 +96,10 @@ export class Explorer {
       policy = choice("policy", scene.policies, take, shown),
       lists = row(...(hooks.above ?? []), policy),
       parts = [this.legend, this.replay.row, this.form, this.backs, this.note],
+      panel = element("div", { class: "vsp-panel" }, ...parts), // bare, the page takes them out
       under = hooks.bare ? this.legend : this.answer,
       seen = [this.canvas, this.drawing, this.said, this.replay.line, under],
-      stage = element("div", { class: "vsp-stage" }, ...seen),
-      panel = element("div", { class: "vsp-panel" }, ...parts)
+      stage = element("div", { class: "vsp-stage" }, ...seen)
     root.replaceChildren(...(hooks.bare ? [stage] : [lists, stage, panel]))
     if (focus) (focus.isConnected ? focus : this.canvas).focus()
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)
