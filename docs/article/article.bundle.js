@@ -623,7 +623,8 @@ function drawAll(view, points) {
   for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
     const cell = view.failing.get(i);
     if (cell === void 0) picture.dot(place, 1.3, start);
-    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
+    else if (cell === view.cell) picture.dot(place, 3.4, failing, paper, 1);
+    else picture.dot(place, 2.7, paper, failing);
   }
   picture.line(path, paper, 5);
   picture.line(path, ink, 2);
@@ -657,7 +658,7 @@ function drawCodewords(view) {
     const point = view.task.place(codeword), [x, y] = picture.at(point);
     picture.dot(point, 5, i === view.marked ? ink : paper, ink);
     if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2);
-    if (view.cells > 30) return;
+    if (view.cells > 30 && i !== view.marked) return;
     const inner = x > picture.side - 40;
     const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6];
     picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
@@ -668,7 +669,7 @@ function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
   Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing });
   for (const share of [0, 1 / 4, 1]) {
     ctx.fillRect(END, y(share), wide - 2 * END, 0.3);
-    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3);
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END - 6, y(share) - 3);
   }
   run.forEach(({ events, set }, i) => {
     for (const { kind } of events)
@@ -848,7 +849,7 @@ var Explorer = class {
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], panel = element("div", { class: "vsp-panel" }, ...parts), under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.answer, this.form, this.backs, this.note, this.replay.row], panel = element("div", { class: "vsp-panel" }, ...parts), seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend], stage = element("div", { class: "vsp-stage" }, ...seen);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
@@ -968,7 +969,7 @@ var Explorer = class {
   fill() {
     if (this.policy.layers) return this.form.replaceChildren();
     const parts = this.shown.map((i) => {
-      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
+      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", cells = this.cells > 1 && this.scene.task.outputs.length > 1, tint = cells ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
       return element("fieldset", acts, element("legend", {}, title), ...lines);
     });
     this.form.replaceChildren(...parts);
@@ -1652,7 +1653,7 @@ var Article = class {
     this.follow();
   }
   listen() {
-    const { root, sections } = this, { canvas } = this.view, { style } = one(root, ".own");
+    const { root, sections, view: { canvas } } = this;
     for (const section of sections)
       section.addEventListener("focusin", () => {
         this.held = performance.now();
@@ -1680,10 +1681,8 @@ var Article = class {
       task.append(skip);
     }
     addEventListener("popstate", () => this.follow());
-    const score = style.getPropertyValue("--score");
     addEventListener("beforeprint", () => {
       for (const output2 of root.querySelectorAll("output")) output2.value = output2.defaultValue;
-      style.setProperty("--score", score);
     });
     addEventListener("afterprint", () => this.say());
   }
@@ -1847,9 +1846,10 @@ var Article = class {
       const now = minus(String(known.get(String(output2.dataset.say)) ?? output2.value));
       if (output2.value !== now) output2.value = now;
     }
-    const [scale, won] = [".scale", ".won"].map((selector) => one(this.root, selector)), [low, high, aim] = [scale.dataset.low, scale.dataset.high, won.dataset.aim].map(Number), done = !failures && played === this.scene.starts.length && section.id === "you";
-    one(scale, ".own").style.setProperty("--score", String((mean - low) / (high - low)));
-    won.textContent = done ? mean > aim + 5e-3 ? BEATEN : WON : "";
+    const [scale, won] = [".scale", ".won"].map((selector) => one(this.root, selector)), done = !failures && played === this.scene.starts.length && section.id === "you";
+    one(scale, ".own").style.setProperty("--score", String(mean));
+    scale.classList.toggle("near", done);
+    won.textContent = done ? mean > Number(won.dataset.aim) + 5e-4 ? BEATEN : WON : "";
   }
 };
 async function begin() {

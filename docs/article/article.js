@@ -88,9 +88,7 @@ class Article {
     this.follow()
   }
   listen() {
-    const { root, sections } = this,
-      { canvas } = this.view,
-      { style } = one(root, ".own")
+    const { root, sections, view: { canvas } } = this
     for (const section of sections)
       section.addEventListener("focusin", () => {
         this.held = performance.now()
@@ -117,10 +115,8 @@ class Article {
       task.append(skip)
     }
     addEventListener("popstate", () => this.follow())
-    const score = style.getPropertyValue("--score")
     addEventListener("beforeprint", () => {
       for (const output of root.querySelectorAll("output")) output.value = output.defaultValue
-      style.setProperty("--score", score) // of the printed policy
     })
     addEventListener("afterprint", () => this.say())
   }
@@ -299,10 +295,10 @@ class Article {
       if (output.value !== now) output.value = now
     }
     const [scale, won] = [".scale", ".won"].map(selector => one(this.root, selector)),
-      [low, high, aim] = [scale.dataset.low, scale.dataset.high, won.dataset.aim].map(Number),
       done = !failures && played === this.scene.starts.length && section.id === "you"
-    one(scale, ".own").style.setProperty("--score", String((mean - low) / (high - low)))
-    won.textContent = done ? (mean > aim + 0.005 ? BEATEN : WON) : ""
+    one(scale, ".own").style.setProperty("--score", String(mean))
+    scale.classList.toggle("near", done)
+    won.textContent = done ? (mean > Number(won.dataset.aim) + 5e-4 ? BEATEN : WON) : ""
   }
 }
 

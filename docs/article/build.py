@@ -28,7 +28,6 @@ LIMITS = {
     "split": "max_pol_loss", "merge": "min_param_distance", "distance": "min_pol_distance", "n_split": "n_split",
     "n_merge": "n_merge",
 }  # fmt: skip
-SCALE = 12, 17  # of the mean return, in section 7
 ABOUT = "400 walkers led by a network, and by three equations that one can read, drag and prove: the method runs live."
 PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -58,14 +57,12 @@ begin()
 
 def text(scene: dict, run: dict, pictures: dict[str, tuple[bytes, str]]) -> str:
     """Return the article's HTML with its numbers, each computed, and its pictures."""
-    says, (low, high) = scene["says"], SCALE
-    shares = {f"{name}_share": (says[f"{name}_mean"] - low) / (high - low) for name in ("paper", "best", "misplaced")}
     still = {
         name: f'<figure class="still">{style.embedded(png, alt, width=460)}</figure>'
         for name, (png, alt) in pictures.items()
     }
     limits = {short: run["config"][name] for short, name in LIMITS.items()}
-    numbers = {**says, **shares, **limits, "low": low, "high": high, "card": card(policies()["faithful_3"])}
+    numbers = {**scene["says"], **limits, "card": card(policies()["faithful_3"])}
     numbers |= {"longer": LONGER, "longer_failures": longer(LONGER), "cite": citation(), "cut": cut()}
     written = (FOLDER / "text.html").read_text("utf-8").format(**numbers, still=still)
     return re.sub(r"(?<=[\s>])-(?=\d)", "−", written)

@@ -95,10 +95,9 @@ export class Explorer {
       take = (/** @type {Policy} */ policy) => (this.show(policy), this.settle()),
       policy = choice("policy", scene.policies, take, shown),
       lists = row(...(hooks.above ?? []), policy),
-      parts = [this.legend, this.replay.row, this.form, this.backs, this.note],
+      parts = [this.answer, this.form, this.backs, this.note, this.replay.row],
       panel = element("div", { class: "vsp-panel" }, ...parts), // bare, the page takes them out
-      under = hooks.bare ? this.legend : this.answer,
-      seen = [this.canvas, this.drawing, this.said, this.replay.line, under],
+      seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend],
       stage = element("div", { class: "vsp-stage" }, ...seen)
     root.replaceChildren(...(hooks.bare ? [stage] : [lists, stage, panel]))
     if (focus) (focus.isConnected ? focus : this.canvas).focus()
@@ -228,7 +227,8 @@ export class Explorer {
     if (this.policy.layers) return this.form.replaceChildren()
     const parts = this.shown.map(i => {
       const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map",
-        tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)",
+        cells = this.cells > 1 && this.scene.task.outputs.length > 1, // as in the picture
+        tint = cells ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)",
         light = () => this.lit === i || this.light(i),
         lines = equations(this, i, () => this.edited()),
         acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` }

@@ -114,7 +114,8 @@ class Workbench:
     def page(self) -> str:
         """Return that file's text."""
         data = to_json([bench_of(task) for task in PAPER_TASKS])
-        body = f'<div class="vsp-explorer" data-bench><script type="application/json">{data}</script></div>'
+        body = "<p>Press distil: cells split where the imitation fails, and merge where neighbours agree.</p>"
+        body += f'<div class="vsp-explorer" data-bench><script type="application/json">{data}</script></div>'
         return standalone("Distil a network", body, ".vsp-page { max-width: 110rem }", f"{BENCH}\nbegin")
 
     def _repr_html_(self) -> str:

@@ -298,7 +298,8 @@ export function drawAll(view, points) {
   for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
     const cell = view.failing.get(i)
     if (cell === undefined) picture.dot(place, 1.3, start)
-    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing)
+    else if (cell === view.cell) picture.dot(place, 3.4, failing, paper, 1)
+    else picture.dot(place, 2.7, paper, failing)
   }
   picture.line(path, paper, 5)
   picture.line(path, ink, 2)
@@ -352,7 +353,7 @@ function drawCodewords(view) {
     picture.dot(point, 5, i === view.marked ? ink : paper, ink)
     // Else it would lie under the finger
     if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2)
-    if (view.cells > 30) return
+    if (view.cells > 30 && i !== view.marked) return
     const inner = x > picture.side - 40 // else the frame cuts the number off
     const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6]
     picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left")
@@ -369,7 +370,7 @@ export function drawTime({ run, scene: { starts }, replay: { time: canvas, at } 
   Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing })
   for (const share of [0, 1 / 4, 1]) {
     ctx.fillRect(END, y(share), wide - 2 * END, 0.3)
-    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3)
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END - 6, y(share) - 3)
   }
   run.forEach(({ events, set }, i) => {
     for (const { kind } of events)

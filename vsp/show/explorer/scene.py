@@ -52,7 +52,9 @@ def scene_of(
     if history is not None:
         scene["policies"][0]["replay"] = _replay(history, next(iter(policies.values())))
     if teacher is not None:
-        scene["teacher"] = {"mean": float(rollout(teacher, task, starts).returns.mean())}
+        played = rollout(teacher, task, starts)
+        failing = int(np.isin(played.outcomes, scene["lost"]).sum())
+        scene["teacher"] = {"mean": float(played.returns.mean()), "failures": failing}
     return scene
 
 
@@ -62,11 +64,8 @@ def bench_of(name: str) -> dict:
     kinds = {what: kind for what, kind in kinds_of(type(preset)).items() if what not in UNSHOWN}
     words = {what: [False, True] if kind is bool else list(get_args(kind)) for what, kind in kinds.items()}
     words["metric"] = list(METRICS)
-    still = VoronoiPolicy(
-        np.array([(task.low + task.high) / 2]), np.zeros((1, len(task.low) + 1, len(task.outputs))), task=task
-    )
     return {
-        "scene": scene_of({"one cell that stands still": still}, task, teacher),
+        "scene": scene_of({}, task, teacher),
         "network": network_of(teacher),
         "preset": {what: getattr(preset, what) for what in kinds},
         "choices": {what: values for what, values in words.items() if values},

@@ -1012,7 +1012,8 @@ function drawAll(view, points) {
   for (const [i, place] of view.starts ? scene.starts.map(view.place).entries() : []) {
     const cell = view.failing.get(i);
     if (cell === void 0) picture.dot(place, 1.3, start);
-    else picture.dot(place, 2.7, cell === view.cell ? failing : paper, failing);
+    else if (cell === view.cell) picture.dot(place, 3.4, failing, paper, 1);
+    else picture.dot(place, 2.7, paper, failing);
   }
   picture.line(path, paper, 5);
   picture.line(path, ink, 2);
@@ -1046,7 +1047,7 @@ function drawCodewords(view) {
     const point = view.task.place(codeword), [x, y] = picture.at(point);
     picture.dot(point, 5, i === view.marked ? ink : paper, ink);
     if (view.held?.finger && i === view.held.cell) picture.dot(point, 34, CLEAR, ink, 2);
-    if (view.cells > 30) return;
+    if (view.cells > 30 && i !== view.marked) return;
     const inner = x > picture.side - 40;
     const [right, down] = [inner ? -9 : 9, y < 28 ? 16 : -6];
     picture.text(String(numberOf(policy, i)), x + right, y + down, inner ? "right" : "left");
@@ -1057,7 +1058,7 @@ function drawTime({ run, scene: { starts }, replay: { time: canvas, at } }) {
   Object.assign(ctx, { fillStyle: tones.ink, textAlign: "right", strokeStyle: tones.failing });
   for (const share of [0, 1 / 4, 1]) {
     ctx.fillRect(END, y(share), wide - 2 * END, 0.3);
-    ctx.fillText(String(Math.round(share * starts.length)), wide - END, y(share) - 3);
+    ctx.fillText(String(Math.round(share * starts.length)), wide - END - 6, y(share) - 3);
   }
   run.forEach(({ events, set }, i) => {
     for (const { kind } of events)
@@ -1237,7 +1238,7 @@ var Explorer = class {
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.legend, this.replay.row, this.form, this.backs, this.note], panel = element("div", { class: "vsp-panel" }, ...parts), under = hooks.bare ? this.legend : this.answer, seen = [this.canvas, this.drawing, this.said, this.replay.line, under], stage = element("div", { class: "vsp-stage" }, ...seen);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.answer, this.form, this.backs, this.note, this.replay.row], panel = element("div", { class: "vsp-panel" }, ...parts), seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend], stage = element("div", { class: "vsp-stage" }, ...seen);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);
@@ -1357,7 +1358,7 @@ var Explorer = class {
   fill() {
     if (this.policy.layers) return this.form.replaceChildren();
     const parts = this.shown.map((i) => {
-      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", tint = this.cells > 1 ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
+      const title = this.cells > 1 ? `Cell ${numberOf(this.policy, i)}` : "The map", cells = this.cells > 1 && this.scene.task.outputs.length > 1, tint = cells ? CELLS[this.policy.tints?.[i] ?? 0] : "var(--vsp-line)", light = () => this.lit === i || this.light(i), lines = equations(this, i, () => this.edited()), acts = { pointerenter: light, focusin: light, "data-cell": i, style: `--tint: ${tint}` };
       return element("fieldset", acts, element("legend", {}, title), ...lines);
     });
     this.form.replaceChildren(...parts);
@@ -1505,19 +1506,19 @@ var Workbench = class {
     this.tasks = tasks;
     this.task = tasks[0];
     const options = tasks.map((task2) => ({ name: task2.scene.task.name, task: task2 }));
-    this.list = choice("task", options, ({ task: task2 }) => this.open(task2, [""]));
+    this.list = choice("task", options, ({ task: task2 }) => this.open(task2, [""], this.runs.length));
     root.replaceChildren(row(this.list, this.beside), this.columns);
     const [name2, ...runs] = location.hash.slice(1).split("/"), task = tasks.find(({ scene }) => scene.task.name === name2) ?? tasks[0];
     this.open(task, runs.length ? runs : [""]);
   }
-  /** Show n runs of a task, the last ones alike; those that are there stay.
+  /** Show n runs of a task; further ones differ by their seeds. Those that are there stay.
    * @param {BenchScene} task @param {string[]} runs */
   open(task, runs, n = Math.min(runs.length, MOST2.length)) {
     const stay = task === this.task && runs.join() === this.written().join() ? n : 0;
     for (const run of this.runs.splice(stay)) run.stop();
     this.columns.replaceChildren(...[...this.columns.children].slice(0, stay));
     this.task = task;
-    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? String(runs.at(-1)));
+    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? `${runs.at(-1)}&seed=${i}`);
     Object.assign(one(this.list, "select"), { selectedIndex: this.tasks.indexOf(task) });
     Object.assign(one(this.beside, "select"), { selectedIndex: n - 1 });
     this.keep();
@@ -1534,8 +1535,12 @@ var Workbench = class {
     const { scene, network: network2, preset, choices } = this.task, root = element("div", { class: "vsp-explorer" }), config = (
       /** @type {Settings & { seed: number }} */
       read(text, preset, choices)
-    ), view = new Explorer(root, scene, { bare: true }), run = new Distiller(view, config, choices, async () => network2, () => this.keep()), copied = element("pre", { class: "vsp-code" });
+    ), net = { name: "the teacher", ...network(network2), results: scene.teacher }, view = new Explorer(root, { ...scene, policies: [
+      /** @type {any} */
+      net
+    ] }, { bare: true }), run = new Distiller(view, config, choices, async () => network2, () => this.keep()), copied = element("pre", { class: "vsp-code" });
     const copy = button("copy as Python", () => {
+      copy.textContent = "copied";
       copied.textContent = python(scene.task.name, run.config, preset);
       navigator.clipboard?.writeText(copied.textContent).catch(() => {
       });

@@ -4,6 +4,7 @@
 import { button, choice, element, one, row, textOf } from "./controls.js"
 import { Distiller, allowed } from "./distiller.js"
 import { Explorer } from "./explorer.js"
+import { network as learnt } from "./model.js"
 
 const MOST = [1, 2, 3, 4] // runs
 
@@ -52,21 +53,21 @@ export class Workbench {
     this.tasks = tasks
     this.task = tasks[0]
     const options = tasks.map(task => ({ name: task.scene.task.name, task }))
-    this.list = choice("task", options, ({ task }) => this.open(task, [""]))
+    this.list = choice("task", options, ({ task }) => this.open(task, [""], this.runs.length))
     root.replaceChildren(row(this.list, this.beside), this.columns)
     // Of the address: "#task/run/run", a run being what differs from the paper
     const [name, ...runs] = location.hash.slice(1).split("/"),
       task = tasks.find(({ scene }) => scene.task.name === name) ?? tasks[0]
     this.open(task, runs.length ? runs : [""])
   }
-  /** Show n runs of a task, the last ones alike; those that are there stay.
+  /** Show n runs of a task; further ones differ by their seeds. Those that are there stay.
    * @param {BenchScene} task @param {string[]} runs */
   open(task, runs, n = Math.min(runs.length, MOST.length)) {
     const stay = task === this.task && runs.join() === this.written().join() ? n : 0
     for (const run of this.runs.splice(stay)) run.stop()
     this.columns.replaceChildren(...[...this.columns.children].slice(0, stay))
     this.task = task
-    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? String(runs.at(-1)))
+    for (let i = this.runs.length; i < n; i++) this.add(runs[i] ?? `${runs.at(-1)}&seed=${i}`)
     Object.assign(one(this.list, "select"), { selectedIndex: this.tasks.indexOf(task) })
     Object.assign(one(this.beside, "select"), { selectedIndex: n - 1 })
     this.keep()
@@ -83,10 +84,12 @@ export class Workbench {
     const { scene, network, preset, choices } = this.task,
       root = element("div", { class: "vsp-explorer" }),
       config = /** @type {Settings & { seed: number }} */ (read(text, preset, choices)),
-      view = new Explorer(root, scene, { bare: true }),
+      net = { name: "the teacher", ...learnt(network), results: scene.teacher },
+      view = new Explorer(root, { ...scene, policies: [/** @type {any} */ (net)] }, { bare: true }),
       run = new Distiller(view, config, choices, async () => network, () => this.keep()),
       copied = element("pre", { class: "vsp-code" })
     const copy = button("copy as Python", () => {
+      copy.textContent = "copied"
       copied.textContent = python(scene.task.name, run.config, preset)
       navigator.clipboard?.writeText(copied.textContent).catch(() => {})
     })
