@@ -700,7 +700,7 @@ function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane 
 function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return "";
   const { n, codewords, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
-${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
+${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nThe new map is random: nobody has trained it yet." : "";
   const cells = count(codewords.length, "cell");
   return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }
@@ -1706,14 +1706,14 @@ var Article = class {
     if (this.section === section && !state && this.entering) return this.entering;
     this.remember();
     Object.assign(this, { section, staging: true });
-    this.distiller?.stop();
+    if (!this.distiller?.run.policy) this.distiller?.stop();
     this.status.textContent = "";
     for (const each of this.sections) each.classList.toggle("active", each === section);
     this.entering = this.stage(section, state ?? this.left[section.id] ?? firstOf(section), put);
     return this.entering;
   }
   /** @param {HTMLElement} section @param {State} state @param {Put} [put] */
-  async stage(section, { policy, at, moment, zoomed = false, numbers }, put) {
+  async stage(section, { policy, at, moment, zoomed = false, numbers, own }, put) {
     const { view, scene } = this;
     const load = (name2) => words(section.dataset.needs).includes(name2) ? this.part(name2) : null;
     const loaded = await Promise.all(
@@ -1731,7 +1731,7 @@ var Article = class {
     view.zoom({ low, high }, moves ? ZOOM : 0);
     view.ring = small && !zoomed ? proof.at : null;
     Object.assign(view, { fixed: Boolean(section.dataset.fixed), starts: !proof, asked: at });
-    view.show(this.policies[policy], numbers);
+    view.show(own && this.distiller?.run.policy || this.policies[policy], numbers);
     if (view.run.length && moment !== void 0) view.replay.to(+moment);
     view.regions = this.same ? this.proved : null;
     this.arrange(section, policy);
@@ -1778,7 +1778,7 @@ var Article = class {
   remember() {
     const { view, zoomed, section } = this;
     if (!section || this.staging) return;
-    const { id = "run" } = view.original, shown = { section: section.id, policy: id, at: view.asked, zoomed }, replayed = section.querySelector("[data-slot=replay]"), numbers = this.same ? void 0 : view.numbers();
+    const { id = "run" } = view.original, shown = { section: section.id, policy: id, at: view.asked, zoomed, own: !view.original.id }, replayed = section.querySelector("[data-slot=replay]"), numbers = this.same ? void 0 : view.numbers();
     this.left[section.id] = { ...shown, ...replayed ? { moment: view.replay.at } : { numbers } };
   }
   /** Remember the scene, and write it into the address: after a gesture, to come back from. */
@@ -1831,10 +1831,8 @@ var Article = class {
   }
   /** @param {HTMLElement} pressed */
   copy(pressed) {
-    const copied = () => pressed.textContent = "link copied";
-    this.status.textContent = location.href;
-    navigator.clipboard?.writeText(location.href).then(copied, () => {
-    });
+    const copied = () => pressed.textContent = "link copied", forbidden = () => this.status.textContent = location.href;
+    (navigator.clipboard?.writeText(location.href) ?? Promise.reject()).then(copied, forbidden);
   }
   // -- What the text says of the picture
   say() {

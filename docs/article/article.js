@@ -138,14 +138,14 @@ class Article {
     if (this.section === section && !state && this.entering) return this.entering
     this.remember()
     Object.assign(this, { section, staging: true })
-    this.distiller?.stop()
+    if (!this.distiller?.run.policy) this.distiller?.stop() // else it goes on
     this.status.textContent = ""
     for (const each of this.sections) each.classList.toggle("active", each === section)
     this.entering = this.stage(section, state ?? this.left[section.id] ?? firstOf(section), put)
     return this.entering
   }
   /** @param {HTMLElement} section @param {State} state @param {Put} [put] */
-  async stage(section, { policy, at, moment, zoomed = false, numbers }, put) {
+  async stage(section, { policy, at, moment, zoomed = false, numbers, own }, put) {
     const { view, scene } = this
     /** @type {<N extends keyof Parts>(name: N) => Promise<Parts[N] | undefined> | null} */
     const load = name => (words(section.dataset.needs).includes(name) ? this.part(name) : null)
@@ -166,7 +166,7 @@ class Article {
     view.zoom({ low, high }, moves ? ZOOM : 0)
     view.ring = small && !zoomed ? proof.at : null
     Object.assign(view, { fixed: Boolean(section.dataset.fixed), starts: !proof, asked: at })
-    view.show(this.policies[policy], numbers)
+    view.show((own && this.distiller?.run.policy) || this.policies[policy], numbers)
     if (view.run.length && moment !== undefined) view.replay.to(+moment)
     view.regions = this.same ? this.proved : null
     this.arrange(section, policy)
@@ -212,8 +212,8 @@ class Article {
   remember() {
     const { view, zoomed, section } = this
     if (!section || this.staging) return
-    const { id = "run" } = view.original, // a reader's own run
-      shown = { section: section.id, policy: id, at: view.asked, zoomed },
+    const { id = "run" } = view.original, // or the run that the reader has made
+      shown = { section: section.id, policy: id, at: view.asked, zoomed, own: !view.original.id },
       replayed = section.querySelector("[data-slot=replay]"),
       numbers = this.same ? undefined : view.numbers()
     this.left[section.id] = { ...shown, ...(replayed ? { moment: view.replay.at } : { numbers }) }
@@ -273,9 +273,9 @@ class Article {
   }
   /** @param {HTMLElement} pressed */
   copy(pressed) {
-    const copied = () => (pressed.textContent = "link copied")
-    this.status.textContent = location.href // where a browser forbids to copy
-    navigator.clipboard?.writeText(location.href).then(copied, () => {})
+    const copied = () => (pressed.textContent = "link copied"),
+      forbidden = () => (this.status.textContent = location.href)
+    ;(navigator.clipboard?.writeText(location.href) ?? Promise.reject()).then(copied, forbidden)
   }
 
   // -- What the text says of the picture

@@ -27,5 +27,6 @@ type State = {
   moment?: number | string
   zoomed?: boolean
   numbers?: Partial<Numbers>
+  own?: boolean // whether it shows the run that the reader has made
 }
 type Put = typeof history.pushState

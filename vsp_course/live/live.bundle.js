@@ -696,7 +696,7 @@ function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane 
 function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return "";
   const { n, codewords, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
-${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : "";
+${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nThe new map is random: nobody has trained it yet." : "";
   const cells = count(codewords.length, "cell");
   return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
 }

@@ -39,7 +39,7 @@ export function momentOf({ run, replay: { at }, original: { limits } }) {
     since = last && last.n < n ? `, since iteration ${last.n}` : "",
     why = last?.events.map(event => `\n${causeOf(event, limits)}`).join("") ?? "",
     fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"),
-    untrained = fresh ? "\nA new map is untrained: if its cell is large, many starts fail." : ""
+    untrained = fresh ? "\nThe new map is random: nobody has trained it yet." : ""
   const cells = count(codewords.length, "cell")
   return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`
 }
