@@ -1,4 +1,4 @@
-"""Write docs/article.html, one file that opens from disk, and docs/article.png, its picture for the README.
+"""Write docs/article.html, one file that opens from disk, and its picture for the README, still and moving.
 
     make article
 
@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import yaml
-from stills import stills
+from stills import moving, stills
 
 from data import cuts, longer, parts, policies
 from vsp import VoronoiPolicy
@@ -118,3 +118,4 @@ if __name__ == "__main__":
     docs = Path(sys.argv[1]) / "docs"
     atomic.write_text(docs / "article.html", page(parts(), pictures))
     atomic.write_bytes(docs / "article.png", pictures["opening"][0])
+    atomic.write_bytes(docs / "article.gif", moving())

@@ -1,7 +1,8 @@
-"""A picture of each section of the article, for readers without JavaScript and for paper, with an alternative text."""
+"""A picture of each section of the article, for readers without JavaScript and for paper; one moves, for the README."""
 
 from __future__ import annotations
 
+import functools
 import io
 from collections.abc import Callable
 
@@ -9,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -22,11 +24,12 @@ from vsp.show.explorer.scene import starts_of
 from vsp.tasks.simplegoal import TASK
 
 WIDTH, PIXELS = 3.2, 880  # inches and pixels: shown 440 pixels wide, a type of 8 points is 15 pixels high
-OPENING = 4.4  # inches: it is the README's picture too, twice as wide and as fine
-N_COLOURS = 24  # of the palette of a PNG
+OPENING = 4.4  # inches: it is the README's picture too, wider and finer
+N_COLOURS = 24  # of the palette of a PNG; what moves has twice as many
 N_GRID = 403  # points on an axis: few lie on a border, where cells are tied
 WAYS = np.array([[0.95, 0.62], [0.62, 0.95], [0.85, 0.85]])  # starts of the teacher's ways
 HALFWAY = 4  # steps of the walkers
+STEP, REST = 450, 2500  # milliseconds: of a step, and at the end
 MOMENTS = (0, 20, 40, 4999)  # iterations of the run
 SLIVER, ENLARGED = ((0.499, 0.503), (0.497, 0.501)), 250  # x and y of what is enlarged, and how many times
 DECIMALS = {"paper": 4, "margin": 5}  # of the areas that fail, in percent, as in the text
@@ -41,40 +44,60 @@ def stills() -> dict[str, tuple[bytes, str]]:
     made = {}
     for name, make in makers.items():
         figure, alt = make()
-        made[name] = _png(figure, (2 if name == "opening" else 1) * PIXELS), alt
+        made[name] = _png(figure, PIXELS * 3 // 2 if name == "opening" else PIXELS), alt
     return made
 
 
-def _opening() -> tuple[Figure, str]:
-    policy, said = data.policies()["faithful_3"], []
-    fig, axes = _boards(2, height=3.05, width=OPENING)
-    says = data.says()
+def moving() -> bytes:
+    """Return the picture of the opening as a GIF that moves: a step a frame, a rest at the end, and again."""
+    n_steps = max(len(way) for ways in _walks() for way in ways) - 1
+    frames = np.stack([_pixels(_opening(step)[0], PIXELS) for step in range(n_steps + 1)])
+    indices, palette = _few_colours(frames, 2 * N_COLOURS)
+    first, *others = [Image.fromarray(each) for each in indices]
+    first.putpalette(palette)
+    for image in others:
+        image.putpalette(palette)
+    file, times = io.BytesIO(), [STEP] * n_steps + [REST]
+    first.save(file, "gif", save_all=True, append_images=others, duration=times, loop=0, optimize=False)
+    return file.getvalue()
+
+
+def _opening(step: int = HALFWAY) -> tuple[Figure, str]:
+    fig, axes = _boards(2, height=3.4, width=OPENING)
+    policy, says, said = data.policies()["faithful_3"], data.says(), []
     names = f"network: {says['weights']:,} numbers", f"3 pairs of equations: {says['three_numbers']} numbers"
     _tiles(axes[1], policy)
-    for ax, each, name, colour in zip(axes, (data.teacher(), policy), names, (style.TEACHER, "black")):
-        there = 0
-        for episode in vsp.collect_episodes(each, TASK, starts_of(TASK)):
-            way = np.concatenate([episode.states, TASK.step(episode.states[-1:], episode.actions[-1:])[0]])
-            there += len(way) <= HALFWAY + 1
-            way = way[: HALFWAY + 1][-2:]
-            ax.plot(*way.T, color=colour, lw=0.4, alpha=0.5, zorder=3)
-            ax.plot(*way[-1], ls="", marker=".", ms=3.4, mew=0, color=colour, zorder=4)
-        said.append(there)
+    for ax, ways, name, colour in zip(axes, _walks(), names, (style.TEACHER, "black")):
+        walked = [way[: step + 1][-2:] for way in ways]
+        ax.add_collection(LineCollection(walked, color=colour, lw=0.4, alpha=0.5, zorder=3), autolim=False)
+        ax.plot(*np.transpose([way[-1] for way in walked]), ls="", marker=".", ms=3.4, mew=0, color=colour, zorder=4)
+        said.append(sum(len(way) <= step + 1 for way in ways))
         ax.set_title(name, loc="left", fontsize=8)
         for place, xy in {"pit": (0.5, 0.48), "goal": (0.075, 0.115)}.items():
             halo = [patheffects.withStroke(linewidth=2.5, foreground="white")]
             ax.text(*xy, place, ha="center", fontsize=8, zorder=5, path_effects=halo)
-    for i, colour in enumerate(style.CELLS[: len(policy)]):
-        y = 0.165 - 0.064 * i
-        fig.add_artist(Rectangle((0.012, y - 0.03), 0.976, 0.06, color=_pale(colour)))
-        for x, text in zip((0.03, 0.52), policy.equations(i)):
-            fig.text(x, y, text.replace("-", "−"), fontsize=8, va="center")
-    fig.get_layout_engine().set(rect=(0, 0.195, 1, 0.795), h_pad=0.02)
+    for i, (codeword, colour) in enumerate(zip(policy.codewords, style.CELLS)):
+        y = 0.245 - 0.095 * i
+        fig.add_artist(Rectangle((0.012, y - 0.045), 0.976, 0.09, color=_pale(colour)))
+        fig.text(0.03, y, "nearest to ({:.2f}, {:.2f})".format(*codeword), fontsize=8, va="center")
+        equations = "\n".join(policy.equations(i)).replace("-", "−")
+        fig.text(0.52, y, equations, fontsize=8, va="center", linespacing=1.25)
+    fig.get_layout_engine().set(rect=(0, 0.295, 1, 0.695), h_pad=0.02)
     return fig, (
         "Two squares with goal and pit. 400 dots walk to the goal and around the pit, left led by a network, right by "
-        f"three pairs of equations in the colours of their cells. After {HALFWAY} steps {said[0]} and {said[1]} are at "
-        "the goal."
+        "three pairs of equations in the colours of their cells, each with the state it is nearest to. "
+        f"After {step} steps {said[0]} and {said[1]} are at the goal."
     )
+
+
+@functools.cache
+def _walks() -> list[list[np.ndarray]]:
+    """Return the ways of the network and of the three pairs of equations from each start. Of each (n_steps + 1, 2)"""
+    policies = data.teacher(), data.policies()["faithful_3"]
+    return [
+        [np.vstack([one.states, TASK.step(one.states[-1:], one.actions[-1:])[0]]) for one in episodes]
+        for episodes in (vsp.collect_episodes(policy, TASK, starts_of(TASK)) for policy in policies)
+    ]
 
 
 def _teacher() -> tuple[Figure, str]:
@@ -246,17 +269,27 @@ def _legend(fig: Figure, ax: Axes) -> None:
     fig.legend([*named.values()], [*named], frameon=False, loc="outside lower center", ncol=2 + (len(named) == 3))
 
 
-def _png(figure: Figure, pixels: int) -> bytes:
-    """Return a figure as a PNG with its most frequent colours, and close it. What it says is drawn in these."""
-    drawn, small = io.BytesIO(), io.BytesIO()
+def _pixels(figure: Figure, pixels: int) -> np.ndarray:
+    """Draw a figure so many pixels wide and close it. (height, pixels, 3)"""
+    drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=pixels / figure.get_figwidth(), metadata={"Software": None})
     plt.close(figure)
-    shown = np.asarray(Image.open(drawn).convert("RGB")).astype(int)
+    return np.asarray(Image.open(drawn).convert("RGB"))
+
+
+def _few_colours(shown: np.ndarray, n: int) -> tuple[np.ndarray, bytes]:
+    """Return what is drawn in its n most frequent colours, as their indices, and these colours."""
     codes, places, counts = np.unique(shown @ [1 << 16, 1 << 8, 1], return_inverse=True, return_counts=True)
     colours = np.column_stack([codes >> 16, codes >> 8 & 255, codes & 255])
-    palette = colours[np.argsort(-counts, kind="stable")[:N_COLOURS]]
-    nearest = np.square(colours[:, None] - palette).sum(axis=2).argmin(axis=1)
-    image = Image.fromarray(nearest[places].reshape(shown.shape[:2]).astype(np.uint8))
-    image.putpalette(palette.astype(np.uint8).tobytes())
+    palette = colours[np.argsort(-counts, kind="stable")[:n]]
+    nearest = np.square(colours[:, None] - palette).sum(axis=2).argmin(axis=1).astype(np.uint8)
+    return nearest[places].reshape(shown.shape[:-1]), palette.astype(np.uint8).tobytes()
+
+
+def _png(figure: Figure, pixels: int) -> bytes:
+    """Return a figure as a PNG with its most frequent colours, and close it."""
+    indices, palette = _few_colours(_pixels(figure, pixels), N_COLOURS)
+    image, small = Image.fromarray(indices), io.BytesIO()
+    image.putpalette(palette)
     image.save(small, "png", optimize=True)
     return small.getvalue()

@@ -14,8 +14,13 @@ from docutils import nodes
 from mathematics import mathml
 from PIL import Image
 
+from vsp.show.captions import caption_of
+
 _IMAGE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 _MATH = re.compile(r"\$([^$]+)\$")
+_LINES = """teacher_returns distillation_history simplegoal_returns run_means mountaincar_returns ledger whisker_bounds
+    hidden_reached hidden_questions beyond/what_cells_buy beyond/map beyond/likeness beyond/limit_cells beyond/rivals
+    beyond/ablation beyond/limit_robots""".split()  # charts of lines and points, which a dark page inverts
 _NUMBER = re.compile(r"[-−+±]?[\d.,]+(e[-+]\d+)?( ?%)?(\sto\s[-−]?[\d.,]+)?|nan|NaN|inf|True|False|[–—]|")
 
 
@@ -69,6 +74,8 @@ def _picture(tag, image: bytes, folder: Path, top: str) -> None:
         return
     width, height = Image.open(io.BytesIO(image)).size
     shown = int(tag.get("width", width))
+    if tag.get("alt") in {caption_of("figures", each).alt for each in _LINES}:
+        tag["class"] = [*tag.get("class", []), "lines"]
     tag.attrs |= {"src": name, "width": shown, "height": round(shown * height / width), "loading": "lazy"}
     link = BeautifulSoup("", "html.parser").new_tag("a", href=name, attrs={"class": "full-size"})
     (tag.find_parent("picture") or tag).wrap(link)
