@@ -243,18 +243,15 @@ GAPS = pd.DataFrame(
 )
 
 
-def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict_and_subject(ax):
+def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
     ledger_gaps(ax, GAPS, band=2**0.5, limit=20)
-    shown = [dots for dots in ax.collections if len(dots.get_offsets())]
-    assert [dots.get_offsets().tolist() for dots in shown] == [[[0.5, 0]], [[-1.2, 3]], [[-20, 1]], [[12, 2]]]
-    colours = [style.TEACHER, style.DISTILLED, style.TEACHER, style.DISTILLED]
-    assert [hexes(dots.get_edgecolors()) for dots in shown] == [[colour] for colour in colours]
-    assert [hexes(dots.get_facecolors()) == ["#ffffff"] for dots in shown] == [False, True, False, False]
-    named = {dots.get_label(): dots for dots in ax.collections if not len(dots.get_offsets())}  # for the legend
-    assert list(named) == ["reproduced", "cannot be told", "differs", "contradicts itself"]
-    for dots, same in zip(shown, named.values(), strict=True):
-        assert dots.get_paths()[0].vertices.tolist() == same.get_paths()[0].vertices.tolist()
-    assert [text.get_text() for text in ax.texts] == ["−300"] and ax.get_xlim() == pytest.approx((-22, 22))
+    dots, names = ax.get_legend_handles_labels()
+    assert names == ["reproduced", "cannot be told", "differs", "contradicts itself"]
+    assert [line.get_xydata().tolist() for line in dots] == [[[0.5, 0]], [[-1.2, 3]], [[-20, 1]], [[12, 2]]]
+    assert [line.get_mfc() for line in dots] == ["black", "white", "black", "black"]
+    assert len({(line.get_marker(), line.get_mfc()) for line in dots}) == 4 and ax.lines[1].get_ydata() == [1.5, 1.5]
+    assert [text.get_text() for text in ax.texts] == ["−300"] and ax.texts[0].xy == pytest.approx((-22, 1))
+    assert ax.get_xlim() == pytest.approx((-22, 22))
     assert labels(ax) == ["mean", "std", "q1", "max"] and ax.get_ylim() == (3.5, -0.5)
     assert ax.patches[0].get_bbox().x1 == pytest.approx(2**0.5)
 

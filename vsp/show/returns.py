@@ -6,12 +6,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from .style import DISTILLED, OTHER, TEACHER
+from .style import DISTILLED, TEACHER
 
-_VERDICTS = {  # marker, and whether it is filled
-    "reproduced": ("o", True), "cannot be told": ("o", False), "differs": ("D", True), "contradicts itself": ("X", True)
-}  # fmt: skip
-_SUBJECTS = {"teacher": TEACHER, "distilled": DISTILLED}
+_VERDICTS = {"reproduced": "o", "cannot be told": "o", "differs": "D", "contradicts itself": "X"}
 
 
 def box_plot(ax: Axes, returns: dict[str, np.ndarray]) -> None:
@@ -79,19 +76,19 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
 def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> None:
     """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value.
 
-    `frame` (index: names) has the columns subject (its colour), verdict (its marker) and gap. Values inside the shaded
-    `band` count as reproduced. A gap beyond `limit` is a number at the edge.
+    `frame` (index: names) has the columns subject (a line divides them), verdict (its marker) and gap. Values inside
+    the shaded `band` count as reproduced. A gap beyond `limit` is a number with an arrow.
     """
     ax.axvspan(-band, band, color="0.9", lw=0)
     ax.axvline(0, color="0.6", lw=0.6)
     ax.axhline((frame["subject"] == "teacher").sum() - 0.5, color="0.6", lw=0.6)
-    gaps, colours = frame["gap"].clip(-limit, limit).to_numpy(), frame["subject"].map(_SUBJECTS).to_numpy()
-    for verdict, (marker, filled) in _VERDICTS.items():
-        rows, look = np.flatnonzero(frame["verdict"] == verdict), {"marker": marker, "s": 16, "lw": 0.8, "zorder": 3}
-        ax.scatter(gaps[rows], rows, edgecolor=colours[rows], color=colours[rows] if filled else "white", **look)
-        ax.scatter([], [], edgecolor=OTHER, color=OTHER if filled else "white", label=verdict, **look)
+    gaps = frame["gap"].clip(-limit, limit).to_numpy()
+    for verdict, marker in _VERDICTS.items():
+        rows, face = np.flatnonzero(frame["verdict"] == verdict), "white" if verdict == "cannot be told" else "black"
+        ax.plot(gaps[rows], rows, marker, color="black", mfc=face, ms=4.5, mew=0.8, label=verdict)
     for row in np.flatnonzero(gaps != frame["gap"]):
         text = f"{frame['gap'].iloc[row]:.0f}".replace("-", "−")
-        ax.text(0.9 * gaps[row], row, text, va="center", ha="left" if gaps[row] < 0 else "right", fontsize=7)
+        look = {"va": "center", "ha": "left" if gaps[row] < 0 else "right", "arrowprops": {"arrowstyle": "->"}}
+        ax.annotate(text, (1.1 * gaps[row], row), (0.88 * gaps[row], row), fontsize=7, **look)
     places = {"yticks": np.arange(len(frame)), "yticklabels": frame.index, "ylim": (len(frame) - 0.5, -0.5)}
     ax.set(xlim=(-1.1 * limit, 1.1 * limit), **places)
