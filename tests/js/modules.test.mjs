@@ -131,8 +131,8 @@ test("what is said of results and changes", () => {
       texts.resultOf({ policy: {}, scene: { ...told.scene, lost: [], teacher: null }, results: { ...results, played: 1 } }),
       "mean return about −1.50.",
     ],
-    [texts.causeOf(split), `split ${where}loss 0.0123`],
-    [texts.causeOf(split, { max_pol_loss: 0.01 }), `split ${where}loss 0.0123, above 0.01`],
+    [texts.causeOf(split), `split ${where}loss 0.0123; the new map was untrained`],
+    [texts.causeOf(split, { max_pol_loss: 0.01 }), `split ${where}loss 0.0123, above 0.01; the new map was untrained`],
     [texts.causeOf(merge, { min_param_distance: 0.02 }), `merge ${where}maps differ by 0.0123, below 0.02`],
   ])
     assert.equal(said, expected)

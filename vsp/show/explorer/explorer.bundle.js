@@ -504,15 +504,18 @@ function tick(low, range, share) {
   return String(+(low + share * range).toFixed(digits2)).replace("-", "−");
 }
 function drawMap(view, n) {
-  const { picture, scene, policy } = view, cells = new Int16Array(n * n), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer), bent = !straight(view), tints = tintsOf(view), by = [...Array(129).keys()].map((i) => (i - 64) / 64), pushes = by.map((by2) => shades(view, by2 < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by2)));
+  const { picture, scene, policy } = view, cells = new Int16Array(n * n), image = new ImageData(n, n), pixels = new Uint32Array(image.data.buffer), tints = tintsOf(view), { far } = (
+    /** @type {Linear} */
+    policy
+  ), by = [...Array(129).keys()].map((i) => (i - 64) / 64), hues = by.map((by2) => shades(view, by2 < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by2))), bent = !straight(view);
   for (let at = 0; at < n * n; at++) {
-    const seen = view.task.see(picture.middle(at, n)), cell = cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER);
-    let hue = tints[cell];
+    const seen = view.task.see(picture.middle(at, n)), cell = cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER), tied = far?.findLastIndex((each) => Math.abs(each - far[cell]) < ON_BORDER), striped = Math.floor((at % n + Math.floor(at / n)) * 50 / n) % 2;
+    let hue = tints[striped && tied || cell];
     if (scene.task.outputs.length === 1 && !policy.layers) {
       const push = raw(policy.coefficients[cell], seen, 0);
-      hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
+      hue = hues[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))];
     }
-    const edge = at % n && cells[at - 1] !== cell || at >= n && cells[at - n] !== cell, [red, green, blue] = hue[edge && bent ? 2 : Number(view.cells > 1 && cell === view.marked)];
+    const edge = at % n && cells[at - 1] !== cell || at >= n && cells[at - n] !== cell, [red, green, blue] = hue[edge && bent ? 2 : +(view.cells > 1 && cell === view.marked)];
     pixels[at] = 255 << 24 | blue << 16 | green << 8 | red;
   }
   picture.map.width = picture.map.height = n;
@@ -633,15 +636,15 @@ function episodeOf({ policy, cell, cells, asked, played, task, picture: { plane 
 function momentOf({ run, replay: { at }, original: { limits } }) {
   if (!run.length) return "";
   const { n, codewords, loss } = run[at], last = run.slice(0, at + 1).findLast(({ events }) => events.length), lossy = loss === void 0 ? "" : `, loss ${loss.toPrecision(2)}`, since = last && last.n < n ? `, since iteration ${last.n}` : "", why = last?.events.map((event) => `
-${causeOf(event, limits)}`).join("") ?? "", fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"), untrained = fresh ? "\nThe new map is random: nobody has trained it yet." : "";
+${causeOf(event, limits)}`).join("") ?? "";
   const cells = count(codewords.length, "cell");
-  return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`;
+  return `iteration ${n}: ${cells}${lossy}${since}${why}`;
 }
 function causeOf({ kind, codeword, cause }, limits = {}) {
   const { max_pol_loss: most, min_param_distance: least } = limits, at = `${kind} at (${codeword.map((value) => minus(value.toFixed(2))).join(", ")})`, found = cause.toPrecision(3);
   if (kind === "merge")
     return `${at}: maps differ by ${found}${least ? `, below ${least}` : ""}`;
-  return `${at}: loss ${found}${most ? `, above ${most}` : ""}`;
+  return `${at}: loss ${found}${most ? `, above ${most}` : ""}; the new map was untrained`;
 }
 function answerOf({ scene, policy, cell, cells }, seen) {
   if (policy.layers) return [];

@@ -214,20 +214,23 @@ function drawMap(view, n) {
     cells = new Int16Array(n * n),
     image = new ImageData(n, n),
     pixels = new Uint32Array(image.data.buffer),
-    bent = !straight(view),
     tints = tintsOf(view),
+    { far } = /** @type {Linear} */ (policy),
     by = [...Array(129).keys()].map(i => (i - 64) / 64),
-    pushes = by.map(by => shades(view, by < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by)))
+    hues = by.map(by => shades(view, by < 0 ? LEFT : RIGHT, 0.7 * Math.abs(by))),
+    bent = !straight(view)
   for (let at = 0; at < n * n; at++) {
     const seen = view.task.see(picture.middle(at, n)),
-      cell = (cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER))
-    let hue = tints[cell]
+      cell = (cells[at] = policy.layers ? 0 : cellOf(policy, seen, ON_BORDER)),
+      tied = far?.findLastIndex(each => Math.abs(each - far[cell]) < ON_BORDER), // so stripes
+      striped = Math.floor((((at % n) + Math.floor(at / n)) * 50) / n) % 2
+    let hue = tints[(striped && tied) || cell]
     if (scene.task.outputs.length === 1 && !policy.layers) {
       const push = raw(policy.coefficients[cell], seen, 0)
-      hue = pushes[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))]
+      hue = hues[Math.round(64 + 64 * clip(push / scene.task.actionHigh[0], -1, 1))]
     }
     const edge = (at % n && cells[at - 1] !== cell) || (at >= n && cells[at - n] !== cell),
-      [red, green, blue] = hue[edge && bent ? 2 : Number(view.cells > 1 && cell === view.marked)]
+      [red, green, blue] = hue[edge && bent ? 2 : +(view.cells > 1 && cell === view.marked)]
     pixels[at] = (255 << 24) | (blue << 16) | (green << 8) | red
   }
   picture.map.width = picture.map.height = n

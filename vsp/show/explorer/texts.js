@@ -37,11 +37,9 @@ export function momentOf({ run, replay: { at }, original: { limits } }) {
     last = run.slice(0, at + 1).findLast(({ events }) => events.length),
     lossy = loss === undefined ? "" : `, loss ${loss.toPrecision(2)}`,
     since = last && last.n < n ? `, since iteration ${last.n}` : "",
-    why = last?.events.map(event => `\n${causeOf(event, limits)}`).join("") ?? "",
-    fresh = last?.n === n && last.events.some(({ kind }) => kind === "split"),
-    untrained = fresh ? "\nThe new map is random: nobody has trained it yet." : ""
+    why = last?.events.map(event => `\n${causeOf(event, limits)}`).join("") ?? ""
   const cells = count(codewords.length, "cell")
-  return `iteration ${n}: ${cells}${lossy}${since}${why}${untrained}`
+  return `iteration ${n}: ${cells}${lossy}${since}${why}`
 }
 
 /** What caused a split or a merge; `limits`: the thresholds, where known.
@@ -52,7 +50,7 @@ export function causeOf({ kind, codeword, cause }, limits = {}) {
     found = cause.toPrecision(3)
   if (kind === "merge")
     return `${at}: maps differ by ${found}${least ? `, below ${least}` : ""}`
-  return `${at}: loss ${found}${most ? `, above ${most}` : ""}`
+  return `${at}: loss ${found}${most ? `, above ${most}` : ""}; the new map was untrained`
 }
 
 /** Why the policy acts so in the chosen state: its cell, the action, what each input adds.

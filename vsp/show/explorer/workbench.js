@@ -89,7 +89,6 @@ export class Workbench {
       run = new Distiller(view, config, choices, async () => network, () => this.keep()),
       copied = element("pre", { class: "vsp-code" })
     const copy = button("copy as Python", () => {
-      copy.textContent = "copied"
       copied.textContent = python(scene.task.name, run.config, preset)
       navigator.clipboard?.writeText(copied.textContent).catch(() => {})
     })
