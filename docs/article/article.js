@@ -298,7 +298,7 @@ class Article {
       done = !failures && played === this.scene.starts.length && section.id === "you"
     one(scale, ".own").style.setProperty("--score", String(mean))
     scale.classList.toggle("near", done)
-    won.textContent = done ? (mean > Number(won.dataset.aim) + 5e-4 ? BEATEN : WON) : ""
+    won.textContent = done ? (mean.toFixed(3) > String(won.dataset.aim) ? BEATEN : WON) : ""
   }
 }
 

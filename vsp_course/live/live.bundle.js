@@ -615,7 +615,7 @@ function drawAll(view, points) {
   const { picture, scene, task } = view;
   picture.begin();
   drawCells(view, points);
-  const path = view.played.states.map(view.place), { paper, ink, failing, start } = picture.tones;
+  const path = view.played.states.slice(0, 250).map(view.place), { paper, ink, failing, start } = picture.tones;
   task.places.forEach((place) => picture.place(place));
   if (view.regions) picture.polygons(view.regions, failing);
   if (scene.task.outputs.length === 2) drawArrows(view);
@@ -848,7 +848,7 @@ var Explorer = class {
     ), focus = root.contains(active) && active;
     root.classList.add("vsp-explorer");
     this.drawing = element("div", { class: "vsp-drawing", "data-task": scene.task.name });
-    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), parts = [this.answer, this.form, this.backs, this.note, this.replay.row], panel = element("div", { class: "vsp-panel" }, ...parts), seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend], stage = element("div", { class: "vsp-stage" }, ...seen);
+    const shown = scene.policies.find(({ name: name2 }) => name2 === first.policy) ?? scene.policies[0], take = (policy2) => (this.show(policy2), this.settle()), policy = choice("policy", scene.policies, take, shown), lists = row(...hooks.above ?? [], policy), seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend], stage = element("div", { class: "vsp-stage" }, ...seen), parts = [this.said, this.answer, this.form, this.backs, this.note, this.replay.row], panel = element("div", { class: "vsp-panel" }, ...hooks.bare ? [] : parts);
     root.replaceChildren(...hooks.bare ? [stage] : [lists, stage, panel]);
     if (focus) (focus.isConnected ? focus : this.canvas).focus();
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas);

@@ -95,10 +95,10 @@ export class Explorer {
       take = (/** @type {Policy} */ policy) => (this.show(policy), this.settle()),
       policy = choice("policy", scene.policies, take, shown),
       lists = row(...(hooks.above ?? []), policy),
-      parts = [this.answer, this.form, this.backs, this.note, this.replay.row],
-      panel = element("div", { class: "vsp-panel" }, ...parts), // bare, the page takes them out
       seen = [this.canvas, this.drawing, this.said, this.replay.line, this.legend],
-      stage = element("div", { class: "vsp-stage" }, ...seen)
+      stage = element("div", { class: "vsp-stage" }, ...seen),
+      parts = [this.said, this.answer, this.form, this.backs, this.note, this.replay.row],
+      panel = element("div", { class: "vsp-panel" }, ...(hooks.bare ? [] : parts))
     root.replaceChildren(...(hooks.bare ? [stage] : [lists, stage, panel]))
     if (focus) (focus.isConnected ? focus : this.canvas).focus()
     new ResizeObserver(() => this.waiting || this.draw()).observe(this.canvas)

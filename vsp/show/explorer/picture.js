@@ -293,7 +293,7 @@ export function drawAll(view, points) {
   const { picture, scene, task } = view
   picture.begin()
   drawCells(view, points)
-  const path = view.played.states.map(view.place),
+  const path = view.played.states.slice(0, 250).map(view.place), // more are a blob
     { paper, ink, failing, start } = picture.tones
   task.places.forEach(place => picture.place(place))
   if (view.regions) picture.polygons(view.regions, failing)

@@ -94,8 +94,8 @@ export class Workbench {
     })
     view.fixed = true
     run.row.firstElementChild?.append(copy)
-    const panel = element("div", { class: "vsp-panel" }, run.row, copied, view.replay.row)
-    root.append(panel)
+    const parts = [run.row, copied, view.replay.row, view.replay.line]
+    root.append(element("div", { class: "vsp-panel" }, ...parts))
     this.columns.append(root)
     this.runs.push(run)
   }
