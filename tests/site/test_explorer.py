@@ -93,12 +93,12 @@ def test_it_says_what_a_gesture_did_and_takes_it_back(shown):
 
 def test_a_number_can_be_written_while_the_state_changes_its_cell(shown):
     """The first digits move the codeword away from the state; the field stays until the reader leaves it."""
-    field, stage = shown.root.get_by_label("codeword: x"), shown.root.locator(".vsp-stage")
-    (cell,) = re.findall(r"Cell \d+", stage.inner_text())
+    field, said = shown.root.get_by_label("codeword: x"), shown.root.locator("b", has_text="one of")
+    (cell,) = re.findall(r"Cell \d+", said.inner_text())
     field.fill("")
     field.press_sequentially("-5.25")
     shown.page.wait_for_timeout(400)
-    assert cell not in stage.inner_text() and field.input_value() == "-5.25"
+    assert cell not in said.inner_text() and field.input_value() == "-5.25"
     text = shown.after(lambda: field.press("Tab") or shown.canvas.focus())[1]
     assert len({*re.findall(r"Cell (\d+)", text)}) == 1
 
