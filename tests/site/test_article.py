@@ -1,5 +1,6 @@
 """The article in Chromium, on the site and as a file from disk: every gesture answers, every address leads back."""
 
+import re
 import statistics
 from pathlib import Path
 
@@ -251,6 +252,20 @@ def test_a_finger_drags_a_number_and_one_undo_takes_it_back(shown):
     article.press("undo")
     article.rest()
     assert result.inner_text().partition(" →")[2].startswith(" 52 of") and before.startswith("52 of")
+
+
+def test_a_run_of_ones_own_goes_on_elsewhere_and_is_there_again(shown):
+    article = shown()
+    article.to("cells")
+    article.press("distil")
+    article.page.locator(".vsp-said", has_text=re.compile(r"iteration [1-9]\d*: .*, loss")).wait_for()
+    noted = article.section.locator("[data-slot=distil] [role=status]")
+    before = int(re.search(r"\d+", noted.inner_text())[0])
+    article.to("fails")
+    assert "19 of 400 fail" in article.page.locator(".vsp-result").inner_text()
+    article.to("cells")
+    assert ", loss" in article.page.locator(".vsp-said").inner_text()  # the stored run tells none
+    assert int(re.search(r"\d+", noted.inner_text())[0]) > before
 
 
 def test_what_cannot_be_loaded_is_told_and_asked_for_again(browser, address):
