@@ -4,7 +4,7 @@
 # files have the times of the checkout, so outputs are never compared with inputs: a fresh clone makes everything.
 
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables # in an order in which no core waits
-BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents
+BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents 12_drone
 NOTEBOOKS := $(sort $(PAPER) $(BEYOND))
 USE_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SUMMARIES := data/results/SimpleGoal-v0.csv data/results/MountainCarContinuous-v0.csv
@@ -47,7 +47,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-train-site-test
-.PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents proofs course article site test \
+.PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents drone proofs course article site test \
   test-js test-long test-tries lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
@@ -104,6 +104,8 @@ hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGE
 	$(PY) -m studies.make_study --agent="$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
 agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable
 	$(PY) -m studies.zoo "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
+drone: begin venv ##- flies our drone's network and maps of it, or the network that flew with AGENT=actor.h, into data/beyond/: 10 minutes
+	$(PY) -m studies.drone --agent="$$AGENT" --out="$$OUT" --jobs="$$JOBS"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable

@@ -16,7 +16,7 @@ from vsp.tasks.registry import get_task
 from vsp.teachers.actors import part_of
 from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
 
-from . import robots, training  # noqa: F401  # robots' tasks are registered
+from . import drone_teacher, robots, training  # noqa: F401  # robots' tasks are registered
 from .recipes import RECIPES, Recipe
 
 PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # a card names their versions
@@ -115,6 +115,7 @@ def main() -> None:
     else:
         for task in RECIPES:
             export(task, training.train(task, seed=SEED, cache=arguments.cache), arguments.out)
+        drone_teacher.export(drone_teacher.train(), Path(arguments.out))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,146 @@
+"""`make drone [AGENT=actor.h]`: one linear map of what flies, and how both fly: rows into data/beyond/.
+
+Without AGENT it is our own teacher. With the file of the network that flew (`vsp_beyond.drone.flown`), only measured
+rows come of it, with the file's checksum; no number of the file, and no map fitted to it, is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from vsp.evaluation import r_squared
+from vsp.protocol import Job, job
+from vsp.protocol.intervals import crossed_interval
+from vsp.protocol.job import provenance
+from vsp.run import command
+from vsp.teachers.teacher import SHIPPED, load_teacher
+from vsp_beyond.drone import flights, imitation
+from vsp_beyond.drone.flights import BODIES, EASY, HARD, PUSH, command_of, fly
+from vsp_beyond.drone.flown import Flown
+from vsp_beyond.drone.quadrotor import CRAZYFLIE, quadrotor
+
+from .committed import read_results, write_results
+
+N, START_SEED, PUSH_SEED = 300, 1000, 1001  # flights of each kind, from starts of their own
+TEACHER = SHIPPED / "Quadrotor-v0.safetensors"
+WAYS = {"one map": {}, "that only imitates": {"calm": False}, "without past commands": {"calm": False, "memory": False}}
+SEEDS = {"network": range(1), **dict.fromkeys(WAYS, range(3)), "one map": range(10)}
+WHOLE = ("network", "one map")  # under all conditions; the others as built, from the easier starts
+CONDITIONS = (*BODIES, "push of .5 m/s")
+KINDS = ("kept", "distance", "change")
+
+
+def own_teacher():
+    """Return our own network of the 16 inputs."""
+    return load_teacher(TEACHER, quadrotor())
+
+
+@dataclass(frozen=True)
+class Measured(Job):
+    """The flights of a network, or of one map of a seed: under all conditions, or as built from the easier starts."""
+
+    agent: str  # the file of the network that flew; "": ours
+    flies: str
+    seed: int
+    kind = "Drone"
+    task = "Quadrotor-v0"
+
+    @cached_property
+    def network(self) -> tuple[flights.Command, str, int]:
+        """How the network flies, its digest, and how many numbers it has."""
+        if self.agent:
+            flown = Flown(self.agent)
+            return flown.command, flown.digest, flown.numbers
+        own = own_teacher()
+        return command_of(own), own.digest, sum(part.size for layer in own.layers for part in layer)
+
+    @property
+    def provenance(self) -> dict[str, str | int]:
+        """The network, and what decides the rest."""
+        settings = {"flies": self.flies, "flights": [N, START_SEED, PUSH_SEED], "conditions": CONDITIONS}
+        return provenance(settings, self.network[1], imitation.VERSION)
+
+    def make(self) -> tuple[dict, dict]:
+        """Fit the map, and fly."""
+        theirs, _, numbers = self.network
+        if self.flies == "network":
+            ours, r2 = theirs, 1.0
+        else:
+            policy = imitation.one_map(theirs, seed=self.seed, progress=False, **WAYS[self.flies])
+            numbers, ours = int(np.count_nonzero(policy.coefficients)), command_of(policy)
+            r2 = _r2(ours, theirs)
+        loops = {name: imitation.radius_at_rest(ours, body) for name, body in BODIES.items()}
+        radii = {name: radius if np.isfinite(radius) else None for name, radius in loops.items()}  # JSON has no NaN
+        made = [_flights(ours, name, starts) for name, starts in conditions(self.flies)]
+        arrays = {kind: np.stack([getattr(one, kind) for one in made]) for kind in KINDS}
+        return arrays, {"numbers": numbers, "r2": r2, "radii": radii}
+
+
+def conditions(flies: str) -> list[tuple[str, flights.Starts]]:
+    """Return the conditions and the limits of starts under which something flies."""
+    names, starts = (CONDITIONS, EASY + HARD) if flies in WHOLE else (CONDITIONS[:1], EASY)
+    return [(name, one) for name in names for one in starts]
+
+
+def _flights(ours: flights.Command, name: str, starts: flights.Starts) -> flights.Flights:
+    pushes = np.random.default_rng(PUSH_SEED).normal(size=(N, 3))
+    pushes *= PUSH / np.linalg.norm(pushes, axis=1, keepdims=True)
+    begun = starts(np.random.default_rng(START_SEED), N)
+    return fly(ours, begun, BODIES.get(name, CRAZYFLIE), pushes=None if name in BODIES else pushes)
+
+
+def _r2(ours: flights.Command, theirs: flights.Command) -> float:
+    """Return R² of the commands on flights of the network that stay in the room."""
+    states: list[np.ndarray] = []
+    flights_ = fly(theirs, EASY[1](np.random.default_rng(START_SEED), N), watch=lambda t, s, c: states.append(s))
+    seen = np.concatenate([one[flights_.kept] for one in states[:: imitation.EVERY]])
+    return r_squared(ours(seen), theirs(seen))
+
+
+def rows(agent: str, folder: Path) -> list[dict]:
+    """Return a row per what flies, condition and kind of start: means over maps and flights, and how much oftener than
+    the network it stays, with an interval over maps *and* starts."""
+    found, network = [], None
+    for flies, seeds in SEEDS.items():
+        work = [Measured(agent, flies, seed) for seed in seeds]
+        loaded = [one.load(folder) for one in work]
+        values = {kind: np.stack([arrays[kind] for arrays, _ in loaded]) for kind in KINDS}  # (seeds, conditions, n)
+        network = values["kept"][0].astype(float) if network is None else network
+        about = [about for _, about in loaded]
+        for i, (condition, starts) in enumerate(conditions(flies)):
+            more = values["kept"][:, i] - network[i]
+            low, high = crossed_interval(more) if flies != "network" else (0.0, 0.0)
+            radii = np.array([one["radii"].get(condition) for one in about], dtype=float)
+            found.append({
+                "agent": "flown" if agent else "own", "flies": flies, "condition": condition,
+                "starts": "hard" if starts in HARD else "easy", "tilt": starts.tilt,
+                "kept": values["kept"][:, i].mean(), "more": more.mean(), "more_low": low, "more_high": high,
+                "change": np.nanmean(values["change"][:, i]), "distance": np.nanmean(values["distance"][:, i]),
+                "radius": radii.max(), "r2": np.mean([one["r2"] for one in about]),
+                "numbers": about[0]["numbers"], "seeds": len(work), "checksum": work[0].network[1],
+                **work[0].provenance,
+            })  # fmt: skip
+    return found
+
+
+def main() -> None:
+    """Fly a network and ten maps of it; write their rows to drone.csv."""
+    parser = command.parser(main.__doc__, "results: OUT/data/beyond, files: OUT/build/drone")
+    parser.add_argument("--agent", default="", help="the file of the network that flew, actor.h")
+    given = parser.parse_args()
+    folder = given.out / "build" / "drone"
+    work = [Measured(given.agent, flies, seed) for flies, seeds in SEEDS.items() for seed in seeds]
+    job.make_all(work, folder, "drones", jobs=given.jobs, unit="controllers")
+    made = pd.DataFrame(rows(given.agent, folder))
+    kept = read_results("drone")
+    write_results(pd.concat([kept[~kept["agent"].isin(made["agent"])], made]), "drone", out=given.out)
+
+
+if __name__ == "__main__":
+    with command.in_one_line():
+        main()

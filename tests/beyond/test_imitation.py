@@ -1,0 +1,125 @@
+import struct
+
+import numpy as np
+import pytest
+
+from vsp.evaluation import r_squared
+from vsp.policy import VoronoiPolicy
+from vsp_beyond.drone import imitation
+from vsp_beyond.drone.flights import BODIES, command_of, fly, with_history
+from vsp_beyond.drone.flown import SIZES, Flown
+from vsp_beyond.drone.quadrotor import CRAZYFLIE, HOVER, Starts, quadrotor, see, see_all
+
+RNG = np.random.default_rng(0)
+
+
+def simple(thrust=1.0):
+    """A hand-made controller: height by thrust, place by tilt, each turn by its rate, against the motors' lag."""
+    thrusts, roll, pitch, yaw = np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]])
+    maps = np.zeros((17, 4))
+    maps[2], maps[8], maps[16] = -0.6 * thrusts, -0.4 * thrusts, HOVER
+    maps[1], maps[3], maps[7], maps[9] = 0.3 * roll, -0.8 * roll, 0.2 * roll, -0.12 * roll
+    maps[0], maps[4], maps[6], maps[10] = -0.3 * pitch, -0.8 * pitch, -0.2 * pitch, -0.12 * pitch
+    maps[5], maps[11] = -0.4 * yaw, -0.1 * yaw
+    maps[12:16] = -1.1 * (np.outer(roll, roll) + np.outer(pitch, pitch))
+    return VoronoiPolicy(np.zeros((1, 16)), thrust * maps[None], task=quadrotor())
+
+
+def test_the_gradient_of_an_eigenvalue_is_its_slope():
+    weights, loop = simple().coefficients[0, :16], imitation.loop_of(CRAZYFLIE)
+    value, gradient = imitation.radius(weights, loop)
+    way = RNG.normal(size=(16, 4))
+    ends = [imitation.radius(weights + step * way, loop)[0] for step in (1e-6, -1e-6)]
+    assert (ends[0] - ends[1]) / 2e-6 == pytest.approx((gradient * way).sum(), rel=1e-4)
+    assert 0.9 < value < 1
+
+
+@pytest.mark.parametrize("body", [CRAZYFLIE, BODIES["mass - 20 %"]])
+def test_the_loop_at_rest_has_the_eigenvalue_of_the_linear_step(body):
+    policy = simple()
+    at_rest = imitation.radius_at_rest(command_of(policy), body)
+    assert at_rest == pytest.approx(imitation.radius(policy.coefficients[0, :16], imitation.loop_of(body))[0], abs=3e-4)
+    assert np.isnan(imitation.radius_at_rest(lambda states: np.zeros((len(states), 4)), body))
+
+
+def test_a_map_is_found_again(monkeypatch):
+    monkeypatch.setattr(imitation, "FLIGHTS", 100)
+    monkeypatch.setattr(imitation, "ROUNDS", 1)
+    known = simple()
+    found = imitation.one_map(command_of(known), seed=0, calm=False)
+    seen = see(Starts(0.3, 1.0, 1.0, 90.0)(RNG, 500))
+    assert r_squared(found.predict(seen)[0], known.predict(seen)[0]) > 0.9999
+    assert np.abs(found.coefficients - known.coefficients)[0, :12].max() < 0.02  # motors say partly what others say
+    again = imitation.one_map(command_of(known), seed=0, calm=False)
+    assert np.array_equal(found.coefficients, again.coefficients)
+    blind = imitation.one_map(command_of(known), seed=0, calm=False, memory=False)
+    assert not blind.coefficients[0, 12:16].any()
+
+
+def test_what_an_eigenvalue_exceeds_costs(monkeypatch):
+    """A map that is too strong trembles; the calm map does not, for any body."""
+    monkeypatch.setattr(imitation, "FLIGHTS", 100)
+    monkeypatch.setattr(imitation, "ROUNDS", 0)
+    strong = simple(4.0)
+    loops = [imitation.loop_of(body) for body in BODIES.values()]
+    fits = {calm: imitation.one_map(command_of(strong), seed=0, calm=calm) for calm in (False, True)}
+    radii = {
+        calm: [imitation.radius(fit.coefficients[0, :16], loop)[0] for loop in loops] for calm, fit in fits.items()
+    }
+    assert max(radii[False]) > 1 and max(radii[True]) < 0.995
+
+
+def header(layers, inputs, outputs, spoilt=lambda text: text):
+    """Return a file like `actor.h`."""
+    arrays = [part for weight, bias in layers for part in (weight.T, bias)] + [inputs, outputs]
+    lines = []
+    for array in arrays:
+        numbers = ", ".join(str(byte) for byte in struct.pack(f"<{array.size}f", *array.ravel()))
+        lines.append(f"alignas(float) const unsigned char memory[] = {{{numbers}}};")
+    return spoilt("\n".join(lines))
+
+
+def network():
+    shapes = (146, 64), (64, 64), (64, 4)
+    layers = [(RNG.normal(size=shape).astype("f4") / 8, RNG.normal(size=shape[1]).astype("f4")) for shape in shapes]
+    inputs = RNG.normal(size=146).astype("f4")
+    hidden = inputs
+    for weight, bias in layers:
+        x = np.clip(hidden @ weight + bias, -3, 3)
+        hidden = x * (27 + x**2) / (27 + 9 * x**2)
+    return layers, inputs, hidden
+
+
+def test_a_network_in_a_header_flies_as_it_says(tmp_path):
+    layers, inputs, outputs = network()
+    (tmp_path / "actor.h").write_text(header(layers, inputs, outputs))
+    flown, states = Flown(tmp_path / "actor.h"), with_history(Starts()(RNG, 5))
+    assert np.allclose(flown.outputs(inputs), outputs, atol=1e-6) and flown.numbers == sum(SIZES[:6]) == 13_828
+    assert np.array_equal(flown.command(states), flown.outputs(see_all(states))) and len(flown.digest) == 64
+    assert fly(flown.command, Starts()(RNG, 3)).kept.shape == (3,)
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "said"),
+    [
+        (lambda text: text.replace("memory", "other", 1), "expected"),
+        (lambda text: text.replace("{", "{256, 0, 0, 0, ", 1), "no float32"),
+        (lambda text: text.replace("{", "{7, ", 1), "no float32"),
+        (lambda text: text.replace("{", "{0, 0, 0, 0, ", 1), "expected"),
+        (lambda text: text + " " * 2**21, "bytes"),
+        (lambda text: text[: len(text) // 2], "expected"),
+    ],
+)
+def test_a_spoilt_header_is_refused(spoilt, said, tmp_path):
+    (tmp_path / "actor.h").write_text(header(*network(), spoilt))
+    with pytest.raises(ValueError, match=said):
+        Flown(tmp_path / "actor.h")
+
+
+@pytest.mark.parametrize(("number", "said"), [(np.nan, "finite"), (0.5, "its own test")])
+def test_a_network_that_misses_its_own_test_is_refused(number, said, tmp_path):
+    layers, inputs, outputs = network()
+    layers[2][1][3] = number
+    (tmp_path / "actor.h").write_text(header(layers, inputs, outputs))
+    with pytest.raises(ValueError, match=said):
+        Flown(tmp_path / "actor.h")

@@ -1,0 +1,74 @@
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import drone
+from studies.batched import Batched
+from studies.committed import read_results
+from vsp.evaluation import rollout_from_seed
+from vsp.tasks import PIT
+from vsp_beyond.drone import imitation
+from vsp_beyond.drone.quadrotor import Starts, quadrotor
+
+
+def test_the_teacher_is_what_its_card_says():
+    card = json.loads(drone.TEACHER.with_suffix(".json").read_text("utf-8"))
+    played = rollout_from_seed(drone.own_teacher(), quadrotor(), 300, seed=0)
+    assert played.returns.mean() == pytest.approx(card["score"]["mean"], abs=0.3)
+    assert (played.outcomes == PIT).mean() == card["score"]["lost"] == 0
+
+
+def test_environments_advance_as_the_task_does():
+    task, rng = quadrotor(Starts(3.0, 2.0, 0.0, 0.0)), np.random.default_rng(0)
+    many = Batched(task, 50, rng)
+    seen, ends, whole = many.reset(), 0, 0
+    before = many._states.copy()
+    for _ in range(450):
+        many.step_async(np.zeros((50, 4), np.float32))
+        after, rewards, outcomes = task.step(before, np.zeros((50, 4)))
+        seen, earned, ended, infos = many.step_wait()
+        assert np.array_equal(earned, rewards.astype(np.float32)) and ended[outcomes != 0].all()
+        assert np.array_equal(seen[~ended], task.observe(after)[~ended])
+        for i in np.flatnonzero(ended):
+            assert np.array_equal(infos[i]["terminal_observation"], task.observe(after)[i])
+            assert infos[i]["TimeLimit.truncated"] == (outcomes[i] != PIT)
+            whole += infos[i]["TimeLimit.truncated"]
+        ends += ended.sum()
+        before = many._states.copy()
+        assert (np.abs(before[ended, :3]) <= 3).all()
+    assert ends > whole > 0
+
+
+def test_rows_of_small_maps(monkeypatch, tmp_path):
+    for module, name, value in (
+        (drone, "N", 20), (imitation, "FLIGHTS", 40), (imitation, "OWN_FLIGHTS", 20), (imitation, "ROUNDS", 1),
+        (imitation, "N_STEPS", 200), (drone, "HARD", drone.HARD[:1]), (drone, "EASY", drone.EASY[:2]),
+        (drone, "CONDITIONS", ("as built", drone.CONDITIONS[-1])), (drone, "BODIES", {"as built": drone.CRAZYFLIE}),
+        (drone, "SEEDS", {"network": range(1), "one map": range(2), "without past commands": range(1)}),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, value)
+    monkeypatch.setattr("sys.argv", ["drone", "--jobs=1", f"--out={tmp_path}"])
+    monkeypatch.setattr(drone, "read_results", lambda name: pd.DataFrame({"agent": ["flown", "own"], "kept": [2, 3]}))
+    drone.main()
+    rows = read_results("drone", tmp_path / "data/beyond")
+    assert rows["agent"].tolist() == ["flown"] + ["own"] * 14 and rows["kept"][0] == 2
+    mine = rows[1:].set_index(["flies", "condition", "starts", "tilt"])
+    assert mine["numbers"].groupby("flies").first().to_dict() == {
+        "network": 5508, "one map": 68, "without past commands": 52,
+    }  # fmt: skip
+    network, ours = (mine.loc[flies, "as built", "easy", 60] for flies in ("network", "one map"))
+    assert network["kept"] == 1 and network["more"] == 0 and network["r2"] == 1
+    assert ours["more"] == pytest.approx(ours["kept"] - 1) and ours["more_low"] <= ours["more"] <= ours["more_high"]
+
+
+@pytest.mark.parametrize("agent", ["own", "flown"])
+def test_committed_rows_are_current_and_reach_the_goal(agent):
+    rows = read_results("drone").query("agent == @agent")
+    for flies, mine in rows.groupby("flies"):
+        today = drone.Measured("", flies, 0).provenance
+        assert set(mine["settings"]) == {today["settings"]} and set(mine["version"]) == {today["version"]}
+        assert agent == "flown" or set(mine["teacher"]) == {today["teacher"]}
+    ours = rows[rows["flies"] == "one map"]
+    assert len(ours) == 56 and (ours["numbers"] <= 350).all() and (ours["seeds"] == 10).all()

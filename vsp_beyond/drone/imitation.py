@@ -1,0 +1,148 @@
+"""One linear map of 16 inputs, limited to the commands' range, that flies as a network flies.
+
+It is fitted to the network's commands on the network's own flights, then also on those of the map (DAgger, Ross et al.
+2011). A map that only imitates chatters: its closed loop near hovering may be unstable, which imitation does not see.
+So what the loop's largest eigenvalue exceeds costs, for each of `flights.BODIES`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from vsp.policy import VoronoiPolicy
+from vsp.run.progress import shown, steps
+from vsp.subpolicies.stacked import BETA1, adam
+
+from .flights import BODIES, Command, command_of, fly, with_history
+from .quadrotor import (
+    ATTITUDE,
+    CRAZYFLIE,
+    HOVER,
+    MOST_RPM,
+    MOTORS,
+    THRUST,
+    Body,
+    G,
+    Starts,
+    advance,
+    quadrotor,
+    see,
+)
+
+VERSION = 1  # raise it when the same arguments give another map
+STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=180.0)
+FLIGHTS, OWN_FLIGHTS, ROUNDS = 800, 300, 4  # of the network; of the map in each round of corrections
+EVERY, SEEN = 3, 300  # every third state of a flight's first 300 is kept
+N_STEPS, BATCH, RATE = 1200, 2048, 0.02  # of Adam, for each round
+SLOPE = 0.01  # of a limited command beyond its limits, in the gradient, so that this does not vanish
+CALM, PRICE = 0.99, 1000.0  # largest eigenvalue of a loop that is free; the price of 1 beyond it, squared
+PARTS = [0, 1, 2, *range(4, 21)]  # of a state near hovering: the attitude's w follows from x, y, z
+
+Loop = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def loop_of(body: Body) -> Loop:
+    """Return the linear step around level hovering at the origin: states' (20, 20), commands' (20, 4), and how the 16
+    inputs follow from a state (16, 20). By central differences."""
+    rest = np.full((1, 21), 2 * np.sqrt(body.mass * G / 4 / THRUST) / MOST_RPM - 1)
+    rest[:, :13], rest[:, ATTITUDE.start] = 0.0, 1.0
+    command, tiny = rest[:, MOTORS], 1e-5
+
+    def moved(parts: np.ndarray) -> np.ndarray:
+        states = np.repeat(rest, len(parts), axis=0)
+        states[:, PARTS] += parts
+        states[:, 3] = np.sqrt(1 - np.square(states[:, 4:7]).sum(axis=1))
+        return states
+
+    def difference(f, n: int) -> np.ndarray:
+        return (f(tiny * np.eye(n)) - f(-tiny * np.eye(n))).T / (2 * tiny)
+
+    here = difference(lambda parts: advance(moved(parts), np.tile(command, (20, 1)), body)[:, PARTS], 20)
+    steer = difference(lambda more: advance(np.repeat(rest, 4, axis=0), command + more, body)[:, PARTS], 4)
+    return here, steer, difference(lambda parts: see(moved(parts)), 20)
+
+
+def radius(weights: np.ndarray, loop: Loop) -> tuple[float, np.ndarray]:
+    """Return the closed loop's largest absolute eigenvalue under the map `weights` (16, 4), and its gradient."""
+    here, steer, seen = loop
+    values, right = np.linalg.eig(here + steer @ weights.T @ seen)
+    i = int(np.abs(values).argmax())
+    left = np.linalg.inv(right)[i]
+    towards = np.conj(values[i]) / abs(values[i]) * np.outer(seen @ right[:, i], left @ steer)
+    return float(abs(values[i])), towards.real
+
+
+def radius_at_rest(command: Command, body: Body = CRAZYFLIE) -> float:
+    """Return the largest absolute eigenvalue of the whole loop, a network's history included, where it comes to rest.
+
+    By central differences; NaN if half a minute of flight from the origin does not end in rest."""
+    states = with_history(Starts(0.0, 0.0, 0.0, 0.0)(np.random.default_rng(0), 1))
+    for _ in range(3000):
+        before, states = states, advance(states, command(states), body)
+    if np.abs(states - before).max() > 1e-6:
+        return np.nan
+    tiny = 1e-4 * np.eye(states.size)  # a network's float32 rounds smaller steps away
+    after = [advance(states + way, command(states + way), body) for way in (tiny, -tiny)]
+    return float(np.abs(np.linalg.eigvals((after[0] - after[1]) / 2e-4)).max())
+
+
+@threadpool_limits.wrap(limits=1)
+def one_map(
+    command: Command, *, seed: int, calm: bool = True, memory: bool = True, progress: bool = True
+) -> VoronoiPolicy:
+    """Distil what flies by `command` into one linear map. The same arguments give the same map.
+
+    Without `calm` it only imitates; without `memory` it does not see the remembered motor speeds. `progress` shows how
+    far it is.
+    """
+    used = np.ones((17, 1))
+    used[12:16] = memory
+    rng = np.random.default_rng(np.random.SeedSequence(seed))
+    loops = [loop_of(body) for body in BODIES.values()] if calm else []
+    seen, taken = _flown(command, command, STARTS(rng, FLIGHTS), kept=True)
+    coefficients = np.zeros((17, 4))
+    coefficients[16] = HOVER
+    with shown(progress):
+        for round_ in steps(range(ROUNDS + 1), "one map", total=ROUNDS + 1, unit="rounds"):
+            coefficients = used * _fitted(coefficients, used[:16, 0] * seen, taken, loops, rng)
+            policy = VoronoiPolicy(np.zeros((1, 16)), coefficients[None], task=quadrotor())
+            if round_ < ROUNDS:
+                more = _flown(command_of(policy), command, STARTS(rng, OWN_FLIGHTS), kept=False)
+                seen, taken = (np.concatenate(both) for both in zip((seen, taken), more))
+    return policy
+
+
+def _flown(flies: Command, says: Command, starts: np.ndarray, *, kept: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs (t, 16) of flights by `flies`, if `kept` of those alone, and what `says` commands there (t, 4)."""
+    seen: list[np.ndarray] = []
+    taken: list[np.ndarray] = []
+
+    def watch(step: int, states: np.ndarray, commands: np.ndarray) -> None:
+        if step < SEEN and step % EVERY == 0:
+            seen.append(see(states))
+            taken.append(commands if flies is says else says(states))
+
+    flights = fly(flies, starts, watch=watch)
+    rows = flights.kept if kept else np.ones(len(starts), dtype=bool)
+    return np.concatenate([part[rows] for part in seen]), np.concatenate([part[rows] for part in taken])
+
+
+def _fitted(
+    coefficients: np.ndarray, seen: np.ndarray, taken: np.ndarray, loops: list[Loop], rng: np.random.Generator
+) -> np.ndarray:
+    """Return the coefficients (17, 4) after Adam's steps on the squared error of the limited commands."""
+    scale = np.append(seen.std(axis=0) + 1e-9, 1.0)[:, None]
+    features, theta = np.hstack([seen, np.ones((len(seen), 1))]) / scale[:, 0], coefficients * scale
+    mean = square = np.zeros_like(theta)
+    for i in range(N_STEPS):
+        rows = rng.integers(len(features), size=BATCH)
+        raw = features[rows] @ theta
+        error = (np.clip(raw, -1, 1) - taken[rows]) * np.where(np.abs(raw) <= 1, 1, SLOPE)
+        gradient = features[rows].T @ error / BATCH
+        for loop in loops:
+            largest, towards = radius(theta[:16] / scale[:16], loop)
+            gradient[:16] += 2 * PRICE * max(0.0, largest - CALM) * towards / scale[:16]
+        mean, square, spread = adam(gradient, mean, square, i + 1)
+        theta = theta - RATE * (1 - i / N_STEPS) * mean / (1 - BETA1 ** (i + 1)) / spread
+    return theta / scale
