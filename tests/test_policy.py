@@ -99,9 +99,6 @@ def test_what_knows_linear_policies_alone_refuses_others():
 
 
 def test_explain_by_hand():
-    told = TWO.explain([0.75, 0.25])
-    assert (told.cell, told.next_cell, told.margin) == (1, 0, 0.5)  # 0.5 to the right codeword, 1.0 to the left
-    assert told.codeword.tolist() == [1, 0.5] and told.raw.tolist() == [3, -0.5] and told.action.tolist() == [1, -0.5]
     left = TWO.explain([0.25, 0.25])
     assert left.contributions.to_numpy().tolist() == [[0.25, 0, 0.25], [0, 0.5, -0.5]]
     assert left.contributions.columns.tolist() == ["x", "y", "bias"]

@@ -7,17 +7,6 @@ from support import SIMPLEGOAL, TASKS, TEACHERS, Constant, same_arrays
 import vsp
 from vsp import collect_episodes, get_task, rollout, rollouts, visited_states
 from vsp.rollouts import standard
-from vsp.tasks import GOAL, PIT, TRUNCATED
-
-
-def test_three_episodes_by_hand():
-    """Left by a tenth per step: into the goal after 2 steps, into the pit after 1, against the wall for 50."""
-    starts = np.array([[0.25, 0.05], [0.65, 0.5], [0.25, 0.95]])
-    result = rollout(Constant(-1.0, 0.0), SIMPLEGOAL, starts)
-    assert result.lengths.tolist() == [2, 1, 50] and result.outcomes.tolist() == [GOAL, PIT, TRUNCATED]
-    first_step = 10 * (np.hypot(0.25, 0.05) - np.hypot(0.15, 0.05))
-    to_the_wall = 10 * (np.hypot(0.25, 0.95) - 0.95)
-    assert result.returns == pytest.approx([first_step + 10, -10, to_the_wall])
 
 
 def test_visited_states_by_hand():

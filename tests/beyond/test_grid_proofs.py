@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import PENDULUM, SIMPLEGOAL
+from test_simplegoal_proof import refuse
 
 import vsp
 from studies import comparison
@@ -181,10 +182,7 @@ def mutants(content, rng):
 def test_the_checker_agrees_and_refuses_every_mutant(proof):
     content = proof.certificate()
     assert check.check_content(content) == content["claim"]
-    for kind, mutant in mutants(content, np.random.default_rng(3)):
-        with pytest.raises(check.Refused):
-            check.check_content(mutant)
-            pytest.fail(f"accepted a mutant: {kind}")
+    refuse(mutants(content, np.random.default_rng(3)))
 
 
 def all_five(content):
