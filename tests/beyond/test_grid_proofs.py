@@ -12,7 +12,7 @@ from test_simplegoal_proof import refuse
 import vsp
 from studies import comparison
 from vsp_beyond.proofs import check, pendulum, pendulum_starts
-from vsp_beyond.proofs.grid import Way, around, invariant, steps_into
+from vsp_beyond.proofs.grid import Way, around, steps_into
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 
@@ -37,12 +37,6 @@ def test_steps_into_a_target_by_hand():
     assert steps_into(target, ways, 1).tolist() == [[1, 1, 0], [0, 0, 0]]
     assert steps_into(target, [ways[0]], 10).tolist() == [[1, 1, 2], [0, 2, 0]]
     assert not steps_into(target, [way([0, 1], [[0, 0], [0, 0]], [[1, 1], [1, 1]], safe=False), *ways], 10)[0, :2].any()
-
-
-def test_what_stays_by_hand():
-    ways = [way([0, 1, 2], [[0, 0], [0, 0], [0, 2]], [[1, 2], [1, 3], [1, 3]])]
-    assert invariant(np.ones((1, 3), dtype=bool), ways).tolist() == [[True, True, True]]
-    assert invariant(np.array([[True, True, False]]), ways).tolist() == [[False, False, False]]
 
 
 def test_an_angle_comes_round():

@@ -106,19 +106,6 @@ def test_outliers_that_are_almost_equal_have_an_exact_deviation():
 # What summary numbers imply
 
 
-def part(values):
-    return statistics.Part(len(values), values.mean(), values.std(), values.min(), values.max())
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_what_remains_is_what_numpy_finds_in_the_rest(seed):
-    values = np.sort(np.random.default_rng(seed).gamma(2.0, size=400))
-    low, middle, high = values[:30], values[30:380], values[380:]
-    told = 400, values.mean(), [part(low), part(high)]
-    assert statistics.remaining_mean(*told) == pytest.approx(middle.mean(), rel=1e-12)
-    assert statistics.remaining_std(400, values.mean(), values.std(), told[2]) == pytest.approx(middle.std(), rel=1e-9)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_bounds_hold_for_samples_whose_truth_is_known(seed):
     rng = np.random.default_rng(seed)

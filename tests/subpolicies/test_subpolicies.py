@@ -153,13 +153,6 @@ def solve(models, cells, inputs, actions):
     models.solve(np.array(cells), inputs.transpose(0, 2, 1) @ inputs, inputs.transpose(0, 2, 1) @ actions)
 
 
-def test_solving_one_state_by_hand():
-    """Map 0, one state x = 2 with action 5: the least change that answers 5 is (2, 1)."""
-    models = models_of(1, d=1, m=1, initial="zeros")
-    solve(models, [0], np.array([[[2.0, 1.0]]]), np.array([[[5.0]]]))
-    assert models.coefficients[0, :, 0] == pytest.approx([2, 1], abs=1e-5)
-
-
 @pytest.mark.parametrize("name", POLICY_CLASSES)
 def test_solving_is_least_squares(name):
     task = get_task(MOUNTAINCAR)
