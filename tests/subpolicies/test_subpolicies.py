@@ -70,21 +70,6 @@ def some_states(task, n=50, seed=0):
     return np.random.default_rng(seed).uniform(task.low, task.high, size=(n, len(task.low)))
 
 
-@pytest.mark.parametrize(
-    ("name", "task", "state", "features", "rows"),
-    [
-        ("constant", MOUNTAINCAR, [0.25, 0.5], [], ["bias"]),
-        ("linear", MOUNTAINCAR, [0.25, 0.5], [0.25, 0.5], ["x", "v", "bias"]),
-        ("quadratic", MOUNTAINCAR, [-0.5, 3], [-0.5, 3, 0.25, -1.5, 9], ["x", "v", "x²", "x·v", "v²", "bias"]),
-    ],
-)
-def test_features_by_hand(name, task, state, features, rows):
-    form, state = policy_class(name, get_task(task)), np.array(state, dtype=float)
-    assert form.features(state).tolist() == features and list(form.rows) == rows
-    assert form.features(np.stack([state] * 3)).tolist() == [features] * 3
-    assert form.features(np.zeros((4, 5, len(state)))).shape == (4, 5, len(features))
-
-
 @each_class
 def test_no_feature_is_larger_than_its_size_and_raw_ones_have_size_1(name, task):
     task = get_task(task)

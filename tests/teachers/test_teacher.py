@@ -97,8 +97,6 @@ def test_a_card_without_a_known_task_is_one_clear_error(copied):
 
 REFUSED = {
     "name the task of the agent": {}, "is a folder": {"task": SIMPLEGOAL, "normalize": ""},
-    "low of its observation_space is .*, MountainCarContinuous-v0 has": {"task": MOUNTAINCAR},
-    "normalize is True. Pass their statistics": {"task": SIMPLEGOAL, "normalize": True},
 }  # fmt: skip
 
 
