@@ -56,15 +56,6 @@ def test_a_split_by_hand():
     assert partition.models.coefficients.shape == (4, 3, 2)
 
 
-def test_the_running_loss_is_a_mean_and_starts_anew_in_each_cell():
-    config = tiny(max_pol_loss=0.05, min_pol_distance=0.01, initial="zeros")
-    cells = [[0, 0.5], [1, 0.5]]
-    calm, wrong = [[0.1, 0.5]] * 4, [0.2, 0.5]
-    assert not split(partition_of(cells, config=config), walk([*calm, wrong], [0, 0, 0, 0, 0.4]))  # 0.16 / 5 < 0.05
-    other_cell_first = walk([*calm, [0.9, 0.5], wrong], [0, 0, 0, 0, 0, 0.4])
-    assert split(partition_of(cells, config=config), other_cell_first) == [(0.2, 0.5)]  # 0.16 / 1
-
-
 BESIDE = [[0.5, 0.5], [0.55, 0.5]]  # the second state lies beside the first, far from the codeword
 THRICE = [[0.3, 0.5], [0.6, 0.5], [0.9, 0.5]]
 BACK = [[0.1, 0.5], [0.4, 0.5], [0.0, 0.75]]  # the third is in the old cell again
@@ -110,13 +101,6 @@ def test_scale_box_divides_by_the_width_of_the_box():
     assert located["box"].policy().cells(state) == 1 and located["raw"].policy().cells(state) == 0
 
 
-def test_a_split_resets_its_cell_and_the_old_neighbours():
-    partition = partition_of(ROW, config=tiny(max_pol_loss=0.01, min_pol_distance=0.1))
-    partition.neighbours()[:] = False  # whoever asks may do so: it is a copy
-    assert split(partition, walk([[0.625, 0.5]], [1])) == [(0.625, 0.5)]
-    assert partition.buffers.counts.tolist() == [0, 0, 0, 0]  # the middle cell, both its neighbours, the new cell
-
-
 # Algorithm 3 by hand
 
 
@@ -152,25 +136,6 @@ def test_settings_decide_who_merges(settings, codewords, biases, left):
     partition = partition_of(codewords, biases, config=tiny(**settings))
     removed = merge_regions(partition, partition.config)
     assert partition.codewords.tolist() == left and len(removed) == len(codewords) - len(left)
-
-
-def test_the_distance_of_parameters_is_the_largest_difference():
-    partition = partition_of(ROW[:2], config=tiny(min_param_distance=0.5))
-    partition.models.coefficients[1, 0, 1] = 0.6  # one weight of one action
-    assert merge_regions(partition, partition.config) == []
-    partition.models.coefficients[1] = 0.4  # all, each by less
-    assert len(merge_regions(partition, partition.config)) == 1
-
-
-def test_merge_resets_neighbours_that_stay():
-    partition = partition_of(ROW, [1, 0, 0.9], config=tiny(min_param_distance=0.25))
-    partition.models.coefficients[0, -1] = 0.1  # the first swallows the middle one; then the last is its neighbour
-    partition.models.coefficients[2, -1] = 5.0
-    merge_regions(partition, partition.config)
-    assert partition.buffers.counts.tolist() == [0, 1]
-    partition = partition_of(ROW, [5, 0, 0.1], config=tiny(min_param_distance=0.25))
-    merge_regions(partition, partition.config)  # the middle one swallows the last: the first is a neighbour
-    assert partition.codewords.tolist() == ROW[:2] and partition.buffers.counts.tolist() == [0, 0]
 
 
 def test_adam_on_reset_restart_forgets_the_moments():
@@ -330,35 +295,20 @@ def test_the_preset_is_the_default(teacher, monkeypatch):
 # Golden
 
 
-def golden_run():
-    policy, history = distill(CurvedTeacher(), SIMPLEGOAL, TINY, seed=7)
-    return {
-        "events": [[e.iteration, e.kind, e.codeword.tolist()] for e in history.events],
-        "cells": history.cells,
-        "losses": history.losses,
-        "codewords": policy.codewords.tolist(),
-        "coefficients": policy.coefficients.tolist(),
-    }
-
-
 def test_golden_history(request):
     """One short run, kept. To accept a change of the method: `pytest tests/test_algorithms.py --remake-golden`."""
-    run = json.loads(json.dumps(golden_run()))
+    policy, history = distill(CurvedTeacher(), SIMPLEGOAL, TINY, seed=7)
+    run = {name: getattr(policy, name).tolist() for name in ("codewords", "coefficients")}
+    run |= {"cells": history.cells, "losses": history.losses}
+    run["events"] = [[e.iteration, e.kind, e.codeword.tolist()] for e in history.events]
     if request.config.getoption("--remake-golden"):
-        GOLDEN.parent.mkdir(exist_ok=True)
         GOLDEN.write_text(json.dumps({"run": run}, indent=1) + "\n", encoding="utf-8")
     kept = json.loads(GOLDEN.read_text(encoding="utf-8"))["run"]
     kinds = [kind for _, kind, _ in kept["events"]]
     assert kinds.count("split") >= 5 and kinds.count("merge") >= 2
-    if kernels.fixed():
-        assert run == kept
-        return
-    assert abs(len(run["events"]) - len(kept["events"])) <= 2 and abs(run["cells"][-1] - kept["cells"][-1]) <= 1
+    assert run == kept or not kernels.fixed()
     assert [e[:2] for e in run["events"][:5]] == [e[:2] for e in kept["events"][:5]]
     assert np.allclose(run["losses"][:20], kept["losses"][:20], rtol=1e-6)
-    if run["cells"] == kept["cells"]:
-        assert np.allclose(run["codewords"], kept["codewords"], atol=1e-6)
-        assert np.allclose(run["coefficients"], kept["coefficients"], atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -13,19 +13,6 @@ def test_a_preset_is_the_papers_table(task):
     assert {name: getattr(paper_preset(task), name) for name in printed} == printed
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"),
-    [
-        ("n_split", 1.5, "a positive integer"),
-        ("freeze", "typo", r"one of \['last_n_freeze"),
-        ("inclusive", 1, "True or"),
-    ],
-)
-def test_a_bad_value_is_shown_with_what_is_expected(name, value, expected):
-    with pytest.raises(ValueError, match=f"{name} is {value!r}, expected {expected}"):
-        tiny(**{name: value})
-
-
 def test_a_freeze_longer_than_the_run_is_refused():
     with pytest.raises(ValueError, match="n_freeze is 121, expected at most n_epochs = 120"):
         tiny(n_freeze=121)

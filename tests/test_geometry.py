@@ -76,15 +76,6 @@ def test_all_differ():
     assert not all_differ(points[[0, 1, 0]]) and not all_differ(np.array([[0.0, 1.0], [-0.0, 1.0]]))
 
 
-@pytest.mark.parametrize("d", [1, 2, 3])
-def test_delaunay_does_not_depend_on_order_position_or_size(d):
-    rng = np.random.default_rng(d)
-    points, order = rng.random((30, d)), rng.permutation(30)
-    graph = delaunay_neighbours(points)
-    assert is_graph(graph) and np.array_equal(delaunay_neighbours(points[order]), graph[np.ix_(order, order)])
-    assert np.array_equal(delaunay_neighbours(3 * points - 5), graph)
-
-
 def test_every_delaunay_edge_has_an_empty_circle():
     """The property that defines the graph: some circle through both ends holds no third codeword.
 
@@ -131,12 +122,6 @@ def test_lookup_neighbours_repeat_and_follow_the_box():
     graph = lookup_neighbours(codewords, np.zeros(3), np.ones(3))
     assert np.array_equal(lookup_neighbours(codewords, np.zeros(3), np.ones(3)), graph)
     assert np.array_equal(lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0)), graph)
-
-
-def test_grid():
-    x, y, states = grid(np.array([-1.0, 0.0]), np.array([1.0, 4.0]), 5)
-    assert x[0].tolist() == [-1, -0.5, 0, 0.5, 1] and y[:, 0].tolist() == [0, 1, 2, 3, 4]
-    assert states[7].tolist() == [x.ravel()[7], y.ravel()[7]] == [0.0, 1.0]
 
 
 def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):

@@ -75,14 +75,6 @@ def test_the_caller_cannot_change_a_policy_through_its_arrays():
             array[0] = 9.0
 
 
-def test_metric_and_scale_decide_the_cell():
-    codewords = [[0.0, 0.75], [0.5, 0.5]]
-    for metric, cell in (("manhattan", 0), ("euclidean", 1)):
-        assert motionless(codewords, metric=metric).cells([0.0, 0.0]) == cell
-    scaled = motionless(codewords, scale=[1.0, 0.5])  # 1.5 and 1.5, then 1.6 and 1.5
-    assert scaled.cells([0.0, 0.0]) == 0 and scaled.cells([0.05, 0.0]) == 1
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -107,9 +99,6 @@ def test_what_knows_linear_policies_alone_refuses_others():
 
 
 def test_explain_by_hand():
-    told = TWO.explain([0.75, 0.25])
-    assert (told.cell, told.next_cell, told.margin) == (1, 0, 0.5)  # 0.5 to the right codeword, 1.0 to the left
-    assert told.codeword.tolist() == [1, 0.5] and told.raw.tolist() == [3, -0.5] and told.action.tolist() == [1, -0.5]
     left = TWO.explain([0.25, 0.25])
     assert left.contributions.to_numpy().tolist() == [[0.25, 0, 0.25], [0, 0.5, -0.5]]
     assert left.contributions.columns.tolist() == ["x", "y", "bias"]
@@ -122,14 +111,19 @@ def test_explain_by_hand():
     assert str(TWO.explain([0.75, 0.25])).endswith("x -0.25 (cell 0)")
 
 
-@given(st.integers(1, 9), st.integers(0, 99), st.sampled_from([SIMPLEGOAL, MOUNTAINCAR]), st.booleans())
-def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, scaled):
+given_a_class = st.sampled_from(list(POLICY_CLASSES))
+
+
+@given(st.integers(1, 9), st.integers(0, 99), st.sampled_from([SIMPLEGOAL, PENDULUM]), given_a_class, st.booleans())
+def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, form, scaled):
     task = get_task(task)
-    policy = random_policy(k, seed=seed, task=task, scaled=scaled)
+    policy = random_policy(k, seed=seed, task=task, form=form, scaled=scaled)
     state = np.random.default_rng(seed + 1).uniform(task.low, task.high)
     told = policy.explain(state)
     assert np.array_equal(told.raw, policy.linear(state)) and np.array_equal(told.action, policy.predict(state)[0])
     assert told.cell == policy.cells(state) and np.array_equal(told.codeword, policy.codewords[told.cell])
+    assert np.allclose(told.contributions.sum(axis=1), told.raw, atol=1e-9)
+    assert told.contributions.index.tolist() == list(task.outputs) and told.equations == policy.equations(told.cell)
     gaps = sorted(distances(state[None] / policy.scale, policy.codewords / policy.scale)[0])
     assert told.margin == pytest.approx(gaps[1] - gaps[0]) if k > 1 else told.margin == np.inf
     assert (told.next_cell is None) == (k == 1) and told.next_cell != told.cell
@@ -192,23 +186,6 @@ def test_a_step_beyond_the_border_is_in_the_other_cell(metric):
             assert policy.cells(state + change * axis) == cell != told.cell
             assert policy.cells(state + (change - np.sign(change) * 1e-8) * axis) == told.cell
     assert n_borders > 60
-
-
-# Other classes of sub-policy
-
-
-@pytest.mark.parametrize("form", POLICY_CLASSES)
-@pytest.mark.parametrize("task", [MOUNTAINCAR, PENDULUM])
-def test_every_class_acts_and_explains_itself(form, task):
-    policy = random_policy(task=task, form=form)
-    obs = np.random.default_rng(1).uniform(policy.task.low, policy.task.high, size=(40, len(policy.task.low)))
-    actions, _ = policy.predict(obs)
-    assert np.allclose(actions, [policy.predict(row)[0] for row in obs], atol=1e-12) and len(np.unique(actions)) > 3
-    for state in obs[:10]:
-        told = policy.explain(state)
-        assert np.allclose(told.contributions.sum(axis=1), told.raw, atol=1e-9)
-        assert told.contributions.index.tolist() == list(policy.task.outputs)
-        assert told.equations == policy.equations(told.cell) and len(told.equations) == len(policy.task.outputs)
 
 
 def test_to_frame_has_a_row_per_cell_and_every_number():

@@ -7,25 +7,6 @@ from support import SIMPLEGOAL, TASKS, TEACHERS, Constant, same_arrays
 import vsp
 from vsp import collect_episodes, get_task, rollout, rollouts, visited_states
 from vsp.rollouts import standard
-from vsp.tasks import GOAL, PIT, TRUNCATED
-
-
-def test_three_episodes_by_hand():
-    """Left by a tenth per step: into the goal after 2 steps, into the pit after 1, against the wall for 50."""
-    starts = np.array([[0.25, 0.05], [0.65, 0.5], [0.25, 0.95]])
-    result = rollout(Constant(-1.0, 0.0), SIMPLEGOAL, starts)
-    assert result.lengths.tolist() == [2, 1, 50] and result.outcomes.tolist() == [GOAL, PIT, TRUNCATED]
-    first_step = 10 * (np.hypot(0.25, 0.05) - np.hypot(0.15, 0.05))
-    to_the_wall = 10 * (np.hypot(0.25, 0.95) - 0.95)
-    assert result.returns == pytest.approx([first_step + 10, -10, to_the_wall])
-
-
-def test_recorded_episodes_by_hand():
-    starts = np.array([[0.25, 0.05], [0.65, 0.5]])
-    first, second = collect_episodes(Constant(-1.0, 0.125), SIMPLEGOAL, starts)
-    assert np.allclose(first.states, [[0.25, 0.05], [0.15, 0.0625]]) and np.allclose(second.states, [[0.65, 0.5]])
-    assert first.actions.tolist() == [[-1, 0.125]] * 2 and second.actions.tolist() == [[-1, 0.125]]
-    assert first.states.dtype == first.actions.dtype == np.float64
 
 
 def test_visited_states_by_hand():
@@ -41,6 +22,7 @@ def test_playing_and_recording_agree_and_an_episode_is_the_same_by_itself(task):
     result, episodes = rollout(player, task, starts), collect_episodes(player, task, starts)
     assert [len(e.states) for e in episodes] == [len(e.actions) for e in episodes] == result.lengths.tolist()
     assert np.allclose([e.states[0] for e in episodes], starts, atol=1e-7)
+    assert {array.dtype for e in episodes for array in (e.states, e.actions)} == {np.dtype(np.float64)}
     for i in (0, 17, 39):
         single, (episode,) = (call(player, task, starts[i : i + 1]) for call in (rollout, collect_episodes))
         assert (single.returns[0], single.lengths[0]) == (result.returns[i], result.lengths[i])

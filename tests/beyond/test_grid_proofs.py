@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import PENDULUM, SIMPLEGOAL
+from test_simplegoal_proof import refuse
 
 import vsp
 from studies import comparison
 from vsp_beyond.proofs import check, pendulum, pendulum_starts
-from vsp_beyond.proofs.grid import Way, around, invariant, steps_into
+from vsp_beyond.proofs.grid import Way, around, steps_into
 from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 
@@ -36,12 +37,6 @@ def test_steps_into_a_target_by_hand():
     assert steps_into(target, ways, 1).tolist() == [[1, 1, 0], [0, 0, 0]]
     assert steps_into(target, [ways[0]], 10).tolist() == [[1, 1, 2], [0, 2, 0]]
     assert not steps_into(target, [way([0, 1], [[0, 0], [0, 0]], [[1, 1], [1, 1]], safe=False), *ways], 10)[0, :2].any()
-
-
-def test_what_stays_by_hand():
-    ways = [way([0, 1, 2], [[0, 0], [0, 0], [0, 2]], [[1, 2], [1, 3], [1, 3]])]
-    assert invariant(np.ones((1, 3), dtype=bool), ways).tolist() == [[True, True, True]]
-    assert invariant(np.array([[True, True, False]]), ways).tolist() == [[False, False, False]]
 
 
 def test_an_angle_comes_round():
@@ -181,10 +176,7 @@ def mutants(content, rng):
 def test_the_checker_agrees_and_refuses_every_mutant(proof):
     content = proof.certificate()
     assert check.check_content(content) == content["claim"]
-    for kind, mutant in mutants(content, np.random.default_rng(3)):
-        with pytest.raises(check.Refused):
-            check.check_content(mutant)
-            pytest.fail(f"accepted a mutant: {kind}")
+    refuse(mutants(content, np.random.default_rng(3)))
 
 
 def all_five(content):

@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, called
-from test_simplegoal_proof import check_command
+from test_simplegoal_proof import check_command, refuse
 
 import vsp
 from studies import comparison
@@ -250,9 +250,7 @@ def test_a_sample_is_not_called_a_proof(capsys):
 
 def test_the_checker_refuses_every_mutant():
     content = load_certificate("mountaincar_limit")[1]
-    for kind, mutate in MUTANTS.items():
-        mutant = copy.deepcopy(content)
-        mutate(mutant["pieces"], mutant["claim"], mutant["policy"])
-        with pytest.raises(check.Refused):
-            check.check_content(mutant)
-            pytest.fail(f"accepted a mutant: {kind}")
+    mutants = {kind: copy.deepcopy(content) for kind in MUTANTS}
+    for kind, mutant in mutants.items():
+        MUTANTS[kind](mutant["pieces"], mutant["claim"], mutant["policy"])
+    refuse(mutants.items())

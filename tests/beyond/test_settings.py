@@ -41,8 +41,6 @@ def test_numbers_of_no_sense_are_refused():
         Tuned(n_cells=3, final_temperature=2.0)
     with pytest.raises(ValueError, match="n_episodes is 10{12}, expected"):
         Faithful(n_cells=3, n_episodes=10**12)
-    with pytest.raises(ValueError, match="failure_penalty is -1"):
-        Faithful(n_cells=3, failure_penalty=-1.0)
     with pytest.raises(ValueError, match="n_generations is False"):
         Tuned(n_cells=3, n_generations=False)
 

@@ -18,7 +18,7 @@ from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, is_snapshot, score, tune
 from vsp_beyond.few_cells.tuned import distill_tuned
-from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss, squared_error
+from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss
 
 SMALL = Tuned(
     n_cells=3, n_episodes=60, n_restarts=2, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
@@ -75,14 +75,6 @@ def test_the_loss_by_hand_and_its_gradient_by_finite_differences(temperature, cl
     assert loss == pytest.approx((softmax(-gaps / temperature, axis=1) * errors).sum(axis=1).mean())
     expected = support.slopes(lambda vector: expected_loss(cells.like(vector), *data, **about)[0], cells.vector)
     assert gradient == pytest.approx(expected, abs=1e-7) and np.abs(gradient).min() > 0
-
-
-def test_in_the_cold_each_state_belongs_to_its_nearest_codeword():
-    cells, labelled = some()
-    loss, gradient = expected_loss(cells, labelled.inputs, labelled.actions, temperature=1e-9, clip_slope=1e-9)
-    error = np.mean((np.clip(hard_actions(cells, labelled.inputs), -1, 1) - labelled.actions) ** 2)
-    assert loss == pytest.approx(error) == squared_error(labelled, cells)
-    assert np.abs(gradient[: cells.codewords.size]).max() == 0  # borders do not feel anything any more
 
 
 def kinked(n=2000):

@@ -386,24 +386,15 @@ wrongs(
 )
 
 
-@right("2.5")
-def with_next(partition, episodes, config, rng, split, merge):
-    episodes, thawed = iter(episodes), config.n_epochs - config.n_freeze
-    for n in range(config.n_epochs):
-        episode = next(episodes)
-        if not len(partition.codewords):
-            partition.add(episode.states[0], rng)
-        partition.observe(episode)
-        partition.train(rng)
-        if n > 0 and n < thawed and not n % config.n_split:
-            split(partition, episode, config, rng)
-        if n > 0 and n < thawed and not n % config.n_merge:
-            merge(partition, config)
-        if n % config.n_reset == 0:  # also at n = 0, where it does no harm
-            partition.clear()
-    return partition
-
-
+LOOP = "episodes = iter(episodes)\n    for n in range(config.n_epochs):\n        episode = next(episodes)"
+FIRST = "        if not len(partition.codewords):\n            partition.add(episode.states[0], rng)\n"
+OBSERVE = "        partition.observe(episode)\n"
+right("2.5")(
+    changed(
+        "2.5", "for n, episode in enumerate(episodes):", LOOP, "    partition.add(episodes[0].states[0], rng)\n", "",
+        OBSERVE, FIRST + OBSERVE, "n and n %", "n %",  # cleared also at n = 0, where it does no harm
+    )
+)  # fmt: skip
 right("2.5")(changed("2.5", ", episode, config, rng)", ", config=config, episode=episode, rng=rng)"))
 
 

@@ -38,16 +38,9 @@ def test_a_tree_is_that_of_scikit_learn(task, leaves):
     assert found.shape == actions.shape and state is None
     assert np.array_equal(found, model.fit(states, actions).predict(other).reshape(actions.shape))
     assert len(tree) == leaves == len(np.unique(tree.predict(states)[0], axis=0))
-
-
-def test_a_leaf_holds_the_mean_action_of_its_states():
-    states = np.array([[0.1, 0.5], [0.2, 0.5], [0.8, 0.5], [0.9, 0.5]])
-    actions = np.array([[0.0, 1.0], [0.2, 1.0], [-1.0, -1.0], [-0.6, -1.0]])
-    tree = Tree(states, actions, leaves=2)
-    assert np.allclose(tree.predict(np.array([[0.0, 0.0], [1.0, 1.0]]))[0], [[0.1, 1.0], [-0.8, -1.0]])
-    assert len(Tree(states[:3], actions[:3], leaves=13)) == 3  # no more leaves than states
-    assert len(Tree(states, np.ones((4, 2)), leaves=13)) == 1
-    assert np.allclose(Tree(states, actions, leaves=1).predict(states)[0], actions.mean(axis=0))
+    assert len(Tree(states[:2], actions[:2], leaves=leaves)) == 2  # no more leaves than states
+    mean = Tree(states, actions, leaves=1)
+    assert len(mean) == 1 and np.allclose(mean.predict(states)[0], actions.mean(axis=0))
 
 
 # Cells of k-means, and DAgger
@@ -119,52 +112,34 @@ def test_of_several_fits_the_one_with_the_best_first_policy_goes_on():
 # Rules of thumb
 
 
-def test_the_rule_of_thumb_of_simplegoal_by_hand():
-    name, policy = rule_of_thumb(SIMPLEGOAL)
-    actions, _ = policy.predict(np.array([[0.0, 0.0], [0.9, 0.2], [0.5, 1.0]]))
-    assert name == "always (−1, −1)" and (actions == -1).all() and len(policy) == 1
-
-
-def test_the_rule_of_thumb_of_mountaincar_by_hand():
-    name, policy = rule_of_thumb(MOUNTAINCAR)
-    actions, _ = policy.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
-    assert name == "12 · velocity" and np.allclose(actions, [[0], [0.6], [-0.84], [0.84]])
-
-
-def test_rules_of_thumb_do_what_is_said_of_them():
-    frame = evaluate(rule_of_thumb(MOUNTAINCAR)[1], MOUNTAINCAR, 200, seed=30)
+def test_rules_of_thumb_by_hand_and_what_is_said_of_them():
+    (straight, always), (pumping, rule) = map(rule_of_thumb, TASKS)
+    assert (straight, pumping) == ("always (−1, −1)", "12 · velocity") and len(always) == 1
+    assert (always.predict(np.array([[0.0, 0.0], [0.9, 0.2], [0.5, 1.0]]))[0] == -1).all()
+    forces, _ = rule.predict(np.array([[-0.5, 0.0], [0.3, 0.05], [-1.2, -0.07], [0.6, 0.07]]))
+    assert np.allclose(forces, [[0], [0.6], [-0.84], [0.84]])
+    frame = evaluate(rule, MOUNTAINCAR, 200, seed=30)
     assert frame["return"].mean() > 97 and (frame["outcome"] == "goal").all()
-    frame = evaluate(rule_of_thumb(SIMPLEGOAL)[1], SIMPLEGOAL, 200, seed=30)
+    frame = evaluate(always, SIMPLEGOAL, 200, seed=30)
     assert set(frame["outcome"]) == {"goal", "pit"} and 0.05 < (frame["outcome"] == "pit").mean() < 0.3
 
 
 # The same cells with other maps
 
 
-def three_cells(task=SIMPLEGOAL):
-    m = len(get_task(task).action_low)
-    codewords = np.array([[0.1, 0.1], [0.5, 0.5], [9.0, 9.0]])  # no state is near the last
-    return VoronoiPolicy(codewords, np.random.default_rng(1).normal(size=(3, 3, m)), task=task)
-
-
-def test_refitted_maps_are_those_of_least_squares_in_each_cell():
-    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
+def test_refitted_maps_are_those_of_least_squares_or_the_mean_action_in_each_cell():
+    codewords, maps = [[0.1, 0.1], [0.5, 0.5], [9.0, 9.0]], np.random.default_rng(1).normal(size=(3, 3, 2))
+    policy, (states, actions) = VoronoiPolicy(codewords, maps, task=SIMPLEGOAL), examples(SIMPLEGOAL)
     found, cells = refit(policy, states, actions), policy.cells(states)
+    means = refit(policy, states, actions, constant=True)
     assert set(cells) == {0, 1} and np.array_equal(found.cells(states), cells)
     for i in (0, 1):
         model = LinearRegression().fit(states[cells == i], actions[cells == i])
         assert np.allclose(found.coefficients[i, :-1], model.coef_.T)
         assert np.allclose(found.coefficients[i, -1], model.intercept_)
-    assert np.array_equal(found.coefficients[2], policy.coefficients[2])  # an empty cell keeps its map
-    assert np.array_equal(policy.coefficients, three_cells().coefficients)  # and the policy is not touched
-
-
-def test_constants_are_the_mean_action_of_each_cell():
-    policy, (states, actions) = three_cells(), examples(SIMPLEGOAL)
-    found, cells = refit(policy, states, actions, constant=True), policy.cells(states)
-    for i in (0, 1):
-        assert np.allclose(found.coefficients[i, :-1], 0)
-        assert np.allclose(found.coefficients[i, -1], actions[cells == i].mean(axis=0))
+        assert np.allclose(means.coefficients[i], [[0, 0], [0, 0], actions[cells == i].mean(axis=0)])
+    assert np.array_equal(found.coefficients[2], maps[2])  # no state is near the last cell, which keeps its map
+    assert np.array_equal(policy.coefficients, maps)  # and the policy is not touched
 
 
 def test_refitting_keeps_the_distance_of_the_lookup():

@@ -10,7 +10,6 @@ from vsp.paper.statistics import greatest_std, outlier_numbers, resample, rounds
 from vsp.protocol import interval, intervals
 
 HAND = np.array([-100.0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 100])  # quartiles 2.5, 5, 7.5: whiskers at -5 and 15
-RETURNS = arrays(np.float64, st.integers(1, 60), elements=st.floats(-1e3, 1e3))
 
 
 def test_spread_by_hand():
@@ -24,16 +23,6 @@ def test_spread_by_hand():
     assert spread([3.0])["std"] == 0 and spread([3.0])["coverage"] == 1
 
 
-@given(RETURNS)
-def test_coverage_is_what_is_left_of_the_outliers(returns):
-    found = spread(returns)
-    outside = found["outliers_below"] + found["outliers_above"]
-    assert found["coverage"] == pytest.approx(1 - outside / len(returns)) and found["coverage"] >= 0.5
-    assert found["min"] <= found["q1"] <= found["median"] <= found["q3"] <= found["max"]
-    assert outlier_numbers(returns)["outliers"] == outside
-    assert spread(returns[::-1].reshape(-1, 1)) == pytest.approx(found)
-
-
 def test_outlier_numbers_by_hand():
     found = outlier_numbers(np.array([-100.0, -50, *range(1, 10), 100]))
     std = np.std([-100, -50, 100], ddof=1)
@@ -41,6 +30,7 @@ def test_outlier_numbers_by_hand():
                 "_above_share": 100 / 3, "_below_mean": -75, "_above_mean": 100, "_below_std": 1250**0.5,
                 "_above_std": 0}  # fmt: skip
     assert {name: found[f"outliers{name}"] for name in expected} == pytest.approx(expected)
+    assert (both := spread([-100.0, -50, *range(1, 10), 100]))["outliers_below"] == 2 * both["outliers_above"] == 2
     without = outlier_numbers(np.arange(10.0))
     assert without["outliers"] == 0 and all(np.isnan(without[f"outliers{name}"]) for name in expected if name)
 
@@ -114,19 +104,6 @@ def test_outliers_that_are_almost_equal_have_an_exact_deviation():
 
 
 # What summary numbers imply
-
-
-def part(values):
-    return statistics.Part(len(values), values.mean(), values.std(), values.min(), values.max())
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_what_remains_is_what_numpy_finds_in_the_rest(seed):
-    values = np.sort(np.random.default_rng(seed).gamma(2.0, size=400))
-    low, middle, high = values[:30], values[30:380], values[380:]
-    told = 400, values.mean(), [part(low), part(high)]
-    assert statistics.remaining_mean(*told) == pytest.approx(middle.mean(), rel=1e-12)
-    assert statistics.remaining_std(400, values.mean(), values.std(), told[2]) == pytest.approx(middle.std(), rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))

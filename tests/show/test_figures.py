@@ -7,9 +7,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
-from drawn import hexes, labels
 from PIL import Image, UnidentifiedImageError
 from support import python
 
@@ -18,7 +16,6 @@ from vsp import geometry, show
 from vsp.rollouts import Episode
 from vsp.run.atomic import ROOT
 from vsp.show import state_space, style
-from vsp.show.returns import box_plot, intervals, ledger_gaps
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
 from vsp.tasks.registry import get_task
 
@@ -176,14 +173,6 @@ def test_the_force_map_has_pixels_centred_on_its_grid(ax):
     assert image.get_array()[0, 0] == pytest.approx(-1.2) and image.get_array()[0, -1] == pytest.approx(0.6)
 
 
-def test_box_plots_show_the_quartiles_and_no_outliers(ax):
-    returns = {"TD3": np.append(np.arange(1.0, 10), 100), "distilled": np.arange(20.0).reshape(4, 5).ravel()}
-    box_plot(ax, returns)
-    assert [t.get_text() for t in ax.get_xticklabels()] == ["TD3\n(n = 10)", "distilled\n(n = 20)"]
-    heights = np.concatenate([line.get_ydata() for line in ax.lines])
-    assert heights.max() < 100 and np.median(returns["TD3"]) in heights and "return" in ax.get_ylabel()
-
-
 def test_a_codeword_has_its_number_and_its_colour_from_birth_to_death(ax):
     words, history = np.column_stack([0.1 * np.arange(11), np.zeros(11)]), vsp.History()
 
@@ -212,48 +201,6 @@ def test_a_trail_runs_from_its_ring_to_where_the_last_action_led(ax):
 def test_importing_does_not_wait_for_what_few_notebooks_use():
     code = "import sys, vsp.show; print(sys.modules.keys() & {'seaborn', 'ipywidgets', 'scipy.stats', 'scipy.ndimage'})"
     assert python(code).strip() == "set()"
-
-
-# Intervals, the ledger, the studies
-
-ROWS = pd.DataFrame(
-    {"here": [2.0, 5.0, 3.0], "low": [1.0, 4.5, 3.0], "high": [4.0, 6.0, 3.0]}, index=["one", "two", "three"]
-)
-
-
-def test_intervals_are_dots_on_lines_and_the_first_is_on_top(ax):
-    intervals(ax, ROWS)
-    lines, dots = ax.collections
-    assert [s.tolist() for s in lines.get_segments()] == [[[1, 0], [4, 0]], [[4.5, 1], [6, 1]], [[3, 2], [3, 2]]]
-    assert dots.get_offsets().tolist() == [[2, 0], [5, 1], [3, 2]]
-    assert ax.get_yticks().tolist() == [0, 1, 2] and labels(ax) == ["one", "two", "three"]
-    assert ax.get_ylim() == (2.5, -0.5)
-    assert hexes(lines.get_colors()) == hexes(dots.get_facecolors()) == [style.DISTILLED]
-    intervals(ax, ROWS, color=(colours := [style.TEACHER, style.DISTILLED, style.GOAL]))
-    assert [hexes(drawn.get_edgecolors()) for drawn in ax.collections[2:]] == [colours, colours]
-
-
-GAPS = pd.DataFrame(
-    {
-        "subject": ["teacher", "teacher", "distilled", "distilled"],
-        "verdict": ["reproduced", "differs", "contradicts itself", "cannot be told"],
-        "gap": [0.5, -300.0, 12.0, -1.2],
-    },
-    index=["mean", "std", "q1", "max"],
-)
-
-
-def test_gaps_of_the_ledger_lie_in_their_rows_by_verdict(ax):
-    ledger_gaps(ax, GAPS, band=2**0.5, limit=20)
-    dots, names = ax.get_legend_handles_labels()
-    assert names == ["reproduced", "cannot be told", "differs", "contradicts itself"]
-    assert [line.get_xydata().tolist() for line in dots] == [[[0.5, 0]], [[-1.2, 3]], [[-20, 1]], [[12, 2]]]
-    assert [line.get_mfc() for line in dots] == ["black", "white", "black", "black"]
-    assert len({(line.get_marker(), line.get_mfc()) for line in dots}) == 4 and ax.lines[1].get_ydata() == [1.5, 1.5]
-    assert [text.get_text() for text in ax.texts] == ["−300"] and ax.texts[0].xy == pytest.approx((-22, 1))
-    assert ax.get_xlim() == pytest.approx((-22, 22))
-    assert labels(ax) == ["mean", "std", "q1", "max"] and ax.get_ylim() == (3.5, -0.5)
-    assert ax.patches[0].get_bbox().x1 == pytest.approx(2**0.5)
 
 
 def test_lines_means_letters_and_rows_are_where_they_belong(ax):

@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher
+from support import PENDULUM, SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import measure as measure_module
 from studies.comparison.measure import action_error, common_states, fidelity, measure, sameness
@@ -48,9 +48,6 @@ def test_no_start_that_is_reported_was_chosen_on(seed=0):
 
 
 def test_the_action_error_by_hand():
-    constant = [VoronoiPolicy(np.zeros((1, 2)), [[[0.0], [0.0], [value]]], task=MOUNTAINCAR) for value in (0.5, 0.1)]
-    starts = np.array([[-0.5, 0.0]])
-    assert action_error(*constant, get_task(MOUNTAINCAR), starts, by=constant[0]) == pytest.approx(0.4)
     torque = VoronoiPolicy(np.zeros((1, 3)), [[[0.0], [0.0], [0.0], [1.0]]], task=PENDULUM)
     still = VoronoiPolicy(np.zeros((1, 3)), np.zeros((1, 4, 1)), task=PENDULUM)
     assert action_error(torque, still, get_task(PENDULUM), np.zeros((1, 2)), by=still) == pytest.approx(0.5)

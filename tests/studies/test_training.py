@@ -32,6 +32,17 @@ def in_json(recipe):
     return {key: list(v) if isinstance(v, tuple) else v for key, v in dataclasses.asdict(recipe).items()}
 
 
+def check_card(teacher, task, recipe, n, seed):
+    """The card has that recipe, and its score is that of n starts on which no one chose a seed."""
+    card, written, packages = teacher.card, teacher.card["score"], make_teachers.ENGINES.get(task, ())
+    assert (card["task"], card["recipe"], teacher.task.name) == (task, in_json(recipe), task)
+    assert card["learning_curve"][-1]["steps"] >= recipe.steps
+    assert {*make_teachers.PACKAGES, *packages} == set(card["versions"])
+    found = rollout_from_seed(teacher, task, n, seed=seed)
+    assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / n**0.5
+    return found
+
+
 ROBOT = pytest.param(CHEETAH, marks=pytest.mark.skipif(not find_spec("mujoco"), reason="needs mujoco"))
 
 
@@ -39,17 +50,12 @@ ROBOT = pytest.param(CHEETAH, marks=pytest.mark.skipif(not find_spec("mujoco"), 
 def test_a_shipped_teacher_is_what_its_card_says(task):
     teacher = load_teacher(task)
     card, written, (mean, failures) = teacher.card, teacher.card["score"], BARS[task]
-    assert (card["task"], card["recipe"]) == (task, in_json(RECIPES[task]))
     assert written["mean"] >= mean and 1 - written["goal"] <= failures
-    steps, means = zip(*((point["steps"], point["mean"]) for point in card["learning_curve"]))
-    assert steps[-1] >= card["recipe"]["steps"]
-    tried = card["seeds_tried"][-1]
+    means, tried = [point["mean"] for point in card["learning_curve"]], card["seeds_tried"][-1]
     assert tried["seed"] == card["seed"] and tried["mean"] == (max(means) if task in BEST_OF_CURVE else means[-1])
-    assert {*make_teachers.PACKAGES, *make_teachers.ENGINES.get(task, ())} == set(card["versions"])
     assert card["sha256"] == atomic.sha256(SHIPPED / f"{task}.safetensors")
     n = {LUNARLANDER: 12, WALKER: 3, CHEETAH: 3}.get(task, 400)  # a physics engine takes longer
-    found = rollout_from_seed(teacher, task, n, seed=20_242)  # starts that no one chose a seed on
-    assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / n**0.5
+    check_card(teacher, task, RECIPES[task], n, seed=20_242)
     assert (Critics(teacher).criticality(np.zeros((3, len(teacher.task.low)))) >= 0).all()  # it has its critics with it
 
 
@@ -176,15 +182,11 @@ def test_the_short_teachers_are_shipped_and_no_others():
 @pytest.mark.parametrize(("task", "seed"), SHIPPED_SHORT)
 def test_a_short_teacher_scores_what_its_card_says(task, seed):
     teacher = load_teacher(SHIPPED / "short" / f"{task}-{seed}.safetensors")
-    card, written = teacher.card, teacher.card["score"]
-    recipe = in_json(short_recipe(task))
-    assert (card["task"], card["seed"], card["recipe"], teacher.task.name) == (task, seed, recipe, task)
-    assert card["learning_curve"][-1]["steps"] >= recipe["steps"] > card["learning_curve"][-2]["steps"]
-    assert {*make_teachers.PACKAGES, *make_teachers.ENGINES.get(task, ())} == set(card["versions"])
-    found = rollout_from_seed(teacher, task, 200, seed=20_241)  # starts that no one has seen
-    assert abs(found.returns.mean() - written["mean"]) < 4 * written["std"] / np.sqrt(200)
+    card, goal, recipe = teacher.card, teacher.card["score"]["goal"], short_recipe(task)
+    assert card["seed"] == seed and recipe.steps > card["learning_curve"][-2]["steps"]
+    found = check_card(teacher, task, recipe, 200, seed=20_241)
     missed = np.mean(found.outcomes != GOAL)
-    assert missed <= (1 - written["goal"]) + 4 * np.sqrt((1 - written["goal"]) / 200)
+    assert missed <= (1 - goal) + 4 * np.sqrt((1 - goal) / 200)
 
 
 @pytest.fixture

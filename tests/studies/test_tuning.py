@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
+from support import SIMPLEGOAL, TASKS, TEACHERS, examples
 
 from studies.comparison.tuning import TunableTree, tunable, tuned
 from studies.rivals.small_network import SmallNetwork
@@ -41,7 +41,7 @@ def fitted(kind, task):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_numbers_act_as_the_policy_they_are_of(kind, task):
     policy, numbers = fitted(kind, task)
-    other = examples(task, n=200, seed=1)[0]
+    other = np.concatenate([examples(task, n=200, seed=1)[0], examples(task)[0]])  # these lie on the cuts
     expected = np.clip(policy.predict(other)[0], get_task(task).action_low, get_task(task).action_high)
     same = numbers.like(numbers.vector)
     assert np.allclose(same.predict(other)[0], expected, atol=1e-6)  # CART's borders are those of float32
@@ -65,18 +65,6 @@ def test_all_numbers_are_tuned_and_the_structure_is_not(kind, n):
         assert np.array_equal(moved.sides, numbers.sides)
         assert np.array_equal(moved.directions, numbers.directions) != numbers.oblique
         assert not (numbers.constant and moved.maps[:, :-1].any())
-
-
-def test_a_tree_by_hand():
-    """Beyond 0.5 of the first input to the right; there, beyond 0.2 of the second one to the right again."""
-    sides = np.array([[-1, 0], [1, -1], [1, 1]])
-    maps = np.array([[[0.0], [0.0], [0.1]], [[1.0], [0.0], [0.0]], [[0.0], [3.0], [0.0]]])
-    frame = Scaling(get_task(MOUNTAINCAR), np.zeros(2), np.ones(2))
-    tree = TunableTree(frame, sides, np.eye(2), np.array([0.5, 0.2]), maps, oblique=False, constant=False)
-    states = np.array([[0.5, 0.9], [0.6, 0.2], [0.6, 0.3]])
-    assert np.allclose(tree.predict(states)[0], [[0.1], [0.6], [0.9]])
-    moved = tree.like(np.append([0.5, 0.35], maps))  # the last state now turns left at the second cut
-    assert np.allclose(moved.predict(states)[0], [[0.1], [0.6], [0.6]]) and moved.thresholds.tolist() == [0.5, 0.35]
 
 
 @pytest.mark.parametrize("kind", ["linear tree", "one map"])

@@ -1,9 +1,7 @@
 """`make agents` and `make hub-teacher`: agents in a folder, what is kept of them, and what is refused in one line."""
 
 import functools
-import os
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -118,17 +116,6 @@ def test_an_agent_that_nobody_has_is_one_line(tmp_path):
     with pytest.raises(command.CommandError, match="cells is 2.0, expected a whole number from 1 to 16$") as caught:
         command.check_parameter("cells", 2.0, range(1, 17))
     assert caught.value._render_traceback_() == [f"error: {caught.value}"]  # what Jupyter shows
-
-
-@pytest.mark.skipif("VSP_AGENTS" not in os.environ, reason="VSP_AGENTS names no folder of agents")
-def test_the_committed_rows_are_those_of_the_zips():
-    for (algorithm, task), path in agents.agents_in(Path(os.environ["VSP_AGENTS"])).items():
-        row, agent = ROWS[(ROWS["algorithm"] == algorithm) & (ROWS["task"] == task)].iloc[0], agents.read(path, task)
-        assert (row["checksum"], row["teacher"]) == (agents.atomic.sha256(path), agent.digest[:10])
-        assert np.abs(agent.predict(agents.plane(task)[2])[0] - agents.actions_of(algorithm, task)).max() < 1e-5
-        alike = likeness(agents.policy_of(algorithm, task), agent, task)
-        assert row["r2_least"] <= alike.r2 + 1e-6
-        assert row["agent"] == pytest.approx(alike.returns["agent"].mean(), abs=0.01)
 
 
 # The paper's part with another teacher

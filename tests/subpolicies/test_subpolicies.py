@@ -70,21 +70,6 @@ def some_states(task, n=50, seed=0):
     return np.random.default_rng(seed).uniform(task.low, task.high, size=(n, len(task.low)))
 
 
-@pytest.mark.parametrize(
-    ("name", "task", "state", "features", "rows"),
-    [
-        ("constant", MOUNTAINCAR, [0.25, 0.5], [], ["bias"]),
-        ("linear", MOUNTAINCAR, [0.25, 0.5], [0.25, 0.5], ["x", "v", "bias"]),
-        ("quadratic", MOUNTAINCAR, [-0.5, 3], [-0.5, 3, 0.25, -1.5, 9], ["x", "v", "x²", "x·v", "v²", "bias"]),
-    ],
-)
-def test_features_by_hand(name, task, state, features, rows):
-    form, state = policy_class(name, get_task(task)), np.array(state, dtype=float)
-    assert form.features(state).tolist() == features and list(form.rows) == rows
-    assert form.features(np.stack([state] * 3)).tolist() == [features] * 3
-    assert form.features(np.zeros((4, 5, len(state)))).shape == (4, 5, len(features))
-
-
 @each_class
 def test_no_feature_is_larger_than_its_size_and_raw_ones_have_size_1(name, task):
     task = get_task(task)
@@ -151,13 +136,6 @@ def test_an_expression_read_as_a_formula_gives_the_output(name):
 
 def solve(models, cells, inputs, actions):
     models.solve(np.array(cells), inputs.transpose(0, 2, 1) @ inputs, inputs.transpose(0, 2, 1) @ actions)
-
-
-def test_solving_one_state_by_hand():
-    """Map 0, one state x = 2 with action 5: the least change that answers 5 is (2, 1)."""
-    models = models_of(1, d=1, m=1, initial="zeros")
-    solve(models, [0], np.array([[[2.0, 1.0]]]), np.array([[[5.0]]]))
-    assert models.coefficients[0, :, 0] == pytest.approx([2, 1], abs=1e-5)
 
 
 @pytest.mark.parametrize("name", POLICY_CLASSES)

@@ -42,7 +42,8 @@ def acts_as(model, teacher, most=1e-5):
     low, high = teacher.task.low, teacher.task.high
     obs = np.random.default_rng(0).uniform(low, high, (10_000, len(low))).astype(np.float32)
     actions, seen = teacher.predict(obs)[0], teacher.inputs(obs)
-    assert np.ptp(actions, axis=0).max() > 1e-5
+    assert np.ptp(actions, axis=0).max() > 1e-5 and actions.dtype == np.float32
+    assert np.allclose(teacher.predict(obs[0])[0], actions[0], atol=1e-5) and teacher.predict(obs[0])[1] is None
     assert np.abs(actions - in_float64(model, seen)).max() < most
     assert np.abs(actions - model.predict(seen, deterministic=True)[0]).max() < 1e-4
 

@@ -105,21 +105,15 @@ HIDDEN = ["a: 1\n---\nnormalize: true", "hyperparams: {normalize: true}", "norma
 
 
 @pytest.mark.usefixtures("no_collection")
-@pytest.mark.parametrize("name", SIGNS)
-def test_a_file_nearby_tells_of_a_normalisation(name, small, tmp_path):
-    path = shutil.copy(small, tmp_path / "x_5_steps.zip")
-    (tmp_path / name).parent.mkdir(exist_ok=True)
-    for text in NO_SIGNS if name == "config.yml" else ():
-        (tmp_path / name).write_text(text)
+def test_settings_nearby_may_say_so_or_not(small, tmp_path):
+    path = shutil.copy(small, tmp_path / "x.zip")
+    for text in NO_SIGNS:
+        (tmp_path / "config.yml").write_text(text)
         load_teacher(path, SIMPLEGOAL)
-    for content in [*UNREADABLE, *(text.encode() for text in HIDDEN)] if name == "config.yml" else ():
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(ValueError, match=rf"x_5_steps.zip: .*{name} (may say so, but cannot be read|says so)"):
+    for content in [*UNREADABLE, *map(str.encode, HIDDEN)]:
+        (tmp_path / "config.yml").write_bytes(content)
+        with pytest.raises(ValueError, match="x.zip: .*config.yml (may say so, but cannot be read|says so)"):
             load_teacher(path, SIMPLEGOAL)
-    (tmp_path / name).write_text(SIGNS[name])
-    with pytest.raises(ValueError, match=rf"x_5_steps.zip: .*{name} .*Pass their statistics, normalize="):
-        load_teacher(path, SIMPLEGOAL)
-    load_teacher(path, SIMPLEGOAL, normalize=False)
 
 
 LAYOUTS = {  # of RL Zoo, and names that people give
@@ -131,16 +125,15 @@ LAYOUTS = {  # of RL Zoo, and names that people give
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("zip_file", LAYOUTS)
-def test_statistics_and_settings_are_found_wherever_people_keep_them(zip_file, small, tmp_path):
-    for name in (zip_file, LAYOUTS[zip_file]):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-    path, found = shutil.copy(small, tmp_path / zip_file), tmp_path / LAYOUTS[zip_file]
-    written(found)
-    if settings := found.suffix == ".yml":
-        found.write_text("normalize: true")
-    with pytest.raises(ValueError, match=f"{LAYOUTS[zip_file]} {'says so' if settings else 'lies beside it'}"):
+@pytest.mark.parametrize(("zip_file", "name"), [*(("x_5_steps.zip", name) for name in SIGNS), *LAYOUTS.items()])
+def test_statistics_and_settings_are_found_wherever_people_keep_them(zip_file, name, small, tmp_path):
+    for each in (zip_file, name):
+        (tmp_path / each).parent.mkdir(parents=True, exist_ok=True)
+    path, said = shutil.copy(small, tmp_path / zip_file), "says so" if name.endswith(".yml") else "lies beside it"
+    (tmp_path / name).write_text(SIGNS.get(name, "normalize: true"))
+    with pytest.raises(ValueError, match=f"{zip_file}: .*{name} {said}.*Pass their statistics, normalize="):
         load_teacher(path, SIMPLEGOAL)
+    load_teacher(path, SIMPLEGOAL, normalize=False)
 
 
 def test_statistics_named_after_another_agent_are_that_agents(small, tmp_path):
