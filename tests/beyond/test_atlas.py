@@ -51,8 +51,7 @@ def test_pieces_fill_the_box_and_are_the_network(task, n):
     """Also exactly, up to the bound. They are counted in another way: lines make one piece of a convex polygon, one
     more each, and one more for each crossing of two inside."""
     teacher, corners, maps, rounding = atlas.pieces_of(load_teacher(task))
-    layers = in_float64(teacher).layers
-    (first, start), (second, offset), (third, last) = layers
+    (first, start), (second, offset), (third, last) = layers = in_float64(teacher).layers
     middles, (a, b), (c, d) = corners.mean(axis=1), teacher.task.low, teacher.task.high
     assert n == len(corners) > 1000 * corners.shape[1] and atlas.areas(corners).sum() == pytest.approx(
         (c - a) * (d - b), abs=0, rel=1e-9
