@@ -2,7 +2,7 @@
 
 `faithful` and `tuned` distil an agent, `at_the_limit` searches for the highest return: each has defaults for any task.
 `simplify` reduces cells and numbers, `report` writes a page about a policy and its agent, `prove` proves what a policy
-does from every start. `few_cells`, `optimum` and `proofs` hold the parts.
+does from every start. `few_cells`, `optimum`, `proofs` and `atlas` hold the parts.
 """
 
 from __future__ import annotations

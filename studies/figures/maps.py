@@ -1,9 +1,11 @@
-"""Figures of other people's agents: the actions of each as a map, with those of its policy below."""
+"""Maps: the actions of other people's agents, each with those of its policy below; and the polygons of an atlas."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 
 from vsp.show.state_space import cells, image
 from vsp.show.style import BORDER, FORCE_MAP
@@ -40,3 +42,16 @@ def agent_maps(axes: np.ndarray, task: str, algorithms: list[str], labels: tuple
     axes[-1].set_xlabel(f"{labels[1]} →")
     axes[-1].text(0.06, 0.5, f"{labels[2]} →", rotation=90, va="center")
     return axes[0]
+
+
+def action_tones(actions: np.ndarray) -> np.ndarray:
+    """Return colours (n, 3) of two actions (n, 2) in [-1, 1]: left is purple, right is orange, up is lighter."""
+    right, up = ((actions + 1) / 2).T[..., None]
+    left = (1 - up) * to_rgb("#5b2a86") + up * to_rgb("#b7a6dd")
+    return (1 - right) * left + right * ((1 - up) * to_rgb("#c4560d") + up * to_rgb("#fbd08f"))
+
+
+def polygons(ax: Axes, corners: np.ndarray, color: np.ndarray | str, *, edge: str = "face") -> None:
+    """Draw polygons (n, k, 2) of `vsp_beyond.atlas`, with thin edges that keep narrow ones visible."""
+    look = {"facecolors": color, "edgecolors": edge, "linewidths": 0.2 if edge == "face" else 0.1}
+    ax.add_collection(PolyCollection(corners, **look, rasterized=True, zorder=3))
