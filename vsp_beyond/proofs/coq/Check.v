@@ -5,7 +5,8 @@
     Each box has a rank. From a box of rank r every step must lead into boxes that lie in the goal or have a smaller
     rank, so that the goal is reached in at most r + 1 steps. Where ranks come from does not matter. *)
 
-From Coq Require Import List QArith Qround ZArith Ascii String FMapPositive.
+From Coq Require Import List QArith Qround ZArith FMapPositive.
+From Coq.Strings Require Import Byte.
 From VSP Require Import Statement.
 Open Scope Z_scope.
 
@@ -64,19 +65,21 @@ Definition check_cell (rank : Z -> Z -> nat) (r : nat) i j plan :=
 (** A box needs a rank below 50, unless it lies inside the pit. *)
 Definition check_box rank plans i j :=
   if (rank i j <? 50)%nat then forallb (check_cell rank (rank i j) i j) plans
-  else (120 <? i) && (i <? 180) && (120 <? j) && (j <? 180).
+  else (120 <? i) && (i <? 179) && (120 <? j) && (j <? 179).
 Definition check rank p :=
   negb (Qeq_bool (x (scale p)) 0) && negb (Qeq_bool (y (scale p)) 0) &&
   let plans := map (plan_of p) (cells p) in all 300 0 (fun i => all 300 0 (check_box rank plans i)).
 
-(** Ranks from a text: row i, character j is the letter number r + 1 in the order A to Z, [, and so on. *)
-Definition tree := PositiveMap.t.
-Fixpoint numbered {A} (k : positive) (all : list A) (found : tree A) :=
+(** Ranks from texts, one for each i. In it, the letters A, B, C, ... at place j stand for ranks 0, 1, 2, ... *)
+Record row := Row { letters : list byte }.
+Declare Scope row_scope.
+Delimit Scope row_scope with row.
+String Notation row Row letters : row_scope.
+Fixpoint numbered {A} (k : positive) (all : list A) (found : PositiveMap.t A) :=
   match all with nil => found | one :: rest => numbered (Pos.succ k) rest (PositiveMap.add k one found) end.
-Definition row_of text :=
-  numbered 1 (map (fun letter => nat_of_ascii letter - 65)%nat (list_ascii_of_string text)) (PositiveMap.empty nat).
-Definition rank_of (texts : list string) :=
-  let rows := numbered 1 (map row_of texts) (PositiveMap.empty _) in
+Definition numbers_in text := numbered 1 (map (fun letter => to_nat letter - 65)%nat (letters text)) (PositiveMap.empty _).
+Definition rank_in texts :=
+  let rows := numbered 1 (map numbers_in texts) (PositiveMap.empty _) in
   fun i j => match PositiveMap.find (Z.to_pos (i + 1)) rows with
     | Some row => match PositiveMap.find (Z.to_pos (j + 1)) row with Some r => r | None => 99%nat end
     | None => 99%nat end.
