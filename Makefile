@@ -47,7 +47,7 @@ unexport PYTHONDONTWRITEBYTECODE PYTHONPATH PYTHONHOME PYTHONSTARTUP
 
 # The parts of environment.lock that a target needs are in the name of its environment: venv-train adds `train`.
 ENVIRONMENTS := venv venv-train venv-train-mujoco venv-mujoco venv-test-train venv-test-train-dask venv-site venv-train-site-test
-.PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents drone proofs course article site test \
+.PHONY: help list quick paper-figures beyond-figures all lab runs study hidden hub-teacher agents drone proofs theorem course article site test \
   test-js test-long test-tries lint test-site manifest lock clean bench stale beyond short-teachers beyond-long faults teachers begin \
   $(ENVIRONMENTS) $(NOTEBOOKS) $(foreach n,$(NOTEBOOKS),$(call outputs,$(n)))
 
@@ -110,6 +110,8 @@ stale: venv ##- lists committed results of ours made with other settings, teache
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
+theorem: begin venv ##- Coq checks a theorem, in build/theorem/: three cells reach SimpleGoal's goal from every start: 1 minute
+	@$(PY) -m vsp_beyond.proofs.theorem "$$OUT/build/theorem"
 
 ## Study
 course: begin venv ## three lessons: hand-out, solutions, slides, the lecturer's guide, into build/course/: 10 to 20 s
