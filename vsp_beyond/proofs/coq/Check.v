@@ -12,10 +12,11 @@ Open Scope Z_scope.
 
 Definition side := 5033164800.
 Definition tenth := 503316480.
-Definition spread := 4800. (* the largest error, 2^-20 *)
+Definition spread := 4800. (* the largest error of a step, 2^-20 of the side *)
 Definition bound low high v := Z.max low (Z.min high v).
 
-(** A lower bound of p x + q y + r over a box: its smallest value there is taken in one of the corners. *)
+(** A lower bound of p x + q y + r over a box: its smallest value there is taken in one of the corners. The coefficients
+    are rounded down, which bounds the value because x and y are not negative. *)
 Record form := Form { a : Z; b : Z; c : Z }.
 Definition rounded (p q r : Q) :=
   let a := Qfloor (p * 16777216) in let b := Qfloor (q * 16777216) in
@@ -27,7 +28,8 @@ Definition least f i j := i * a f + j * b f + c f.
 Record bounds := Bounds { act : form; minus_act : form; move : form; minus_move : form }.
 Definition bounds_of (u v : Q) (e : equation) :=
   let p := ((1 # 10) * per_x e)%Q in let q := ((1 # 10) * per_y e)%Q in let r := ((1 # 10) * constant e)%Q in
-  Bounds (rounded p q r) (rounded (- p) (- q) (- r)) (rounded (u + p) (v + q) r) (rounded (- (u + p)) (- (v + q)) (- r)).
+  Bounds (rounded p q r) (rounded (- p) (- q) (- r))
+    (rounded (u + p) (v + q) r) (rounded (- (u + p)) (- (v + q)) (- r)).
 
 (** What it needs of a cell: where another one is so much nearer that it cannot act, and where it moves. *)
 Record plan := Plan { borders : list form; along_x : bounds; along_y : bounds }.
@@ -53,6 +55,8 @@ Fixpoint all (n : nat) (k : Z) (test : Z -> bool) :=
 Definition box_of v := Z.min 299 (Z.shiftr v 24).
 Definition among low high := all (Z.to_nat (box_of high - box_of low + 1)) (box_of low).
 
+(** The check of one cell in one box of rank r. Either the cell cannot act there, or its step surely misses the pit, and
+    every box that it may lead into lies in the goal or has a smaller rank. The goal is boxes 0 to 29 on both axes. *)
 Definition check_cell (rank : Z -> Z -> nat) (r : nat) i j plan :=
   if forallb (fun f => least f i j <=? 0) (borders plan) then
     let x0 := low_end (along_x plan) i i j in let x1 := high_end (along_x plan) i i j in
@@ -62,7 +66,7 @@ Definition check_cell (rank : Z -> Z -> nat) (r : nat) i j plan :=
     else false
   else true.
 
-(** A box needs a rank below 50, unless it lies inside the pit. *)
+(** A box needs a rank below 50, unless it lies inside the pit, away from its edges: boxes 121 to 178 on both axes. *)
 Definition check_box rank plans i j :=
   if (rank i j <? 50)%nat then forallb (check_cell rank (rank i j) i j) plans
   else (120 <? i) && (i <? 179) && (120 <? j) && (j <? 179).
@@ -77,7 +81,8 @@ Delimit Scope row_scope with row.
 String Notation row Row letters : row_scope.
 Fixpoint numbered {A} (k : positive) (all : list A) (found : PositiveMap.t A) :=
   match all with nil => found | one :: rest => numbered (Pos.succ k) rest (PositiveMap.add k one found) end.
-Definition numbers_in text := numbered 1 (map (fun letter => to_nat letter - 65)%nat (letters text)) (PositiveMap.empty _).
+Definition numbers_in text :=
+  numbered 1 (map (fun letter => to_nat letter - 65)%nat (letters text)) (PositiveMap.empty _).
 Definition rank_in texts :=
   let rows := numbered 1 (map numbers_in texts) (PositiveMap.empty _) in
   fun i j => match PositiveMap.find (Z.to_pos (i + 1)) rows with

@@ -111,7 +111,8 @@ Lemma place_ok q : 0 <= q <= 1 ->
 Proof.
   intros. unfold place, inside. pose proof (Qfloor_le (300 * q)). pose proof (Qlt_floor (300 * q)).
   assert (0 <= Qfloor (300 * q))%Z by (apply (Qfloor_resp_le 0); lra).
-  destruct (Z.min_spec 299 (Qfloor (300 * q))) as [[? ->] | [? ->]]; (split; [lia|]); repeat split; intros; rational; lra.
+  destruct (Z.min_spec 299 (Qfloor (300 * q))) as [[? ->] | [? ->]]; (split; [lia|]);
+  repeat split; intros; rational; lra.
 Qed.
 
 Lemma box_of_ok low high q : inject_Z low <= 5033164800 * q <= inject_Z high ->
@@ -165,7 +166,8 @@ Proof.
   intros square (c & error_x & error_y & near & ex & ey & tx & ty) checked.
   destruct (in_place s square) as ([Hi Hj] & Hx & Hy). fold i j in Hi, Hj, Hx, Hy.
   rewrite forallb_forall in checked. specialize (checked (plan_of p c) (in_map _ _ _ (proj1 near))).
-  unfold check_cell in checked. rewrite (borders_ok c s i j) in checked by tauto. cbn [along_x along_y plan_of] in checked.
+  unfold check_cell in checked. rewrite (borders_ok c s i j) in checked by tauto.
+  cbn [along_x along_y plan_of] in checked.
   assert (1 * x s + 0 * y s == x s) as ux by ring. assert (0 * x s + 1 * y s == y s) as uy by ring.
   pose proof (ends_ok _ _ (for_x c) s i j i _ _ (proj1 Hi) (proj1 Hj) Hx Hy Hx ux ex) as X. rewrite <- tx in X.
   pose proof (ends_ok _ _ (for_y c) s i j j _ _ (proj1 Hi) (proj1 Hj) Hx Hy Hy uy ey) as Y. rewrite <- ty in Y.
@@ -177,10 +179,12 @@ Proof.
   - intros [[? ?] [? ?]]. rewrite !orb_true_iff, !Z.leb_le in outside.
     destruct outside as [[[o | o] | o] | o]; rational; lra.
   - apply (among_ok _ _ _ (x t)) in checked; [|assumption]. apply (among_ok _ _ _ (y t)) in checked; [|assumption].
-    rewrite orb_true_iff, andb_true_iff, !Z.ltb_lt, Nat.ltb_lt in checked. destruct checked as [[goal_x goal_y] | ?]; [|auto].
+    rewrite orb_true_iff, andb_true_iff, !Z.ltb_lt, Nat.ltb_lt in checked.
+    destruct checked as [[goal_x goal_y] | ?]; [|auto].
     left. destruct inner as [tx' ty']. pose proof (place_ok _ tx'). pose proof (place_ok _ ty').
     assert (place (x t) + 1 <= 30 /\ place (y t) + 1 <= 30)%Z as [? ?] by lia.
-    assert (300 * x t < inject_Z (place (x t)) + 1 /\ 300 * y t < inject_Z (place (y t)) + 1) by (split; [apply H | apply H0]; lia).
+    assert (300 * x t < inject_Z (place (x t)) + 1 /\ 300 * y t < inject_Z (place (y t)) + 1)
+      by (split; [apply H | apply H0]; lia).
     split; rational; lra.
 Qed.
 
@@ -198,7 +202,8 @@ Qed.
 
 (** From a box of rank r the goal is reached in at most r + 1 more steps. *)
 Lemma arrives run (checked : check rank p = true) : is_run p run -> forall r n, in_square (run n) ->
-  rank (place (x (run n))) (place (y (run n))) = r -> (r < 50)%nat -> (forall m, 1 <= m <= n -> ~ in_goal (run m))%nat ->
+  rank (place (x (run n))) (place (y (run n))) = r -> (r < 50)%nat ->
+  (forall m, 1 <= m <= n -> ~ in_goal (run m))%nat ->
   exists last, (n < last <= n + r + 1)%nat /\ in_goal (run last) /\ forall m, (n < m <= last)%nat -> ~ in_pit (run m).
 Proof.
   intros is_run r. induction r as [r induction] using lt_wf_ind. intros n square Hr small before.
@@ -222,7 +227,8 @@ Proof.
   apply Qeq_bool_neq in sx, sy. destruct (in_place _ square) as ([Hi Hj] & Hx & Hy).
   pose proof (check_ok p rank checked _ _ Hi Hj) as box. unfold check_box in box.
   destruct (Nat.ltb_spec (rank (place (x (run O))) (place (y (run O)))) 50) as [ranked | _].
-  - destruct (arrives p rank sx sy run checked is_run _ O square eq_refl ranked) as (n & range & goal & no_pits); [lia|].
+  - destruct (arrives p rank sx sy run checked is_run _ O square eq_refl ranked)
+      as (n & range & goal & no_pits); [lia|].
     exists n. repeat split; try lia; try apply goal. intros m Hm.
     destruct m; [assumption | apply no_pits; lia].
   - contradict no_pit. rewrite !andb_true_iff, !Z.ltb_lt in box. destruct box as [[[x0 x1] y0] y1].
