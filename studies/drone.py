@@ -24,7 +24,7 @@ from vsp_beyond.drone.flights import BODIES, EASY, HARD, PUSH, command_of, fly
 from vsp_beyond.drone.flown import Flown
 from vsp_beyond.drone.quadrotor import CRAZYFLIE, quadrotor
 
-from .committed import read_results, write_results
+from .committed import RESULTS, read_results, write_results
 
 N, START_SEED, PUSH_SEED = 300, 1000, 1001  # flights of each kind, from starts of their own
 TEACHER = SHIPPED / "Quadrotor-v0.safetensors"
@@ -137,8 +137,10 @@ def main() -> None:
     work = [Measured(given.agent, flies, seed) for flies, seeds in SEEDS.items() for seed in seeds]
     job.make_all(work, folder, "drones", jobs=given.jobs, unit="controllers")
     made = pd.DataFrame(rows(given.agent, folder))
-    kept = read_results("drone")
-    write_results(pd.concat([kept[~kept["agent"].isin(made["agent"])], made]), "drone", out=given.out)
+    if (RESULTS / "drone.csv").exists():
+        kept = read_results("drone")
+        made = pd.concat([kept[~kept["agent"].isin(made["agent"])], made])
+    write_results(made, "drone", out=given.out)
 
 
 if __name__ == "__main__":

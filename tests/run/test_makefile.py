@@ -265,15 +265,7 @@ def test_the_notebooks_of_a_fresh_clone_run_and_those_beyond_the_paper_read_the_
     assert len(ran("all")) == 11 and ran("all") == []
     for name in ("studies/new.py", "data/beyond/rows.csv"):
         (checkout / name).touch()
-        assert ran("all") == [
-            "06_few_equations",
-            "07_limits",
-            "08_proofs",
-            "09_methods",
-            "10_robots",
-            "11_agents",
-            "12_drone",
-        ]
+        assert ran("all") == ["06_few_equations", "07_limits", "08_proofs", "09_methods", "10_robots", "11_agents"]
 
 
 def test_new_runs_reach_the_notebooks_that_draw_them(checkout, ran):

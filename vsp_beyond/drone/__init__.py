@@ -2,4 +2,3 @@
 
 from .flown import Flown
 from .imitation import one_map
-from .quadrotor import quadrotor

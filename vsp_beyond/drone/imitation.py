@@ -31,12 +31,13 @@ from .quadrotor import (
 )
 
 VERSION = 1  # raise it when the same arguments give another map
-STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=180.0)
-FLIGHTS, OWN_FLIGHTS, ROUNDS = 800, 300, 4  # of the network; of the map in each round of corrections
+STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=150.0)
+FLIGHTS, OWN_FLIGHTS, ROUNDS = 800, 50, 4  # of the network; of the map with each body in each round of corrections
 EVERY, SEEN = 3, 300  # every third state of a flight's first 300 is kept
 N_STEPS, BATCH, RATE = 1200, 2048, 0.02  # of Adam, for each round
 SLOPE = 0.01  # of a limited command beyond its limits, in the gradient, so that this does not vanish
 CALM, PRICE = 0.99, 1000.0  # largest eigenvalue of a loop that is free; the price of 1 beyond it, squared
+TREMBLE, TURN = 0.05, 0.2  # an eigenvalue that turns by more than so many rad a step counts so much more
 PARTS = [0, 1, 2, *range(4, 21)]  # of a state near hovering: the attitude's w follows from x, y, z
 
 Loop = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -64,13 +65,17 @@ def loop_of(body: Body) -> Loop:
 
 
 def radius(weights: np.ndarray, loop: Loop) -> tuple[float, np.ndarray]:
-    """Return the closed loop's largest absolute eigenvalue under the map `weights` (16, 4), and its gradient."""
+    """Return the closed loop's largest absolute eigenvalue under the map `weights` (16, 4), and its gradient.
+
+    What trembles counts `TREMBLE` more, so that it dies out sooner.
+    """
     here, steer, seen = loop
     values, right = np.linalg.eig(here + steer @ weights.T @ seen)
-    i = int(np.abs(values).argmax())
+    sizes = np.abs(values) + TREMBLE * (np.abs(np.angle(values)) > TURN)
+    i = int(sizes.argmax())
     left = np.linalg.inv(right)[i]
     towards = np.conj(values[i]) / abs(values[i]) * np.outer(seen @ right[:, i], left @ steer)
-    return float(abs(values[i])), towards.real
+    return float(sizes[i]), towards.real
 
 
 def radius_at_rest(command: Command, body: Body = CRAZYFLIE) -> float:
@@ -100,7 +105,7 @@ def one_map(
     used[12:16] = memory
     rng = np.random.default_rng(np.random.SeedSequence(seed))
     loops = [loop_of(body) for body in BODIES.values()] if calm else []
-    seen, taken = _flown(command, command, STARTS(rng, FLIGHTS), kept=True)
+    seen, taken = _flown(command, command, STARTS(rng, FLIGHTS))
     coefficients = np.zeros((17, 4))
     coefficients[16] = HOVER
     with shown(progress):
@@ -108,13 +113,16 @@ def one_map(
             coefficients = used * _fitted(coefficients, used[:16, 0] * seen, taken, loops, rng)
             policy = VoronoiPolicy(np.zeros((1, 16)), coefficients[None], task=quadrotor())
             if round_ < ROUNDS:
-                more = _flown(command_of(policy), command, STARTS(rng, OWN_FLIGHTS), kept=False)
-                seen, taken = (np.concatenate(both) for both in zip((seen, taken), more))
+                for body in BODIES.values():
+                    more = _flown(command_of(policy), command, STARTS(rng, OWN_FLIGHTS), body)
+                    seen, taken = (np.concatenate(both) for both in zip((seen, taken), more))
     return policy
 
 
-def _flown(flies: Command, says: Command, starts: np.ndarray, *, kept: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return inputs (t, 16) of flights by `flies`, if `kept` of those alone, and what `says` commands there (t, 4)."""
+def _flown(flies: Command, says: Command, starts: np.ndarray, body: Body = CRAZYFLIE) -> tuple[np.ndarray, np.ndarray]:
+    """Return inputs (t, 16) of flights by `flies`, and what `says` commands there (t, 4).
+
+    Of what flies by itself, only flights that stay in the room count."""
     seen: list[np.ndarray] = []
     taken: list[np.ndarray] = []
 
@@ -123,8 +131,8 @@ def _flown(flies: Command, says: Command, starts: np.ndarray, *, kept: bool) -> 
             seen.append(see(states))
             taken.append(commands if flies is says else says(states))
 
-    flights = fly(flies, starts, watch=watch)
-    rows = flights.kept if kept else np.ones(len(starts), dtype=bool)
+    flights = fly(flies, starts, body, watch=watch)
+    rows = flights.kept | (flies is not says)
     return np.concatenate([part[rows] for part in seen]), np.concatenate([part[rows] for part in taken])
 
 
