@@ -110,7 +110,7 @@ stale: venv ##- lists committed results of ours made with other settings, teache
 	@$(PY) -m studies.comparison.stale
 proofs: begin venv ##- proofs for ten policies: certificates into data/beyond/proofs/, and tables: 10 to 30 minutes, resumable
 	$(PY) -m studies.make_proofs --out="$$OUT" --jobs="$${DASK:-$$JOBS}"
-theorem: begin venv ##- Coq checks a theorem, in build/theorem/: three cells reach SimpleGoal's goal from every start: 1 minute
+theorem: begin venv ##- lets Coq prove that three cells reach SimpleGoal's goal from every start outside the pit, in build/theorem/: 1 minute
 	@$(PY) -m vsp_beyond.proofs.theorem "$$OUT/build/theorem"
 
 ## Study

@@ -117,6 +117,8 @@ def test_coq_refuses_one_altered_rank_box_or_coefficient(tmp_path):
 def test_float64_steps_that_see_float32_are_steps_of_the_statement():
     error, tie = theorem.rounding(POLICY)
     assert error < theorem.ERROR and tie < theorem.TIE
+    goal, low, high = (10 * Fraction(edge) for edge in (simplegoal.GOAL_EDGE, simplegoal.PIT_LOW, simplegoal.PIT_HIGH))
+    assert goal >= 1 and low >= 4 and high <= 6  # so the program's goal is no smaller, its pit no larger
     states = starts(100_000)
     seen = POLICY.task.observe(states)
     assert seen.dtype == np.float32 and np.abs(seen - states).max() <= theorem.SEEN

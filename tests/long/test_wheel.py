@@ -50,7 +50,7 @@ def wheel(tmp_path_factory):
 def test_it_holds_code_teachers_and_the_papers_values_in_13_megabytes(wheel):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     code = {path.relative_to(ROOT).as_posix() for part in ("vsp", "vsp_beyond") for path in (ROOT / part).rglob("*.*")
-            if path.suffix in (".py", ".js", ".json", ".css", ".html", ".c")}  # fmt: skip
+            if path.suffix in (".py", ".js", ".json", ".css", ".html", ".c", ".v")}  # fmt: skip
     data = {path.relative_to(ROOT).as_posix() for part in ("paper", "teachers")
             for path in (ROOT / "data" / part).rglob("*") if path.is_file()}  # fmt: skip
     assert names == code | {f"vsp/{name}" for name in data}
