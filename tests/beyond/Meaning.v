@@ -5,22 +5,23 @@ From VSP Require Import Statement Policy.
 Import ListNotations.
 
 Goal always_arrives the_policy -> forall run, (forall n, step the_policy (run n) (run (S n))) ->
-  0 <= x (run O) <= 1 -> 0 <= y (run O) <= 1 -> ~ in_pit (run O) ->
-  exists n, (0 < n < 51)%nat /\ in_goal (run n) /\ forall m, (m < S n)%nat -> ~ in_pit (run m).
+  0 <= x (run O) <= 1 -> 0 <= y (run O) <= 1 -> x (run O) <= 49 # 100 \/ 51 # 100 <= y (run O) ->
+  exists n, (0 < n < 51)%nat /\ in_goal (run n) /\ forall m, (m < n)%nat -> ~ in_pit (run (S m)).
 Proof.
-  intros arrives run steps h_x h_y no_pit. destruct (arrives run) as (n & h & goal & pits).
+  intros arrives run steps h_x h_y not_deep. destruct (arrives run) as (n & h & goal & pits).
   - intros n _. apply steps.
   - now split.
-  - assumption.
-  - exists n. repeat split; try apply goal; try apply le_n_S; try apply h. intros m hm. apply pits, le_S_n, hm.
+  - intros [[low _] [_ high]]. destruct not_deep as [no | no]; [revert low | revert high]; now apply Qle_not_lt.
+  - exists n. repeat split; try apply goal; try apply le_n_S; try apply h. intros m hm. apply pits.
+    split; [apply le_n_S, Nat.le_0_l | exact hm].
 Qed.
 
 (** A run may do anything after the goal, also leave the square. *)
 Goal always_arrives the_policy -> forall run, (forall n, step the_policy (run n) (run (S n)) \/
-  exists m, (0 < m <= n)%nat /\ in_goal (run m)) -> in_square (run O) -> ~ in_pit (run O) ->
+  exists m, (0 < m <= n)%nat /\ in_goal (run m)) -> in_square (run O) -> ~ deep_in_pit (run O) ->
   exists n, (0 < n < 51)%nat /\ in_goal (run n).
 Proof.
-  intros arrives run steps square no_pit. destruct (arrives run) as (n & h & goal & _); try assumption.
+  intros arrives run steps square not_deep. destruct (arrives run) as (n & h & goal & _); try assumption.
   - intros n before. destruct (steps n) as [? | (m & h & goal)]; [assumption|]. now destruct (before m).
   - exists n. repeat split; try apply goal; try apply le_n_S; apply h.
 Qed.

@@ -78,10 +78,10 @@ def test_coq_computes_these_dynamics(tmp_path):
     rows = [f"({coq(s)}, {coq(t)}, {coq(e)}, {c}%nat, {coq(distances(s)[c])})" for s, t, e, c in rows]
     text = f"{MEANING}Goal forallb right [{'; '.join(rows)}] = true. Proof. vm_cast_no_check (eq_refl true). Qed.\n"
     claims = {f"small {coq(error)}": abs(error) <= size for error in (size, -size, size * 1.01, -size * 1.01)}
-    edges = [Fraction(k, 10) + d for k in (1, 4, 6) for d in (-Fraction(1, 2**70), 0, Fraction(1, 2**70))]
+    edges = [Fraction(k, 100) + d for k in (10, 40, 49, 51, 60) for d in (-Fraction(1, 2**70), 0, Fraction(1, 2**70))]
     for place in [*moved[:20], *(pair for e in edges for q in (0.05, 0.5) for pair in ((e, q), (q, e)))]:
-        claims[f"in_goal {coq(place)}"] = all(10 * Fraction(q) < 1 for q in place)
-        claims[f"in_pit {coq(place)}"] = all(4 < 10 * Fraction(q) < 6 for q in place)
+        for name, low, high in ("in_goal", -1, 10), ("in_pit", 40, 60), ("deep_in_pit", 49, 51):
+            claims[f"{name} {coq(place)}"] = all(low < 100 * Fraction(q) < high for q in place)
     text += "".join(f"Goal {'' if true else '~ '}{claim}. Proof. holds. Qed.\n" for claim, true in claims.items())
     for no, y, proof in ("", height(theorem.TIE), "may"), ("~", height(theorem.TIE) - Fraction(1, 2**70), "may_not"):
         text += f"Goal {ACTS.format(no, coq((0.5, y)))}. Proof. {proof}. Qed.\n"

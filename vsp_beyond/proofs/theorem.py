@@ -1,8 +1,8 @@
 """Let a proof kernel, Coq, check that SimpleGoal's policy with a margin always reaches the goal: `make theorem`.
 
-The theorem is coq/Statement.v. Its proof in coq/ needs data: the policy's numbers, exactly as its certificate holds
-them, and for each box of a grid a number of steps. Coq trusts nothing that is computed here. `rounding` leads from the
-theorem, which is about rational numbers, to the episodes of `vsp.evaluate`.
+The theorem is about coq/Statement.v. Its proof in coq/ needs for each box of a grid a number of steps, which Coq checks,
+so nobody need trust how it is found. Coq does trust Policy.v: that `files` writes the certificate's numbers exactly.
+`rounding` leads from the theorem, which is about rational numbers, to the episodes of `vsp.evaluate`.
 """
 
 from __future__ import annotations
@@ -88,8 +88,9 @@ def rounding(policy: VoronoiPolicy) -> tuple[Fraction, Fraction]:
     walls, and how much the squared scaled distance of the acting cell exceeds the least.
 
     The policy sees a float32 copy of the state. All else is float64: each operation errs by at most `UNIT`, relative to
-    its result. An action takes at most 5 that count, a step 2 more and the stride's own error, a squared distance 9,
-    here 16, because its terms and their roots are rounded too.
+    its result. A term of an action is rounded as a product and in two sums: 3, here 5. The stride 0.1 and the product
+    with it err by 0.1 `UNIT` each, the sum, below 1.1, by 1.1: here 2. A gap is a difference of two quotients, so it
+    errs by 2 `UNIT` of its bound, its square by 5, the sum of two by 6, and the roots that are compared add 2: here 16.
     """
     rows, units = terms(policy), [Fraction(unit) for unit in policy.scale.tolist()]
     maps = [numbers for row in rows for numbers in (row[2:5], row[5:8])]
@@ -143,7 +144,7 @@ def main() -> None:
         printed = compiled(folder)
     except ValueError as refusal:
         sys.exit(f"error: {refusal}")
-    if printed != 2 * "Closed under the global context\n":
+    if printed != 3 * "Closed under the global context\n":
         sys.exit(f"error: the theorem rests on\n{printed}")
     print(f"Coq proved {folder}/Statement.v of Policy.v there in {time.perf_counter() - begun:.0f} s, without axioms")
 

@@ -66,10 +66,10 @@ Definition check_cell (rank : Z -> Z -> nat) (r : nat) i j plan :=
     else false
   else true.
 
-(** A box needs a rank below 50, unless it lies inside the pit, away from its edges: boxes 121 to 178 on both axes. *)
+(** A box needs a rank below 50, unless it lies deep in the pit: boxes 148 to 152 on both axes. *)
 Definition check_box rank plans i j :=
   if (rank i j <? 50)%nat then forallb (check_cell rank (rank i j) i j) plans
-  else (120 <? i) && (i <? 179) && (120 <? j) && (j <? 179).
+  else (147 <? i) && (i <? 153) && (147 <? j) && (j <? 153).
 Definition check rank p :=
   negb (Qeq_bool (x (scale p)) 0) && negb (Qeq_bool (y (scale p)) 0) &&
   let plans := map (plan_of p) (cells p) in all 300 0 (fun i => all 300 0 (check_box rank plans i)).

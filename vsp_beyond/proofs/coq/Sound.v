@@ -222,38 +222,50 @@ End Policy.
 
 Theorem sound p rank : check rank p = true -> always_arrives p.
 Proof.
-  intros checked run is_run square no_pit. pose proof checked as found. unfold check in found.
+  intros checked run is_run square not_deep. pose proof checked as found. unfold check in found.
   rewrite !andb_true_iff, !negb_true_iff in found. destruct found as [[sx sy] _].
   apply Qeq_bool_neq in sx, sy. destruct (in_place _ square) as ([Hi Hj] & Hx & Hy).
   pose proof (check_ok p rank checked _ _ Hi Hj) as box. unfold check_box in box.
   destruct (Nat.ltb_spec (rank (place (x (run O))) (place (y (run O)))) 50) as [ranked | _].
   - destruct (arrives p rank sx sy run checked is_run _ O square eq_refl ranked)
       as (n & range & goal & no_pits); [lia|].
-    exists n. repeat split; try lia; try apply goal. intros m Hm.
-    destruct m; [assumption | apply no_pits; lia].
-  - contradict no_pit. rewrite !andb_true_iff, !Z.ltb_lt in box. destruct box as [[[x0 x1] y0] y1].
+    exists n. repeat split; try lia; try apply goal. intros m Hm. apply no_pits. lia.
+  - contradict not_deep. rewrite !andb_true_iff, !Z.ltb_lt in box. destruct box as [[[x0 x1] y0] y1].
     destruct square as [X Y]. destruct (place_ok _ X) as (_ & _ & X1), (place_ok _ Y) as (_ & _ & Y1).
     specialize (X1 ltac:(lia)). specialize (Y1 ltac:(lia)). unfold inside in *.
-    assert (121 <= place (x (run O)) <= 178 /\ 121 <= place (y (run O)) <= 178)%Z as [[? ?] [? ?]] by lia.
+    assert (148 <= place (x (run O)) <= 152 /\ 148 <= place (y (run O)) <= 152)%Z as [[? ?] [? ?]] by lia.
     split; split; rational; lra.
 Qed.
 
-(** Some cell can always act, because one is the nearest. So from every state there is a step. *)
-Lemma a_nearest p s all : all <> nil ->
-  exists c, In c all /\ forall other, In other all -> distance p c s <= distance p other s.
+(** A run from every start: without errors, by the nearest cell. *)
+Fixpoint nearest p s c others :=
+  match others with nil => c | other :: rest =>
+    nearest p s (if Qle_bool (distance p c s) (distance p other s) then c else other) rest end.
+Definition next p s :=
+  match cells p with nil => s | first :: rest => let c := nearest p s first rest in
+    State (moved (x s) (for_x c) s 0) (moved (y s) (for_y c) s 0) end.
+
+Lemma nearest_ok p s others : forall c, In (nearest p s c others) (c :: others) /\
+  forall other, In other (c :: others) -> distance p (nearest p s c others) s <= distance p other s.
 Proof.
-  induction all as [|one all nearest]; intros some; [easy|]. destruct all as [|two all].
-  - exists one. split; [now left|]. intros other [-> | []]. apply Qle_refl.
-  - destruct nearest as (c & there & least); [easy|].
-    destruct (Qlt_le_dec (distance p one s) (distance p c s)) as [nearer | farther].
-    + exists one. split; [now left|]. intros other [-> | found]; [apply Qle_refl|].
-      apply Qlt_le_weak in nearer. exact (Qle_trans _ _ _ nearer (least other found)).
-    + exists c. split; [now right|]. intros other [<- | found]; [assumption | auto].
+  induction others as [|one rest nearer]; intros c; cbn [nearest].
+  - split; [now left|]. intros other [-> | []]. apply Qle_refl.
+  - destruct (Qle_bool (distance p c s) (distance p one s)) eqn:first.
+    + apply Qle_bool_iff in first. destruct (nearer c) as [found least]. split; [cbn in *; tauto|].
+      intros other [-> | [-> | there]]; [apply least; now left | | apply least; now right].
+      exact (Qle_trans _ _ _ (least c (or_introl eq_refl)) first).
+    + assert (distance p one s <= distance p c s) as second.
+      { apply Qlt_le_weak, Qnot_le_lt. intros le. apply Qle_bool_iff in le. congruence. }
+      destruct (nearer one) as [found least]. split; [now right|].
+      intros other [-> | there]; [|now apply least]. exact (Qle_trans _ _ _ (least one (or_introl eq_refl)) second).
 Qed.
 
-Theorem a_step_exists p s : cells p <> nil -> exists t, step p s t.
+Theorem a_run_exists p s : cells p <> nil -> exists run, is_run p run /\ run 0%nat = s.
 Proof.
-  intros some. destruct (a_nearest p s _ some) as (c & there & least).
-  eexists (State _ _), c, 0, 0. repeat split; try easy.
-  intros other found. specialize (least other found). assert (0 <= 1 # 2 ^ 16) by easy. lra.
+  intros some. exists (fun n => Nat.iter n (next p) s). split; [|reflexivity]. intros n _.
+  change (let t := Nat.iter n (next p) s in step p t (next p t)). intros t. unfold next.
+  destruct (cells p) as [|first rest] eqn:all; [easy|].
+  destruct (nearest_ok p t rest first) as [found least]. rewrite <- all in found, least.
+  exists (nearest p t first rest), 0, 0. split; [split; [exact found|] | now repeat apply conj; try apply Qeq_refl].
+  intros other there. specialize (least other there). assert (0 <= 1 # 2 ^ 16) by easy. lra.
 Qed.

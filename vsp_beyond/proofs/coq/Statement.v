@@ -1,4 +1,6 @@
-(** What is proved about SimpleGoal, in exact rational numbers. This file can be read alone; the others are the proof.
+(** What is claimed about SimpleGoal, in exact rationals. Theorem.v asserts [always_arrives the_policy]. Coq cannot
+    check two things: that Policy.v holds the numbers of the policy's file, which Python transcribes in [make theorem],
+    and that the task is as defined here. Tests compare both, the task in 100,000 steps.
 
     An agent stands at a point of the unit square. In each step a policy decides where it moves. An episode ends when a
     move leads into the goal or into the pit. The task allows 50 steps. *)
@@ -10,9 +12,9 @@ Record state := State { x : Q; y : Q }.
 Definition in_square s := 0 <= x s <= 1 /\ 0 <= y s <= 1.
 Definition in_goal s := x s < 1 # 10 /\ y s < 1 # 10.
 Definition in_pit s := 2 # 5 < x s < 3 # 5 /\ 2 # 5 < y s < 3 # 5.
+Definition deep_in_pit s := 49 # 100 < x s < 51 # 100 /\ 49 # 100 < y s < 51 # 100.
 
-(** A policy is a list of cells. A cell has a codeword and two equations, one for each coordinate of the action.
-    [the_policy] stands in Policy.v, which [make theorem] writes: the numbers are exactly those of the policy's file. *)
+(** A policy is a list of cells. A cell has a codeword and two equations, one for each coordinate of the action. *)
 Record equation := Equation { per_x : Q; per_y : Q; constant : Q }.
 Record cell := Cell { codeword : state; for_x : equation; for_y : equation }.
 Record policy := Policy { scale : state; cells : list cell }.
@@ -40,7 +42,7 @@ Definition step p s t := exists c error_x error_y, may_act p c s /\ small error_
 Definition is_run p (run : nat -> state) :=
   forall n, (forall m, (1 <= m <= n)%nat -> ~ in_goal (run m)) -> step p (run n) (run (S n)).
 
-(** From every start in the square outside the pit, every run is in the goal after 1 to 50 steps, and was never in the
-    pit until then. (Runs exist: there is a step from every state, see [a_step_exists] in Sound.v.) *)
-Definition always_arrives p := forall run, is_run p run -> in_square (run 0%nat) -> ~ in_pit (run 0%nat) ->
-  exists n, (1 <= n <= 50)%nat /\ in_goal (run n) /\ forall m, (m <= n)%nat -> ~ in_pit (run m).
+(** From every start in the square, except deep in the pit, every run is in the goal after 1 to 50 steps, and no step
+    until then leads into the pit. (Runs exist from every start: [runs_exist] in Theorem.v.) *)
+Definition always_arrives p := forall run, is_run p run -> in_square (run 0%nat) -> ~ deep_in_pit (run 0%nat) ->
+  exists n, (1 <= n <= 50)%nat /\ in_goal (run n) /\ forall m, (1 <= m <= n)%nat -> ~ in_pit (run m).
