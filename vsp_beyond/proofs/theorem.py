@@ -1,8 +1,8 @@
 """Let a proof kernel, Coq, check that SimpleGoal's policy with a margin always reaches the goal: `make theorem`.
 
-The theorem is about coq/Statement.v. Its proof in coq/ needs for each box of a grid a number of steps, which Coq checks,
-so nobody need trust how it is found. Coq does trust Policy.v: that `files` writes the certificate's numbers exactly.
-`rounding` leads from the theorem, which is about rational numbers, to the episodes of `vsp.evaluate`.
+coq/Statement.v has the claim. The proof needs a number of steps for each box of a grid. Coq checks these, but takes
+Policy.v as it is: we trust that `files` writes the certificate's numbers exactly. `rounding` leads from the theorem,
+which is about rational numbers, to the episodes of `vsp.evaluate`.
 """
 
 from __future__ import annotations
