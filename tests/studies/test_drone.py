@@ -46,6 +46,7 @@ def test_rows_of_small_maps(monkeypatch, tmp_path):
         (drone, "N", 20), (imitation, "FLIGHTS", 40), (imitation, "OWN_FLIGHTS", 20), (imitation, "ROUNDS", 1),
         (imitation, "N_STEPS", 200), (drone, "HARD", drone.HARD[:1]), (drone, "EASY", drone.EASY[:2]),
         (drone, "CONDITIONS", ("as built", drone.CONDITIONS[-1])), (drone, "BODIES", {"as built": drone.CRAZYFLIE}),
+        (imitation, "BODIES", {"as built": drone.CRAZYFLIE}),
         (drone, "SEEDS", {"network": range(1), "one map": range(2), "without past commands": range(1)}),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
