@@ -104,7 +104,7 @@ hub-teacher: begin venv ##- the paper's MountainCar part with the teacher in AGE
 	$(PY) -m studies.make_study --agent="$${AGENT:?expected AGENT=file.zip}" --out="$$OUT/build/hub" --jobs="$${DASK:-$$JOBS}"
 agents: begin venv ##- reads, plays and distils the zips in AGENTS=folder, into data/beyond/: 10 minutes an agent or little more, resumable
 	$(PY) -m studies.zoo "$${AGENTS:?expected AGENTS=folder}" --out="$$OUT" --jobs="$$JOBS"
-drone: begin venv ##- flies our drone's network and maps of it, or the network that flew with AGENT=actor.h, into data/beyond/: 10 minutes
+drone: begin venv ##- flies our drone's network and maps of it, or the network that flew with AGENT=actor.h, into data/beyond/: 10 to 30 minutes, resumable
 	$(PY) -m studies.drone --agent="$$AGENT" --out="$$OUT" --jobs="$$JOBS"
 stale: venv ##- lists committed results of ours made with other settings, teachers or versions than today's
 	@$(PY) -m studies.comparison.stale

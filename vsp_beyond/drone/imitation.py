@@ -1,7 +1,7 @@
 """One linear map of 16 inputs, limited to the commands' range, that flies as a network flies.
 
 It is fitted to the network's commands on the network's own flights, then also on those of the map (DAgger, Ross et al.
-2011). A map that only imitates chatters: its closed loop near hovering may be unstable, which imitation does not see.
+2011). A map that only imitates may chatter: imitation does not see whether its closed loop near hovering is stable.
 So what the loop's largest eigenvalue exceeds costs, for each of `flights.BODIES`.
 """
 
