@@ -1,7 +1,5 @@
 """Committed results of the studies: the tables and policies in data/beyond, and what they were made with."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`make proofs`: write certificates to data/beyond/proofs and results to data/beyond."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`make study`, `make hidden`, `make hub-teacher`: write the experiments on the reproduction to data/results/."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

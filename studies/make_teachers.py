@@ -1,7 +1,5 @@
 """`make teachers`, `make short-teachers`: train the teachers, also those of robots, and write them with their cards."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

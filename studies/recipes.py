@@ -1,7 +1,5 @@
 """How each teacher is trained."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Only the functions that train import torch and stable_baselines3.
 """
 
-from __future__ import annotations
-
 import copy
 import io
 import os

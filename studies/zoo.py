@@ -5,8 +5,6 @@ distilled to the fewest of `SIZES` cells that act like it. What cannot be read o
 reason. Those of MountainCar are distilled by the paper's method, too.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time

@@ -6,8 +6,6 @@ the public API: it checks arguments and resolves names of tasks. What goes beyon
 `vsp_beyond`.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import warnings

@@ -5,8 +5,6 @@ out in large batches ahead of the loop. The cells' models are stacked, so one st
 of the algorithm as the paper prints it; "R1" is an open question, a field of `Config` or a pass of `paper.readings`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@ A row holds the features of a state, which are the inputs of a sub-policy (for l
 teacher's action there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .config import Config

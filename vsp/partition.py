@@ -1,7 +1,5 @@
 """`Partition`: the state of a distillation, which consists of codewords, the cells' models and their buffers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from . import geometry

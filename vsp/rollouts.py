@@ -1,7 +1,5 @@
 """Batched episodes of any policy in any task: all episodes of a batch advance together."""
 
-from __future__ import annotations
-
 from dataclasses import InitVar, dataclass
 from itertools import pairwise
 from typing import Protocol

@@ -5,8 +5,6 @@
 does from every start. `few_cells`, `optimum`, `proofs` and `atlas` hold the parts.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """C code for a device: of floats, with a safe action, a header, and a comment that says what goes in and out."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

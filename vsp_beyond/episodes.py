@@ -1,7 +1,5 @@
 """Episodes to look at, moment by moment, on the page of any task: what an explorer is for two dimensions."""
 
-from __future__ import annotations
-
 import io
 from contextlib import suppress
 from typing import Any

@@ -1,7 +1,5 @@
 """One page about a policy and the agent that it imitates, in one file to send: it needs no other file or host."""
 
-from __future__ import annotations
-
 import base64
 import html
 import math

@@ -10,8 +10,6 @@ In a student version, nbgrader's stub replaces each answer, as `nbgrader generat
 The pages of the site are student versions with the output of the worked cells, run as students get them.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import hashlib

@@ -1,7 +1,5 @@
 """Pictures of the course, shown in the notebook and not saved."""
 
-from __future__ import annotations
-
 import io
 
 import matplotlib.pyplot as plt

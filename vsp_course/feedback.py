@@ -3,8 +3,6 @@
 Feedback names what was found and what was expected, and points to a hint. It never gives the answer.
 """
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import functools

@@ -3,8 +3,6 @@
 Each check calls a student's function on small random cases, and raises `NotYet` or prints one line.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

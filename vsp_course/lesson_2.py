@@ -4,8 +4,6 @@ The checks of the two passes and of a sub-policy class have modules of their own
 on cases with a known answer, and raises `NotYet` or prints one line.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 from dataclasses import replace

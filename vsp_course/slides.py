@@ -6,8 +6,6 @@ and the slides before. reveal.js 5.2.1 (MIT license) turns the slides; `reveal/`
 and the page around it.
 """
 
-from __future__ import annotations
-
 import ast
 import html
 from pathlib import Path

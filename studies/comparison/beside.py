@@ -1,7 +1,5 @@
 """Make the files beside the rows: kept policies, how alike policies of two seeds are, a gait, the best returns."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

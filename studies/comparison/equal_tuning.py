@@ -3,8 +3,6 @@
 Also count what each method costs: episodes of every kind, and seconds.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -6,8 +6,6 @@ are fitted together, and cells that are grown greedily. It also has our cells, f
 `ObliqueLinearTree` is the fourth combination.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits

@@ -4,8 +4,6 @@ data/beyond/optimum.csv holds the returns of the best policies, from the start s
 Regret is the best possible mean return minus a policy's.
 """
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -4,8 +4,6 @@ The settings say how many cells or leaves there are, and with a `Tuned` how many
 episodes alone gets as many episodes as the other methods get in all rounds. Methods for robots read a `Walking`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from dataclasses import replace

@@ -5,8 +5,6 @@ search for the limit were changed after first results from the report starts. Po
 LunarLander, are measured from new starts. The longer search for one map was added after results from those.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vsp import Policy, Task, VoronoiPolicy, start_states

@@ -3,8 +3,6 @@
 A row is one method at one size with one seed. data/beyond/<table>_<task>.csv holds the rows of a table and a task.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial

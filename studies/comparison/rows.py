@@ -4,8 +4,6 @@ The methods of a table have the same start states and, unless their names say ot
 Distillation times differ from run to run, so they are in a separate file, <table>_seconds.csv.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time

@@ -4,8 +4,6 @@
 they were made with, follows from the table of methods. Not checked are proofs, times and measurements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from vsp.run import atomic, command

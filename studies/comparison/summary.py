@@ -1,7 +1,5 @@
 """Summarise the committed rows of the comparison: means, which policies match their teacher, and who acts like it."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of the comparison of methods."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Maps: the actions of other people's agents, each with those of its policy below; and the polygons of an atlas."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection

@@ -6,8 +6,6 @@ nearest of these with 60 fresh ones. "Near" compares every value that the paper 
 outliers, cells and coefficients. All stages write rows, so that an interrupted search goes on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache, lru_cache

@@ -1,7 +1,5 @@
 """What the cells buy: distilled policies beside simpler ones, fitted to the teacher data that each distillation saw."""
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import version
 

@@ -5,8 +5,6 @@ A "paper" is a sample of runs, from start states of its own; so is the "rerun". 
 it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """DAgger (Ross et al. 2011): fit, visit states, let the teacher label them, fit again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

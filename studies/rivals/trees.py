@@ -3,8 +3,6 @@
 All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

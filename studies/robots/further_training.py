@@ -4,8 +4,6 @@ TD3 (Fujimoto et al. 2018, in Stable-Baselines3) learns from every single step, 
 critics begin with the teacher's weights.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vsp import Policy

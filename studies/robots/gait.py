@@ -3,8 +3,6 @@
 A picture of the gait then needs neither a physics engine nor a renderer.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

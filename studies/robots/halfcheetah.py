@@ -1,7 +1,5 @@
 """HalfCheetah-v5: Gymnasium's environment on MuJoCo, with names for its variables."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from importlib.util import find_spec

@@ -1,8 +1,6 @@
 """Imitate also on states that follow a mistake: from the teacher's episodes, from episodes in which it is pushed,
 and from the policy's own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,8 +1,6 @@
 """Learn one linear map from returns alone, without a teacher, by augmented random search (ARS V2-t, Mania et al.
 2018)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Cells and trees as differentiable actors: soft borders while they learn and in the critics' targets, hard ones when
 they act. Imports torch."""
 
-from __future__ import annotations
-
 import torch
 
 from vsp_beyond.few_cells.units import ScaledCells, Scaling, parted

@@ -5,8 +5,6 @@ Returns have no unit, shares are in percent. Standard deviations divide by n, as
 only for the 24 outliers of SimpleGoal's teacher.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

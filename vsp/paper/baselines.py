@@ -4,8 +4,6 @@ A partition that does not beat them gains nothing from its cells. All act throug
 and raise ValueError for arrays of a wrong shape, numbers that are not finite, and a seed below 0 or not an integer.
 """
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import numpy as np

@@ -22,8 +22,6 @@ Rules:
 Each fact counts once (`FOLLOWS`). `studies.reproduction.verdicts` measures how often these rules are wrong.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -4,8 +4,6 @@ The values are in `data/paper/*.csv`, as printed; column `where` names the place
 its bytes match the manifest of its folder; the listed files were checked against the paper.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 from collections.abc import Iterable

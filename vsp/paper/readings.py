@@ -3,8 +3,6 @@
 The other open questions are fields of `Config`. With all defaults, the passes do what `vsp.algorithms` does.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Literal
 

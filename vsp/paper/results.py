@@ -3,8 +3,6 @@
 A row states its provenance (`protocol.jobs`); `studies.comparison.stale` compares it with the current one.
 """
 
-from __future__ import annotations
-
 import io
 import os
 from pathlib import Path

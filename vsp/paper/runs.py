@@ -1,7 +1,5 @@
 """The paper's experiment: many distillations of one teacher, each a `Job`, and how they end."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import asdict, dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Standard deviations divide by n - 1 for samples (`spread`) and by n for the iden
 (`remaining_std` and the like). In the identities NaN gives NaN.
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Intervals (95 %) over policies, over policies and start states, and of shares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Method`: anything that turns an agent into a policy, with what identifies its results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Whole files: written completely or not at all, and read only where they are regular files."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

@@ -1,7 +1,5 @@
 """Shared parts of commands: the value of --jobs, and errors in one line."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import errno

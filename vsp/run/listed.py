@@ -3,8 +3,6 @@
 `sha256sum -c` can check the manifests. `python -m vsp.run.manifest` writes them again for the files as they are.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shlex

@@ -1,7 +1,5 @@
 """Show the progress of long work: a bar in a notebook and on a terminal, the same bar every ten seconds in a log."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

@@ -7,8 +7,6 @@ A notebook has a cell tagged `parameters`, after which the run sets `out`, `quic
 only after every cell ran without an error. `runs` is the real `out`/data/runs.
 """
 
-from __future__ import annotations
-
 import argparse
 import filecmp
 import logging

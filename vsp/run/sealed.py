@@ -1,7 +1,5 @@
 """Sealed files: the first line is the checksum of the rest, which is verified before anything is parsed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

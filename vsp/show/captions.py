@@ -3,8 +3,6 @@
 That file lists them in the order of the notebooks, so that code cells contain only code.
 """
 
-from __future__ import annotations
-
 import html
 import os
 import tomllib

@@ -1,7 +1,5 @@
 """Figures over a two-dimensional state: cells, codewords, arrows, force maps, episodes."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes

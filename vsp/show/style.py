@@ -3,8 +3,6 @@
 The force map runs from purple (push left) to orange (push right).
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import io

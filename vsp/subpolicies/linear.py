@@ -3,8 +3,6 @@
 To add one, write a function that takes a task and returns a `PolicyClass`, and pass it as `Config.sub_policy`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 This suits physics engines, which step one state at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass

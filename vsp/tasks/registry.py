@@ -1,7 +1,5 @@
 """The tasks by name."""
 
-from __future__ import annotations
-
 import difflib
 import importlib
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """SimpleGoal (paper, section "Navigation task"): its dynamics on arrays, and a Gymnasium class over them."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 

@@ -5,8 +5,6 @@ runs here: `inert.described` says what they describe. The memory that the tensor
 is made.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """Normalised observations: the statistics of Stable-Baselines3's `VecNormalize`, and what tells they are needed."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings

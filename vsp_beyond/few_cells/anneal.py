@@ -1,7 +1,5 @@
 """Deterministic annealing (Rose 1998): gradient descent on the imitation error, of all numbers of cells together."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

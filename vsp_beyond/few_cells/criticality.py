@@ -1,7 +1,5 @@
 """What the critics of a teacher say: the value of an action, and the cost of a wrong one."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

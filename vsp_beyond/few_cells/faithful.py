@@ -4,8 +4,6 @@ First it finds the cells with the least action error. Then CMA-ES raises their r
 the least error. The return is a constraint, not the objective: a return above the teacher's earns nothing.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field

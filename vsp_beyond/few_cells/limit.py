@@ -4,8 +4,6 @@ The result of such a search depends on its initial policy. So several are tuned 
 the end.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

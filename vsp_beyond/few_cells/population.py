@@ -1,7 +1,5 @@
 """Roll out many policies of one shape in one batch: a generation of CMA-ES takes as many steps as one policy."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

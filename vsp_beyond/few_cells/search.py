@@ -5,8 +5,6 @@ and a small slope beyond the limits. Softness and slope both fall stage by stage
 Descents that fall behind are stopped early (successive halving, Jamieson & Talwalkar 2016).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

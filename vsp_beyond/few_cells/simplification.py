@@ -1,7 +1,5 @@
 """`simplify`: the fewest cells, then the fewest and shortest coefficients, that keep the return within a tolerance."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

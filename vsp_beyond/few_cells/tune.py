@@ -1,7 +1,5 @@
 """Tuning on the return by CMA-ES (Hansen 2016), and how candidates are compared."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@ Three parts: deterministic annealing on the teacher's actions, correction on the
 tuning on the return. A `Tuned` can switch off the last two.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

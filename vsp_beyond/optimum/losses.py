@@ -1,7 +1,5 @@
 """Find where a policy loses return relative to the best one: what each step costs if the best actions follow."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ nearest to the origin, on an edge at distance 0.1. From a start at distance d, t
 starts inside the goal at d < 0.1, entering at once is better and returns 10.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Explorer`: policies of one task to explore in a browser, as an element of a page or as a standalone file."""
 
-from __future__ import annotations
-
 import html
 import io
 import json

@@ -1,7 +1,5 @@
 """Collect what an explorer shows, as plain data for its script: task, policies, replay, teacher, starts."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections import defaultdict
