@@ -108,8 +108,7 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:
-    """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
-    SimpleGoal."""
+    """Return mean return and shares of outcomes over `N_SAMPLED` episodes, a hundredth except on SimpleGoal."""
     n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
     played = rollout(policy, policy.task, start_states(policy.task, n, 1))
     shares = {f"sampled_{name}": float((played.outcomes == end).mean()) for end, name in ENDS.items()}

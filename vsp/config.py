@@ -5,8 +5,6 @@ change the passes themselves, are fields of `paper.readings.Readings`. R11 (whic
 field: the paper's prose answers it, "this iteration's episode".
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -117,7 +115,7 @@ class Config:
         own = {name: identity(value) for name, value in vars(self).items()}
         return {name: value for name, value in own.items() if name not in EXTENSIONS or value != EXTENSIONS[name]}
 
-    def quick(self) -> Config:
+    def quick(self) -> "Config":
         """Return the same method with a tenth of the iterations: for a first look, not for results."""
         tenth = {name: max(1, getattr(self, name) // 10) for name in ("n_epochs", "n_freeze")}
         return dataclasses.replace(self, **tenth)

@@ -1,7 +1,5 @@
 """Evaluate policies from start states that are the same for all, and compare a policy with the agent it imitates."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -74,7 +72,7 @@ def rollout_from_seed(policy: Policy, task: str | Task, n_episodes: int = 1000, 
     return rollout(policy, task, start_states(task, n_episodes, seed))
 
 
-def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> pd.DataFrame:
+def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> "pd.DataFrame":
     """Run `policy` from the start states of `seed`. Returns a row per episode with return, length and outcome."""
     import pandas as pd  # here, because it takes long to import
 

@@ -1,7 +1,5 @@
 """Record one distillation, so that a notebook can replay it."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -72,7 +70,7 @@ class History:
         check_count("iteration", n, least=0, most=len(self.cells) - 1)
         return self._snapshots[bisect_right(self._snapshots, n, key=lambda snapshot: snapshot[0]) - 1][1]
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """One row per iteration: cells, loss, splits, merges."""
         import pandas as pd  # here, because it takes long to import
 

@@ -3,8 +3,6 @@
 `VoronoiPolicy` is the one whose cells are drawn by codewords, as in the paper.
 """
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json
@@ -47,12 +45,12 @@ class Explanation:
     cell: int
     codeword: np.ndarray | None
     equations: tuple[str, ...]
-    contributions: pd.DataFrame
+    contributions: "pd.DataFrame"
     raw: np.ndarray
     action: np.ndarray
     next_cell: int | None
     margin: float
-    borders: pd.DataFrame
+    borders: "pd.DataFrame"
 
     def __str__(self) -> str:
         action = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.contributions.index, self.action))
@@ -138,7 +136,7 @@ class PiecewisePolicy(Exportable):
             borders=self._borders(state, cell),
         )
 
-    def _borders(self, state: np.ndarray, cell: int) -> pd.DataFrame:
+    def _borders(self, state: np.ndarray, cell: int) -> "pd.DataFrame":
         """Return the columns change (in units of the input; NaN where no change within the box leads to another cell)
         and cell (-1 there).
 
@@ -169,7 +167,7 @@ class PiecewisePolicy(Exportable):
             inside, outside, found = line[left[0] - 1, axis], line[left[0], axis], int(self.cells(line[left[0]]))
         return float(outside - state[axis]), found
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Return one row per cell: its codeword if it has one, then the coefficients, named as in data/paper."""
         import pandas as pd  # here, because it takes long to import
 

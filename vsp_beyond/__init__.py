@@ -60,11 +60,9 @@ def faithful_method(**options) -> Method:
 def tuned(
     agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int, progress: bool = True
 ) -> VoronoiPolicy:
-    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it.
-
-    `config` defaults to `tuned_preset(task)`. The same arguments give the same policy. Raises ValueError if the agent
-    does not fit the task.
-    """
+    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it. `config` defaults to
+    `tuned_preset(task)`. The same arguments give the same policy. Raises ValueError if the agent does not fit the
+    task."""
     task = get_task(task)
     config = tuned_preset(task) if config is None else config
     check_kind(config, Tuned)

@@ -55,9 +55,7 @@ def _about(policy: PiecewisePolicy, states: np.ndarray | None = None) -> str:
 
 def largest_jump(policy: PiecewisePolicy, states: np.ndarray) -> np.ndarray:
     """Return by how much each action jumps at most where the ways between successive `states` (n, d) leave a cell. (m,)
-
-    Each such way is halved until both its ends are next to the border.
-    """
+    Each such way is halved until both its ends are next to the border."""
     here, there = states[:-1].copy(), states[1:].copy()
     cells = policy.cells(here)
     crossed = cells != policy.cells(there)

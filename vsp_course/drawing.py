@@ -42,10 +42,8 @@ def walls(ax: Axes) -> Axes:
 def actions_and_error(
     policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None, history: History | None = None
 ) -> tuple[Figure, np.ndarray]:
-    """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords.
-
-    The error is shown over the whole square, or in `states` (n, 2). Numbers are those of births in the `history`.
-    """
+    """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords. The error is shown
+    over the whole square, or in `states` (n, 2). Numbers are those of births in the `history`."""
     x, y, grid = show.grid(policy.task.low, policy.task.high, 101)
     _, _, sparse = show.grid(policy.task.low, policy.task.high, 21)
     fig, axes = pair()

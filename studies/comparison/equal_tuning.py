@@ -34,20 +34,15 @@ COLUMNS = ["mean", "low", "high", "r2"]
 
 
 def all_rows(task: str) -> pd.DataFrame:
-    """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`.
-
-    Each method, size and seed occurs once: the last of `SOURCES` that has it counts.
-    """
+    """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`. Of equal rows, that of
+    the last of `SOURCES` counts."""
     frame = pd.concat([read_rows(task, table=table) for table in SOURCES if table in TABLES[task]])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
 def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Add a column r2 to `frame`: 1 minus the squared action error divided by that of the best constant action.
-
-    Both errors are measured in the teacher's states of `measure`, which no fit has seen. `likeness` gives R² on more
-    states.
-    """
+    """Add a column r2 to `frame`: 1 minus the squared action error divided by that of the best constant action, both in
+    the teacher's states of `measure`, which no fit has seen."""
     teacher, about = load_teacher(task), get_task(task)
     states = visited_states(teacher, about, start_states(about, N_ERROR // about.slowness, ERROR_SEED))
     constant = float(np.sqrt(in_half_ranges(teacher, about, states).var(axis=0).mean()))
@@ -94,9 +89,7 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 
 def closest(frame: pd.DataFrame, task: str) -> dict[str, str | float]:
     """Return who acts most like the teacher among those that are as good (`AS_GOOD`), with up to 13 cells or leaves.
-
-    Keys: size, r2 and mean of our faithful policies; rival (the other method), "rival size" and so on.
-    """
+    Keys: size, r2 and mean of our faithful policies; rival (the other method), "rival size" and so on."""
     points = possible(frame[(frame["size"] <= SHOWN[-1]) & (frame["method"] != "teacher")])
     good = points[AS_GOOD[task](points, teacher_of(frame))].sort_values("r2")
     ours, rival = (good[good["method"].str.match(kind)].iloc[-1] for kind in ("faithful$", "(?!faithful|our cells)"))
@@ -110,10 +103,8 @@ def possible(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_and_geometry(task: str) -> pd.DataFrame:
-    """Return the table "apart", which separates fit from geometry, one row per method.
-
-    Columns: method; "r2 2" and so on (the median r2 at that size); "mean 2" and so on (the median mean return).
-    """
+    """Return the table "apart", which separates fit from geometry, one row per method. Columns: method; "r2 2" and so
+    on (the median r2 at that size); "mean 2" and so on (the median mean return)."""
     rows = with_r2(read_rows(task, table="apart"), task)
     table = rows.groupby(["method", "size"], sort=False)[["r2", "mean"]].median().unstack("size")
     table.columns = [f"{what} {size}" for what, size in table.columns]

@@ -27,10 +27,8 @@ def best_mean(task: str, folder: str | os.PathLike | None = None) -> float:
 
 
 def with_regret(table: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Add a column regret to `table`: the best possible mean return minus the column mean.
-
-    It is "not known" for a task whose best return is not computed.
-    """
+    """Add a column regret to `table`: the best possible mean return minus the column mean. It is "not known" for a task
+    whose best return is not computed."""
     best = best_mean(task)
     return table.assign(regret="not known" if np.isnan(best) else best - table["mean"])
 
@@ -57,12 +55,9 @@ def near(task: str, folder: str | os.PathLike | None = None) -> float:
 
 
 def limit_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Summarise the policies at the limit, one row per number of cells.
-
-    Columns: size, policies; mean, low and high (its 95 % interval), least and most (lowest and highest mean return of a
-    seed), regret (of the mean; NaN where the best return is not known), failing (highest of a seed); near (share of the
-    policies that are at the limit).
-    """
+    """Summarise the policies at the limit, one row per number of cells. Columns: size, policies; mean, low and high
+    (its 95 % interval), least and most (lowest and highest mean return of a seed), regret (of the mean; NaN where the
+    best return is not known), failing (highest of a seed); near (share of the policies that are at the limit)."""
     rows = read_rows(task, folder, table="limit")
     table, is_near = _with_extremes(rows, "size").sort_index(), rows["mean"] >= near(task, folder)
     table.insert(table.columns.get_loc("failing"), "regret", best_mean(task, folder) - table["mean"])
@@ -76,22 +71,18 @@ def _with_extremes(rows: pd.DataFrame, by: str) -> pd.DataFrame:
 
 
 def starts_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Compare the `SEARCHES` by their start and their length, one row per search.
-
-    Columns: method, policies, mean, low, high (its 95 % interval), least and most (lowest and highest mean return of a
-    seed) and failing (highest of a seed).
-    """
+    """Compare the `SEARCHES` by their start and their length, one row per search. Columns: method, policies, mean, low,
+    high (its 95 % interval), least and most (lowest and highest mean return of a seed) and failing (highest of a
+    seed)."""
     rows = pd.concat([read_rows(task, folder, table=table) for table in ("methods", "starts", "limit")])
     rows = rows[(rows["size"] == PRESETS["limit"](task).n_cells) & rows["method"].isin(SEARCHES)]
     return _with_extremes(rows, "method").loc[list(SEARCHES)].reset_index()
 
 
 def robots_summary(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame:
-    """Summarise the policies of a robot, one row per method and size, the teacher first.
-
-    Columns: method, size, policies, mean, low, high (its 95 % interval), seeds (the mean return of each, the lowest
-    first), failing, share (mean divided by the teacher's mean return), and r2 (the median).
-    """
+    """Summarise the policies of a robot, one row per method and size, the teacher first. Columns: method, size,
+    policies, mean, low, high (its 95 % interval), seeds (the mean return of each, the lowest first), failing, share
+    (mean divided by the teacher's mean return), and r2 (the median)."""
     rows, kind = read_rows(task, folder, table="robots"), ["method", "size"]
     teacher = rows.loc[rows["method"] == WALKER, "mean"].iloc[0]
     each = rows.groupby(kind).agg(

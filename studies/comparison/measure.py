@@ -44,9 +44,7 @@ def measure(policy: Policy, teacher: Policy, task: Task, seed: int = REPORT_SEED
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
     """Return the root mean square difference between the actions of `policy` and `teacher` in the states `by` visits.
-
-    It is in units of half the action range.
-    """
+    It is in units of half the action range."""
     states = visited_states(by, task, starts)
     return _rmse(in_half_ranges(policy, task, states), in_half_ranges(teacher, task, states))
 
@@ -59,10 +57,8 @@ def in_half_ranges(policy: Policy, task: Task, states: np.ndarray) -> np.ndarray
 
 def fidelity(policy: Policy, teacher: Policy, task: Task, states: np.ndarray | None = None) -> dict[str, float]:
     """Measure how closely the policy's actions match the teacher's on `states` (n, d), by default `common_states`.
-
     Keys: r2 (R² of the actions, all coordinates pooled), r2_worst (R² of the worst coordinate), off (share of the
-    states where an action is off by more than a tenth of its range).
-    """
+    states where an action is off by more than a tenth of its range)."""
     states = common_states(teacher, task) if states is None else states
     wanted = in_half_ranges(teacher, task, states)
     errors = np.square(in_half_ranges(policy, task, states) - wanted)
@@ -83,12 +79,9 @@ def common_states(teacher: Policy, task: Task) -> np.ndarray:
 def sameness(
     one: VoronoiPolicy, other: VoronoiPolicy, teacher: Policy, task: Task, states: np.ndarray
 ) -> dict[str, float]:
-    """Compare two policies on `states` (n, d).
-
-    Keys: index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells, about 0 for
-    unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their actions,
-    divided by that from the teacher's actions (mean over the two policies).
-    """
+    """Compare two policies on `states` (n, d). Keys: index, the adjusted Rand index of their cells (Hubert & Arabie
+    1985: 1 for the same cells, about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean
+    square difference between their actions, divided by that from the teacher's actions (mean over the two policies)."""
     from sklearn.metrics import adjusted_rand_score
 
     first, second, wanted = (in_half_ranges(policy, task, states) for policy in (one, other, teacher))

@@ -39,11 +39,8 @@ class Row(Job):
 
     @property
     def start_seed(self) -> int:
-        """The seed of the start states from which its returns are measured.
-
-        At the limit small differences count, so a slow task is played from as many starts as others, and from new ones,
-        as robots are.
-        """
+        """The seed of the start states from which its returns are measured. At the limit small differences count, so a
+        slow task is played from as many starts as others, and from new ones, as robots are."""
         if self.how.preset == "walking":
             return measure.NEW_SEED
         slow = get_task(self.task).slowness > 1

@@ -16,10 +16,8 @@ from .rows import jobs_of
 
 
 def stale() -> list[str]:
-    """List the results in data/beyond that are missing, damaged or out of date, one message each.
-
-    The list is empty if all are up to date.
-    """
+    """List the results in data/beyond that are missing, damaged or out of date, one message each. The list is empty if
+    all are up to date."""
     messages = []
     for name, target, today in committed():
         try:

@@ -36,10 +36,8 @@ PARTS = {TUNED: "all parts"} | {
 
 
 def read_rows(task: str, folder: str | os.PathLike | None = None, *, table: str = "methods") -> pd.DataFrame:
-    """Read the rows of `task` in a table, by default the committed ones, or those in `folder`.
-
-    `failing` is NaN for a task where no policy can reach a goal.
-    """
+    """Read the rows of `task` in a table, by default the committed ones, or those in `folder`. `failing` is NaN for a
+    task where no policy can reach a goal."""
     frame = read_results(f"{table}_{task}", folder)
     return frame.assign(failing=np.nan) if (frame["failing"] == 1).all() else frame
 
@@ -50,11 +48,9 @@ def teacher_of(rows: pd.DataFrame) -> pd.Series:
 
 
 def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
-    """Summarise rows of `read_rows`: one row per method and size, within a size the best mean return first.
-
-    Columns: method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median; and
-    failing, error_teacher, error_own, cells (means over the seeds).
-    """
+    """Summarise rows of `read_rows`: one row per method and size, within a size the best mean return first. Columns:
+    method, size, policies (how many), mean, low and high (its 95 % interval, for other seeds), median; and failing,
+    error_teacher, error_own, cells (means over the seeds)."""
     table = []
     for (method, size), rows in frame.groupby(["method", "size"], sort=False):
         low, high = mean_interval(rows["mean"].to_numpy())
@@ -66,10 +62,8 @@ def method_summary(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def mean_interval(values: np.ndarray) -> tuple[float, float]:
-    """Return the 95 % interval (Student's t) of the mean of `values` (n,) over other seeds; NaN for a single value.
-
-    Seeds are few, and of three or five a bootstrap interval would be too narrow.
-    """
+    """Return the 95 % interval (Student's t) of the mean of `values` (n,) over other seeds; NaN for a single value. Of
+    three or five seeds a bootstrap interval would be too narrow."""
     if len(values) < 2:
         return np.nan, np.nan
     half = stats.t.ppf(0.975, len(values) - 1) * stats.sem(values)
@@ -88,10 +82,8 @@ def ahead(ours: pd.Series, other: pd.Series) -> str:
 
 
 def ablation(frame: pd.DataFrame) -> pd.DataFrame:
-    """Summarise our tuned cells, complete and with one part removed, at the size of the preset.
-
-    Columns are those of `method_summary`, and `part`: what was removed, in the words and the order of `PARTS`.
-    """
+    """Summarise our tuned cells, complete and with one part removed, at the size of the preset. Columns are those of
+    `method_summary`, and `part`: what was removed, in the words and the order of `PARTS`."""
     size = frame.loc[frame["method"] == "our cells, one restart", "size"].iloc[0]
     table = method_summary(frame[(frame["size"] == size) & frame["method"].isin(PARTS)]).set_index("method")
     return table.loc[[name for name in PARTS if name in table.index]].reset_index().assign(
@@ -126,10 +118,8 @@ def likeness(task: str, folder: str | os.PathLike | None = None) -> pd.DataFrame
 
 
 def largest_alike(table: pd.DataFrame) -> int | None:
-    """Return the largest size up to which the median pair of seeds has the same cells, or None.
-
-    `table` is that of `likeness`. Cells count as the same if their index is at least `SAME_CELLS`.
-    """
+    """Return the largest size up to which the median pair of seeds has the same cells, or None. `table` is that of
+    `likeness`. Cells count as the same if their index is at least `SAME_CELLS`."""
     known = table[table["index"].notna()]
     alike = known.loc[(known["index"] >= SAME_CELLS).cummin(), "size"]
     return int(alike.iloc[-1]) if len(alike) else None
@@ -170,11 +160,9 @@ def _of_gaps(groups: list[pd.DataFrame]) -> dict[str, float]:
 
 
 def over_groups(groups: list[np.ndarray]) -> tuple[float, float]:
-    """Return the percentile bootstrap interval (95 %) of the mean of the groups' means.
-
-    Resamples the groups, such as teachers, and the values within each, such as policies. With few groups the interval
-    understates how much another group may differ.
-    """
+    """Return the percentile bootstrap interval (95 %) of the mean of the groups' means. Resamples the groups, such as
+    teachers, and the values within each, such as policies. With few groups the interval understates how much another
+    group may differ."""
     rng, n = np.random.default_rng(0), len(groups)
     means = [group[rng.integers(len(group), size=(2000, n, len(group)))].mean(axis=2) for group in groups]
     drawn = rng.integers(n, size=(2000, n))

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -102,20 +103,6 @@ def experiment(change: dict, task: str) -> Experiment:
 _usual, _teacher = cache(paper_experiment), cache(load_teacher)
 
 
-class Remembering:
-    """A teacher that knows what it answered: runs with one seed, and other settings, ask it the same."""
-
-    def __init__(self, teacher: Policy):
-        self.teacher, self.known = teacher, dict[bytes, np.ndarray]()
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d)."""
-        key = obs.tobytes()
-        if key not in self.known:
-            self.known[key] = self.teacher.predict(obs)[0]
-        return self.known[key], None
-
-
 def of_partitions(policies: Iterable[VoronoiPolicy]) -> dict[str, float]:
     """Describe partitions: cells; the largest coefficient, and the median one, by size; and the share of pairs of
     codewords that are nearer than a new codeword may be to its own (means over policies)."""
@@ -151,9 +138,17 @@ def printed_facts(task: str) -> dict[str, float]:
 
 
 @lru_cache(maxsize=16)
-def _remembered(task: str, teacher: int, seed: int) -> Remembering:
-    """Return a teacher that remembers what the runs with this seed ask."""
-    return Remembering(experiment({"teacher": teacher}, task).teacher)
+def _remembered(task: str, teacher: int, seed: int) -> Policy:
+    """Return a teacher that remembers its answers: runs with this seed, and other settings, ask it the same."""
+    asked, known = experiment({"teacher": teacher}, task).teacher, dict[bytes, np.ndarray]()
+
+    def predict(obs: np.ndarray) -> tuple[np.ndarray, None]:
+        key = obs.tobytes()
+        if key not in known:
+            known[key] = asked.predict(obs)[0]
+        return known[key], None
+
+    return SimpleNamespace(predict=predict)
 
 
 def tried(task: str, stage: str, k: int) -> dict[str, float]:
@@ -243,11 +238,9 @@ def search(out: Path, jobs: int | str) -> None:
 
 
 def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.DataFrame) -> pd.DataFrame:
-    """Return which printed values the settings reach: one row per name of `facts`.
-
-    Columns: paper; of all settings that were screened least, low, high and most (low and high: the middle 95 %); low
-    and high of the nearest; and the values of each row of `fresh`, which are settings with fresh seeds.
-    """
+    """Return which printed values the settings reach: one row per name of `facts`. Columns: paper; of all settings that
+    were screened least, low, high and most (low and high: the middle 95 %); low and high of the nearest; and the values
+    of each row of `fresh`, which are settings with fresh seeds."""
     paper = pd.Series(printed_facts(task))
     every, nearest, fresh = (frame[paper.index] for frame in (every, nearest, fresh))
     found = pd.concat([every.quantile([0, 0.025, 0.975, 1]), nearest.quantile([0.025, 0.975]), fresh]).T
@@ -256,11 +249,9 @@ def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.Dat
 
 
 def questions(near: dict[str, pd.Series]) -> pd.DataFrame:
-    """Return what the nearest settings say of each open question: one row per answer.
-
-    Columns: question, answer, prior (its share), and for each task and both the share among the nearest `N_POSTERIOR`
-    (of both tasks: a quarter of these) with its 95 % interval.
-    """
+    """Return what the nearest settings say of each open question: one row per answer. Columns: question, answer, prior
+    (its share), and for each task and both the share among the nearest `N_POSTERIOR` (of both tasks: a quarter of
+    these) with its 95 % interval."""
     rows = []
     for name, weights in PRIOR.items():
         for answer, weight in weights.items():

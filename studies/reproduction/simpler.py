@@ -92,13 +92,11 @@ def _fitted(experiment: Experiment, run: Run) -> dict[str, tuple[int, Outcomes]]
 
 
 def _played(experiment: Experiment, policies: dict[str, VoronoiPolicy | Tree]) -> dict[str, tuple[int, Outcomes]]:
-    """Return the number of cells and the evaluated episodes of each policy."""
     task, n, seed = experiment.task, experiment.n_episodes, EVALUATION_SEED
     return {kind: (len(p), rollout_from_seed(p, task, n, seed=seed)) for kind, p in policies.items()}
 
 
 def _row(evaluated: list[tuple[float, Outcomes]], teacher: np.ndarray) -> dict[str, float]:
-    """Return the row of policies of one kind, given the cells and episodes of each, and the `teacher`'s returns."""
     returns, codes = (np.stack([getattr(o, name) for _, o in evaluated]) for name in ("returns", "outcomes"))
     low, high = crossed_interval(returns - teacher)
     row = {"policies": len(evaluated), "cells": np.mean([n for n, _ in evaluated]), "mean": returns.mean()}

@@ -41,10 +41,8 @@ def experiments(task: str) -> dict[str, Experiment]:
 
 
 def study(runs: str | os.PathLike, *, jobs: int | str = 1) -> pd.DataFrame:
-    """Return one row per task, subject, what the rerun is set against, and name of a result.
-
-    Columns: kind, and the shares of `N_PAIRS` pairs that have each of `ledger.VERDICTS`.
-    """
+    """Return one row per task, subject, what the rerun is set against, and name of a result. Columns: kind, and the
+    shares of `N_PAIRS` pairs that have each of `ledger.VERDICTS`."""
     work = []
     for task in printed.TASKS:
         starts, n = start_states(task, N_STARTS, START_SEED), N_RUNS[task]

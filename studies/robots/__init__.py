@@ -4,13 +4,8 @@ Imitation includes states after pushes and after the policy's own mistakes. Then
 with a few cells as its actor.
 """
 
-from vsp.tasks import register_maker
-
-from . import bipedalwalker, halfcheetah
+from . import tasks
 from .gait import record_gait
 from .imitation import imitate_pushed
 from .random_search import search_one_map
 from .settings import Walking, walking_preset
-
-for _task in (bipedalwalker, halfcheetah):
-    register_maker(_task.NAME, _task.make)

@@ -20,10 +20,7 @@ STEPS_PER_UPDATE = 2  # twice as many updates for the same steps do not raise th
 
 def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *, seed: int) -> Policy:
     """Return the most rewarding of the first policy and `N_CHOICES` policies during training. Same arguments, same
-    policy.
-
-    `numbers`: `ScaledCells`, or a tree in these units that a `SoftActor` takes. The teacher has critics.
-    """
+    policy. `numbers`: `ScaledCells`, or a tree in these units that a `SoftActor` takes. The teacher has critics."""
     import torch
 
     policy_of = frame.policy if isinstance(numbers, ScaledCells) else lambda tree: tree

@@ -13,11 +13,9 @@ DIGITS = 4  # decimals of a position in metres, and of an input
 
 
 def record_gait(policy: VoronoiPolicy, task: str | Task, *, start: float, n_steps: int) -> pd.DataFrame:
-    """Record an episode from the seed `start`: one row per step with cell, feet, and the lines that make up the body.
-
-    Columns step, cell, back and front (whether this foot touches the ground), for each line of the body x0, z0, x1
-    and z1 in metres, such as "torso x0", and for each input what the policy sees, such as "input θ".
-    """
+    """Record an episode from the seed `start`, one row per step: step, cell, back and front (whether this foot touches
+    the ground), for each line of the body x0, z0, x1 and z1 in metres, such as "torso x0", and what the policy sees of
+    each input, such as "input θ"."""
     task = get_task(task)
     states, rows = task.begin(np.array([[float(start)]])), []
     for step in range(min(n_steps, task.max_steps)):

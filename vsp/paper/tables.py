@@ -4,8 +4,6 @@
 words, percentages, each interval in one column, no row numbers.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -44,7 +42,7 @@ QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting
 def save_table(
     frame: pd.DataFrame, name: str, *, out: str | os.PathLike, shown: pd.DataFrame | None = None,
     caption: str | None = None,
-) -> HTML:  # fmt: skip
+) -> "HTML":  # fmt: skip
     """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
     A name "beyond/x" writes OUT/figures/beyond/tables/x. `shown` replaces the whole table for readers: a part of it, or
@@ -62,7 +60,7 @@ def save_table(
     return show_table(shown, name, caption=caption)
 
 
-def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
+def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> "HTML":
     """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml.
 
     A table of more than `ROWS` rows is folded below its caption. Numbers have true minus signs, and intervals do not
@@ -191,7 +189,7 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3) -> pd.DataF
     return pd.DataFrame({"codeword": codewords, **columns})
 
 
-def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> HTML:
+def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> "HTML":
     """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
 
     Raises ValueError unless the sub-policies are linear.

@@ -9,8 +9,6 @@ was copied to another folder:
 - the seed, where a result has one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

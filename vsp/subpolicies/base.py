@@ -3,8 +3,6 @@
 Coefficients (p, m) have a column per action; the last row is the bias.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -74,7 +72,7 @@ class PolicyClass:
         """
         return inputs @ coefficients, lambda error: inputs.transpose(0, 2, 1) @ error
 
-    def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> pd.DataFrame:
+    def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> "pd.DataFrame":
         """Return the terms of the output at `state` (d,): m rows, one per action; a column per feature and the bias."""
         import pandas as pd  # here, because it takes long to import
 

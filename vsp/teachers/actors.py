@@ -4,8 +4,6 @@ All are layers with one activation between them. `POLICIES` has the policy class
 a setting, a class or a tensor, is refused by name: it might act.
 """
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable
@@ -89,7 +87,7 @@ _HARMLESS = set(
 _FLATTEN = "stable_baselines3.common.torch_layers.FlattenExtractor"  # does nothing to an observation of one dimension
 
 
-def actor_of(saved: Saved) -> Actor:
+def actor_of(saved: "Saved") -> Actor:
     """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
     policy = saved.setting("policy_class")
     name = policy.name if isinstance(policy, Thing) and policy.given is None else "one that only its own code can build"
@@ -125,7 +123,7 @@ def actor_of(saved: Saved) -> Actor:
     return Actor(layers, activation, squashed, clip if clip > 0 else np.inf)
 
 
-def _policy_settings(saved: Saved) -> dict:
+def _policy_settings(saved: "Saved") -> dict:
     found = saved.setting("policy_kwargs")
     found = found.items if isinstance(found, Thing) and found.name == "collections.OrderedDict" else found or {}
     if not isinstance(found, dict):
@@ -227,7 +225,7 @@ def _modules(tensors: dict[str, np.ndarray], network: str) -> list[tuple[str, di
     return found
 
 
-def check_spaces(found: Callable[[str], Any], task: Task) -> None:
+def check_spaces(found: Callable[[str], Any], task: "Task") -> None:
     """Raise Unfit unless an agent's "observation_space" and "action_space", which `found` returns as descriptions or
     spaces, are the boxes of the task.
 

@@ -1,7 +1,5 @@
 """One door for every agent: the file of one, a model in memory, a function of observations."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os
@@ -94,7 +92,7 @@ def digest_of(agent: Policy) -> str:
     return digest
 
 
-def _weights(model: Any, statistics: Normalization | None) -> bytes | None:
+def _weights(model: Any, statistics: "Normalization | None") -> bytes | None:
     """Return the weights of a Stable-Baselines3 model and its statistics of observations; None for other objects."""
     if hasattr(model, "digest"):
         return str(model.digest).encode()
@@ -105,7 +103,7 @@ def _weights(model: Any, statistics: Normalization | None) -> bytes | None:
     return b"".join(parts) + _bytes(statistics)
 
 
-def _bytes(statistics: Normalization | None) -> bytes:
+def _bytes(statistics: "Normalization | None") -> bytes:
     return b"".join(np.asarray(part).tobytes() for part in statistics or ())
 
 

@@ -1,7 +1,5 @@
 """Load a trained actor as a teacher and act with it in batches. This needs only NumPy: some matrix products."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -44,7 +42,7 @@ class Teacher:
         *,
         card: dict | None = None,
         critic: dict[str, np.ndarray] | None = None,
-        normalization: Normalization | None = None,
+        normalization: "Normalization | None" = None,
     ):
         self.task, self.card, self.critic = get_task(task), card or {}, critic or {}
         self.actor = weights if isinstance(weights, Actor) else Actor(layers_of(weights, "mu"))

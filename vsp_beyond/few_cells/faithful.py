@@ -20,9 +20,8 @@ from vsp.tasks.base import GOAL, Task
 from vsp.tasks.registry import get_task
 
 from .config import Faithful
-from .population import rollout_population
 from .search import even_moves, least_error
-from .tune import cma_es, is_snapshot, score
+from .tune import cma_es, is_snapshot, rollout_population, score
 from .units import LabelledStates, ScaledCells, Scaling, needed_only, spread, squared_error, unexplained, warn_outside
 
 VERSION = 1  # raise it when the same arguments give another policy
@@ -157,9 +156,7 @@ def _tune(
 ) -> Iterator[ScaledCells]:  # fmt: skip
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
     `SNAPSHOTS` times. Each generation is rolled out from some starts of the `pool`, where the teacher scores `goals`.
-
-    Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
-    """
+    Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little."""
     config, scaling = candidates.config, candidates.scaling
     move = even_moves(labelled, cells)
     step = np.sqrt(FIRST_STEP * max(squared_error(labelled, cells), 1e-6) / cells.vector.size)
@@ -177,11 +174,8 @@ def _tune(
 
 
 def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: float | None) -> np.ndarray:
-    """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,).
-
-    It is the error plus a penalty for a missed return. With `min_r2`, it is the missed return plus a penalty for an
-    error beyond it.
-    """
+    """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,): the
+    error plus a penalty for a missed return; with `min_r2`, the missed return plus a penalty for an error beyond it."""
     if min_r2 is None:
         return errors + PRICE / tolerance * np.maximum(0.0, missed)
     return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND

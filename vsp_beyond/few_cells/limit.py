@@ -88,6 +88,5 @@ def _screened(teacher: Policy, task: Task, config: Tuned, seed: int, *, closest:
 
 
 def _tuned(policy: VoronoiPolicy, teacher: Policy, task: Task, config: Tuned, seed: int) -> VoronoiPolicy:
-    """Tune `policy` with the settings `config`."""
     config = replace(config, n_cells=len(policy), n_restarts=1, n_corrections=0)
     return distill_tuned(teacher, task, config, seed=seed, start=policy)[0]

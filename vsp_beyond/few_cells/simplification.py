@@ -95,10 +95,8 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
 
 
 def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
-    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True.
-
-    Coefficients are tried in order of increasing effect on the action, for a change of the input by `policy.scale`.
-    """
+    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True. Coefficients are
+    tried in order of increasing effect on the action, for a change of the input by `policy.scale`."""
     sizes = np.abs(policy.coefficients) * np.append(policy.scale, 1.0)[:, None]
     for place in np.argsort(sizes, axis=None, kind="stable"):
         coefficients = policy.coefficients.copy()
