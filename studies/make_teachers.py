@@ -39,9 +39,8 @@ BARS = {
 
 
 def export(task: str, checkpoint: Path, folder: str | os.PathLike = SHIPPED) -> None:
-    """Write the teacher as safetensors with its card. Raises `CommandError` if it does not meet the requirements. The
-    card lists the rejected trials with other recipes that the shipped card lists. Actor and critics are written in
-    float32."""
+    """Write the teacher as safetensors in float32 with its card, which lists the rejected trials that the shipped card
+    lists. Raises `CommandError` if it does not meet the requirements."""
     snapshot = training.read_checkpoint(checkpoint)
     if not reaches_bar(training.score(_teacher(snapshot, task), task, seed=training.SELECTION_SEED), task):
         raise command.CommandError(f"{task}: seed {SEED} does not meet the requirements {BARS[task]}: set another SEED")

@@ -1,7 +1,5 @@
-"""Train a TD3 teacher with Stable-Baselines3, resumably. `studies.make_teachers` makes the shipped ones.
-
-Only the functions that train import torch and stable_baselines3.
-"""
+"""Train a TD3 teacher with Stable-Baselines3, resumably. Only the functions that train import torch and
+stable_baselines3."""
 
 import copy
 import hashlib
@@ -15,8 +13,7 @@ import numpy as np
 
 from vsp.evaluation import rollout_from_seed
 from vsp.run import atomic, sealed
-from vsp.tasks.base import GOAL, PIT
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL, PIT, get_task
 from vsp.teachers import Teacher
 
 CHUNK = 10_000  # steps between two checkpoints

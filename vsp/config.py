@@ -22,10 +22,8 @@ EXTENSIONS = {"metric": LOOKUP, "sub_policy": "linear", "fit": "adam"}
 
 @dataclass(frozen=True)
 class Config:
-    """All settings of a distillation, apart from the teacher, the task and the seed.
-
-    Raises ValueError for a value out of range; the message shows the value and what was expected.
-    """
+    """All settings of a distillation, apart from the teacher, the task and the seed. Raises ValueError for a value out
+    of range; the message shows the value and what was expected."""
 
     # Table T2
     n_epochs: int
@@ -160,10 +158,8 @@ _PRESETS = {task: Config(**{name: row[i] for name, row in _T2.items()}) for i, t
 
 
 def paper_preset(task: str | Task) -> Config:
-    """Return the paper's settings for `task`: table T2 and the default answers to R1 to R15.
-
-    Raises ValueError for a task that is not in the paper.
-    """
+    """Return the paper's settings for `task`: table T2 and the default answers to R1 to R15. Raises ValueError for a
+    task that is not in the paper."""
     name = get_task(task).name
     if name not in _PRESETS:
         raise ValueError(

@@ -116,9 +116,7 @@ class PiecewisePolicy(Exportable):
 
     def explain(self, obs: np.ndarray) -> Explanation:
         """Explain the action at one observation (d,): cell, equations, contributions of features, and nearest borders.
-
-        Raises ValueError for a batch, and for bad numbers as `predict` does.
-        """
+        Raises ValueError for a batch, and for bad numbers as `predict` does."""
         state = self._states(obs)
         if state.ndim != 1:
             raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
@@ -188,10 +186,8 @@ class PiecewisePolicy(Exportable):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the cells, the maps and the action box: its identity as an agent.
-
-        Raises ValueError if a part from outside cannot be identified.
-        """
+        """SHA-256 of the cells, the maps and the action box: its identity as an agent. Raises ValueError if a part from
+        outside cannot be identified."""
         from .run.identity import identity  # here: few policies are agents
 
         parts = [self.where, self.policy_class, self.coefficients, self.task.action_low, self.task.action_high]

@@ -15,13 +15,10 @@ _REAL = re.compile(r"(?<![\w.])(\d+(\.\d*)?e[-+]?\d+|\d+\.\d*)")  # a number wit
 def to_c(
     policy: PiecewisePolicy, *, real: str = "double", safe: np.ndarray | None = None, states: np.ndarray | None = None
 ) -> str:
-    """Return `policy.to_c()` for a device.
-
-    With `real` "float" all its numbers are floats: an action is right to about six digits, and on a border another cell
-    may act. `safe` (m,) is the action for a state that is not finite, by default NAN. Of `states` (n, d), a comment
-    says how much the action jumps at the borders around them, at most. Raises ValueError as `to_c` does, for another
-    `real`, and for a safe action beyond the limits.
-    """
+    """Return `policy.to_c()` for a device. With `real` "float" all its numbers are floats: an action is right to about
+    six digits, and on a border another cell may act. `safe` (m,) is the action for a state that is not finite, by
+    default NAN. Of `states` (n, d), a comment says how much the action jumps at the borders around them, at most.
+    Raises ValueError as `to_c` does, for another `real`, and for a safe action beyond the limits."""
     code, task = policy.to_c(), policy.task
     if real not in ("double", "float"):
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")

@@ -8,9 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from vsp import History, show
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy
+from vsp import History, Policy, VoronoiPolicy, show
 
 
 def picture(fig: Figure, alt: str) -> show.Picture:

@@ -1,4 +1,5 @@
-"""Shared by all checks: call a student's function, recognise common mistakes, print one line of feedback.
+"""Shared by all checks: call a student's function on small cases, recognise common mistakes, print one line of
+feedback.
 
 Feedback names what was found and what was expected, and points to a hint. It never gives the answer.
 """

@@ -1,8 +1,5 @@
-"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs shown there.
-
-The checks of the two passes and of a sub-policy class have modules of their own. Each check calls a student's function
-on cases with a known answer, and raises `NotYet` or prints one line.
-"""
+"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs shown there. The
+checks of the two passes and of a sub-policy class have modules of their own."""
 
 import contextlib
 from collections.abc import Callable

@@ -1,7 +1,5 @@
-"""Compare methods at equal tuning: each with the same number of cells or leaves, before and after tuning.
-
-Also count what each method costs: episodes of every kind, and seconds.
-"""
+"""Compare methods at equal tuning: each with the same number of cells or leaves, before and after; and what they
+cost."""
 
 import numpy as np
 import pandas as pd
@@ -50,12 +48,10 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
 
 
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first.
-
-    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean,
-    low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
-    method of size 1 is one linear map. Sizes without rivals are left out.
-    """
+    """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first. `frame` has
+    the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean, low, high (its 95 %
+    interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only method of size 1 is
+    one linear map. Sizes without rivals are left out."""
     r2, rows = frame.groupby(["method", "size"])["r2"].median(), []
     table = method_summary(frame).set_index(["method", "size"]).join(r2)
     for size in SHOWN:
@@ -70,12 +66,10 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
-    """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1.
-
-    Columns: size; mean, low, high and policies of our cells; rival (the name of the other method with the highest
-    mean), "rival mean" and so on; ahead: "theirs" if some other method is `ahead` of ours, else ours beside the rival;
-    behind, how many of the other methods ours are ahead of.
-    """
+    """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1. Columns: size;
+    mean, low, high and policies of our cells; rival (the name of the other method with the highest mean), "rival mean"
+    and so on; ahead: "theirs" if some other method is `ahead` of ours, else ours beside the rival; behind, how many of
+    the other methods ours are ahead of."""
     compared, columns = [], [*INTERVAL, "policies"]
     for size, rows in table[table["size"] > 1].groupby("size"):
         ours, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
@@ -113,11 +107,9 @@ def fit_and_geometry(task: str) -> pd.DataFrame:
 
 def budgets(task: str) -> pd.DataFrame:
     """Count the episodes of every kind that our policies and one tuned linear map need, and their seconds on one core.
-
     Columns: method, size (the preset's); numbers of episodes: teacher (played by the teacher), correction (played by
     the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the seeds).
-    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound.
-    """
+    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound."""
     long = "_long" * (task in LONG)
     times = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
     seconds = times[times["task"] == task].groupby(["method", "size"])["seconds"].median()

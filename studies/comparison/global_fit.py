@@ -1,9 +1,8 @@
 """Separate the effect of the fit from that of the borders: what our cells owe to each.
 
-Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
-fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
-are fitted together, and cells that are grown greedily. It also has our cells, fitted from as many random starts.
-`ObliqueLinearTree` is the fourth combination.
+Our cells differ from a tree with linear leaves (`ObliqueLinearTree`) by their borders, and by their fit of all numbers
+together, not greedily. Here are the mixed combinations, a tree fitted together and cells grown greedily; and our cells,
+fitted from as many random starts as the tree.
 """
 
 from functools import partial

@@ -24,12 +24,10 @@ def settings(seed: int = REPORT_SEED) -> dict:
 
 
 def measure(policy: Policy, teacher: Policy, task: Task, seed: int = REPORT_SEED) -> dict[str, float]:
-    """Measure a policy: returns, from the starts of `seed`, action errors and size.
-
-    Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none). Slow tasks are played from fewer starts; but
-    of those of `LIMIT_SEED` all are played.
-    """
+    """Measure a policy: returns, from the starts of `seed`, action errors and size. Keys: mean (return), failing (share
+    of episodes without the goal), error_teacher and error_own (action errors in the teacher's states and in the
+    policy's own), cells (or leaves; 0: none). Slow tasks are played from fewer starts; but of those of `LIMIT_SEED` all
+    are played."""
     n = N_REPORTED if seed == LIMIT_SEED else N_REPORTED // task.slowness
     result = rollout(policy, task, start_states(task, n, seed))
     starts = start_states(task, N_ERROR // task.slowness, ERROR_SEED)

@@ -15,8 +15,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from vsp import Policy, VoronoiPolicy, get_task, load_teacher, start_states
 from vsp.algorithms import distill
-from vsp.evaluation import start_states
 from vsp.geometry import METRICS
 from vsp.paper import printed
 from vsp.paper.ledger import ledger_table
@@ -24,13 +24,11 @@ from vsp.paper.readings import Readings
 from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import N_RUNS, Experiment, paper_experiment, results_of
 from vsp.paper.statistics import outlier_numbers, quartiles_from_fences, spread
-from vsp.policy import VoronoiPolicy
 from vsp.protocol import share_interval
 from vsp.protocol.job import settings_id
-from vsp.rollouts import Policy, rollout
+from vsp.rollouts import rollout
 from vsp.run import workers
-from vsp.tasks import get_task
-from vsp.teachers.teacher import SHIPPED, load_teacher
+from vsp.teachers import SHIPPED
 
 VERSION = 1  # raise it when the same settings give other rows
 N_SETTINGS, PRIOR_SEED = 4000, 777

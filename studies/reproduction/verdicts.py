@@ -1,8 +1,7 @@
 """How often the ledger's rules are wrong: the rerun against itself, and against runs that are known to be others.
 
 A "paper" is a sample of runs, from start states of its own; so is the "rerun". If both come from the same runs, each
-"differs" is wrong. If the paper's are fitted by least squares, or distilled from another teacher, the rules should see
-it.
+"differs" is wrong. If the paper's are fitted by least squares, or have another teacher, the rules should see it.
 """
 
 import os

@@ -1,8 +1,5 @@
-"""Continue the teacher's training with a few cells as its actor: tuning for policies of a thousand numbers.
-
-TD3 (Fujimoto et al. 2018, in Stable-Baselines3) learns from every single step, CMA-ES only from whole episodes. The
-critics begin with the teacher's weights.
-"""
+"""Continue the teacher's training with a few cells as its actor, and its critics: TD3 (Fujimoto et al. 2018) learns
+from every single step, CMA-ES only from whole episodes. That takes it to policies of a thousand numbers."""
 
 import numpy as np
 

@@ -23,10 +23,8 @@ OPEN = (
 
 @dataclass(frozen=True)
 class Readings:
-    """How a splitting and a merging pass read the paper; `split` and `merge` are for `algorithms.distill`.
-
-    Raises ValueError for an unknown reading.
-    """
+    """How a splitting and a merging pass read the paper; `split` and `merge` are for `algorithms.distill`. Raises
+    ValueError for an unknown reading."""
 
     split_lookup: Literal["refreshed", "kept"] = "refreshed"
     """R2. The codewords among which a splitting pass looks states up: all, including those that it has just added

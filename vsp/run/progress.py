@@ -12,10 +12,8 @@ DELAY = 2.0  # seconds of work without a bar
 
 
 def progress(items: Iterable, name: str, *, total: int, unit: str, done: int = 0, delay: float = 0.0) -> Iterator:
-    """Yield `items` and show on standard error how many of `total` are done, and the time left.
-
-    `done` of them were done before this call; the bar appears after `delay` seconds.
-    """
+    """Yield `items` and show on standard error how many of `total` are done, and the time left. `done` of them were
+    done before this call; the bar appears after `delay` seconds."""
     from tqdm import auto, notebook
 
     widget = issubclass(auto.tqdm, notebook.tqdm)  # it disappears when the work is done

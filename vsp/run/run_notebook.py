@@ -143,11 +143,8 @@ def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> 
 
 
 def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode]:
-    """Return the outputs of code cell `number` in a form that is the same for every run.
-
-    Text is joined into one piece. Widgets are replaced by their static image; a widget without one, such as a progress
-    bar, is removed.
-    """
+    """Return the outputs of code cell `number` in a form that is the same for every run. Text is joined into one piece.
+    Widgets are replaced by their static image; a widget without one, such as a progress bar, is removed."""
     result: list[NotebookNode] = []
     for output in outputs:
         data = output.get("data", {})

@@ -79,19 +79,14 @@ class PolicyClass:
         return pd.DataFrame(coefficients.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name.
-
-        `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that
-        are zero.
-        """
+        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name. `digits` is
+        the number of decimals. None prints each number exactly, in its shortest form, without terms that are zero."""
         return combination(column, [*map(symbol, self.terms), ""], digits)
 
 
 def combination(column: np.ndarray, names: Sequence[str], digits: int | None) -> str:
     """Return a sum of `names`, each times its coefficient in `column` (p,), as text; an empty name is a constant.
-
-    `digits` as in `PolicyClass.expression`.
-    """
+    `digits` as in `PolicyClass.expression`."""
     terms = [(c, name) for c, name in zip(column, names, strict=True) if c or digits is not None]
     parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
     text = " ".join(parts)

@@ -178,10 +178,8 @@ def layers_of(
     tensors: dict[str, np.ndarray], *networks: str, epsilon: float = 0.001, biased: bool = True
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return the layers of these networks in float32, one after the other; batch normalisation is merged into the next.
-
     A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for layers
-    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`.
-    """
+    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`."""
     layers: list[tuple[np.ndarray, np.ndarray]] = []
     shift, scale = np.zeros(1), np.ones(1)
     for module, parts in (found for network in networks for found in _modules(tensors, network)):
@@ -227,11 +225,8 @@ def _modules(tensors: dict[str, np.ndarray], network: str) -> list[tuple[str, di
 
 def check_spaces(found: Callable[[str], Any], task: "Task") -> None:
     """Raise Unfit unless an agent's "observation_space" and "action_space", which `found` returns as descriptions or
-    spaces, are the boxes of the task.
-
-    Observations without limits fit any, with a warning: some environments had none in older versions, but a wrapper
-    that changes observations may have taken the limits away, too.
-    """
+    spaces, are the boxes of the task. Observations without limits fit any, with a warning: some environments had none
+    in older versions, but a wrapper that changes observations may have taken the limits away, too."""
     boxes = {"observation_space": (task.low, task.high), "action_space": (task.action_low, task.action_high)}
     for name, ours in boxes.items():
         space, free = found(name), name == "observation_space"

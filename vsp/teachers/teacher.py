@@ -11,8 +11,7 @@ import numpy as np
 
 from ..checks import check_choice, check_observations
 from ..run import atomic, listed
-from ..tasks.base import Task
-from ..tasks.registry import get_task, task_names
+from ..tasks import Task, get_task, task_names
 from . import actors
 from .actors import Actor, layers_of, part_of
 

@@ -22,9 +22,9 @@ class Critics:
             raise ValueError("the critics give several numbers for an action, expected one value: not those of TQC")
 
     def criticality(self, obs: np.ndarray) -> np.ndarray:
-        """Return the cost of a wrong action in the states (n, d): the weights of VIPER (Bastani et al. 2018). (n,) This
-        is the value of the teacher's own action minus that of the worst corner of the action box, by the lower of its
-        critics; at least 0."""
+        """Return the cost of a wrong action in the states (n, d), the weights of VIPER (Bastani et al. 2018): the value
+        of the teacher's own action minus that of the worst corner of the action box, by the lower of its critics; at
+        least 0. (n,)"""
         states = self.teacher.inputs(obs)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self.teacher.half))), dtype=np.float32)
         # The critics see actions in units of the action box, from -1 to 1

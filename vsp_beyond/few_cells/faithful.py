@@ -12,12 +12,11 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp.checks import check_seed
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, visited_states
+from vsp.rollouts import rollout, visited_states
 from vsp.run.progress import steps
-from vsp.tasks.base import GOAL, Task
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL
 
 from .config import Faithful
 from .search import even_moves, least_error
@@ -41,11 +40,9 @@ def distill_faithfully(
     teacher: Policy, task: str | Task, config: Faithful, *, seed: int
 ) -> tuple[VoronoiPolicy, pd.DataFrame]:
     """Distil `teacher` to at most `config.n_cells` cells that act like it and are as good. Same arguments, same policy.
-
     Returns the policy and its history, one row per candidate: stage ("fit", "tune"), r2 (of the limited actions, on the
     states of the fit), gap (mean return less the failure penalty, minus the teacher's from the same starts), kept. The
-    most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does.
-    """
+    most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does."""
     check_seed(seed)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
@@ -136,12 +133,10 @@ class _Candidates:
 
 
 def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | None) -> int:
-    """Return which candidate is kept, by the R² (c,) and the gap (c,) of all candidates. The first is the closest.
-
-    It is the one with the highest R² among those with a gap of at least `least_gap`. If there is none, it is the one
-    with the highest return among those with at most `NEAR` times the error of the first. With `min_r2`, it is the one
-    with the highest return among those with at least this R², or else the one with the highest R².
-    """
+    """Return which candidate is kept, by the R² (c,) and the gap (c,) of all candidates. The first is the closest. It
+    is the one with the highest R² among those with a gap of at least `least_gap`. If there is none, it is the one with
+    the highest return among those with at most `NEAR` times the error of the first. With `min_r2`, it is the one with
+    the highest return among those with at least this R², or else the one with the highest R²."""
     if min_r2 is not None:
         accepted, value, instead = r2 >= min_r2, gap, r2
     else:

@@ -17,13 +17,12 @@ from functools import cached_property
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.evaluation import Likeness, likeness, start_states
-from vsp.policy import VoronoiPolicy
-from vsp.protocol import interval
-from vsp.protocol.job import Job, make_all, provenance
-from vsp.rollouts import Policy, rollout, visited_states
-from vsp.tasks.base import Task
-from vsp.teachers.agents import digest_of
+from vsp import Policy, Task, VoronoiPolicy, start_states
+from vsp.evaluation import Likeness, likeness
+from vsp.protocol import Job, interval
+from vsp.protocol.job import make_all, provenance
+from vsp.rollouts import rollout, visited_states
+from vsp.teachers import digest_of
 
 from .config import Faithful, faithful_preset
 from .faithful import distill_faithfully

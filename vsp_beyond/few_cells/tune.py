@@ -54,8 +54,7 @@ def tune(
 
 def cma_es(start: np.ndarray, step: float, rng: np.random.Generator, *, diagonal: bool = False):
     """Return the search of the library `cma` from `start`, with first standard deviation `step` and random draws from
-    `rng`. `diagonal`: learn variances only (sep-CMA-ES, Ros & Hansen 2008), for more numbers than there are
-    generations."""
+    `rng`; `diagonal`: of variances only (sep-CMA-ES, Ros & Hansen 2008), for more numbers than generations."""
     import cma  # here, because few uses need it
 
     options = {"seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape), "verbose": -9}

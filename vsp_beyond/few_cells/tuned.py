@@ -10,13 +10,11 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp.checks import check_seed
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, visited_states
+from vsp.rollouts import visited_states
 from vsp.run.progress import steps
 from vsp.subpolicies.stacked import BETA1, adam
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
 
 from .config import Tuned
 from .criticality import Critics
@@ -31,12 +29,10 @@ def distill_tuned(
     teacher: Policy, task: str | Task, config: Tuned, *, seed: int, start: VoronoiPolicy | None = None
 ) -> tuple[VoronoiPolicy, pd.DataFrame]:
     """Distil `teacher` to `config.n_cells` cells, from scratch or from those of `start`. Same arguments, same policy.
-
     Returns the policy and its history, one row per candidate: stage ("line", one linear map, or "start"; "fit",
     "correct", "tune"), restart, mean return and share of failed episodes from the validation starts. Distances are
     Euclidean, also those of `start`, which is for the same task and has as many cells; its scale is kept. Raises
-    ValueError as `distill` does, and for `criticality` with a teacher that has no critics.
-    """
+    ValueError as `distill` does, and for `criticality` with a teacher that has no critics."""
     check_seed(seed)
     task = get_task(task)
     critics = Critics(teacher) if config.criticality else None  # raises now, not after an hour

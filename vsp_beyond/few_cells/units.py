@@ -1,8 +1,5 @@
-"""Cells and labelled states, in units in which one step size fits all: inputs of mean 0 and deviation 1, actions in
-[-1, 1].
-
-Everything here is arrays: no episode is played, and no teacher asked.
-"""
+"""Cells and labelled states as arrays, in units in which one step size fits all: inputs of mean 0 and deviation 1,
+actions in [-1, 1]."""
 
 from __future__ import annotations
 
@@ -13,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from vsp.policy import VoronoiPolicy
+from vsp import Task, VoronoiPolicy
 from vsp.rollouts import standard
-from vsp.tasks.base import Task
 
 METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
 

@@ -12,8 +12,7 @@ import pandas as pd
 from scipy import sparse
 
 from vsp.rollouts import Policy, visited_states
-from vsp.tasks.base import RUNNING, Task
-from vsp.tasks.registry import get_task
+from vsp.tasks import RUNNING, Task, get_task
 
 SWEEPS = 60  # sweeps of evaluation between two improvements (modified policy iteration, Puterman & Shin 1978)
 MOST_IMPROVEMENTS = 1000
@@ -66,7 +65,7 @@ class Grid:
 
 
 def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:
-    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step. (n,) The
+    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step: (n,). The
     task must have one action, and the grid's variables as its state. Episodes have no step limit here; a price keeps
     them short. Raises RuntimeError if the values do not converge."""
     moves = [_move(task, grid, action, price) for action in actions]
@@ -113,9 +112,9 @@ class GridPolicy:
         return np.concatenate([self._best(part) for part in parts])[:, None], None
 
     def lost(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return.
-        The shape is (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible
-        after its end."""
+        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return:
+        (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible after its
+        end."""
         states, best = self.state_of(obs.astype(np.float64)), self.predict(obs)[0]
         return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
 
@@ -152,12 +151,10 @@ PENDULUM_REGIONS: dict[str, Region] = {"swing-up": lambda obs: ~held(obs), "hold
 def losses(
     policy: Policy, best: GridPolicy, task: str | Task, starts: np.ndarray, regions: dict[str, Region]
 ) -> pd.DataFrame:
-    """Return what `policy` loses in each of the `regions`, such as `PENDULUM_REGIONS`, one row per region.
-
-    Columns: steps (share of the policy's steps that are in the region) and lost (return lost there per episode). The
-    sum of all losses of an episode is its regret, up to the grid's error, if no more return is possible after its end.
-    Raises ValueError as `visited_states` does.
-    """
+    """Return what `policy` loses in each of the `regions`, such as `PENDULUM_REGIONS`, one row per region. Columns:
+    steps (share of the policy's steps that are in the region) and lost (return lost there per episode). The sum of all
+    losses of an episode is its regret, up to the grid's error, if no more return is possible after its end. Raises
+    ValueError as `visited_states` does."""
     task = get_task(task)
     states = visited_states(policy, task, starts)
     lost = best.lost(states, np.asarray(policy.predict(states)[0], dtype=np.float64))
