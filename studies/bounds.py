@@ -6,8 +6,6 @@ last term is -10. After 50 steps it is 0, and s' is the last state. Distances ar
 |s'| is at least its value at the centroid, and at most the mean of its values at the corners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`make proofs`: write certificates to data/beyond/proofs and results to data/beyond."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -110,8 +108,7 @@ def _of_simplegoal_proof(proof: SimpleGoalProof) -> dict:
 
 
 def _sampled(policy: VoronoiPolicy) -> dict:
-    """Return mean return and shares of outcomes over `N_SAMPLED` episodes; a hundredth of them where the task is not
-    SimpleGoal."""
+    """Return mean return and shares of outcomes over `N_SAMPLED` episodes, a hundredth except on SimpleGoal."""
     n = N_SAMPLED if policy.task.name == SIMPLEGOAL else N_SAMPLED // 100
     played = rollout(policy, policy.task, start_states(policy.task, n, 1))
     shares = {f"sampled_{name}": float((played.outcomes == end).mean()) for end, name in ENDS.items()}

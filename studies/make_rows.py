@@ -1,7 +1,5 @@
 """Run `make beyond` and `make beyond-long`: make the rows of the comparison of methods, and time the methods."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from vsp.run import command

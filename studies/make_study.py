@@ -1,7 +1,5 @@
 """`make study`, `make hidden`, `make hub-teacher`: write the experiments on the reproduction to data/results/."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,10 +15,8 @@ from .zoo import CAR, read
 
 
 def main() -> None:
-    """Make the missing runs of the experiments, and write simpler.csv and verdicts.csv.
-
-    With --hidden, search for hidden settings instead. With --agent, write hub_teacher_ledger.csv instead, and print it.
-    """
+    """Make the missing runs of the experiments, and write simpler.csv and verdicts.csv. With --hidden, search for
+    hidden settings instead. With --agent, write hub_teacher_ledger.csv instead, and print it."""
     parser = command.parser(main.__doc__, "write to OUT/data/results and OUT/build/study")
     parser.add_argument("--agent", type=Path, help="a zip of Stable-Baselines3, trained for MountainCar")
     parser.add_argument("--hidden", action="store_true", help="write hidden_*.csv")
@@ -40,10 +36,8 @@ def main() -> None:
 
 def with_another_teacher(agent: Path, runs: Path, jobs: int | str) -> pd.DataFrame:
     """Distil the agent in a zip as often as the paper distils MountainCar's teacher; return the ledger of the results.
-
     The paper's own teacher is the RL Zoo's TD3 agent, whose weights we do not have. The committed table is that of the
-    zoo's DDPG agent, its sibling. Raises `CommandError` for an agent of another task.
-    """
+    zoo's DDPG agent, its sibling. Raises `CommandError` for an agent of another task."""
     try:
         experiment = replace(paper_experiment(CAR), teacher=read(agent, CAR))
     except ValueError as error:

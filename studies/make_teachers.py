@@ -1,7 +1,5 @@
 """`make teachers`, `make short-teachers`: train the teachers, also those of robots, and write them with their cards."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -17,7 +15,7 @@ from vsp.teachers.actors import part_of
 from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
 
 from . import drone_teacher, robots, training  # noqa: F401  # robots' tasks are registered
-from .recipes import RECIPES, Recipe
+from .training import RECIPES, Recipe
 
 PACKAGES = ("torch", "stable-baselines3", "gymnasium", "numpy")  # a card names their versions
 ENGINES = {"HalfCheetah-v5": ("mujoco",)}
@@ -41,11 +39,8 @@ BARS = {
 
 
 def export(task: str, checkpoint: Path, folder: str | os.PathLike = SHIPPED) -> None:
-    """Write the teacher as safetensors with its card. Raises `CommandError` if it does not meet the requirements.
-
-    The card lists the rejected trials with other recipes that the shipped card lists. Actor and critics are written in
-    float32.
-    """
+    """Write the teacher as safetensors in float32 with its card, which lists the rejected trials that the shipped card
+    lists. Raises `CommandError` if it does not meet the requirements."""
     snapshot = training.read_checkpoint(checkpoint)
     if not reaches_bar(training.score(_teacher(snapshot, task), task, seed=training.SELECTION_SEED), task):
         raise command.CommandError(f"{task}: seed {SEED} does not meet the requirements {BARS[task]}: set another SEED")

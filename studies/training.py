@@ -1,26 +1,20 @@
-"""Train a TD3 teacher with Stable-Baselines3, resumably. `studies.make_teachers` makes the shipped ones.
-
-Only the functions that train import torch and stable_baselines3.
-"""
-
-from __future__ import annotations
+"""Train a TD3 teacher with Stable-Baselines3, resumably. Only the functions that train import torch and
+stable_baselines3."""
 
 import copy
+import hashlib
 import io
 import os
 import pickle
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from vsp.evaluation import rollout_from_seed
 from vsp.run import atomic, sealed
-from vsp.tasks.base import GOAL, PIT
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL, PIT, get_task
 from vsp.teachers import Teacher
-
-from .recipes import BEST_OF_CURVE, RECIPES, Recipe
 
 CHUNK = 10_000  # steps between two checkpoints
 SCORE_EPISODES, CURVE_EPISODES = 10_000, 500
@@ -28,12 +22,53 @@ OFTEN = {"BipedalWalker-v3": 4}  # factor on CURVE_EPISODES where a rare fall de
 SELECTION_SEED, SCORE_SEED = 101, 102  # seeds of start states: to select a training seed, and to report scores
 
 
-def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | None = None, report=print) -> Path:
-    """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint.
+@dataclass(frozen=True)
+class Recipe:
+    """Arguments of Stable-Baselines3's TD3 for one teacher; the policy is MlpPolicy, [400, 300], ReLU."""
 
-    Training proceeds in chunks of `CHUNK` steps. Each chunk begins a new episode with new random streams from (seed,
-    steps so far), so a run that was killed and resumed ends with the same weights as an uninterrupted one.
-    """
+    steps: int  # environment steps
+    batch_size: int = 256
+    train_freq: tuple[int, str] = (1, "step")
+    gradient_steps: int = 1  # per training phase; -1: as many as steps were taken
+    learning_rate: float = 1e-3
+    gamma: float = 0.99  # discount per step
+    buffer_size: int = 1_000_000
+    learning_starts: int = 100
+    noise: str = "normal"  # exploration noise: "normal" or "ornstein-uhlenbeck"
+    noise_std: float = 0.1  # its standard deviation, in units of the action
+
+    @property
+    def id(self) -> str:
+        """Eight hexadecimal digits of a hash: a checkpoint is resumed only with the same recipe."""
+        return hashlib.sha256(repr(self).encode()).hexdigest()[:8]
+
+
+RECIPES = {
+    # "500.000 steps using the standard parameters": the library's defaults, with the exploration noise of the
+    # TD3 article (Fujimoto et al. 2018); without noise, training never discovers that a short last step pays
+    "SimpleGoal-v0": Recipe(steps=500_000),
+    # RL Zoo's recipe with the library defaults of that time (batch 100, one training phase per episode)
+    "MountainCarContinuous-v0": Recipe(
+        steps=300_000, batch_size=100, train_freq=(1, "episode"), gradient_steps=-1,
+        noise="ornstein-uhlenbeck", noise_std=0.5,
+    ),
+    # RL Zoo's recipe
+    "Pendulum-v1": Recipe(steps=20_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
+    # With RL Zoo's recipe the return rises and falls; a larger buffer, a higher gamma and smaller steps stabilise it
+    "LunarLanderContinuous-v3": Recipe(steps=450_000, learning_rate=3e-4, learning_starts=10_000),
+    # RL Zoo's recipe with fewer steps
+    "BipedalWalker-v3": Recipe(steps=300_000, gamma=0.98, buffer_size=200_000, learning_starts=10_000),
+    "HalfCheetah-v5": Recipe(steps=350_000, learning_starts=10_000),
+}  # fmt: skip
+
+# Tasks whose teacher is the best snapshot of the learning curve; for other tasks it is the last one
+BEST_OF_CURVE = ("LunarLanderContinuous-v3", "BipedalWalker-v3", "HalfCheetah-v5")
+
+
+def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | None = None, report=print) -> Path:
+    """Train a TD3 teacher for `task`, resuming from `cache`, and return the path of its last checkpoint. Training
+    proceeds in chunks of `CHUNK` steps. Each chunk begins a new episode with new random streams from (seed, steps so
+    far), so a run that was killed and resumed ends with the same weights as an uninterrupted one."""
     import torch
 
     torch.set_num_threads(1)
@@ -63,10 +98,8 @@ def train(task: str, *, seed: int, cache: str | os.PathLike, recipe: Recipe | No
 
 
 def read_checkpoint(path: str | os.PathLike) -> dict:
-    """Read a checkpoint that `train` wrote. Raises FileNotFoundError or `run.atomic.DamagedFile`.
-
-    torch's `weights_only` loading runs no code from the file.
-    """
+    """Read a checkpoint that `train` wrote. Raises FileNotFoundError or `run.atomic.DamagedFile`. torch's
+    `weights_only` loading runs no code from the file."""
     import torch
 
     content = io.BytesIO(sealed.read_sealed(path))
@@ -107,7 +140,6 @@ def _snapshot(model) -> dict:
 
 
 def _restore(model, snapshot: dict) -> None:
-    """Restore a snapshot into a new model."""
     model.set_parameters(snapshot["parameters"])
     for name, rows in snapshot["buffer"].items():
         getattr(model.replay_buffer, name)[: len(rows)] = rows.numpy()
@@ -123,10 +155,8 @@ def _score(model, task: str) -> dict:
 
 
 def score(teacher: Teacher, task: str, n_episodes: int = SCORE_EPISODES, *, seed: int = SCORE_SEED) -> dict:
-    """Return the mean and standard deviation of the return, and the shares of episodes that end in goal and pit.
-
-    Slow tasks are scored over fewer episodes.
-    """
+    """Return the mean and standard deviation of the return, and the shares of episodes that end in goal and pit. Slow
+    tasks are scored over fewer episodes."""
     result = rollout_from_seed(teacher, task, n_episodes // get_task(task).slowness, seed=seed)
     return {
         "mean": round(float(result.returns.mean()), 4),

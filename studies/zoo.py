@@ -1,11 +1,9 @@
 """`make agents AGENTS=folder`: read, play and distil every agent of a folder, such as a clone of the public collection.
 
 Agents are zips of Stable-Baselines3 and sb3-contrib, ALGORITHM-TASK.zip or TASK.zip below a folder ALGORITHM. Each is
-distilled to the fewest of `SIZES` cells that act like it. What cannot be read or takes too long gets a row with the
-reason. Those of MountainCar are distilled by the paper's method, too.
+distilled to the fewest of `SIZES` cells that act like it, those of MountainCar also by the paper's method. What cannot
+be read or takes too long gets a row with the reason.
 """
-
-from __future__ import annotations
 
 import contextlib
 import os
@@ -18,18 +16,17 @@ import gymnasium
 import numpy as np
 import pandas as pd
 
+from vsp import Task, VoronoiPolicy, get_task, load_teacher, start_states
 from vsp.algorithms import VERSION, distill
 from vsp.config import paper_preset
-from vsp.evaluation import Likeness, likeness, start_states
+from vsp.evaluation import Likeness, likeness
 from vsp.paper.baselines import refit
-from vsp.policy import VoronoiPolicy
 from vsp.protocol import Job, job
 from vsp.protocol.job import provenance
 from vsp.rollouts import visited_states
 from vsp.run import atomic, command, sealed
-from vsp.tasks import Task, get_task
+from vsp.teachers import SHIPPED, Teacher
 from vsp.teachers.normalization import statistics_beside
-from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
 from vsp_beyond.few_cells import faithful_preset
 from vsp_beyond.few_cells.faithful import distill_faithfully
 
@@ -181,12 +178,10 @@ def kept(checksum: str) -> tuple[dict, dict] | None:
 
 
 def by_the_paper(agent: Teacher) -> list[dict]:
-    """Distil an agent of MountainCar by the paper's method; return rows of each seed, in three ways.
-
-    The paper's settings; the same cells with maps by least squares; Adam with ten times the step size. `apart` is how
-    many of the agent's states are farther from each other than a codeword must be from a state, `slope` the median
-    coefficient of the velocity, without its sign, over the agent's states.
-    """
+    """Distil an agent of MountainCar by the paper's method; return rows of each seed, in three ways. The paper's
+    settings; the same cells with maps by least squares; Adam with ten times the step size. `apart` is how many of the
+    agent's states are farther from each other than a codeword must be from a state, `slope` the median coefficient of
+    the velocity, without its sign, over the agent's states."""
     config, rows = paper_preset(CAR), []
     states = visited_states(agent, CAR, start_states(CAR, N_SEEN, SEEN_SEED))
     for seed in SEEDS:

@@ -6,8 +6,6 @@ the public API: it checks arguments and resolves names of tasks. What goes beyon
 `vsp_beyond`.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 import warnings
@@ -72,9 +70,7 @@ def distill(
 
 def likeness(policy: Policy, other: Policy, task: str | Task, n: int = 1000, *, seed: int = 7) -> Likeness:
     """Compare `policy` with the agent `other`: actions, returns and failures in n episodes from the starts of `seed`.
-
-    An engine that is slow plays fewer. Raises ValueError unless both fit the task.
-    """
+    An engine that is slow plays fewer. Raises ValueError unless both fit the task."""
     return evaluation.likeness(agent(policy, task), agent(other, task), task, n, seed=seed)
 
 
@@ -102,5 +98,4 @@ def __getattr__(name: str) -> ModuleType | Callable:
 
 
 def __dir__() -> list[str]:
-    """List what this file offers, also what is imported on first use."""
     return sorted({*__all__, *_LATER})

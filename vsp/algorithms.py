@@ -5,8 +5,6 @@ out in large batches ahead of the loop. The cells' models are stacked, so one st
 of the algorithm as the paper prints it; "R1" is an open question, a field of `Config` or a pass of `paper.readings`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -61,10 +59,8 @@ def distill(
 
 
 def split_regions(partition: Partition, episode: Episode, config: Config, rng: np.random.Generator) -> list[Change]:
-    """Algorithm 2: walk along the episode and split each cell where the running mean loss is too high.
-
-    Returns the new codewords, each (d,), with the running mean loss that caused it.
-    """
+    """Algorithm 2: walk along the episode and split each cell where the running mean loss is too high. Returns the new
+    codewords, each (d,), with the running mean loss that caused it."""
     previous: int | None = None
     losses: list[float] = []
     added: list[Change] = []
@@ -87,10 +83,8 @@ def split_regions(partition: Partition, episode: Episode, config: Config, rng: n
 
 
 def merge_regions(partition: Partition, config: Config) -> list[Change]:
-    """Algorithm 3: for each cell, remove neighbours with similar coefficients.
-
-    Returns the removed codewords, each (d,), with the L-infinity distance of its map from that of the cell.
-    """
+    """Algorithm 3: for each cell, remove neighbours with similar coefficients. Returns the removed codewords, each
+    (d,), with the L-infinity distance of its map from that of the cell."""
     before, i = partition.codewords, 0
     causes: dict[tuple, float] = {}
     while i < len(partition.codewords):  # l. 1

@@ -4,8 +4,6 @@ A row holds the features of a state, which are the inputs of a sub-policy (for l
 teacher's action there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .config import Config
@@ -45,10 +43,8 @@ class Buffers:
         self.counts += np.bincount(cells, minlength=len(self.counts))
 
     def sample(self, cells: np.ndarray, size: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Draw a minibatch for each of `cells` (c,), with replacement.
-
-        Returns inputs (c, size, q + 1) and actions (c, size, m).
-        """
+        """Draw a minibatch for each of `cells` (c,), with replacement. Returns inputs (c, size, q + 1) and actions (c,
+        size, m)."""
         slots = (rng.random((len(cells), size)) * self.counts[cells, None]).astype(np.intp)
         rows = self._table[cells[:, None], slots]
         return self._inputs.take(rows, axis=0), self._actions.take(rows, axis=0)

@@ -4,8 +4,6 @@ A policy is cells and maps (`policy.PiecewisePolicy`). To draw cells in another 
 `Cells`, in any file.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any, Protocol
 

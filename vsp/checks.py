@@ -1,7 +1,5 @@
 """Checks of arguments. Each raises one clear error that shows the offending value and what was expected."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

@@ -5,8 +5,6 @@ change the passes themselves, are fields of `paper.readings.Readings`. R11 (whic
 field: the paper's prose answers it, "this iteration's episode".
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -24,10 +22,8 @@ EXTENSIONS = {"metric": LOOKUP, "sub_policy": "linear", "fit": "adam"}
 
 @dataclass(frozen=True)
 class Config:
-    """All settings of a distillation, apart from the teacher, the task and the seed.
-
-    Raises ValueError for a value out of range; the message shows the value and what was expected.
-    """
+    """All settings of a distillation, apart from the teacher, the task and the seed. Raises ValueError for a value out
+    of range; the message shows the value and what was expected."""
 
     # Table T2
     n_epochs: int
@@ -117,7 +113,7 @@ class Config:
         own = {name: identity(value) for name, value in vars(self).items()}
         return {name: value for name, value in own.items() if name not in EXTENSIONS or value != EXTENSIONS[name]}
 
-    def quick(self) -> Config:
+    def quick(self) -> "Config":
         """Return the same method with a tenth of the iterations: for a first look, not for results."""
         tenth = {name: max(1, getattr(self, name) // 10) for name in ("n_epochs", "n_freeze")}
         return dataclasses.replace(self, **tenth)
@@ -162,10 +158,8 @@ _PRESETS = {task: Config(**{name: row[i] for name, row in _T2.items()}) for i, t
 
 
 def paper_preset(task: str | Task) -> Config:
-    """Return the paper's settings for `task`: table T2 and the default answers to R1 to R15.
-
-    Raises ValueError for a task that is not in the paper.
-    """
+    """Return the paper's settings for `task`: table T2 and the default answers to R1 to R15. Raises ValueError for a
+    task that is not in the paper."""
     name = get_task(task).name
     if name not in _PRESETS:
         raise ValueError(

@@ -1,7 +1,5 @@
 """Evaluate policies from start states that are the same for all, and compare a policy with the agent it imitates."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,8 +10,7 @@ from threadpoolctl import threadpool_limits
 from .checks import check_count, check_seed
 from .rollouts import Outcomes, Policy, record, rollout
 from .run import progress
-from .tasks.base import GOAL, OUTCOMES, Task
-from .tasks.registry import get_task
+from .tasks import GOAL, OUTCOMES, Task, get_task
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,7 +71,7 @@ def rollout_from_seed(policy: Policy, task: str | Task, n_episodes: int = 1000, 
     return rollout(policy, task, start_states(task, n_episodes, seed))
 
 
-def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> pd.DataFrame:
+def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: int) -> "pd.DataFrame":
     """Run `policy` from the start states of `seed`. Returns a row per episode with return, length and outcome."""
     import pandas as pd  # here, because it takes long to import
 
@@ -84,10 +81,8 @@ def evaluate(policy: Policy, task: str | Task, n_episodes: int = 1000, *, seed: 
 
 
 def likeness(policy: Policy, agent: Policy, task: str | Task, n: int = 1000, *, seed: int = 7) -> Likeness:
-    """Compare `policy` with `agent` over n episodes from the starts of `seed`, fewer where an engine is slow.
-
-    Raises ValueError unless both fit the task.
-    """
+    """Compare `policy` with `agent` over n episodes from the starts of `seed`, fewer where an engine is slow. Raises
+    ValueError unless both fit the task."""
     task = get_task(task)
     starts = start_states(task, max(10, n // task.slowness), seed)
     played, episodes = record(agent, task, starts)
@@ -109,10 +104,8 @@ def r_squared(ours: np.ndarray, theirs: np.ndarray) -> float:
 
 @threadpool_limits.wrap(limits=1)  # the same text on any machine, as the distillation before it
 def remark(policy: Policy, agent: Policy, task: Task, n: int, advice: str) -> None:
-    """Print on standard error how alike they are in n / 40 episodes, at most 100, and `advice`, unless all is silent.
-
-    n is the number of episodes that the distillation played, so that this takes a small share of its time.
-    """
+    """Print on standard error how alike they are in n / 40 episodes, at most 100, and `advice`, unless all is silent. n
+    is the number of episodes that the distillation played, so that this takes a small share of its time."""
     if progress.is_shown():
         alike = likeness(policy, agent, task, min(100, n // 40))
         print(f"{alike}; closer: {advice}", file=sys.stderr)

@@ -3,8 +3,6 @@
 Numbers are written so that they read back as the same float64. The cells write their own part (`cells.Cells`).
 """
 
-from __future__ import annotations
-
 import json
 import re
 

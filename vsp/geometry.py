@@ -5,8 +5,6 @@ already divided by the scale of the distance. They raise ValueError for arrays o
 finite, no codewords, or an unknown metric.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

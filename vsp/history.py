@@ -1,7 +1,5 @@
 """Record one distillation, so that a notebook can replay it."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -36,11 +34,8 @@ class Event(NamedTuple):
 
 
 class History:
-    """Cells, losses and events over the iterations of one run, and snapshots of the policy.
-
-    There are at most about `SNAPSHOTS` snapshots, and one more per change of the codewords. Two numbers are kept per
-    iteration, 40 bytes.
-    """
+    """Cells, losses and events over the iterations of one run, and snapshots of the policy. There are at most about
+    `SNAPSHOTS` snapshots, and one more per change of the codewords. Two numbers are kept per iteration, 40 bytes."""
 
     def __init__(self, n_iterations: int = 0) -> None:
         self.every = max(SNAPSHOT_EVERY, n_iterations // SNAPSHOTS)  # iterations between two snapshots
@@ -65,14 +60,12 @@ class History:
             self._snapshots.append((n, partition.policy()))
 
     def policy_at(self, n: int) -> VoronoiPolicy:
-        """Return the policy after iteration n, or less than `every` iterations before it.
-
-        Raises ValueError outside the run.
-        """
+        """Return the policy after iteration n, or less than `every` iterations before it. Raises ValueError outside the
+        run."""
         check_count("iteration", n, least=0, most=len(self.cells) - 1)
         return self._snapshots[bisect_right(self._snapshots, n, key=lambda snapshot: snapshot[0]) - 1][1]
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """One row per iteration: cells, loss, splits, merges."""
         import pandas as pd  # here, because it takes long to import
 

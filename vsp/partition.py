@@ -1,7 +1,5 @@
 """`Partition`: the state of a distillation, which consists of codewords, the cells' models and their buffers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from . import geometry
@@ -14,10 +12,8 @@ from .tasks import Task
 
 
 class Partition:
-    """The state of a distillation: codewords, the cells' models, their buffers.
-
-    `observe` checks its episode. The other methods do not check, because a run calls them thousands of times.
-    """
+    """The state of a distillation: codewords, the cells' models, their buffers. `observe` checks its episode. The other
+    methods do not check, because a run calls them thousands of times."""
 
     def __init__(self, task: Task, config: Config):
         d, m = len(task.low), len(task.action_low)
@@ -47,10 +43,8 @@ class Partition:
         return float(self.buffers.fit(self.models, cells, self.config, rng).mean())
 
     def add(self, state: np.ndarray, rng: np.random.Generator) -> int:
-        """Make `state` (d,) the codeword of a new, untrained cell. Returns its index.
-
-        Raises ValueError if `state` is a codeword already.
-        """
+        """Make `state` (d,) the codeword of a new, untrained cell. Returns its index. Raises ValueError if `state` is a
+        codeword already."""
         if (self.codewords == state).all(axis=1).any():
             raise ValueError(f"state {state.tolist()} is a codeword already, expected another")
         self.codewords, self._graph = np.concatenate([self.codewords, state[None]]), None

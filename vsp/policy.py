@@ -3,8 +3,6 @@
 `VoronoiPolicy` is the one whose cells are drawn by codewords, as in the paper.
 """
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json
@@ -47,12 +45,12 @@ class Explanation:
     cell: int
     codeword: np.ndarray | None
     equations: tuple[str, ...]
-    contributions: pd.DataFrame
+    contributions: "pd.DataFrame"
     raw: np.ndarray
     action: np.ndarray
     next_cell: int | None
     margin: float
-    borders: pd.DataFrame
+    borders: "pd.DataFrame"
 
     def __str__(self) -> str:
         action = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.contributions.index, self.action))
@@ -118,9 +116,7 @@ class PiecewisePolicy(Exportable):
 
     def explain(self, obs: np.ndarray) -> Explanation:
         """Explain the action at one observation (d,): cell, equations, contributions of features, and nearest borders.
-
-        Raises ValueError for a batch, and for bad numbers as `predict` does.
-        """
+        Raises ValueError for a batch, and for bad numbers as `predict` does."""
         state = self._states(obs)
         if state.ndim != 1:
             raise ValueError(f"observation has shape {state.shape}, expected {(len(self.task.low),)}: one state")
@@ -138,7 +134,7 @@ class PiecewisePolicy(Exportable):
             borders=self._borders(state, cell),
         )
 
-    def _borders(self, state: np.ndarray, cell: int) -> pd.DataFrame:
+    def _borders(self, state: np.ndarray, cell: int) -> "pd.DataFrame":
         """Return the columns change (in units of the input; NaN where no change within the box leads to another cell)
         and cell (-1 there).
 
@@ -169,7 +165,7 @@ class PiecewisePolicy(Exportable):
             inside, outside, found = line[left[0] - 1, axis], line[left[0], axis], int(self.cells(line[left[0]]))
         return float(outside - state[axis]), found
 
-    def to_frame(self) -> pd.DataFrame:
+    def to_frame(self) -> "pd.DataFrame":
         """Return one row per cell: its codeword if it has one, then the coefficients, named as in data/paper."""
         import pandas as pd  # here, because it takes long to import
 
@@ -190,10 +186,8 @@ class PiecewisePolicy(Exportable):
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the cells, the maps and the action box: its identity as an agent.
-
-        Raises ValueError if a part from outside cannot be identified.
-        """
+        """SHA-256 of the cells, the maps and the action box: its identity as an agent. Raises ValueError if a part from
+        outside cannot be identified."""
         from .run.identity import identity  # here: few policies are agents
 
         parts = [self.where, self.policy_class, self.coefficients, self.task.action_low, self.task.action_high]

@@ -1,7 +1,5 @@
 """Batched episodes of any policy in any task: all episodes of a batch advance together."""
 
-from __future__ import annotations
-
 from dataclasses import InitVar, dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -22,10 +20,8 @@ class Policy(Protocol):
 
 @dataclass(frozen=True)
 class Episode:
-    """One recorded episode of T steps: the states, and the actions taken in them.
-
-    Raises ValueError unless all numbers are finite and T is the same for both and at least 1. `checked` skips this.
-    """
+    """One recorded episode of T steps: the states, and the actions taken in them. Raises ValueError unless all numbers
+    are finite and T is the same for both and at least 1. `checked` skips this."""
 
     states: np.ndarray  # (T, d) float64, as the policy observed them
     actions: np.ndarray  # (T, m) float64
@@ -61,19 +57,14 @@ class Outcomes:
 
 
 def rollout(policy: Policy, task: str | Task, starts: np.ndarray) -> Outcomes:
-    """Run one episode of `policy` from each start state (n, s).
-
-    Raises ValueError for starts that are not finite or lie outside the box, and for a policy that does not fit the
-    task or whose actions are not finite.
-    """
+    """Run one episode of `policy` from each start state (n, s). Raises ValueError for starts that are not finite or lie
+    outside the box, and for a policy that does not fit the task or whose actions are not finite."""
     return _play(policy, get_task(task), starts)
 
 
 def record(policy: Policy, task: str | Task, starts: np.ndarray) -> tuple[Outcomes, Episodes]:
-    """Run one episode from each start state (n, s); return how they ended, and every state and action of each.
-
-    Raises ValueError as `rollout` does.
-    """
+    """Run one episode from each start state (n, s); return how they ended, and every state and action of each. Raises
+    ValueError as `rollout` does."""
     steps: Steps = []
     outcomes = _play(policy, get_task(task), starts, steps)
     index, states, actions = (np.concatenate(parts) for parts in zip(*steps))
@@ -89,10 +80,8 @@ def collect_episodes(policy: Policy, task: str | Task, starts: np.ndarray) -> Ep
 
 
 def visited_states(policy: Policy, task: str | Task, starts: np.ndarray) -> np.ndarray:
-    """Return all states (t, d) that are visited from the start states (n, s), episode by episode.
-
-    Raises ValueError as `rollout` does, and if there are no start states.
-    """
+    """Return all states (t, d) that are visited from the start states (n, s), episode by episode. Raises ValueError as
+    `rollout` does, and if there are no start states."""
     episodes = collect_episodes(policy, task, starts)
     if not episodes:
         raise ValueError("there are no start states, expected at least one")
@@ -109,10 +98,8 @@ def standard(states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _play(policy: Policy, task: Task, starts: np.ndarray, steps: Steps | None = None) -> Outcomes:
-    """Run episodes from `starts` (n, s) to their ends, at most `task.at_once` together.
-
-    If `steps` is a list, the observations and actions of each step are appended to it.
-    """
+    """Run episodes from `starts` (n, s) to their ends, at most `task.at_once` together. If `steps` is a list, the
+    observations and actions of each step are appended to it."""
     if not callable(getattr(policy, "predict", None)):
         raise ValueError(f"the policy is {policy!r}, expected something with `predict`: `vsp.agent` wraps other agents")
     starts = check_array("start states", starts, (-1, task.start_size or len(task.low)))
@@ -140,10 +127,8 @@ def _check_inside(task: Task, seen: np.ndarray) -> None:
 
 
 def _advance(policy: Policy, task: Task, states: np.ndarray, first: int, result: Outcomes, steps: Steps | None) -> None:
-    """Run episodes from `states` to their ends, all together; finished ones leave the batch.
-
-    They are entered in `result` from the number `first` on.
-    """
+    """Run episodes from `states` to their ends, all together; finished ones leave the batch. They are entered in
+    `result` from the number `first` on."""
     active = np.arange(first, first + len(states))  # numbers of the running episodes
     for t in range(task.max_steps):
         observations = task.observe(states)

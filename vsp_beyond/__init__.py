@@ -5,18 +5,15 @@
 does from every start. `few_cells`, `optimum`, `proofs` and `atlas` hold the parts.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 
+from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp import agent as as_agent
 from vsp.evaluation import remark
-from vsp.policy import VoronoiPolicy
 from vsp.protocol import Method
-from vsp.rollouts import Episodes, Policy
+from vsp.rollouts import Episodes
 from vsp.run.progress import shown
-from vsp.tasks import Task, get_task
 
 from .few_cells import Faithful, Tuned, faithful_preset, limit_preset, simplify, tuned_preset
 from .few_cells.config import check_kind
@@ -30,13 +27,11 @@ def faithful(
     agent: Policy, task: str | Task, config: Faithful | None = None, *,
     n_cells: int | None = None, min_r2: float | None = None, seed: int, progress: bool = True,
 ) -> VoronoiPolicy:  # fmt: skip
-    """Distil `agent` to few cells that act like it and return as much, in any task.
-
-    `config` defaults to `faithful_preset(task)`. `n_cells` is the largest number of cells. Given `min_r2`, the policy
-    has the highest return among those whose actions have at least this R² against the agent's. The same arguments give
-    the same policy. `progress` shows how far it is, and at last how alike agent and policy are. Warns if no such policy
-    is found. Raises ValueError if the agent does not fit the task, and for numbers out of range.
-    """
+    """Distil `agent` to few cells that act like it and return as much, in any task. `config` defaults to
+    `faithful_preset(task)`. `n_cells` is the largest number of cells. Given `min_r2`, the policy has the highest return
+    among those whose actions have at least this R² against the agent's. The same arguments give the same policy.
+    `progress` shows how far it is, and at last how alike agent and policy are. Warns if no such policy is found. Raises
+    ValueError if the agent does not fit the task, and for numbers out of range."""
     agent, task = as_agent(agent), get_task(task)
     if config is None:
         config = faithful_preset(task, n_cells=n_cells, min_r2=min_r2)
@@ -62,11 +57,8 @@ def faithful_method(**options) -> Method:
 def tuned(
     agent: Policy, task: str | Task, config: Tuned | None = None, *, seed: int, progress: bool = True
 ) -> VoronoiPolicy:
-    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it.
-
-    `config` defaults to `tuned_preset(task)`. The same arguments give the same policy. Raises ValueError if the agent
-    does not fit the task.
-    """
+    """Distil `agent` to few cells and tune them on the return alone: they may act unlike it. `config` defaults to
+    `tuned_preset(task)`. Same arguments, same policy. Raises ValueError if the agent does not fit the task."""
     task = get_task(task)
     config = tuned_preset(task) if config is None else config
     check_kind(config, Tuned)
@@ -78,13 +70,11 @@ def tuned(
 def at_the_limit(
     task: str | Task, config: Tuned | None = None, *, seed: int, teacher: Policy | None = None, progress: bool = True
 ) -> VoronoiPolicy:
-    """Search for at most `config.n_cells` cells whose return is as high as possible.
-
-    `config` defaults to `limit_preset(task)`. `teacher` defaults to the best policy if it is known, else to the shipped
-    teacher; for other tasks it is needed. For a task with a physics engine, which is played in fewer episodes, two
-    shorter searches follow, each from the result of the one before. The same arguments give the same policy. Raises
-    ValueError if the teacher does not fit the task, and without a teacher for a task that has none.
-    """
+    """Search for at most `config.n_cells` cells whose return is as high as possible. `config` defaults to
+    `limit_preset(task)`. `teacher` defaults to the best policy if it is known, else to the shipped teacher; for other
+    tasks it is needed. For a task with a physics engine, which is played in fewer episodes, two shorter searches
+    follow, each from the result of the one before. The same arguments give the same policy. Raises ValueError if the
+    teacher does not fit the task, and without a teacher for a task that has none."""
     task = get_task(task)
     config = limit_preset(task) if config is None else config
     check_kind(config, Tuned)

@@ -1,7 +1,5 @@
 """`python -m vsp_beyond agent.zip MountainCarContinuous-v0`: from the file of an agent to a page that can be sent."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

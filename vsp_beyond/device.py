@@ -1,7 +1,5 @@
 """C code for a device: of floats, with a safe action, a header, and a comment that says what goes in and out."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -17,13 +15,10 @@ _REAL = re.compile(r"(?<![\w.])(\d+(\.\d*)?e[-+]?\d+|\d+\.\d*)")  # a number wit
 def to_c(
     policy: PiecewisePolicy, *, real: str = "double", safe: np.ndarray | None = None, states: np.ndarray | None = None
 ) -> str:
-    """Return `policy.to_c()` for a device.
-
-    With `real` "float" all its numbers are floats: an action is right to about six digits, and on a border another cell
-    may act. `safe` (m,) is the action for a state that is not finite, by default NAN. Of `states` (n, d), a comment
-    says how much the action jumps at the borders around them, at most. Raises ValueError as `to_c` does, for another
-    `real`, and for a safe action beyond the limits.
-    """
+    """Return `policy.to_c()` for a device. With `real` "float" all its numbers are floats: an action is right to about
+    six digits, and on a border another cell may act. `safe` (m,) is the action for a state that is not finite, by
+    default NAN. Of `states` (n, d), a comment says how much the action jumps at the borders around them, at most.
+    Raises ValueError as `to_c` does, for another `real`, and for a safe action beyond the limits."""
     code, task = policy.to_c(), policy.task
     if real not in ("double", "float"):
         raise ValueError(f"real is {real!r}, expected 'double' or 'float'")
@@ -57,9 +52,7 @@ def _about(policy: PiecewisePolicy, states: np.ndarray | None = None) -> str:
 
 def largest_jump(policy: PiecewisePolicy, states: np.ndarray) -> np.ndarray:
     """Return by how much each action jumps at most where the ways between successive `states` (n, d) leave a cell. (m,)
-
-    Each such way is halved until both its ends are next to the border.
-    """
+    Each such way is halved until both its ends are next to the border."""
     here, there = states[:-1].copy(), states[1:].copy()
     cells = policy.cells(here)
     crossed = cells != policy.cells(there)

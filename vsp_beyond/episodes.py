@@ -1,7 +1,5 @@
 """Episodes to look at, moment by moment, on the page of any task: what an explorer is for two dimensions."""
 
-from __future__ import annotations
-
 import io
 from contextlib import suppress
 from typing import Any
@@ -10,12 +8,11 @@ import gymnasium
 import numpy as np
 from PIL import Image
 
-from vsp.evaluation import Likeness, start_states
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, record
+from vsp import Policy, Task, VoronoiPolicy, start_states
+from vsp.evaluation import Likeness
+from vsp.rollouts import record
 from vsp.show.explorer.scene import numbers_of, task_of, to_json
 from vsp.show.style import embedded
-from vsp.tasks import Task
 
 MOMENTS = 400  # of an episode, evenly spaced if it has more steps
 WORST = 3  # episodes with the lowest returns

@@ -1,7 +1,5 @@
 """Names of inputs and outputs for tasks that vsp does not name itself: from a file, or for Gymnasium's own tasks."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace

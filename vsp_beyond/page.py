@@ -1,7 +1,5 @@
 """One page about a policy and the agent that it imitates, in one file to send: it needs no other file or host."""
 
-from __future__ import annotations
-
 import base64
 import html
 import math
@@ -14,15 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
+from vsp import PiecewisePolicy, Policy, Task, VoronoiPolicy, get_task
 from vsp import agent as as_agent
 from vsp.evaluation import ALIKE, CLOSE, Likeness, likeness
-from vsp.policy import PiecewisePolicy, VoronoiPolicy
 from vsp.protocol import interval, share_interval
-from vsp.rollouts import Policy
 from vsp.show.explorer import PLANES, Explorer, standalone
 from vsp.show.state_space import birth_colours
 from vsp.show.style import CELLS
-from vsp.tasks import Task, get_task
 
 from .device import to_c, to_header
 from .episodes import episodes
@@ -50,11 +46,9 @@ def report(
     tried: Sequence[Tried] = (), until: float = math.inf,
 ) -> str:  # fmt: skip
     """Return a page as HTML: what it says first, equations, sizes that were tried, episodes, the explorer, how alike
-    they act, what is proved, and the policy as files to save.
-
-    `name` and `remarks` stand on the page as text. `tried`: stages of `fewest`. `until`, a time of `time.monotonic`,
-    bounds the proof. Raises ValueError unless the policy is cells and maps and both fit the task.
-    """
+    they act, what is proved, and the policy as files to save. `name` and `remarks` stand on the page as text. `tried`:
+    stages of `fewest`. `until`, a time of `time.monotonic`, bounds the proof. Raises ValueError unless the policy is
+    cells and maps and both fit the task."""
     task, agent = get_task(task), as_agent(agent)
     if not isinstance(policy, PiecewisePolicy):
         raise ValueError(f"the policy is {policy!r:.60}, expected cells and maps: a vsp.PiecewisePolicy")

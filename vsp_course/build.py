@@ -10,8 +10,6 @@ In a student version, nbgrader's stub replaces each answer, as `nbgrader generat
 The pages of the site are student versions with the output of the worked cells, run as students get them.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import hashlib
@@ -44,10 +42,8 @@ _EXAM = re.compile(r"\*Exam\.\*\s(.*?)\s\*Answer:\*\s(.*)", re.DOTALL)
 
 
 def build(out: str | os.PathLike) -> list[Path]:
-    """Write all versions, slides and the guide to OUT/build/course and return the files. Same sources, same bytes.
-
-    A file that somebody has edited is kept under another name.
-    """
+    """Write all versions, slides and the guide to OUT/build/course and return the files. Same sources, same bytes. A
+    file that somebody has edited is kept under another name."""
     folder, lessons = Path(out) / "build" / "course", read_sources()
     students = {name: nbformat.writes(student(lesson)) + "\n" for name, lesson in lessons.items()}
     texts = {f"student/{name}": text for name, text in students.items()}
@@ -184,10 +180,8 @@ def write_pages(out: str | os.PathLike) -> list[Path]:
 
 
 def page(lesson: NotebookNode) -> NotebookNode:
-    """Run a student version and return it with the outputs of its worked cells; exercises and checks show none.
-
-    Raises RuntimeError if a worked cell fails.
-    """
+    """Run a student version and return it with the outputs of its worked cells; exercises and checks show none. Raises
+    RuntimeError if a worked cell fails."""
     from nbclient import NotebookClient
 
     lesson.metadata.kernelspec = {"name": KERNEL, "display_name": "Python 3", "language": "python"}

@@ -1,7 +1,5 @@
 """Pictures of the course, shown in the notebook and not saved."""
 
-from __future__ import annotations
-
 import io
 
 import matplotlib.pyplot as plt
@@ -10,9 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from vsp import History, show
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy
+from vsp import History, Policy, VoronoiPolicy, show
 
 
 def picture(fig: Figure, alt: str) -> show.Picture:
@@ -44,10 +40,8 @@ def walls(ax: Axes) -> Axes:
 def actions_and_error(
     policy: VoronoiPolicy, teacher: Policy, states: np.ndarray | None = None, history: History | None = None
 ) -> tuple[Figure, np.ndarray]:
-    """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords.
-
-    The error is shown over the whole square, or in `states` (n, 2). Numbers are those of births in the `history`.
-    """
+    """Draw a policy's arrows on SimpleGoal beside its squared error, both with cells and codewords. The error is shown
+    over the whole square, or in `states` (n, 2). Numbers are those of births in the `history`."""
     x, y, grid = show.grid(policy.task.low, policy.task.high, 101)
     _, _, sparse = show.grid(policy.task.low, policy.task.high, 21)
     fig, axes = pair()

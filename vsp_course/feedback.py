@@ -1,9 +1,8 @@
-"""Shared by all checks: call a student's function, recognise common mistakes, print one line of feedback.
+"""Shared by all checks: call a student's function on small cases, recognise common mistakes, print one line of
+feedback.
 
 Feedback names what was found and what was expected, and points to a hint. It never gives the answer.
 """
-
-from __future__ import annotations
 
 import contextlib
 import copy
@@ -102,11 +101,8 @@ class Exercise:
 
     def call(self, function: Callable, *arguments: object, keep: bool = False, empty: bool = False) -> Any:
         """Call a student's function and return its result. It gets copies of `arguments`; with `keep`, the first one
-        itself, to be altered.
-
-        Raises NotYet for a stub, an error, an interrupt, an argument altered in place, a call of the library's own
-        function, and (unless `empty`) for no result.
-        """
+        itself, to be altered. Raises NotYet for a stub, an error, an interrupt, an argument altered in place, a call of
+        the library's own function, and (unless `empty`) for no result."""
         self.refuse_if(not callable(function), f"{function!r}", "a function")
         given = copy.deepcopy(arguments, {id(arguments[0]): arguments[0]} if keep else None)
         try:
@@ -174,10 +170,8 @@ class Exercise:
 
     def ask(self, given: Any, text: str) -> None:
         """Raise NotYet unless the dictionary `given` has the right answer to every question of the exercise in
-        questions.toml; else print `text`.
-
-        With it comes how many of the first answers were right: who guesses sees it in the result.
-        """
+        questions.toml; else print `text`. With it comes how many of the first answers were right: who guesses sees it
+        in the result."""
         questions = tables("questions.toml")[self.number]
         first = self.first(given, {key: question["options"] for key, question in questions.items()})
         right = [seal(self.number, key, first[key]) == question["right"] for key, question in questions.items()]

@@ -6,8 +6,6 @@ copied or altered. An answer runs in the process that judges it. So one with a w
 anybody else, does not run: the lecturer reads it.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib

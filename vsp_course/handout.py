@@ -3,8 +3,6 @@
 The code comes as a wheel. The lessons need no torch, because teachers act by NumPy, so a set-up is a small download.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io

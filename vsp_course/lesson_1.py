@@ -1,17 +1,11 @@
-"""Checks of lesson 1: what a policy is, linear maps, errors, cells, and codewords set by hand and by a rule.
-
-Each check calls a student's function on small random cases, and raises `NotYet` or prints one line.
-"""
-
-from __future__ import annotations
+"""Checks of lesson 1: what a policy is, linear maps, errors, cells, and codewords set by hand and by a rule."""
 
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from vsp import Policy, Task, VoronoiPolicy, agent, geometry, get_task, load_teacher, teacher_episodes
+from vsp import PiecewisePolicy, Policy, Task, VoronoiPolicy, agent, geometry, get_task, load_teacher, teacher_episodes
 from vsp.paper import baselines
-from vsp.policy import PiecewisePolicy
 from vsp.rollouts import Episodes
 
 from . import drawing

@@ -1,10 +1,5 @@
-"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs shown there.
-
-The checks of the two passes and of a sub-policy class have modules of their own. Each check calls a student's function
-on cases with a known answer, and raises `NotYet` or prints one line.
-"""
-
-from __future__ import annotations
+"""Checks of lesson 2: a plot of a run, running means, Algorithm 1, hyperparameters; and the runs shown there. The
+checks of the two passes and of a sub-policy class have modules of their own."""
 
 import contextlib
 from collections.abc import Callable
@@ -193,10 +188,8 @@ def _on_schedule(log: _Log, episodes: list[Episode], config: Config, freeze: str
 def grown(
     split: Callable, merge: Callable, frame: Callable, teacher: Policy, task: Task, config: Config
 ) -> tuple[VoronoiPolicy, VoronoiPolicy]:
-    """Run the student's three functions and vsp's with the same random numbers, and return both policies.
-
-    vsp's function replaces one that is still a stub; a printed line says which.
-    """
+    """Run the student's three functions and vsp's with the same random numbers, and return both policies. vsp's
+    function replaces one that is still a stub; a printed line says which."""
     ours, stubs = (vsp.split_regions, vsp.merge_regions, _algorithm_1), set()
     students = [_or_ours(function, our, stubs) for function, our in zip((split, merge, frame), ours)]
     made = []

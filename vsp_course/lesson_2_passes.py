@@ -3,8 +3,6 @@
 Where the paper leaves a question open (see vsp/config.py) every reading counts as right, unless the lesson decides it.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace

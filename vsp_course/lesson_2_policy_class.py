@@ -1,7 +1,5 @@
 """Check of lesson 2: a sub-policy class written by the student."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

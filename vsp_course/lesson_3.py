@@ -1,9 +1,4 @@
-"""Checks of lesson 3: what a box plot hides, paired gaps, intervals over policies, repairs, and a better policy.
-
-Each check calls a student's function on small random cases, and raises `NotYet` or prints one line.
-"""
-
-from __future__ import annotations
+"""Checks of lesson 3: what a box plot hides, paired gaps, intervals over policies, repairs, and a better policy."""
 
 import functools
 from collections.abc import Callable

@@ -6,8 +6,6 @@ and the slides before. reveal.js 5.2.1 (MIT license) turns the slides; `reveal/`
 and the page around it.
 """
 
-from __future__ import annotations
-
 import ast
 import html
 from pathlib import Path
@@ -30,10 +28,8 @@ NOTE = "\n\nNote:\n\n"
 
 
 def room(n: int = 1, *, height: float = 1.9, **subplots) -> tuple[Figure, np.ndarray]:
-    """Make a figure with n panels for a room: 4.5 inches wide, `height` inches high, and drawn as wide as a slide.
-
-    So its type of 8 points is 32 pixels high. Returns the figure and its axes (n,).
-    """
+    """Make a figure with n panels for a room: 4.5 inches wide, `height` inches high, and drawn as wide as a slide. So
+    its type of 8 points is 32 pixels high. Returns the figure and its axes (n,)."""
     return show.panels(n, width=4.5, height=height, dpi=PROJECTED / 4.5, **subplots)
 
 

@@ -2,6 +2,19 @@
 
 from ..committed import RESULTS, read_results
 from .equal_tuning import all_rows, budgets, closest, equal_budget, fit_and_geometry, leaders, possible
-from .limits import best_mean, limit_summary, near, references, robots_summary, starts_summary, with_regret
 from .methods import TASKS
-from .summary import ablation, largest_alike, likeness, method_summary, other_teachers, read_rows
+from .summary import (
+    ablation,
+    best_mean,
+    largest_alike,
+    likeness,
+    limit_summary,
+    method_summary,
+    near,
+    other_teachers,
+    read_rows,
+    references,
+    robots_summary,
+    starts_summary,
+    with_regret,
+)

@@ -1,7 +1,5 @@
 """Make the files beside the rows: kept policies, how alike policies of two seeds are, a gait, the best returns."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -104,11 +102,9 @@ def _sameness(name: str, pairs: list[tuple[Row, Row]], jobs: tuple[Row, ...], *p
 
 
 def best_returns() -> pd.DataFrame:
-    """Return the returns of the best policies, one row per task and way to find them. A task's last row is its best.
-
+    """Return the returns of the best policies, one row per task and way to find them; a task's last row is its best.
     Columns: task, found (how: "closed form", or the points of the grid), mean, worst, failing (share of the episodes
-    that miss the goal; NaN for a task without a goal), longest (steps). Takes about five minutes.
-    """
+    that miss the goal; NaN for a task without a goal), longest (steps). Takes about five minutes."""
     rows = []
     for name, finer in progress(WAYS, "optimum", total=len(WAYS), unit="policies"):
         task = get_task(name)

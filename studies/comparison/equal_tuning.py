@@ -1,9 +1,5 @@
-"""Compare methods at equal tuning: each with the same number of cells or leaves, before and after tuning.
-
-Also count what each method costs: episodes of every kind, and seconds.
-"""
-
-from __future__ import annotations
+"""Compare methods at equal tuning: each with the same number of cells or leaves, before and after; and what they
+cost."""
 
 import numpy as np
 import pandas as pd
@@ -36,20 +32,15 @@ COLUMNS = ["mean", "low", "high", "r2"]
 
 
 def all_rows(task: str) -> pd.DataFrame:
-    """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`.
-
-    Each method, size and seed occurs once: the last of `SOURCES` that has it counts.
-    """
+    """Return the committed rows of `task` for all methods, from the shipped teacher, `with_r2`. Of equal rows, that of
+    the last of `SOURCES` counts."""
     frame = pd.concat([read_rows(task, table=table) for table in SOURCES if table in TABLES[task]])
     return with_r2(frame.drop_duplicates(["method", "size", "seed"], keep="last", ignore_index=True), task)
 
 
 def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Add a column r2 to `frame`: 1 minus the squared action error divided by that of the best constant action.
-
-    Both errors are measured in the teacher's states of `measure`, which no fit has seen. `likeness` gives R² on more
-    states.
-    """
+    """Add a column r2 to `frame`: 1 minus the squared action error divided by that of the best constant action, both in
+    the teacher's states of `measure`, which no fit has seen."""
     teacher, about = load_teacher(task), get_task(task)
     states = visited_states(teacher, about, start_states(about, N_ERROR // about.slowness, ERROR_SEED))
     constant = float(np.sqrt(in_half_ranges(teacher, about, states).var(axis=0).mean()))
@@ -57,12 +48,10 @@ def with_r2(frame: pd.DataFrame, task: str) -> pd.DataFrame:
 
 
 def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first.
-
-    `frame` has the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean,
-    low, high (its 95 % interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only
-    method of size 1 is one linear map. Sizes without rivals are left out.
-    """
+    """Return one row per size and method of `IMITATIONS`, within a size the best tuned mean return first. `frame` has
+    the rows of a task, of all methods, with their r2. Columns: size, method, policies; mean, low, high (its 95 %
+    interval) and r2 of the tuned policies; "untuned mean" and so on for the untuned ones. The only method of size 1 is
+    one linear map. Sizes without rivals are left out."""
     r2, rows = frame.groupby(["method", "size"])["r2"].median(), []
     table = method_summary(frame).set_index(["method", "size"]).join(r2)
     for size in SHOWN:
@@ -77,12 +66,10 @@ def equal_budget(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaders(table: pd.DataFrame) -> pd.DataFrame:
-    """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1.
-
-    Columns: size; mean, low, high and policies of our cells; rival (the name of the other method with the highest
-    mean), "rival mean" and so on; ahead: "theirs" if some other method is `ahead` of ours, else ours beside the rival;
-    behind, how many of the other methods ours are ahead of.
-    """
+    """Compare our cells with the best other method in an `equal_budget` table, one row per size above 1. Columns: size;
+    mean, low, high and policies of our cells; rival (the name of the other method with the highest mean), "rival mean"
+    and so on; ahead: "theirs" if some other method is `ahead` of ours, else ours beside the rival; behind, how many of
+    the other methods ours are ahead of."""
     compared, columns = [], [*INTERVAL, "policies"]
     for size, rows in table[table["size"] > 1].groupby("size"):
         ours, others = rows[rows["method"] == OURS].iloc[0], rows[rows["method"] != OURS]
@@ -96,9 +83,7 @@ def leaders(table: pd.DataFrame) -> pd.DataFrame:
 
 def closest(frame: pd.DataFrame, task: str) -> dict[str, str | float]:
     """Return who acts most like the teacher among those that are as good (`AS_GOOD`), with up to 13 cells or leaves.
-
-    Keys: size, r2 and mean of our faithful policies; rival (the other method), "rival size" and so on.
-    """
+    Keys: size, r2 and mean of our faithful policies; rival (the other method), "rival size" and so on."""
     points = possible(frame[(frame["size"] <= SHOWN[-1]) & (frame["method"] != "teacher")])
     good = points[AS_GOOD[task](points, teacher_of(frame))].sort_values("r2")
     ours, rival = (good[good["method"].str.match(kind)].iloc[-1] for kind in ("faithful$", "(?!faithful|our cells)"))
@@ -112,10 +97,8 @@ def possible(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def fit_and_geometry(task: str) -> pd.DataFrame:
-    """Return the table "apart", which separates fit from geometry, one row per method.
-
-    Columns: method; "r2 2" and so on (the median r2 at that size); "mean 2" and so on (the median mean return).
-    """
+    """Return the table "apart", which separates fit from geometry, one row per method. Columns: method; "r2 2" and so
+    on (the median r2 at that size); "mean 2" and so on (the median mean return)."""
     rows = with_r2(read_rows(task, table="apart"), task)
     table = rows.groupby(["method", "size"], sort=False)[["r2", "mean"]].median().unstack("size")
     table.columns = [f"{what} {size}" for what, size in table.columns]
@@ -124,11 +107,9 @@ def fit_and_geometry(task: str) -> pd.DataFrame:
 
 def budgets(task: str) -> pd.DataFrame:
     """Count the episodes of every kind that our policies and one tuned linear map need, and their seconds on one core.
-
     Columns: method, size (the preset's); numbers of episodes: teacher (played by the teacher), correction (played by
     the policy, labelled by the teacher), tuning and validation (played by candidates); seconds (median over the seeds).
-    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound.
-    """
+    Faithful policies are tuned only if they return too little, so their tuning episodes are an upper bound."""
     long = "_long" * (task in LONG)
     times = pd.concat([read_results(f"{table}_seconds{long}") for table in ("methods", "tuned", "faithful")])
     seconds = times[times["task"] == task].groupby(["method", "size"])["seconds"].median()

@@ -1,15 +1,13 @@
 """Separate the effect of the fit from that of the borders: what our cells owe to each.
 
-Our cells differ from a tree with linear leaves in two ways. Their borders form a Voronoi diagram. Their numbers are
-fitted all together, while a tree is grown greedily. This module has the two mixed combinations: a tree whose numbers
-are fitted together, and cells that are grown greedily. It also has our cells, fitted from as many random starts.
-`ObliqueLinearTree` is the fourth combination.
+Our cells differ from a tree with linear leaves (`ObliqueLinearTree`) by their borders, and by their fit of all numbers
+together, not greedily. Here are the mixed combinations, a tree fitted together and cells grown greedily; and our cells,
+fitted from as many random starts as the tree.
 """
 
-from __future__ import annotations
+from functools import partial
 
 import numpy as np
-from scipy.optimize import minimize
 from threadpoolctl import threadpool_limits
 
 from vsp import Policy, Task, VoronoiPolicy
@@ -41,12 +39,10 @@ def global_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
 
 @threadpool_limits.wrap(limits=1)
 def global_tree(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> TunableTree:
-    """Return the oblique tree with the least error on states (n, d) and actions (n, m).
-
-    The search is that of `search.least_error`. Descents from randomly split trees start at a high temperature. Greedy
-    trees are good already and join at a lower one. Descents keep the structure of a tree, and fit its directions,
-    thresholds and maps together. If no descent is better, the best greedy tree is returned.
-    """
+    """Return the oblique tree with the least error on states (n, d) and actions (n, m) that descents find, as those of
+    `search.least_error`: from random trees at a high temperature, from greedy ones at a lower one. They keep the
+    structure of a tree, and fit directions, thresholds and maps together. If none is better, the best greedy tree is
+    returned."""
     rng, frame = np.random.default_rng(seed), Scaling.of(task, states)
     some = spread(states / frame.scale, search.FEW, rng)
 
@@ -87,10 +83,8 @@ class RandomTree(ObliqueLinearTree):
 
 
 def action_error(policy: Policy, frame: Scaling, states: np.ndarray, actions: np.ndarray) -> float:
-    """Return the mean squared difference of the policy's actions in states (n, d) from `actions` (n, m).
-
-    Actions are in units of half their range.
-    """
+    """Return the mean squared difference of the policy's actions in states (n, d) from `actions` (n, m). Actions are in
+    units of half their range."""
     return float(np.square(frame.outputs(policy.predict(states)[0]) - frame.outputs(actions)).mean())
 
 
@@ -98,41 +92,22 @@ def descend(
     tree: TunableTree, states: np.ndarray, actions: np.ndarray, stages: range,
     *, n_iterations: int = search.N_ITERATIONS,
 ) -> TunableTree:  # fmt: skip
-    """Fit `tree` by L-BFGS on the expected loss, stage by stage, as `search.descend` fits cells.
-
-    The temperature is in units of half a cell's width. This makes a border as soft as one between two codewords.
-    """
+    """Fit `tree` by L-BFGS on the expected loss, stage by stage, as `search.descend` fits cells. The temperature is in
+    units of half a cell's width. This makes a border as soft as one between two codewords."""
     labelled = LabelledStates(tree.frame.inputs(states), tree.frame.outputs(actions))
     unit = 0.5 * np.sqrt(temperature_unit(labelled, len(tree)))
     for stage in stages:
-        tree = _cooler(labelled, tree, unit, stage, n_iterations)
+        temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
+        bases = search.uncorrelated(labelled, shares(tree, labelled.states, temperature))
+        about = {"labelled": labelled, "temperature": temperature, "clip_slope": search.CLIP_SLOPES[stage]}
+        tree = search.least(partial(expected_loss, **about), tree, bases, slope, n_iterations)
     return tree
 
 
-def _cooler(labelled: LabelledStates, tree: TunableTree, unit: float, stage: int, n_iterations: int) -> TunableTree:
-    temperature, slope = unit * search.TEMPERATURES[stage], np.sqrt(search.TEMPERATURES[stage])
-    bases = search.uncorrelated(labelled, shares(tree, labelled.inputs[:, :-1], temperature))
-    vector, shape, cut = tree.vector, tree.maps.shape, tree.vector.size - tree.maps.size
-
-    def move(step: np.ndarray) -> TunableTree:
-        return tree.like(vector + joined([slope * step[:cut], bases @ step[cut:].reshape(shape)]))
-
-    def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = expected_loss(move(step), labelled, temperature, search.CLIP_SLOPES[stage])
-        by_maps = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
-        return value, joined([slope * gradient[:cut], by_maps])
-
-    options = {"maxiter": n_iterations, "maxcor": 20}
-    return move(minimize(loss, np.zeros(len(vector)), jac=True, method="L-BFGS-B", options=options).x)
-
-
 def shares(tree: TunableTree, states: np.ndarray, temperature: float) -> np.ndarray:
-    """Return the share of each of `states` (n, d) that belongs to each leaf: (leaves, n).
-
-    As the temperature goes to 0, a state belongs wholly to its own leaf. A share is a product over the nodes on the
-    path to the leaf. Each factor is a sigmoid of the state's distance beyond the threshold, in units of the
-    temperature.
-    """
+    """Return the share of each of `states` (n, d) that belongs to each leaf: (leaves, n). It is a product over the
+    nodes on the path to the leaf, each factor a sigmoid of the distance beyond the threshold, in units of the
+    temperature."""
     return np.exp(_ways(tree) @ _turns(tree, states, temperature))
 
 
@@ -152,9 +127,7 @@ def expected_loss(
     tree: TunableTree, labelled: LabelledStates, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
     """Return the mean squared error of the limited actions, weighted by each leaf's share of a state, and its gradient.
-
-    This is `units.expected_loss` for trees. The gradient is with respect to `tree.vector`.
-    """
+    This is `units.expected_loss` for trees. The gradient is with respect to `tree.vector`."""
     (n, m), (k, rows, _), states = labelled.actions.shape, tree.maps.shape, labelled.inputs[:, :-1]
     raw = ScaledCells(np.zeros((k, 0)), tree.maps).outputs(labelled.inputs)
     limited = np.clip(raw, -1.0, 1.0)
@@ -178,14 +151,11 @@ def expected_loss(
 
 @threadpool_limits.wrap(limits=1)
 def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task, seed: int) -> VoronoiPolicy:
-    """Grow Voronoi cells as `ObliqueLinearTree` grows leaves, for states (n, d) and actions (n, m).
-
-    The cell whose best oblique split lowers the squared error most is split. Its codeword is replaced by the best of
-    `pairs`: two codewords, one on each side of the hyperplane. Then all states are assigned to their nearest codewords,
-    and all maps are refitted by least squares. Codewords never move later. Distances are Euclidean, between
-    standardised states. A split lowers the error of a tree; with Voronoi cells it may raise it, for it moves other
-    borders too. There are fewer than `size` cells if no split of a tree lowers the error.
-    """
+    """Grow Voronoi cells as `ObliqueLinearTree` grows leaves, for states (n, d) and actions (n, m). Of the cell whose
+    best oblique split lowers the squared error most, the codeword is replaced by the best of `pairs`, one on each side
+    of the hyperplane; then all maps are refitted by least squares. Codewords never move later. Distances are Euclidean,
+    between standardised states. A split of Voronoi cells may raise the error, for it moves other borders too. There are
+    fewer than `size` cells if no split of a tree lowers the error."""
     frame, d, m = Scaling.of(task, states), states.shape[1], actions.shape[1]
     points, least = frame.inputs(states)[:, :-1], 1e-9 * np.square(actions).sum()
     tree = ObliqueLinearTree(states, actions, leaves=1, task=task, seed=seed)  # used only to search for splits
@@ -211,11 +181,9 @@ def greedy_cells(states: np.ndarray, actions: np.ndarray, size: int, task: Task,
 
 
 def pairs(codeword: np.ndarray, points: np.ndarray, split: Split) -> list[np.ndarray]:
-    """Return pairs of codewords (2, d) that may replace `codeword`, left and right of the hyperplane of `split`.
-
-    The first pair is the means of the `points` (n, d) on either side. The others are the codeword, or either mean, with
-    its mirror image across the hyperplane: their border is the hyperplane itself.
-    """
+    """Return pairs of codewords (2, d) that may replace `codeword`, left and right of the hyperplane of `split`. The
+    first pair is the means of the `points` (n, d) on either side. The others are the codeword, or either mean, with its
+    mirror image across the hyperplane: their border is the hyperplane itself."""
     right = split.right(points)
     means = np.array([points[~right].mean(axis=0), points[right].mean(axis=0)])
     mirrored = [np.array([point, _mirrored(point, split)]) for point in (codeword, *means)]

@@ -4,10 +4,8 @@ The settings say how many cells or leaves there are, and with a `Tuned` how many
 episodes alone gets as many episodes as the other methods get in all rounds. Methods for robots read a `Walking`.
 """
 
-from __future__ import annotations
-
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,14 +13,14 @@ import numpy as np
 
 from vsp import Policy, Task, VoronoiPolicy, agent
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map
-from vsp.rollouts import visited_states
+from vsp.rollouts import rollout, visited_states
 from vsp_beyond import Faithful, Tuned
 from vsp_beyond.few_cells.faithful import distill_faithfully
 from vsp_beyond.few_cells.limit import search_limit
+from vsp_beyond.few_cells.tune import score
 from vsp_beyond.few_cells.tuned import distill_tuned
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
-from ..rivals.dagger import dagger
 from ..rivals.small_network import SmallNetwork, units_for
 from ..rivals.trees import LinearTree, ObliqueLinearTree
 from ..robots import Walking, imitate_pushed, search_one_map
@@ -34,7 +32,7 @@ from .tuning import TunableTree, tuned
 
 
 def our_cells(teacher: Policy, task: Task, config: Tuned, seed: int, **changes) -> Policy:
-    """Call `distill_tuned` with some settings changed."""
+    """Call `distill_tuned`, some settings changed."""
     return distill_tuned(teacher, task, replace(config, **changes), seed=seed)[0]
 
 
@@ -72,13 +70,31 @@ FITS: dict[str, Callable[..., Policy]] = {
 }
 
 
+def dagger(fits: Sequence[Callable[..., Policy]], teacher: Policy, task: Task, *, rounds: Tuned, seed: int) -> Policy:
+    """Run DAgger (Ross et al. 2011): fit, visit states, let the teacher label them, fit again; return the best policy.
+    `rounds` sets episodes, corrections and validation. All `fits` are tried in the first round, which helps if they
+    differ in their random numbers; only the one with the best first policy is corrected."""
+    rng, validation_rng = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+    validation = task.start(validation_rng, rounds.n_validation)
+    policy, states = teacher, np.zeros((0, len(task.low)))
+    tried: list[tuple[float, Policy]] = []
+    for i in range(1 + rounds.n_corrections):
+        n = rounds.n_correction_episodes if i else rounds.n_episodes
+        states = np.concatenate([states, visited_states(policy, task, task.start(rng, n))])
+        actions = np.asarray(teacher.predict(states)[0], dtype=np.float64)
+        candidates = [(fit, fit(states, actions)) for fit in fits]
+        scores = [score(rollout(policy, task, validation), rounds.failure_penalty) for _, policy in candidates]
+        fit, policy = candidates[int(np.argmax(scores))]
+        fits = [fit]
+        tried.append((max(scores), policy))
+    return max(tried, key=lambda pair: pair[0])[1]
+
+
 def corrected(
     teacher: Policy, task: Task, config: Tuned, seed: int, *, fit: str, rounds: int, by_chance: bool
 ) -> Policy:
-    """Run DAgger with a fit of `FITS`, with as many corrected episodes as ours, in more rounds since it is quick.
-
-    A fit that depends `by_chance` on its seed gets as many restarts as ours; the best is corrected.
-    """
+    """Run DAgger with a fit of `FITS`, with as many corrected episodes as ours, in more rounds since it is quick. A fit
+    that depends `by_chance` on its seed gets as many restarts as ours; the best is corrected."""
     n, n_fits = config.n_corrections * config.n_correction_episodes, config.n_restarts if by_chance else 1
     config = replace(config, n_corrections=rounds, n_correction_episodes=n // rounds)
     seeds = range(n_fits * seed, n_fits * (seed + 1))
@@ -114,11 +130,8 @@ def robot_cells(teacher: Policy, task: Task, config: Walking, seed: int) -> Poli
 
 
 def robot_tree(teacher: Policy, task: Task, config: Walking, seed: int) -> Policy:
-    """Fit an oblique tree with linear leaves in as many rounds as `robot_cells`, and in the same way.
-
-    All its numbers are fitted together: in the first round from random and from greedy trees, later from the tree of
-    the round before.
-    """
+    """Fit an oblique tree with linear leaves in as many rounds as `robot_cells`, all its numbers together: first from
+    random and greedy trees, later from the tree of the round before."""
 
     def fit(frame: Scaling, labelled: LabelledStates, before: Policy | None, rng: np.random.Generator) -> Policy:
         states, actions = frame.states(labelled.inputs), frame.actions(labelled.actions)

@@ -5,8 +5,6 @@ search for the limit were changed after first results from the report starts. Po
 LunarLander, are measured from new starts. The longer search for one map was added after results from those.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vsp import Policy, Task, VoronoiPolicy, start_states
@@ -26,12 +24,10 @@ def settings(seed: int = REPORT_SEED) -> dict:
 
 
 def measure(policy: Policy, teacher: Policy, task: Task, seed: int = REPORT_SEED) -> dict[str, float]:
-    """Measure a policy: returns, from the starts of `seed`, action errors and size.
-
-    Keys: mean (return), failing (share of episodes without the goal), error_teacher and error_own (action errors in the
-    teacher's states and in the policy's own), cells (or leaves; 0: none). Slow tasks are played from fewer starts; but
-    of those of `LIMIT_SEED` all are played.
-    """
+    """Measure a policy: returns, from the starts of `seed`, action errors and size. Keys: mean (return), failing (share
+    of episodes without the goal), error_teacher and error_own (action errors in the teacher's states and in the
+    policy's own), cells (or leaves; 0: none). Slow tasks are played from fewer starts; but of those of `LIMIT_SEED` all
+    are played."""
     n = N_REPORTED if seed == LIMIT_SEED else N_REPORTED // task.slowness
     result = rollout(policy, task, start_states(task, n, seed))
     starts = start_states(task, N_ERROR // task.slowness, ERROR_SEED)
@@ -46,9 +42,7 @@ def measure(policy: Policy, teacher: Policy, task: Task, seed: int = REPORT_SEED
 
 def action_error(policy: Policy, teacher: Policy, task: Task, starts: np.ndarray, *, by: Policy) -> float:
     """Return the root mean square difference between the actions of `policy` and `teacher` in the states `by` visits.
-
-    It is in units of half the action range.
-    """
+    It is in units of half the action range."""
     states = visited_states(by, task, starts)
     return _rmse(in_half_ranges(policy, task, states), in_half_ranges(teacher, task, states))
 
@@ -61,10 +55,8 @@ def in_half_ranges(policy: Policy, task: Task, states: np.ndarray) -> np.ndarray
 
 def fidelity(policy: Policy, teacher: Policy, task: Task, states: np.ndarray | None = None) -> dict[str, float]:
     """Measure how closely the policy's actions match the teacher's on `states` (n, d), by default `common_states`.
-
     Keys: r2 (R² of the actions, all coordinates pooled), r2_worst (R² of the worst coordinate), off (share of the
-    states where an action is off by more than a tenth of its range).
-    """
+    states where an action is off by more than a tenth of its range)."""
     states = common_states(teacher, task) if states is None else states
     wanted = in_half_ranges(teacher, task, states)
     errors = np.square(in_half_ranges(policy, task, states) - wanted)
@@ -85,12 +77,9 @@ def common_states(teacher: Policy, task: Task) -> np.ndarray:
 def sameness(
     one: VoronoiPolicy, other: VoronoiPolicy, teacher: Policy, task: Task, states: np.ndarray
 ) -> dict[str, float]:
-    """Compare two policies on `states` (n, d).
-
-    Keys: index, the adjusted Rand index of their cells (Hubert & Arabie 1985: 1 for the same cells, about 0 for
-    unrelated ones; NaN where a policy has one cell); ratio, the root mean square difference between their actions,
-    divided by that from the teacher's actions (mean over the two policies).
-    """
+    """Compare two policies on `states` (n, d). Keys: index, the adjusted Rand index of their cells (Hubert & Arabie
+    1985: 1 for the same cells, about 0 for unrelated ones; NaN where a policy has one cell); ratio, the root mean
+    square difference between their actions, divided by that from the teacher's actions (mean over the two policies)."""
     from sklearn.metrics import adjusted_rand_score
 
     first, second, wanted = (in_half_ranges(policy, task, states) for policy in (one, other, teacher))

@@ -1,9 +1,5 @@
-"""The table of methods: how each is made, at which sizes, with which settings. And the tables of rows.
-
-A row is one method at one size with one seed. data/beyond/<table>_<task>.csv holds the rows of a table and a task.
-"""
-
-from __future__ import annotations
+"""The table of methods: how each is made, at which sizes, with which settings. And the tables of rows, a row for each
+method, size and seed: data/beyond/<table>_<task>.csv."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace

@@ -4,8 +4,6 @@ The methods of a table have the same start states and, unless their names say ot
 Distillation times differ from run to run, so they are in a separate file, <table>_seconds.csv.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time
@@ -41,11 +39,8 @@ class Row(Job):
 
     @property
     def start_seed(self) -> int:
-        """The seed of the start states from which its returns are measured.
-
-        At the limit small differences count, so a slow task is played from as many starts as others, and from new ones,
-        as robots are.
-        """
+        """The seed of the start states from which its returns are measured. At the limit small differences count, so a
+        slow task is played from as many starts as others, and from new ones, as robots are."""
         if self.how.preset == "walking":
             return measure.NEW_SEED
         slow = get_task(self.task).slowness > 1

@@ -1,10 +1,8 @@
-"""Find committed results that were made with other settings, another teacher or another version than today's.
+"""`python -m studies.comparison.stale` prints which committed results are out of date, or nothing.
 
-`python -m studies.comparison.stale` prints them, or nothing if all are up to date. Which results there are, and what
-they were made with, follows from the table of methods. Not checked are proofs, times and measurements.
+Which results there are, and what they were made with, follows from the table of methods. Not checked are proofs, times
+and measurements.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 
@@ -18,10 +16,7 @@ from .rows import jobs_of
 
 
 def stale() -> list[str]:
-    """List the results in data/beyond that are missing, damaged or out of date, one message each.
-
-    The list is empty if all are up to date.
-    """
+    """List the results in data/beyond that are missing, damaged or out of date, one message each."""
     messages = []
     for name, target, today in committed():
         try:

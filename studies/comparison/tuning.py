@@ -1,7 +1,5 @@
 """Tune every method in the same way: CMA-ES on all numbers of a tree, a partition or a network of fixed structure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -45,7 +43,7 @@ class TunableTree:
         directions = [self.directions] if self.oblique else []
         return [*directions, self.thresholds, self.maps[:, -1] if self.constant else self.maps]
 
-    def like(self, vector: np.ndarray) -> TunableTree:
+    def like(self, vector: np.ndarray) -> "TunableTree":
         """Return the same structure with the numbers of `vector`."""
         *directions, thresholds, maps = parted(vector, self.parts)
         if self.constant:
@@ -74,7 +72,7 @@ class TunableNetwork:
         """All tuned numbers, as one vector."""
         return joined([self.hidden, self.output])
 
-    def like(self, vector: np.ndarray) -> TunableNetwork:
+    def like(self, vector: np.ndarray) -> "TunableNetwork":
         """Return the same structure with the numbers of `vector`."""
         return TunableNetwork(self.frame, *parted(vector, [self.hidden, self.output]))
 
@@ -85,11 +83,8 @@ class TunableNetwork:
 
 
 def tuned(start: Policy, teacher: Policy, task: Task, config: Tuned, seed: int) -> Policy:
-    """Tune `start` on the return as `distill_tuned` tunes its cells.
-
-    The search, the number of its start states, the penalty and the number of snapshots are the same. Returns the best
-    snapshot on the validation starts, or `start` itself if none is better.
-    """
+    """Tune `start` on the return by the search of `distill_tuned`, with as many start states and snapshots and the same
+    penalty. Returns the best snapshot on the validation starts, or `start` itself if none is better."""
     streams = np.random.SeedSequence(seed).spawn(5)  # as in `distill_tuned`
     starts, _, _, validation, search = map(np.random.default_rng, streams)
     states = visited_states(teacher, task, task.start(starts, config.n_episodes))
@@ -111,10 +106,8 @@ def _itself(cells: Any) -> Any:
 
 
 def tunable(policy: VoronoiPolicy | Tree | LinearTree | SmallNetwork, frame: Scaling) -> Any:
-    """Return one linear map or a tree as a `TunableTree`, and a network as a `TunableNetwork`.
-
-    It has the policy's own units, or those of `frame` if the policy has none.
-    """
+    """Return one linear map or a tree as a `TunableTree`, and a network as a `TunableNetwork`. It has the policy's own
+    units, or those of `frame` if the policy has none."""
     if isinstance(policy, VoronoiPolicy):
         maps, none, d = frame.cells(policy).coefficients, np.zeros(0), len(frame.centre)
         return TunableTree(frame, none[None], np.zeros((0, d)), none, maps, oblique=False, constant=False)

@@ -1,7 +1,5 @@
 """Figures of the comparison of methods."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -44,9 +42,7 @@ MARKED = {
 
 def fidelity_map(ax: Axes, points: pd.DataFrame) -> Axes:
     """Plot mean return over R²: policies further right act more like the teacher, policies higher up return more.
-
-    `points` has the columns method, mean and r2. Methods in `MARKED` are drawn; a line joins ours.
-    """
+    `points` has the columns method, mean and r2. Methods in `MARKED` are drawn; a line joins ours."""
     ax.axvline(0, color="0.8", lw=0.8)
     places = points.set_index("method").loc[list(MARKED), ["r2", "mean"]]
     ax.plot(*places[places.index.str.match("faithful|our cells")].sort_values("r2").T.to_numpy(), color=OURS)
@@ -72,11 +68,9 @@ def likeness_over_cells(ax: Axes, tables: dict[str, pd.DataFrame]) -> Axes:
 
 
 def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict]) -> Axes:
-    """Plot a column of `frame` over the number of cells or leaves: one labelled line per method, the median of its seeds.
-
-    `frame` has the columns method, size and seed of `studies.comparison`. Only the methods in `looks` are drawn. Our
-    bands span the 10 % to 90 % quantiles over the seeds.
-    """
+    """Plot a column of `frame` over the number of cells or leaves: one labelled line per method, the median of its
+    seeds. `frame` has the columns method, size and seed of `studies.comparison`. Only the methods in `looks` are drawn.
+    Our bands span the 10 % to 90 % quantiles over the seeds."""
     ax.set_xscale("log")
     for method, look in looks.items():
         up, look = look.get("up", 0), {name: value for name, value in look.items() if name != "up"}
@@ -93,7 +87,6 @@ def over_cells(ax: Axes, frame: pd.DataFrame, column: str, looks: dict[str, dict
 
 
 def _ticks_at(ax: Axes, values: pd.Series) -> Axes:
-    """Put ticks at exactly these values."""
     places = np.unique(values.astype(int))
     ax.set_xticks(places, [str(place) for place in places])
     ax.minorticks_off()

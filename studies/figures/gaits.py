@@ -1,7 +1,5 @@
 """Draw a robot's gait from recorded data: poses in the colour of the active cell, and the feet below."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes

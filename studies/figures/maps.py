@@ -1,7 +1,5 @@
 """Maps: the actions of other people's agents, each with those of its policy below; and the polygons of an atlas."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
@@ -18,9 +16,7 @@ COLUMNS = 4
 
 def agent_maps(axes: np.ndarray, task: str, algorithms: list[str], labels: tuple[str, str, str]) -> Axes:
     """Draw a task's agents in every other row of `axes` (r * 4,), and below each its policy with the borders of cells.
-
-    The two free axes show the colours and the `labels` of action and variables. Returns the first axes.
-    """
+    The two free axes show the colours and the `labels` of action and variables. Returns the first axes."""
     x, y, _ = plane(task)
     (fine_x, fine_y, states), high, grid = plane(task, 301), get_task(task).action_high, axes.reshape(-1, COLUMNS)
     look = {"cmap": FORCE_MAP, "vmin": -1, "vmax": 1, "interpolation": "bilinear"}

@@ -6,18 +6,17 @@ nearest of these with 60 fresh ones. "Near" compares every value that the paper 
 outliers, cells and coefficients. All stages write rows, so that an interrupted search goes on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
+from vsp import Policy, VoronoiPolicy, get_task, load_teacher, start_states
 from vsp.algorithms import distill
-from vsp.evaluation import start_states
 from vsp.geometry import METRICS
 from vsp.paper import printed
 from vsp.paper.ledger import ledger_table
@@ -25,13 +24,11 @@ from vsp.paper.readings import Readings
 from vsp.paper.results import RESULTS, read_results, write_results
 from vsp.paper.runs import N_RUNS, Experiment, paper_experiment, results_of
 from vsp.paper.statistics import outlier_numbers, quartiles_from_fences, spread
-from vsp.policy import VoronoiPolicy
 from vsp.protocol import share_interval
 from vsp.protocol.job import settings_id
-from vsp.rollouts import Policy, rollout
+from vsp.rollouts import rollout
 from vsp.run import workers
-from vsp.tasks import get_task
-from vsp.teachers.teacher import SHIPPED, load_teacher
+from vsp.teachers import SHIPPED
 
 VERSION = 1  # raise it when the same settings give other rows
 N_SETTINGS, PRIOR_SEED = 4000, 777
@@ -104,20 +101,6 @@ def experiment(change: dict, task: str) -> Experiment:
 _usual, _teacher = cache(paper_experiment), cache(load_teacher)
 
 
-class Remembering:
-    """A teacher that knows what it answered: runs with one seed, and other settings, ask it the same."""
-
-    def __init__(self, teacher: Policy):
-        self.teacher, self.known = teacher, dict[bytes, np.ndarray]()
-
-    def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d)."""
-        key = obs.tobytes()
-        if key not in self.known:
-            self.known[key] = self.teacher.predict(obs)[0]
-        return self.known[key], None
-
-
 def of_partitions(policies: Iterable[VoronoiPolicy]) -> dict[str, float]:
     """Describe partitions: cells; the largest coefficient, and the median one, by size; and the share of pairs of
     codewords that are nearer than a new codeword may be to its own (means over policies)."""
@@ -153,9 +136,17 @@ def printed_facts(task: str) -> dict[str, float]:
 
 
 @lru_cache(maxsize=16)
-def _remembered(task: str, teacher: int, seed: int) -> Remembering:
-    """Return a teacher that remembers what the runs with this seed ask."""
-    return Remembering(experiment({"teacher": teacher}, task).teacher)
+def _remembered(task: str, teacher: int, seed: int) -> Policy:
+    """Return a teacher that remembers its answers: runs with this seed, and other settings, ask it the same."""
+    asked, known = experiment({"teacher": teacher}, task).teacher, dict[bytes, np.ndarray]()
+
+    def predict(obs: np.ndarray) -> tuple[np.ndarray, None]:
+        key = obs.tobytes()
+        if key not in known:
+            known[key] = asked.predict(obs)[0]
+        return known[key], None
+
+    return SimpleNamespace(predict=predict)
 
 
 def tried(task: str, stage: str, k: int) -> dict[str, float]:
@@ -245,11 +236,9 @@ def search(out: Path, jobs: int | str) -> None:
 
 
 def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.DataFrame) -> pd.DataFrame:
-    """Return which printed values the settings reach: one row per name of `facts`.
-
-    Columns: paper; of all settings that were screened least, low, high and most (low and high: the middle 95 %); low
-    and high of the nearest; and the values of each row of `fresh`, which are settings with fresh seeds.
-    """
+    """Return which printed values the settings reach: one row per name of `facts`. Columns: paper; of all settings that
+    were screened least, low, high and most (low and high: the middle 95 %); low and high of the nearest; and the values
+    of each row of `fresh`, which are settings with fresh seeds."""
     paper = pd.Series(printed_facts(task))
     every, nearest, fresh = (frame[paper.index] for frame in (every, nearest, fresh))
     found = pd.concat([every.quantile([0, 0.025, 0.975, 1]), nearest.quantile([0.025, 0.975]), fresh]).T
@@ -258,11 +247,9 @@ def reached(task: str, every: pd.DataFrame, nearest: pd.DataFrame, fresh: pd.Dat
 
 
 def questions(near: dict[str, pd.Series]) -> pd.DataFrame:
-    """Return what the nearest settings say of each open question: one row per answer.
-
-    Columns: question, answer, prior (its share), and for each task and both the share among the nearest `N_POSTERIOR`
-    (of both tasks: a quarter of these) with its 95 % interval.
-    """
+    """Return what the nearest settings say of each open question: one row per answer. Columns: question, answer, prior
+    (its share), and for each task and both the share among the nearest `N_POSTERIOR` (of both tasks: a quarter of
+    these) with its 95 % interval."""
     rows = []
     for name, weights in PRIOR.items():
         for answer, weight in weights.items():

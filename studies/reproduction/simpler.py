@@ -1,25 +1,21 @@
 """What the cells buy: distilled policies beside simpler ones, fitted to the teacher data that each distillation saw."""
 
-from __future__ import annotations
-
 import os
 from importlib.metadata import version
 
 import numpy as np
 import pandas as pd
 
-from vsp.algorithms import teacher_episodes
+from vsp import VoronoiPolicy, get_task, teacher_episodes
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Experiment, Results, Run, paper_results
-from vsp.policy import VoronoiPolicy
-from vsp.protocol.intervals import crossed_interval
+from vsp.protocol import crossed_interval
 from vsp.protocol.job import settings_id
 from vsp.rollouts import Outcomes
 from vsp.run import workers
-from vsp.tasks.base import GOAL
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL
 
 VERSION = 2  # raise it when the same runs give other results
 LEAVES = (13, 32)  # cells of the partitions that the paper prints
@@ -68,12 +64,10 @@ def fit(experiment: Experiment, run: Run) -> dict[str, VoronoiPolicy | Tree]:
 
 def compare_simpler(result: Results, n_runs: int = N_FITTED, *, jobs: int | str = 1) -> pd.DataFrame:
     """Compare the distilled policies with simpler ones: one row per kind of policy (the index), best mean return first.
-
     Columns: policies (how many), cells (mean number of cells or leaves), mean (return), gap (mean return minus the
     teacher's from the same starts), low and high (95 % interval of the gap), std (of all returns), failing (share of
     episodes that miss the goal). Intervals resample policies and start states together. Simpler policies are fitted to
-    the data of the first `n_runs` runs; `jobs` as in `workers`.
-    """
+    the data of the first `n_runs` runs; `jobs` as in `workers`."""
     experiment, task = result.experiment, result.experiment.task
     work = [(experiment, run) for run in result.runs[:n_runs]]
     fitted = dict(workers.results(_fitted, work, f"{task}, simpler", jobs=jobs, total=len(work), unit="fits"))
@@ -94,13 +88,11 @@ def _fitted(experiment: Experiment, run: Run) -> dict[str, tuple[int, Outcomes]]
 
 
 def _played(experiment: Experiment, policies: dict[str, VoronoiPolicy | Tree]) -> dict[str, tuple[int, Outcomes]]:
-    """Return the number of cells and the evaluated episodes of each policy."""
     task, n, seed = experiment.task, experiment.n_episodes, EVALUATION_SEED
     return {kind: (len(p), rollout_from_seed(p, task, n, seed=seed)) for kind, p in policies.items()}
 
 
 def _row(evaluated: list[tuple[float, Outcomes]], teacher: np.ndarray) -> dict[str, float]:
-    """Return the row of policies of one kind, given the cells and episodes of each, and the `teacher`'s returns."""
     returns, codes = (np.stack([getattr(o, name) for _, o in evaluated]) for name in ("returns", "outcomes"))
     low, high = crossed_interval(returns - teacher)
     row = {"policies": len(evaluated), "cells": np.mean([n for n, _ in evaluated]), "mean": returns.mean()}

@@ -1,11 +1,8 @@
 """How often the ledger's rules are wrong: the rerun against itself, and against runs that are known to be others.
 
 A "paper" is a sample of runs, from start states of its own; so is the "rerun". If both come from the same runs, each
-"differs" is wrong. If the paper's are fitted by least squares, or distilled from another teacher, the rules should see
-it.
+"differs" is wrong. If the paper's are fitted by least squares, or have another teacher, the rules should see it.
 """
-
-from __future__ import annotations
 
 import os
 import re
@@ -43,10 +40,8 @@ def experiments(task: str) -> dict[str, Experiment]:
 
 
 def study(runs: str | os.PathLike, *, jobs: int | str = 1) -> pd.DataFrame:
-    """Return one row per task, subject, what the rerun is set against, and name of a result.
-
-    Columns: kind, and the shares of `N_PAIRS` pairs that have each of `ledger.VERDICTS`.
-    """
+    """Return one row per task, subject, what the rerun is set against, and name of a result. Columns: kind, and the
+    shares of `N_PAIRS` pairs that have each of `ledger.VERDICTS`."""
     work = []
     for task in printed.TASKS:
         starts, n = start_states(task, N_STARTS, START_SEED), N_RUNS[task]

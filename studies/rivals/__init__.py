@@ -1,1 +1,1 @@
-"""Methods to compare our cells with: trees, small networks, DAgger."""
+"""Methods to compare our cells with: trees and small networks."""

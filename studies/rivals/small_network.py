@@ -1,7 +1,5 @@
 """A network with one hidden layer and as few parameters as a distilled policy: a baseline without cells."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,9 +1,5 @@
-"""Trees to compare with the Voronoi partition: CART, and model trees with axis-aligned or oblique splits.
-
-All are fitted to states (n, d) and actions (n, m) of a teacher, and act through the same `predict` as `VoronoiPolicy`.
-"""
-
-from __future__ import annotations
+"""Trees to compare with the Voronoi partition, fitted to states (n, d) and actions (n, m) of a teacher: CART, and model
+trees with axis-aligned or oblique splits."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -42,12 +38,10 @@ class Node:
 
 
 class LinearTree:
-    """A model tree: splits along the axes and a least-squares map in each leaf (RETIS, Karalič 1992).
-
-    It has at most `leaves` leaves and is grown best split first on standardised states. A split is judged by the error
-    of a map on each side, not of a constant. It lies at one of `CUTS` quantiles of its node. Each side keeps at least
-    twice as many states as a map has rows. `constant` fits one action per leaf instead of a map.
-    """
+    """A model tree: splits along the axes and a least-squares map in each leaf (RETIS, Karalič 1992). It has at most
+    `leaves` leaves and is grown best split first on standardised states. A split lies at one of `CUTS` quantiles of its
+    node and is judged by the error of a map on each side, which keeps at least twice as many states as a map has rows.
+    `constant` fits one action per leaf instead of a map."""
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, constant: bool = False):
         self.task, self.constant = get_task(task), constant
@@ -129,14 +123,11 @@ def _squared_errors(moments: np.ndarray, m: int) -> np.ndarray:
 
 
 class ObliqueLinearTree(LinearTree):
-    """A model tree with oblique splits: the tree here that is most similar to linear maps in Voronoi cells.
-
-    Engelhardt et al. (2023) extract rules from samples of a teacher by CART and by oblique predictive clustering trees
-    (SPYCT, Stepišnik & Kocev 2021). As in SPYCT, a hyperplane separates two clusters of a node's actions, here by
-    k-means and discriminant analysis. The axes, the principal components and the directions of least squares compete
-    with it. The best direction is perturbed at random (OC1, Murthy et al. 1994). Splits are judged by the maps on both
-    sides. A split lies at one of `cuts` quantiles along the direction that is best at a few of them.
-    """
+    """A model tree with oblique splits, the tree here that is most similar to linear maps in Voronoi cells. As in SPYCT
+    (Stepišnik & Kocev 2021), which Engelhardt et al. (2023) fit to a teacher, a hyperplane separates two clusters of a
+    node's actions, here by k-means and discriminant analysis. The axes, the principal components and the directions of
+    least squares compete with it. The best direction is perturbed at random (OC1, Murthy et al. 1994). Splits are
+    judged by the maps on both sides, at one of `cuts` quantiles along the direction that is best at a few of them."""
 
     def __init__(
         self, states: np.ndarray, actions: np.ndarray, *, leaves: int, task: str, seed: int, constant: bool = False,

@@ -1,16 +1,6 @@
-"""Methods for walking robots: many inputs, several actions, and mistakes that add up.
+"""Methods for walking robots: imitation also after pushes and mistakes, then training with a few cells as the actor."""
 
-Imitation includes states after pushes and after the policy's own mistakes. Then the teacher's own training continues,
-with a few cells as its actor.
-"""
-
-from vsp.tasks import register_maker
-
-from . import bipedalwalker, halfcheetah
-from .gait import record_gait
 from .imitation import imitate_pushed
 from .random_search import search_one_map
 from .settings import Walking, walking_preset
-
-for _task in (bipedalwalker, halfcheetah):
-    register_maker(_task.NAME, _task.make)
+from .tasks import record_gait

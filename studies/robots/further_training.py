@@ -1,10 +1,5 @@
-"""Continue the teacher's training with a few cells as its actor: tuning for policies of a thousand numbers.
-
-TD3 (Fujimoto et al. 2018, in Stable-Baselines3) learns from every single step, CMA-ES only from whole episodes. The
-critics begin with the teacher's weights.
-"""
-
-from __future__ import annotations
+"""Continue the teacher's training with a few cells as its actor, and its critics: TD3 (Fujimoto et al. 2018) learns
+from every single step, CMA-ES only from whole episodes. That takes it to policies of a thousand numbers."""
 
 import numpy as np
 
@@ -22,10 +17,7 @@ STEPS_PER_UPDATE = 2  # twice as many updates for the same steps do not raise th
 
 def train_further(frame: Scaling, numbers, teacher: Teacher, config: Walking, *, seed: int) -> Policy:
     """Return the most rewarding of the first policy and `N_CHOICES` policies during training. Same arguments, same
-    policy.
-
-    `numbers`: `ScaledCells`, or a tree in these units that a `SoftActor` takes. The teacher has critics.
-    """
+    policy. `numbers`: `ScaledCells`, or a tree in these units that a `SoftActor` takes. The teacher has critics."""
     import torch
 
     policy_of = frame.policy if isinstance(numbers, ScaledCells) else lambda tree: tree

@@ -1,8 +1,6 @@
 """Imitate also on states that follow a mistake: from the teacher's episodes, from episodes in which it is pushed,
 and from the policy's own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -39,10 +37,8 @@ class Pushed:
 
 @threadpool_limits.wrap(limits=1)
 def imitate_pushed(teacher: Policy, task: str | Task, config: Walking, *, seed: int, fit: Fit | None = None) -> Policy:
-    """Fit a policy in each round, and return the most rewarding one. Same arguments, same policy.
-
-    `fit`: by default the closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed.
-    """
+    """Fit a policy in each round, and return the most rewarding one. Same arguments, same policy. `fit`: by default the
+    closest `config.n_cells` cells. Raises ValueError as `rollout` does, and for a bad seed."""
     task, fit = get_task(task), fit or partial(cells_fit, config=config)
     starts, pushes, fits, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
     own = visited_states(teacher, task, task.start(starts, config.n_episodes))

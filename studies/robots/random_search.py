@@ -1,15 +1,13 @@
 """Learn one linear map from returns alone, without a teacher, by augmented random search (ARS V2-t, Mania et al.
 2018)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from vsp import Policy, Task, VoronoiPolicy
-from vsp_beyond.few_cells.population import rollout_population
+from vsp_beyond.few_cells.tune import rollout_population
 from vsp_beyond.few_cells.units import METRIC
 
 from .imitation import most_rewarding
@@ -43,10 +41,8 @@ class RunningMoments:
 @threadpool_limits.wrap(limits=1)
 def search_one_map(task: Task, config: Walking, *, seed: int) -> Policy:
     """Find the best map within `config.n_random_steps` steps of the robot, as one cell. Same arguments, same policy.
-
     Each round plays maps on both sides of the current one, in random directions. The map then moves along the `n_best`
-    directions with the highest returns. Raises ValueError for a bad seed.
-    """
+    directions with the highest returns. Raises ValueError for a bad seed."""
     forgiving, d, m = _forgiving(task), len(task.low), len(task.action_low)
     starts, noise, validation = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(3))
     weights, moments, played, on_the_way = np.zeros((d, m)), RunningMoments(d), 0, []

@@ -1,7 +1,5 @@
 """`Walking`: the settings of all methods that make policies for robots, and its presets."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vsp import Task, get_task

@@ -1,8 +1,6 @@
 """Cells and trees as differentiable actors: soft borders while they learn and in the critics' targets, hard ones when
 they act. Imports torch."""
 
-from __future__ import annotations
-
 import torch
 
 from vsp_beyond.few_cells.units import ScaledCells, Scaling, parted
@@ -11,10 +9,8 @@ CLIP_SLOPE = 0.02  # slope beyond the action limits in training: without it, a s
 
 
 class SoftActor(torch.nn.Module):
-    """Policies made of linear maps, in the units of a `Scaling`, as the network that TD3 trains.
-
-    `numbers`: `ScaledCells`, or a `TunableTree` with oblique borders. Observations (n, d) to actions (n, m) in [-1, 1].
-    """
+    """Policies made of linear maps, in the units of a `Scaling`, as the network that TD3 trains. `numbers`:
+    `ScaledCells`, or a `TunableTree` with oblique borders. Observations (n, d) to actions (n, m) in [-1, 1]."""
 
     def __init__(self, frame: Scaling, numbers, temperature: float):
         super().__init__()

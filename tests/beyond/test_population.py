@@ -4,7 +4,7 @@ from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, random_policy
 
 from vsp.rollouts import rollout
 from vsp.tasks.registry import get_task
-from vsp_beyond.few_cells.population import rollout_population
+from vsp_beyond.few_cells.tune import rollout_population
 
 
 @pytest.mark.parametrize(("task", "n"), [(SIMPLEGOAL, 50), (PENDULUM, 10), (LUNARLANDER, 3)])

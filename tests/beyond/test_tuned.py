@@ -14,10 +14,9 @@ from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
 from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.anneal import anneal, random_init
 from vsp_beyond.few_cells.config import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, is_snapshot, score, tune
-from vsp_beyond.few_cells.tuned import distill_tuned
+from vsp_beyond.few_cells.tuned import anneal, distill_tuned, random_init
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss
 
 SMALL = Tuned(

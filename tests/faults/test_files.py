@@ -19,7 +19,7 @@ from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload, flipped
 import vsp
 from studies import training
 from studies.comparison.rows import Row, make_all
-from studies.recipes import Recipe
+from studies.training import Recipe
 from vsp.paper import results, runs
 from vsp.run import atomic
 from vsp.run.atomic import DamagedFile

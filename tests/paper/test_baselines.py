@@ -7,7 +7,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.tree import DecisionTreeRegressor
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
 
-from studies.rivals.dagger import dagger
+from studies.comparison.makers import dagger
 from vsp.evaluation import evaluate
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
 from vsp.policy import VoronoiPolicy

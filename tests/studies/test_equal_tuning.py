@@ -13,7 +13,7 @@ from studies.comparison.methods import METHODS
 from vsp import get_task, load_teacher, start_states, visited_states
 from vsp_beyond import faithful_preset, tuned_preset
 
-MODULES = ("studies.rivals.dagger", "vsp_beyond.few_cells.tune", "vsp_beyond.few_cells.tuned")
+MODULES = ("studies.comparison.makers", "vsp_beyond.few_cells.tune", "vsp_beyond.few_cells.tuned")
 dagger, tune, refine = map(importlib.import_module, MODULES)  # and not the functions
 
 
@@ -95,8 +95,10 @@ def test_a_budget_is_what_is_played(monkeypatch, name):
 
         return count
 
+    play = tune.rollout
+    monkeypatch.setattr(tune, "rollout_population", lambda policies, *of: [play(policy, *of) for policy in policies])
     for module in (dagger, tune):
-        monkeypatch.setattr(module, "rollout", counting("validation", module.rollout))
+        monkeypatch.setattr(module, "rollout", counting("validation", play))
     for module in (dagger, refine):
         count = counting("teacher", module.visited_states, lambda policy: policy is teacher)
         monkeypatch.setattr(module, "visited_states", count)

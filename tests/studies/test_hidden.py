@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import cache, partial
+from types import SimpleNamespace
 from typing import get_args, get_type_hints
 
 import numpy as np
@@ -54,12 +55,17 @@ def test_no_reading_is_forgotten():
     assert all(usual[name] in hidden.PRIOR[name] and len(hidden.PRIOR[name]) > 1 for name in OPEN)
 
 
-def test_a_teacher_that_remembers_gives_the_same_run():
+def test_a_teacher_that_remembers_gives_the_same_run(monkeypatch):
     one = hidden.experiment({"n_minibatches": 2}, SIMPLEGOAL)
     config, task = dataclasses.replace(one.config, n_epochs=60, n_freeze=10), get_task(SIMPLEGOAL)
-    teacher = hidden.Remembering(one.teacher)
-    policies = [distill(actor, task, config, seed=3)[0] for actor in (one.teacher, teacher, teacher)]
-    assert policies[0].digest == policies[1].digest == policies[2].digest and teacher.known
+    asked = []
+    counting = SimpleNamespace(predict=lambda obs: (asked.append(obs), one.teacher.predict(obs))[1])
+    monkeypatch.setattr(hidden, "experiment", lambda *_: SimpleNamespace(teacher=counting))
+    teacher, digests, counts = hidden._remembered.__wrapped__(SIMPLEGOAL, 0, 3), [], []
+    for actor in (one.teacher, teacher, teacher):
+        digests.append(distill(actor, task, config, seed=3)[0].digest)
+        counts.append(len(asked))
+    assert len({*digests}) == 1 and counts[0] == 0 < counts[1] == counts[2]
 
 
 def test_facts_of_the_paper_are_its_printed_values():

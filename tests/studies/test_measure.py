@@ -5,8 +5,8 @@ import pytest
 from support import PENDULUM, SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import measure as measure_module
+from studies.comparison.makers import dagger
 from studies.comparison.measure import action_error, common_states, fidelity, measure, sameness
-from studies.rivals.dagger import dagger
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout_from_seed, start_states
 from vsp.paper.baselines import Tree
 from vsp_beyond import Tuned

@@ -7,8 +7,7 @@ from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TAS
 
 from studies import make_teachers, training
 from studies.make_teachers import BARS, export, main, short_recipe
-from studies.recipes import BEST_OF_CURVE, RECIPES, Recipe
-from studies.training import read_checkpoint
+from studies.training import BEST_OF_CURVE, RECIPES, Recipe, read_checkpoint
 from vsp.evaluation import rollout_from_seed
 from vsp.run import atomic, command, listed
 from vsp.tasks.base import GOAL

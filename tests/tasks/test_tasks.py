@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, WALKER, RandomPolicy
 
 import vsp
-from studies.robots import halfcheetah
+from studies.robots import tasks as robots
 from vsp.rollouts import collect_episodes, rollout
 from vsp.tasks import simplegoal
 from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
@@ -267,7 +267,7 @@ def test_an_unknown_task_is_answered_with_the_nearest(typo, near):
 
 
 def test_without_mujoco_one_sentence_says_how_to_get_it(monkeypatch):
-    monkeypatch.setattr(halfcheetah, "find_spec", lambda name: None)
+    monkeypatch.setattr(robots, "find_spec", lambda name: None)
     teacher = vsp.load_teacher(CHEETAH)  # acts, and can be read, without an engine
     assert teacher.predict(np.zeros(17))[0].shape == (6,)
     with pytest.raises(ValueError, match="HalfCheetah-v5 needs the package mujoco, which is not inst.*: run `make "):
@@ -284,7 +284,7 @@ def test_the_cheetah_has_the_boxes_of_gymnasium():
 
 
 def test_mujocos_warnings_are_pythons_but_for_the_one_of_every_environment(recwarn):
-    halfcheetah._warn("compiler attribute 'settotalmass' is deprecated")
+    robots._warn("compiler attribute 'settotalmass' is deprecated")
     assert not recwarn
     with pytest.warns(RuntimeWarning, match="Nan, Inf or huge value"):
-        halfcheetah._warn("Nan, Inf or huge value in QACC at DOF 0.")
+        robots._warn("Nan, Inf or huge value in QACC at DOF 0.")

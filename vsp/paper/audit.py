@@ -5,8 +5,6 @@ Returns have no unit, shares are in percent. Standard deviations divide by n, as
 only for the 24 outliers of SimpleGoal's teacher.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,11 +48,9 @@ def quote(*ids: str) -> str:
 
 
 class Column:
-    """A column of T5 or T6, and the numbers that the text adds.
-
-    `values` are min, max, mean, std, q1, median, q3, iqr, and coverage in percent. `below` and `above` are the
-    outliers that the text describes: at most one part each, none if it gives no mean.
-    """
+    """A column of T5 or T6, and the numbers that the text adds. `values` are min, max, mean, std, q1, median, q3, iqr,
+    and coverage in percent. `below` and `above` are the outliers that the text describes: at most one part each, none
+    if it gives no mean."""
 
     def __init__(self, task: str, subject: str):
         self.name, self.values = f"{PREFIX[task]}_{subject}", pd.Series(printed.printed_spread_values(task, subject))
@@ -167,10 +163,8 @@ def mountaincar_quartiles() -> Finding:
 
 
 def outlier_rules() -> Finding:
-    """Find the rule for outliers, which the paper does not state.
-
-    A rule fits a side if the outliers there end beyond its bound. Without outliers it fits if no return is beyond it.
-    """
+    """Find the rule for outliers, which the paper does not state. A rule fits a side if the outliers there end beyond
+    its bound. Without outliers it fits if no return is beyond it."""
     notes, common = [], {"1.5 IQR", "2 std"}
     for column in (Column(task, subject) for task in printed.TASKS for subject in ("drl", "ours")):
         c, end, start = column.values, column.low, column.high
@@ -219,11 +213,9 @@ def similar_spread() -> Finding:
 
 
 def authors_environment() -> Finding:
-    """Replay the published policy in SimpleGoal as the paper's first author published it later.
-
-    In github.com/SenneDeproost/CM-GP, envs/simple_envs.py (commit 1cf9c35, March 2026), goal and pit replace the reward
-    of the step, as here; but to touch the border ends an episode with -10.
-    """
+    """Replay the published policy in SimpleGoal as the paper's first author published it later. In
+    github.com/SenneDeproost/CM-GP, envs/simple_envs.py (commit 1cf9c35, March 2026), goal and pit replace the reward of
+    the step, as here; but to touch the border ends an episode with -10."""
 
     def bordered(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         moved, rewards, outcomes = simplegoal.step(states, actions)

@@ -4,8 +4,6 @@ A partition that does not beat them gains nothing from its cells. All act throug
 and raise ValueError for arrays of a wrong shape, numbers that are not finite, and a seed below 0 or not an integer.
 """
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import numpy as np
@@ -38,11 +36,9 @@ def linear_map(states: np.ndarray, actions: np.ndarray, task: str) -> VoronoiPol
 
 
 def refit(policy: P, states: np.ndarray, actions: np.ndarray, *, constant: bool = False) -> P:
-    """Return `policy` with new maps, by least squares on the states (n, d) and actions (n, m) in each cell.
-
-    These are the maps that training would converge to. `constant` fits a constant action per cell instead. A cell
-    without states keeps its map. Raises ValueError unless the maps are linear.
-    """
+    """Return `policy` with new maps, by least squares on the states (n, d) and actions (n, m) in each cell. These are
+    the maps that training would converge to. `constant` fits a constant action per cell instead. A cell without states
+    keeps its map. Raises ValueError unless the maps are linear."""
     policy.check_linear()
     states, actions = check_data(states, actions, *np.subtract(policy.coefficients.shape[1:], (1, 0)))
     cells, coefficients = policy.cells(states), policy.coefficients.copy()
@@ -53,11 +49,9 @@ def refit(policy: P, states: np.ndarray, actions: np.ndarray, *, constant: bool 
 
 
 def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:
-    """Return the name and the policy that a person would write for `task` without a teacher.
-
-    SimpleGoal: walk diagonally towards the goal and ignore the pit. MountainCarContinuous: push in the direction of
-    motion, 12 times the velocity, limited to [-1, 1]. Raises ValueError for another task.
-    """
+    """Return the name and the policy that a person would write for `task` without a teacher. SimpleGoal: walk
+    diagonally towards the goal and ignore the pit. MountainCarContinuous: push in the direction of motion, 12 times the
+    velocity, limited to [-1, 1]. Raises ValueError for another task."""
     rules = {
         "SimpleGoal-v0": ("always (−1, −1)", [[0, 0], [0, 0], [-1, -1]]),
         "MountainCarContinuous-v0": ("12 · velocity", [[0], [12], [0]]),
@@ -69,9 +63,7 @@ def rule_of_thumb(task: str) -> tuple[str, VoronoiPolicy]:
 
 class Tree:
     """A regression tree (CART, Breiman et al. 1984) with at most `leaves` leaves, each with one constant action.
-
-    scikit-learn grows it, best split first, on the mean squared error of `actions` (n, m) at `states` (n, d).
-    """
+    scikit-learn grows it, best split first, on the mean squared error of `actions` (n, m) at `states` (n, d)."""
 
     def __init__(self, states: np.ndarray, actions: np.ndarray, *, leaves: int):
         from sklearn.tree import DecisionTreeRegressor

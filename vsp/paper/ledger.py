@@ -22,8 +22,6 @@ Rules:
 Each fact counts once (`FOLLOWS`). `studies.reproduction.verdicts` measures how often these rules are wrong.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 
@@ -66,10 +64,8 @@ COLUMNS = "id part fact task where quantity subject paper value here low high ve
 
 def ledger_table(results: dict[str, Results], *, n_resamples: int = N_RESAMPLES) -> pd.DataFrame:
     """Return one row per printed value, with columns `COLUMNS`; `results` by task. The same results give the same rows.
-
     `here` is the rerun's value, NaN where there is none; `low` and `high` are NaN for settings. Column `cell` names the
-    notebook and the cell that computes it.
-    """
+    notebook and the cell that computes it."""
     settings = pd.DataFrame.from_dict(_settings(results), orient="index", columns=["here"])
     parts = [measured(task, result, n_resamples=n_resamples) for task, result in results.items()]
     frame = printed.printed_values().join(pd.concat([settings, *parts]), on="id")
@@ -100,10 +96,8 @@ def verdict_counts(book: pd.DataFrame) -> pd.DataFrame:
 
 def wrong_verdicts(frame: pd.DataFrame) -> pd.DataFrame:
     """Return how often "differs" is the verdict, in percent of the pairs of samples: one row per kind of result.
-
     Columns: kind; of the same runs the mean over the results of a kind, and the highest; for runs that are known to be
-    others, by what changed, the highest.
-    """
+    others, by what changed, the highest."""
     told = frame[frame["cannot be checked"] < 1].assign(differs=100 * frame["differs"])
     same, others = (told[(told["against"] == "the same") == side] for side in (True, False))
     shares = same.groupby("kind", sort=False)["differs"].agg(["mean", "max"])
@@ -169,9 +163,7 @@ def of_returns(returns: np.ndarray, *, n_resamples: int = N_RESAMPLES) -> pd.Dat
 
 def set_against(found: pd.DataFrame, returns: np.ndarray, values: pd.Series, std: float) -> pd.DataFrame:
     """Add to what `of_returns` found of `returns` (p, n) the columns beyond and unit, as `verdicts` needs them.
-
-    `values` are the paper's by name; `std` is its standard deviation of the returns.
-    """
+    `values` are the paper's by name; `std` is its standard deviation of the returns."""
     frame = found.assign(beyond=np.nan, unit=std)
     for name, value in values[values.index.isin(frame.index)].items():
         if name.endswith(("share", "coverage")):
@@ -193,11 +185,9 @@ def _beyond(name: str, returns: np.ndarray, value: float) -> int:
 
 
 def ledger_gaps(book: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Return the results of `SHOWN`: columns subject, verdict and gap (index: names in words).
-
-    The gap is the printed value minus the rerun's, in half-widths of the rerun's interval on that side, which count as
-    at least half a unit of the last printed digit.
-    """
+    """Return the results of `SHOWN`: columns subject, verdict and gap (index: names in words). The gap is the printed
+    value minus the rerun's, in half-widths of the rerun's interval on that side, which count as at least half a unit of
+    the last printed digit."""
     rows = book.set_index("id").loc[[f"{printed.PREFIX[task]}_{name}" for name in SHOWN]]
     half = np.where(rows["value"] > rows["here"], rows["high"] - rows["here"], rows["here"] - rows["low"])
     half = np.maximum(half, 0.5 * rows["paper"].map(last_digit))

@@ -1,7 +1,5 @@
 """`make runs`: make the distillations that the paper reports."""
 
-from __future__ import annotations
-
 from ..run import command
 from .runs import N_RUNS, paper_results
 

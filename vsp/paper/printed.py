@@ -4,8 +4,6 @@ The values are in `data/paper/*.csv`, as printed; column `where` names the place
 its bytes match the manifest of its folder; the listed files were checked against the paper.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 from collections.abc import Iterable
@@ -34,9 +32,7 @@ def printed_hyperparameters(task: str) -> dict[str, int | float | bool]:
 
 def printed_spread(task: str) -> pd.DataFrame:
     """Return the spread of the returns on `task`: one row per metric (the index), columns drl, ours, unit, where.
-
-    Coverage, the share of episodes that are not outliers, is in percent; all else is in units of return.
-    """
+    Coverage, the share of episodes that are not outliers, is in percent; all else is in units of return."""
     frame = _read("spread.csv", numbers=["drl", "ours"])
     return frame[frame["task"] == check_task(task)].drop(columns="task").set_index("metric")
 
@@ -47,11 +43,9 @@ def printed_spread_values(task: str, subject: str) -> dict[str, float]:
 
 
 def printed_text_numbers() -> pd.DataFrame:
-    """Return the numbers in running text and captions: one row per number, its id as index.
-
-    Columns: task ("both" where one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value
-    (NaN for a version or a name), unit, printed (the paper's spelling), where.
-    """
+    """Return the numbers in running text and captions: one row per number, its id as index. Columns: task ("both" where
+    one number serves both), quantity, subject ("DRL", "Ours", "task", "protocol"), value (NaN for a version or a name),
+    unit, printed (the paper's spelling), where."""
     return _read("text_numbers.csv", numbers=["value"]).set_index("id")
 
 
@@ -68,10 +62,8 @@ def spread_id(task: str, subject: str, metric: str) -> str:
 
 
 def printed_values() -> pd.DataFrame:
-    """Return every number that the paper prints, in tables T2 to T6, text and captions: one row per value.
-
-    Columns: id, task, where, quantity, subject, paper (the paper's spelling), value (NaN for a version or a name).
-    """
+    """Return every number that the paper prints, in tables T2 to T6, text and captions: one row per value. Columns: id,
+    task, where, quantity, subject, paper (the paper's spelling), value (NaN for a version or a name)."""
     text = _read("text_numbers.csv", numbers=["value"]).rename(columns={"printed": "paper"})
     rows = []
     for row in _read("spread.csv").to_dict("records"):
@@ -97,11 +89,9 @@ def printed_tdavq_comparison() -> pd.DataFrame:
 
 
 def linear_policies(task: str) -> pd.DataFrame:
-    """Return the best partition that the paper found for `task`: one row per cell, in the paper's order.
-
-    Columns: codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no
-    such term) and <output>_printed, the expression as the paper prints it; for MountainCar also its colour.
-    """
+    """Return the best partition that the paper found for `task`: one row per cell, in the paper's order. Columns:
+    codeword_<input>, then for each output <output>_<input> and <output>_bias (zero where the paper prints no such term)
+    and <output>_printed, the expression as the paper prints it; for MountainCar also its colour."""
     frame = _read(f"{SHORT[check_task(task)].lower()}_linear_policies.csv")
     return frame.astype(dict.fromkeys(_numbers(frame), np.float64))
 
@@ -118,7 +108,6 @@ def published_policy(task: str) -> VoronoiPolicy:
 
 
 def _numbers(columns: Iterable[str]) -> list[str]:
-    """Return the numeric columns of a table of linear policies."""
     return [name for name in columns if not name.endswith(("_printed", "colour", "where"))]
 
 

@@ -3,8 +3,6 @@
 The other open questions are fields of `Config`. With all defaults, the passes do what `vsp.algorithms` does.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -25,10 +23,8 @@ OPEN = (
 
 @dataclass(frozen=True)
 class Readings:
-    """How a splitting and a merging pass read the paper; `split` and `merge` are for `algorithms.distill`.
-
-    Raises ValueError for an unknown reading.
-    """
+    """How a splitting and a merging pass read the paper; `split` and `merge` are for `algorithms.distill`. Raises
+    ValueError for an unknown reading."""
 
     split_lookup: Literal["refreshed", "kept"] = "refreshed"
     """R2. The codewords among which a splitting pass looks states up: all, including those that it has just added

@@ -3,8 +3,6 @@
 A row states its provenance (`protocol.jobs`); `studies.comparison.stale` compares it with the current one.
 """
 
-from __future__ import annotations
-
 import io
 import os
 from pathlib import Path
@@ -23,10 +21,11 @@ def read_results(name: str, folder: str | os.PathLike | None = None) -> pd.DataF
     return pd.read_csv(io.BytesIO(content), dtype=_TYPES)
 
 
-def write_results(frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str | None = "%.6f") -> None:
-    """Write OUT/data/results/NAME.csv atomically, and list it in the manifest of its folder.
-
-    `float_format`: of all floats; None: as many digits as they have.
-    """
+def write_results(
+    frame: pd.DataFrame, name: str, *, out: str | os.PathLike, float_format: str | None = "%.6f",
+    folder: str = "data/results",
+) -> None:  # fmt: skip
+    """Write OUT/`folder`/NAME.csv atomically, and list it in the manifest of its folder. `float_format`: of all floats;
+    None: as many digits as they have."""
     text = frame.to_csv(index=False, float_format=float_format, lineterminator="\n")
-    listed.write_listed(Path(out) / "data" / "results" / f"{name}.csv", text)
+    listed.write_listed(Path(out, folder, f"{name}.csv"), text)

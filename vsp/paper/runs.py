@@ -1,7 +1,5 @@
 """The paper's experiment: many distillations of one teacher, each a `Job`, and how they end."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -19,10 +17,8 @@ from ..protocol import EVALUATION_SEED, N_EPISODES, job
 from ..rollouts import Outcomes
 from ..run import sealed
 from ..run.identity import identity
-from ..tasks.base import GOAL, PIT, TRUNCATED
-from ..tasks.registry import get_task
-from ..teachers import digest_of, load_teacher
-from ..teachers.teacher import Teacher
+from ..tasks import GOAL, PIT, TRUNCATED, get_task
+from ..teachers import Teacher, digest_of, load_teacher
 from .readings import Readings
 
 N_RUNS = {"SimpleGoal-v0": 85, "MountainCarContinuous-v0": 40}  # paper, section "Experimental Validation"
@@ -167,10 +163,8 @@ class Results:
 def paper_results(
     task: str, *, runs: str | os.PathLike, n: int = 0, quick: bool = False, jobs: int | str = -1
 ) -> Results:
-    """Return the paper's experiment on `task`; make the runs that are missing in the folder `runs`.
-
-    `n`: how many runs; 0: as many as in the paper, or a few if `quick`. Raises ValueError unless `n` is such a number.
-    """
+    """Return the paper's experiment on `task`; make the runs that are missing in the folder `runs`. `n`: how many runs;
+    0: as many as in the paper, or a few if `quick`. Raises ValueError unless `n` is such a number."""
     one = paper_experiment(task, quick=quick)
     check_count("n", n := n or (QUICK_RUNS if quick else N_RUNS[one.task]))
     return results_of(one, n, runs=runs, jobs=jobs)

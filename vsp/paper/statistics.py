@@ -4,8 +4,6 @@ Standard deviations divide by n - 1 for samples (`spread`) and by n for the iden
 (`remaining_std` and the like). In the identities NaN gives NaN.
 """
 
-from __future__ import annotations
-
 import math
 from collections import namedtuple
 from collections.abc import Sequence
@@ -39,9 +37,7 @@ def spread(returns: np.ndarray) -> dict[str, float]:
 
 def outlier_numbers(returns: np.ndarray) -> dict[str, float]:
     """Return the paper's statistics of outliers, under the names that end their ids in `data/paper/text_numbers.csv`.
-
-    Means, standard deviations and ranges of an empty set are NaN. Raises ValueError as `spread` does.
-    """
+    Means, standard deviations and ranges of an empty set are NaN. Raises ValueError as `spread` does."""
     facts, returns = spread(returns), np.ravel(returns)
     lower, upper = facts["lower_fence"], facts["upper_fence"]
     numbers = {name: facts[name] for name in ("mean", "std", "min", "max")}
@@ -131,10 +127,8 @@ def remaining_std(n: float, mean: float, std: float, parts: Sequence[Part]) -> f
 
 
 def quarters(n: float, marks: Sequence[float], below: float = 0, above: float = 0) -> Groups:
-    """Return the quarters of n values without the outliers; `marks`: lowest of the rest, Q1, median, Q3, highest.
-
-    The quartiles count all values: `below` outliers belong to the first quarter, `above` outliers to the last.
-    """
+    """Return the quarters of n values without the outliers; `marks`: lowest of the rest, Q1, median, Q3, highest. The
+    quartiles count all values: `below` outliers belong to the first quarter, `above` outliers to the last."""
     return list(zip((n / 4 - below, n / 4, n / 4, n / 4 - above), marks[:-1], marks[1:], strict=True))
 
 

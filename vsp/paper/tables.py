@@ -4,8 +4,6 @@
 words, percentages, each interval in one column, no row numbers.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -44,7 +42,7 @@ QUANTITIES = {"quantity", "statistic", "score", "of a run", "best run", "setting
 def save_table(
     frame: pd.DataFrame, name: str, *, out: str | os.PathLike, shown: pd.DataFrame | None = None,
     caption: str | None = None,
-) -> HTML:  # fmt: skip
+) -> "HTML":  # fmt: skip
     """Write OUT/figures/tables/NAME.csv and .tex; return the table as HTML for a notebook.
 
     A name "beyond/x" writes OUT/figures/beyond/tables/x. `shown` replaces the whole table for readers: a part of it, or
@@ -62,12 +60,10 @@ def save_table(
     return show_table(shown, name, caption=caption)
 
 
-def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> HTML:
-    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml.
-
-    A table of more than `ROWS` rows is folded below its caption. Numbers have true minus signs, and intervals do not
-    wrap.
-    """
+def show_table(frame: pd.DataFrame, name: str = "", *, caption: str | None = None) -> "HTML":
+    """Return the frame as HTML for a notebook, below `caption` or that of table `name` in notebooks/captions.toml. A
+    table of more than `ROWS` rows is folded below its caption. Numbers have true minus signs, and intervals do not
+    wrap."""
     from IPython.display import HTML
 
     about, fold = caption_of("tables", name, text=caption), len(frame) > ROWS
@@ -123,11 +119,8 @@ def _heading(column: str) -> str:
 
 
 def as_text(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the frame as text.
-
-    Floats have three decimals, or fewer if these hold the whole column. From 100 on they have fewer, so that five
-    digits remain. All else stays as it is, apart from thousands separators.
-    """
+    """Return the frame as text. Floats have three decimals, or fewer if these hold the whole column. From 100 on they
+    have fewer, so that five digits remain. All else stays as it is, apart from thousands separators."""
     return frame.apply(lambda column: column.map(lambda value: _text(value, _decimals(column))))
 
 
@@ -191,11 +184,9 @@ def equation_table(policy: VoronoiPolicy, *, digits: int | None = 3) -> pd.DataF
     return pd.DataFrame({"codeword": codewords, **columns})
 
 
-def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> HTML:
+def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> "HTML":
     """Return the policy as HTML for a notebook: its equations, below `caption`, the distance and the action limits.
-
-    Raises ValueError unless the sub-policies are linear.
-    """
+    Raises ValueError unless the sub-policies are linear."""
     policy.check_linear()
     frame, task, where = equation_table(policy), policy.task, "One map for all states"
     if len(policy) > 1:
@@ -210,10 +201,8 @@ def show_policy(policy: VoronoiPolicy, *, caption: str = "") -> HTML:
 
 
 def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFrame:
-    """Return T5 or T6: the paper's columns beside the rerun's. `teacher` (n,) and `runs` (p, n) are returns.
-
-    Coverage is in percent.
-    """
+    """Return T5 or T6: the paper's columns beside the rerun's. `teacher` (n,) and `runs` (p, n) are returns. Coverage
+    is in percent."""
     printed = printed_spread(task)
     table = pd.DataFrame({"metric": printed.index})
     for name, label, values in zip(("drl", "ours"), ("teacher", "distilled"), (teacher, runs)):
@@ -225,10 +214,8 @@ def spread_table(task: str, teacher: np.ndarray, runs: np.ndarray) -> pd.DataFra
 
 
 def text_number_table(task: str, teacher: np.ndarray, runs: np.ndarray, *, cells: int) -> pd.DataFrame:
-    """Return N: the numbers of the running text beside the rerun's; NaN where the paper gives none.
-
-    `teacher` (n,) and `runs` (p, n) are returns, `cells` the number of cells of the best policy.
-    """
+    """Return N: the numbers of the running text beside the rerun's; NaN where the paper gives none. `teacher` (n,) and
+    `runs` (p, n) are returns, `cells` the number of cells of the best policy."""
     known, prefix = printed_text_numbers(), PREFIX[check_task(task)]
     means = runs.mean(axis=1)
     distilled = outlier_numbers(runs) | {"lowest_run_mean": means.min(), "highest_run_mean": means.max()}

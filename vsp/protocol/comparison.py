@@ -1,7 +1,5 @@
 """`compare`: the paper's protocol for any methods. Runs that exist are read, those that are missing are made."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sized
@@ -54,7 +52,7 @@ class Comparison:
     def __str__(self) -> str:
         return self.frame.to_string(index=False)
 
-    def plot(self, task: str | Task, ax: Axes | None = None) -> Axes:
+    def plot(self, task: str | Task, ax: "Axes | None" = None) -> "Axes":
         """Draw the mean returns of one task with their intervals, on `ax` or a new figure. Returns the axes."""
         from ..show import intervals, panels
 

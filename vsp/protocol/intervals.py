@@ -1,7 +1,5 @@
 """Intervals (95 %) over policies, over policies and start states, and of shares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -10,10 +8,8 @@ from ..checks import check_count, check_finite, check_seed
 
 
 def bootstrap_draws(n_rows: int, n_resamples: int, seed: int) -> np.ndarray:
-    """Return the indices of the `n_rows` rows that each resample draws with replacement. (n_resamples, n_rows)
-
-    Every interval over policies resamples this way; the same seed draws the same rows.
-    """
+    """Return the indices of the `n_rows` rows that each resample draws with replacement. (n_resamples, n_rows) Every
+    interval over policies resamples this way; the same seed draws the same rows."""
     check_count("n_resamples", n_resamples)
     check_seed(seed)
     return np.random.default_rng(seed).integers(n_rows, size=(n_resamples, n_rows))

@@ -9,8 +9,6 @@ was copied to another folder:
 - the seed, where a result has one.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -87,10 +85,8 @@ def settings_id(settings: dict | list) -> str:
 
 
 def load_made(path: str | os.PathLike, kind: str, expected: dict) -> tuple[dict, dict]:
-    """Return the arrays and about of a sealed file.
-
-    Raises `atomic.DamagedFile`, also if about differs from `expected`, as in a swapped or old file.
-    """
+    """Return the arrays and about of a sealed file. Raises `atomic.DamagedFile`, also if about differs from `expected`,
+    as in a swapped or old file."""
     arrays, about = sealed.load_arrays(path, kind=kind)
     for name, value in expected.items():
         if about.get(name) != value:

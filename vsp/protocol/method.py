@@ -1,7 +1,5 @@
 """`Method`: anything that turns an agent into a policy, with what identifies its results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -51,10 +49,8 @@ class Method:
 def paper_method(
     config: Config | None = None, *, split: SplitPass | None = None, merge: MergePass | None = None
 ) -> Method:
-    """Return the paper's method: Algorithms 1 to 3, by default with the paper's settings of the task.
-
-    `split` and `merge` replace Algorithms 2 and 3.
-    """
+    """Return the paper's method: Algorithms 1 to 3, by default with the paper's settings of the task. `split` and
+    `merge` replace Algorithms 2 and 3."""
 
     def make(agent: Policy, task: Task, data: Episodes | None, seed: int) -> Policy:
         return algorithms.distill(agent, task, config or paper_preset(task), seed=seed, split=split, merge=merge)[0]

@@ -1,7 +1,5 @@
 """Whole files: written completely or not at all, and read only where they are regular files."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os
@@ -28,10 +26,8 @@ def data_folder(name: str) -> Path:
 
 
 def begin(path: Path) -> Path:
-    """Begin to write to `path`: return a new, empty file beside it.
-
-    Raises `DamagedFile` if `path` is there and no regular file, and OSError where nothing can be written.
-    """
+    """Begin to write to `path`: return a new, empty file beside it. Raises `DamagedFile` if `path` is there and no
+    regular file, and OSError where nothing can be written."""
     if path.exists() and not path.is_file():
         raise DamagedFile(f"{path}: {_NO_FILE}")
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -41,10 +37,8 @@ def begin(path: Path) -> Path:
 
 
 def write_bytes(path: str | os.PathLike, content: bytes) -> None:
-    """Write `content` to `path` atomically, by way of a temporary file beside it.
-
-    A reader (or a run after a crash) sees the old file or the complete new one, never a partial one.
-    """
+    """Write `content` to `path` atomically, by way of a temporary file beside it. A reader (or a run after a crash)
+    sees the old file or the complete new one, never a partial one."""
     path = Path(path)
     temporary = begin(path)
     try:
@@ -66,10 +60,8 @@ def write_text(path: str | os.PathLike, text: str) -> None:
 
 
 def read_bytes(path: str | os.PathLike, most: float = math.inf) -> bytes:
-    """Return all bytes of a regular file.
-
-    Raises `MissingFile`, and `DamagedFile` for a folder, a FIFO or a device, and for a file of more than `most` bytes.
-    """
+    """Return all bytes of a regular file. Raises `MissingFile`, and `DamagedFile` for a folder, a FIFO or a device, and
+    for a file of more than `most` bytes."""
     path = Path(path)
     if path.is_file():
         if (size := path.stat().st_size) > most:

@@ -1,7 +1,5 @@
 """Shared parts of commands: the value of --jobs, and errors in one line."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import errno
@@ -55,11 +53,9 @@ def parser(about: str | None, out: str) -> argparse.ArgumentParser:
 
 @contextlib.contextmanager
 def in_one_line(what: str = "") -> Iterator[None]:
-    """End a command and its workers with a one-line message, without traceback, for errors that its user can fix.
-
-    These are a damaged or missing file, a full or read-only disk, an interrupt or SIGTERM, and every `CommandError`.
-    `what` names the work, and precedes messages that do not name it.
-    """
+    """End a command and its workers with a one-line message, without traceback, for errors that its user can fix. These
+    are a damaged or missing file, a full or read-only disk, an interrupt or SIGTERM, and every `CommandError`. `what`
+    names the work, and precedes messages that do not name it."""
     begin = f"error: {what}: " if what else "error: "
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # all code that started kernels or workers then ends them
     try:

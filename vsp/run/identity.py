@@ -4,8 +4,6 @@ Code of this repository is identified by its name, and by a version that is rais
 identified by its qualified name, its settings, and a hash of its source and of what it uses from its own modules.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib

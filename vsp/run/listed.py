@@ -3,8 +3,6 @@
 `sha256sum -c` can check the manifests. `python -m vsp.run.manifest` writes them again for the files as they are.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shlex
@@ -16,11 +14,9 @@ MANIFEST = "MANIFEST.sha256"
 
 
 def write_listed(path: str | os.PathLike, content: str | bytes) -> None:
-    """Write `content` (a string as UTF-8) atomically, then the file's line in the manifest of its folder.
-
-    Concurrent writers keep each other's lines. If a writer is killed between the two steps, readers refuse the file
-    until it is written again.
-    """
+    """Write `content` (a string as UTF-8) atomically, then the file's line in the manifest of its folder. Concurrent
+    writers keep each other's lines. If a writer is killed between the two steps, readers refuse the file until it is
+    written again."""
     write_bytes(path, content.encode() if isinstance(content, str) else content)
     list_file(path)
 
@@ -55,10 +51,8 @@ def read_listed(path: str | os.PathLike) -> bytes:
 
 
 def _listed(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest.
-
-    A damaged line lists no file that exists, and neither does a last line that was cut.
-    """
+    """Return the SHA-256 of every file in the manifest of `folder`; an empty dictionary if there is no manifest. A
+    damaged line lists no file that exists, and neither does a last line that was cut."""
     manifest = folder / MANIFEST
     text = read_bytes(manifest).decode(errors="replace") if os.path.lexists(manifest) else ""
     return {name: digest for digest, _, name in (line.partition("  ") for line in text.split("\n")[:-1])}

@@ -1,7 +1,5 @@
 """Locks between processes."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Iterator
@@ -12,11 +10,8 @@ from .command import CommandError
 
 @contextlib.contextmanager
 def folder_lock(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
-    """Hold the lock of `folder` while the block runs, after waiting for it.
-
-    With `refusal`, a reason, it does not wait: it raises CommandError if a process holds the lock. The system frees the
-    lock however the process ends.
-    """
+    """Hold the lock of `folder` while the block runs, after waiting for it. With `refusal`, a reason, it does not wait:
+    it raises CommandError if a process holds the lock. The system frees the lock however the process ends."""
     import fcntl  # imported here: Windows, where students read files, has no fcntl
 
     Path(folder).mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,5 @@
 """Update manifests after files were changed on purpose: `python -m vsp.run.manifest [FOLDER ...]`."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

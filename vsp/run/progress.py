@@ -1,7 +1,5 @@
 """Show the progress of long work: a bar in a notebook and on a terminal, the same bar every ten seconds in a log."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os
@@ -14,10 +12,8 @@ DELAY = 2.0  # seconds of work without a bar
 
 
 def progress(items: Iterable, name: str, *, total: int, unit: str, done: int = 0, delay: float = 0.0) -> Iterator:
-    """Yield `items` and show on standard error how many of `total` are done, and the time left.
-
-    `done` of them were done before this call; the bar appears after `delay` seconds.
-    """
+    """Yield `items` and show on standard error how many of `total` are done, and the time left. `done` of them were
+    done before this call; the bar appears after `delay` seconds."""
     from tqdm import auto, notebook
 
     widget = issubclass(auto.tqdm, notebook.tqdm)  # it disappears when the work is done

@@ -7,8 +7,6 @@ A notebook has a cell tagged `parameters`, after which the run sets `out`, `quic
 only after every cell ran without an error. `runs` is the real `out`/data/runs.
 """
 
-from __future__ import annotations
-
 import argparse
 import filecmp
 import logging
@@ -145,11 +143,8 @@ def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> 
 
 
 def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode]:
-    """Return the outputs of code cell `number` in a form that is the same for every run.
-
-    Text is joined into one piece. Widgets are replaced by their static image; a widget without one, such as a progress
-    bar, is removed.
-    """
+    """Return the outputs of code cell `number` in a form that is the same for every run. Text is joined into one piece.
+    Widgets are replaced by their static image; a widget without one, such as a progress bar, is removed."""
     result: list[NotebookNode] = []
     for output in outputs:
         data = output.get("data", {})

@@ -1,7 +1,5 @@
 """Sealed files: the first line is the checksum of the rest, which is verified before anything is parsed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -39,10 +37,8 @@ def save_arrays(path: str | os.PathLike, arrays: dict[str, np.ndarray], about: d
 
 
 def load_arrays(path: str | os.PathLike, *, kind: str | tuple[str, ...]) -> tuple[dict[str, np.ndarray], dict]:
-    """Read a file that `save_arrays` wrote with this `about["kind"]`, or one of several: its arrays and `about`.
-
-    Raises `MissingFile` or `DamagedFile`.
-    """
+    """Read a file that `save_arrays` wrote with this `about["kind"]`, or one of several: its arrays and `about`. Raises
+    `MissingFile` or `DamagedFile`."""
     from safetensors import SafetensorError
     from safetensors.numpy import load
 

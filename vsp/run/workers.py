@@ -3,8 +3,6 @@
 Workers write no files, so a cluster needs no shared folder, and one process writes all files.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import platform

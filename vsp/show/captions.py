@@ -3,8 +3,6 @@
 That file lists them in the order of the notebooks, so that code cells contain only code.
 """
 
-from __future__ import annotations
-
 import html
 import os
 import tomllib
@@ -54,10 +52,8 @@ def _book() -> dict[tuple[str, str], Caption]:
 
 
 def caption_of(kind: str, name: str, *, text: str | None = None, alt: str = "") -> Caption:
-    """Return the caption of a figure or table; `kind` is "figures" or "tables".
-
-    `text` and `alt` override the entry in notebooks/captions.toml. Raises ValueError for a figure without any `alt`.
-    """
+    """Return the caption of a figure or table; `kind` is "figures" or "tables". `text` and `alt` override the entry in
+    notebooks/captions.toml. Raises ValueError for a figure without any `alt`."""
     known = _book().get((kind, name), Caption("", ""))
     caption = Caption(known.label, known.text if text is None else text, alt or known.alt)
     if kind == "figures" and not caption.alt:

@@ -1,7 +1,5 @@
 """`Laboratory`: change settings, say what to expect, distil again, and draw the result with the explorer."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any

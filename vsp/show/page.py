@@ -1,7 +1,5 @@
 """Show a widget in a notebook: the widget where a kernel runs, a picture elsewhere."""
 
-from __future__ import annotations
-
 from IPython.display import display
 
 # A notebook opened later shows an error in place of the widget. So the output always contains a picture, too. The style

@@ -1,7 +1,5 @@
 """Figures of returns: distributions, intervals, the ledger."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -74,11 +72,9 @@ def reference(ax: Axes, value: float, name: str, *, color: str = TEACHER, ls: st
 
 
 def ledger_gaps(ax: Axes, frame: pd.DataFrame, *, band: float, limit: float) -> None:
-    """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value.
-
-    `frame` (index: names) has the columns subject (a line divides them), verdict (its marker) and gap. Values inside
-    the shaded `band` count as reproduced. A gap beyond `limit` is a number with an arrow.
-    """
+    """Plot the paper's values minus the rerun's, in half-widths of the rerun's intervals: one row per value. `frame`
+    (index: names) has the columns subject (a line divides them), verdict (its marker) and gap. Values inside the shaded
+    `band` count as reproduced. A gap beyond `limit` is a number with an arrow."""
     ax.axvspan(-band, band, color="0.9", lw=0)
     ax.axvline(0, color="0.6", lw=0.6)
     ax.axhline((frame["subject"] == "teacher").sum() - 0.5, color="0.6", lw=0.6)

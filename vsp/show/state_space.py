@@ -1,7 +1,5 @@
 """Figures over a two-dimensional state: cells, codewords, arrows, force maps, episodes."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +10,7 @@ from matplotlib.patches import Rectangle
 from ..history import History
 from ..policy import VoronoiPolicy
 from ..rollouts import Episode, Policy
-from ..tasks import simplegoal
-from ..tasks.base import Task
+from ..tasks import Task, simplegoal
 from .style import BORDER, CELLS, CODEWORD, FORCE_MAP, GOAL, PIT, TEACHER, label
 
 PALE = 0.42  # how much of its colour is in a cell; the rest is white
@@ -48,10 +45,8 @@ def cells(
     ax: Axes, x: np.ndarray, y: np.ndarray, index: np.ndarray, *, fill: np.ndarray | None = None,
     width: float = 0.6, color: str = BORDER,
 ) -> None:  # fmt: skip
-    """Draw the borders of Voronoi cells, `width` points wide.
-
-    `index`: the cell of each grid point; `fill`: the place of each cell's colour in `CELLS` (k,).
-    """
+    """Draw the borders of Voronoi cells, `width` points wide. `index`: the cell of each grid point; `fill`: the place
+    of each cell's colour in `CELLS` (k,)."""
     index = index.reshape(x.shape)
     if fill is not None:
         shades = 1 - PALE * (1 - mpl.colors.to_rgba_array(CELLS)[fill[index]])
@@ -136,10 +131,8 @@ def force_bar(fig: Figure, drawn: AxesImage, axes: np.ndarray) -> None:
 def error_map(
     ax: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray, *, label: str, beside: np.ndarray | None = None
 ) -> None:
-    """Draw a non-negative quantity over a two-dimensional state, darker where larger, with a colour bar.
-
-    All axes in `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size.
-    """
+    """Draw a non-negative quantity over a two-dimensional state, darker where larger, with a colour bar. All axes in
+    `beside` (None: only `ax`) make room for the colour bar, so that they stay equal in size."""
     drawn = image(ax, x, y, error.reshape(x.shape), cmap="Reds", vmin=0)
     ax.figure.colorbar(drawn, ax=ax if beside is None else list(beside), label=label)
 

@@ -3,8 +3,6 @@
 The force map runs from purple (push left) to orange (push right).
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import io
@@ -56,20 +54,16 @@ def panels(
     n: int = 1, *, height: float = 2.3, width: float = TEXT_WIDTH, rows: int = 1, **subplots
 ) -> tuple[Figure, np.ndarray]:
     """Make a figure with n panels in `rows` rows, by default as wide as the text of an LNCS page; sizes in inches.
-
-    Returns the figure and its axes (n,). Sets the style of all later figures.
-    """
+    Returns the figure and its axes (n,). Sets the style of all later figures."""
     mpl.rcParams.update(_STYLE)
     fig, axes = plt.subplots(rows, n // rows, figsize=(width, height), layout="constrained", squeeze=False, **subplots)
     return fig, axes.ravel()
 
 
 def embedded(image: bytes, alt: str, *, width: int = 720) -> str:
-    """Return the bytes of an image file as an HTML element, `width` pixels wide, or less if there is less room.
-
-    Width and height are stated so that the page does not jump while it loads; decoding is synchronous so that replacing
-    a picture does not flicker. Raises PIL.UnidentifiedImageError if `image` is no image.
-    """
+    """Return the bytes of an image file as an HTML element, `width` pixels wide, or less if there is less room. Width
+    and height are stated so that the page does not jump while it loads; decoding is synchronous so that replacing a
+    picture does not flicker. Raises PIL.UnidentifiedImageError if `image` is no image."""
     with Image.open(io.BytesIO(image)) as opened:
         kind, height = opened.get_format_mimetype(), round(width * opened.height / opened.width)
     size = f'width="{width}" height="{height}" style="max-width: 100%; height: auto"'

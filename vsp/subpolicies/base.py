@@ -3,8 +3,6 @@
 Coefficients (p, m) have a column per action; the last row is the bias.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -74,26 +72,21 @@ class PolicyClass:
         """
         return inputs @ coefficients, lambda error: inputs.transpose(0, 2, 1) @ error
 
-    def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> pd.DataFrame:
+    def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> "pd.DataFrame":
         """Return the terms of the output at `state` (d,): m rows, one per action; a column per feature and the bias."""
         import pandas as pd  # here, because it takes long to import
 
         return pd.DataFrame(coefficients.T * np.append(self.features(state), 1.0), columns=list(self.rows))
 
     def expression(self, column: np.ndarray, digits: int | None, symbol: Callable[[str], str] = str) -> str:
-        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name.
-
-        `digits` is the number of decimals. None prints each number exactly, in its shortest form, without terms that
-        are zero.
-        """
+        """Return one action's output as text, for coefficients (p,); `symbol` formats a variable's name. `digits` is
+        the number of decimals. None prints each number exactly, in its shortest form, without terms that are zero."""
         return combination(column, [*map(symbol, self.terms), ""], digits)
 
 
 def combination(column: np.ndarray, names: Sequence[str], digits: int | None) -> str:
     """Return a sum of `names`, each times its coefficient in `column` (p,), as text; an empty name is a constant.
-
-    `digits` as in `PolicyClass.expression`.
-    """
+    `digits` as in `PolicyClass.expression`."""
     terms = [(c, name) for c, name in zip(column, names, strict=True) if c or digits is not None]
     parts = [f"{'-' if c < 0 else '+'} {number(abs(c), digits)} {name}".rstrip() for c, name in terms] or ["+ 0"]
     text = " ".join(parts)

@@ -3,8 +3,6 @@
 To add one, write a function that takes a task and returns a `PolicyClass`, and pass it as `Config.sub_policy`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -42,10 +40,8 @@ POLICY_CLASSES = {"constant": constant, "linear": linear, "quadratic": quadratic
 
 
 def policy_class(sub_policy: SubPolicy, task: Task) -> PolicyClass:
-    """Return the class of sub-policies for `task`: by its name, or by a function of the task.
-
-    Raises ValueError for an unknown name, and for a function that returns something else.
-    """
+    """Return the class of sub-policies for `task`: by its name, or by a function of the task. Raises ValueError for an
+    unknown name, and for a function that returns something else."""
     if not callable(sub_policy):
         check_choice("sub_policy", sub_policy, POLICY_CLASSES)
         return POLICY_CLASSES[sub_policy](task)

@@ -1,7 +1,5 @@
 """The sub-policies of all cells, stacked in one array, so that one step trains them all."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .base import PolicyClass

@@ -4,8 +4,6 @@ Every function of states takes a batch of n and returns a batch. To add a task, 
 `mountaincar.py` and enter its `TASK` in `registry.py`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

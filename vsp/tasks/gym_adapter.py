@@ -3,8 +3,6 @@
 This suits physics engines, which step one state at a time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -41,10 +39,8 @@ def _draw_seeds(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def begin_live(name: str, starts: np.ndarray) -> np.ndarray:
-    """Return a freshly reset environment per start, which `end_live` closes. (n,) objects
-
-    Raises ValueError for an environment of old Gym's API.
-    """
+    """Return a freshly reset environment per start, which `end_live` closes. (n,) objects Raises ValueError for an
+    environment of old Gym's API."""
     episodes = np.empty(len(starts), dtype=object)
     with ExitStack() as opened:  # closes them unless all begin
         for i, (seed,) in enumerate(starts):
@@ -83,10 +79,8 @@ def _see_live(states: np.ndarray) -> np.ndarray:
 def _step_live(
     outcome: Outcome | None, states: np.ndarray, actions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Step every environment. `outcome` tells whether an episode that ended succeeded; None: success is undefined.
-
-    An episode that the environment cuts off by itself counts as one that reached the step limit.
-    """
+    """Step every environment. `outcome` tells whether an episode that ended succeeded; None: success is undefined. An
+    episode that the environment cuts off by itself counts as one that reached the step limit."""
     rewards, outcomes = np.zeros(len(states)), np.full(len(states), RUNNING)
     for i, (episode, action) in enumerate(zip(states, actions)):
         action = action.astype(episode.env.action_space.dtype)
@@ -146,10 +140,8 @@ def live_task(
     name: str, low: np.ndarray, high: np.ndarray, action_low: np.ndarray, action_high: np.ndarray, *, max_steps: int,
     outcome: Outcome | None = None,
 ) -> Task:  # fmt: skip
-    """Return the `Task` of the environment `name` with the given boxes (d,) and (m,).
-
-    Each episode opens the environment when it begins, at most `AT_ONCE` together.
-    """
+    """Return the `Task` of the environment `name` with the given boxes (d,) and (m,). Each episode opens the
+    environment when it begins, at most `AT_ONCE` together."""
     inputs, outputs = tuple(f"s{i}" for i in range(len(low))), tuple(f"a{j}" for j in range(len(action_low)))
     return Task(
         name, inputs, outputs, inputs, low, high, action_low, action_high, max_steps, _draw_seeds,

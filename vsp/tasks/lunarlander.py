@@ -1,7 +1,5 @@
 """LunarLanderContinuous-v3: Gymnasium's environment, stepped by its physics engine, with names for its variables."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MountainCarContinuous-v0: Gymnasium's environment, with its dynamics on arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .base import GOAL, RUNNING, Task
@@ -15,11 +13,8 @@ def start(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def step(states: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gymnasium's `Continuous_MountainCarEnv.step`, for a batch.
-
-    As in Gymnasium, the cost uses the action *before* it is clipped to [-1, 1], and the state is float32 after the
-    first step.
-    """
+    """Gymnasium's `Continuous_MountainCarEnv.step`, for a batch. As in Gymnasium, the cost uses the action *before* it
+    is clipped to [-1, 1], and the state is float32 after the first step."""
     position, velocity = states.T
     force = np.clip(actions[:, 0], -1.0, 1.0)
     velocity = np.clip(velocity + 0.0015 * force - 0.0025 * np.cos(3 * position), -0.07, 0.07)

@@ -1,7 +1,5 @@
 """Pendulum-v1: Gymnasium's environment, with its dynamics on arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .base import RUNNING, Task

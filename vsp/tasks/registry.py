@@ -1,7 +1,5 @@
 """The tasks by name."""
 
-from __future__ import annotations
-
 import difflib
 import importlib
 from collections.abc import Callable, Sequence
@@ -45,10 +43,8 @@ def is_own(task: Task) -> bool:
 
 def get_task(name: str | Task) -> Task:
     """Return the `Task` called `name`: one of `task_names()`, or any environment in Gymnasium's registry.
-
     "module:Name-v0" imports the module that registers Name-v0 first. A `Task` is returned as it is. Raises ValueError
-    for an unknown name, with the most similar one, and as `gymnasium_task` does; what an import raises.
-    """
+    for an unknown name, with the most similar one, and as `gymnasium_task` does; what an import raises."""
     if isinstance(name, Task):
         return name
     if not isinstance(name, str) or name not in _ADDED:
@@ -57,10 +53,8 @@ def get_task(name: str | Task) -> Task:
 
 
 def _registered(name: str) -> str:
-    """Return `name` without its module, which is imported, if any.
-
-    Raises ValueError for a name that Gymnasium does not know. The message suggests a similar name if there is one.
-    """
+    """Return `name` without its module, which is imported, if any. Raises ValueError for a name that Gymnasium does not
+    know. The message suggests a similar name if there is one."""
     if not isinstance(name, str):
         raise ValueError(f"task is a {type(name).__name__}, expected a name or a Task: are the arguments in order?")
     module, colon, name = name.rpartition(":")
@@ -112,11 +106,9 @@ def _names(what: str, given: Sequence[str] | None, plain: tuple[str, ...]) -> tu
 
 
 def saved_task(name: str, inputs: Sequence[str], outputs: Sequence[str], box: dict[str, np.ndarray]) -> Task:
-    """Return the task of a saved policy, with the names and the `BOX` that were saved.
-
-    If no such environment is registered, the task has no dynamics: its policy can act, but no episode can run. Raises
-    ValueError if the environment of that name has another box.
-    """
+    """Return the task of a saved policy, with the names and the `BOX` that were saved. If no such environment is
+    registered, the task has no dynamics: its policy can act, but no episode can run. Raises ValueError if the
+    environment of that name has another box."""
     inputs, outputs = tuple(inputs), tuple(outputs)
     try:
         known = get_task(name.rpartition(":")[2])  # a file must not make us import a module

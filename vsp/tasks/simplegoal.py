@@ -1,7 +1,5 @@
 """SimpleGoal (paper, section "Navigation task"): its dynamics on arrays, and a Gymnasium class over them."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 
@@ -19,12 +17,9 @@ def start(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def step(states: np.ndarray, actions: np.ndarray, *, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Move by a tenth of the action; the reward is ten times the distance gained towards the origin.
-
-    Entering the goal pays +10 and entering the pit -10 instead. The paper's text adds them to the progress, but its
-    numbers do not: its teacher's minimum is exactly -10.0. `margin` makes the goal smaller, and the pit larger, on
-    every side.
-    """
+    """Move by a tenth of the action; the reward is ten times the distance gained towards the origin. Entering the goal
+    pays +10 and entering the pit -10 instead. The paper's text adds them to the progress, but its numbers do not: its
+    teacher's minimum is exactly -10.0. `margin` makes the goal smaller, and the pit larger, on every side."""
     moved = np.clip(states + STRIDE * np.clip(actions, -1.0, 1.0), 0.0, 1.0)
     progress = 10.0 * (np.hypot(states[:, 0], states[:, 1]) - np.hypot(moved[:, 0], moved[:, 1]))
     in_goal = (moved < GOAL_EDGE - margin).all(axis=1)

@@ -4,8 +4,6 @@ All are layers with one activation between them. `POLICIES` has the policy class
 a setting, a class or a tensor, is refused by name: it might act.
 """
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Callable
@@ -89,7 +87,7 @@ _HARMLESS = set(
 _FLATTEN = "stable_baselines3.common.torch_layers.FlattenExtractor"  # does nothing to an observation of one dimension
 
 
-def actor_of(saved: Saved) -> Actor:
+def actor_of(saved: "Saved") -> Actor:
     """Return the network that acts. Raises Unknown, by name, for anything that is not modelled here."""
     policy = saved.setting("policy_class")
     name = policy.name if isinstance(policy, Thing) and policy.given is None else "one that only its own code can build"
@@ -125,7 +123,7 @@ def actor_of(saved: Saved) -> Actor:
     return Actor(layers, activation, squashed, clip if clip > 0 else np.inf)
 
 
-def _policy_settings(saved: Saved) -> dict:
+def _policy_settings(saved: "Saved") -> dict:
     found = saved.setting("policy_kwargs")
     found = found.items if isinstance(found, Thing) and found.name == "collections.OrderedDict" else found or {}
     if not isinstance(found, dict):
@@ -180,10 +178,8 @@ def layers_of(
     tensors: dict[str, np.ndarray], *networks: str, epsilon: float = 0.001, biased: bool = True
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return the layers of these networks in float32, one after the other; batch normalisation is merged into the next.
-
     A layer may lack its bias unless `biased`. Raises Unknown for a module that is neither, and ValueError for layers
-    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`.
-    """
+    that do not fit each other and for numbers that are not finite or beyond `MOST_WEIGHT`."""
     layers: list[tuple[np.ndarray, np.ndarray]] = []
     shift, scale = np.zeros(1), np.ones(1)
     for module, parts in (found for network in networks for found in _modules(tensors, network)):
@@ -227,13 +223,10 @@ def _modules(tensors: dict[str, np.ndarray], network: str) -> list[tuple[str, di
     return found
 
 
-def check_spaces(found: Callable[[str], Any], task: Task) -> None:
+def check_spaces(found: Callable[[str], Any], task: "Task") -> None:
     """Raise Unfit unless an agent's "observation_space" and "action_space", which `found` returns as descriptions or
-    spaces, are the boxes of the task.
-
-    Observations without limits fit any, with a warning: some environments had none in older versions, but a wrapper
-    that changes observations may have taken the limits away, too.
-    """
+    spaces, are the boxes of the task. Observations without limits fit any, with a warning: some environments had none
+    in older versions, but a wrapper that changes observations may have taken the limits away, too."""
     boxes = {"observation_space": (task.low, task.high), "action_space": (task.action_low, task.action_high)}
     for name, ours in boxes.items():
         space, free = found(name), name == "observation_space"

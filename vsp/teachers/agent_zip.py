@@ -5,8 +5,6 @@ runs here: `inert.described` says what they describe. The memory that the tensor
 is made.
 """
 
-from __future__ import annotations
-
 import base64
 import io
 import json
@@ -61,10 +59,8 @@ class _View(NamedTuple):
 
 
 def read_zip(path: Path) -> Saved:
-    """Return what a Stable-Baselines3 zip says. No code from the file runs.
-
-    Raises FileNotFoundError, and `atomic.DamagedFile` for a file that is no such zip or exceeds the limits above.
-    """
+    """Return what a Stable-Baselines3 zip says. No code from the file runs. Raises FileNotFoundError, and
+    `atomic.DamagedFile` for a file that is no such zip or exceeds the limits above."""
     if not path.exists():
         raise FileNotFoundError(f"{path}: no such file, expected a zip that Stable-Baselines3's `save` wrote")
     try:
@@ -126,10 +122,8 @@ def _old_tensors(content: bytes) -> dict[str, np.ndarray]:
 
 
 def _views(found: Any) -> dict[str, _View]:
-    """Return the tensors that torch's pickle of a `state_dict` describes, but those of target networks, by name.
-
-    Raises ValueError for another pickle, and for tensors that need too much memory.
-    """
+    """Return the tensors that torch's pickle of a `state_dict` describes, but those of target networks, by name. Raises
+    ValueError for another pickle, and for tensors that need too much memory."""
     if not isinstance(found, Thing) or found.name != "collections.OrderedDict":
         raise ValueError("the policy is no dictionary of tensors, expected one as torch writes it")
     tensors = ((str(name), value) for name, value in found.items.items())

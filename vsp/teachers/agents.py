@@ -1,7 +1,5 @@
 """One door for every agent: the file of one, a model in memory, a function of observations."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import os
@@ -12,8 +10,7 @@ import numpy as np
 
 from ..policy import PiecewisePolicy
 from ..rollouts import Policy
-from ..tasks.base import Task
-from ..tasks.registry import get_task
+from ..tasks import Task, get_task
 from .actors import check_spaces
 from .teacher import Teacher, load_teacher
 
@@ -22,10 +19,8 @@ if TYPE_CHECKING:
 
 
 class Agent:
-    """A teacher made from a function of observations (n, d) that returns actions (n, m).
-
-    `identify` returns what its `digest` is made of, None if nobody knows.
-    """
+    """A teacher made from a function of observations (n, d) that returns actions (n, m). `identify` returns what its
+    `digest` is made of, None if nobody knows."""
 
     def __init__(self, act: Callable[[np.ndarray], np.ndarray], identify: Callable[[], bytes | None] = lambda: None):
         self._act, self._identify, self._asked = act, identify, False
@@ -37,10 +32,8 @@ class Agent:
         return None if known is None else hashlib.sha256(known).hexdigest()
 
     def predict(self, obs: np.ndarray) -> tuple[np.ndarray, None]:
-        """Actions (n, m) for observations (n, d), or (m,) for one (d,).
-
-        Raises ValueError if the first answer is not the same twice: a sampled action carries no information.
-        """
+        """Actions (n, m) for observations (n, d), or (m,) for one (d,). Raises ValueError if the first answer is not
+        the same twice: a sampled action carries no information."""
         actions = np.asarray(self._act(obs))
         if not self._asked and not np.array_equal(actions, np.asarray(self._act(obs)), equal_nan=True):
             raise ValueError(
@@ -94,7 +87,7 @@ def digest_of(agent: Policy) -> str:
     return digest
 
 
-def _weights(model: Any, statistics: Normalization | None) -> bytes | None:
+def _weights(model: Any, statistics: "Normalization | None") -> bytes | None:
     """Return the weights of a Stable-Baselines3 model and its statistics of observations; None for other objects."""
     if hasattr(model, "digest"):
         return str(model.digest).encode()
@@ -105,7 +98,7 @@ def _weights(model: Any, statistics: Normalization | None) -> bytes | None:
     return b"".join(parts) + _bytes(statistics)
 
 
-def _bytes(statistics: Normalization | None) -> bytes:
+def _bytes(statistics: "Normalization | None") -> bytes:
     return b"".join(np.asarray(part).tobytes() for part in statistics or ())
 
 

@@ -6,8 +6,6 @@ stays a `Thing`: the name of what would be called, and what it would get. Only s
 nothing nested is printed, because that may never end.
 """
 
-from __future__ import annotations
-
 import pickletools
 import re
 from dataclasses import dataclass, field

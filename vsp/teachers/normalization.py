@@ -1,7 +1,5 @@
 """Normalised observations: the statistics of Stable-Baselines3's `VecNormalize`, and what tells they are needed."""
 
-from __future__ import annotations
-
 import os
 import re
 import warnings
@@ -35,10 +33,8 @@ class Normalization(NamedTuple):
 
 def read_normalization(path: str | os.PathLike, d: int) -> Normalization | None:
     """Return the statistics of d observations in a pickle of `VecNormalize`, without running it; None if it says that
-    observations are not normalised.
-
-    Raises `MissingFile`, `DamagedFile`, and ValueError for statistics that do not fit.
-    """
+    observations are not normalised. Raises `MissingFile`, `DamagedFile`, and ValueError for statistics that do not
+    fit."""
     content = atomic.read_bytes(path, LARGEST)
     try:
         saved = described(content)
@@ -59,10 +55,8 @@ def read_normalization(path: str | os.PathLike, d: int) -> Normalization | None:
 
 def statistics_of(normalize: Any, d: int = -1) -> Normalization | None:
     """Return the statistics in what a user gives: a file of `VecNormalize`, such an object, or (mean, variance); None
-    if they say that observations are not normalised. d is the number of observations; -1: any.
-
-    Raises as `read_normalization` does, and ValueError for anything else.
-    """
+    if they say that observations are not normalised. d is the number of observations; -1: any. Raises as
+    `read_normalization` does, and ValueError for anything else."""
     if isinstance(normalize, str | os.PathLike):
         return read_normalization(normalize, d)
     if hasattr(normalize, "obs_rms") and hasattr(normalize, "epsilon"):
@@ -86,10 +80,7 @@ def _of_running(wrapper: Any, d: int) -> Normalization | None:
 
 def of_model(model: Any, normalize: Any = None) -> Normalization | None:
     """Return the statistics of a model in memory: those that `normalize` gives, or those of its environment; None if it
-    has none.
-
-    Raises ValueError if it has none, but keeps what an on-policy agent keeps only beside them.
-    """
+    has none. Raises ValueError if it has none, but keeps what an on-policy agent keeps only beside them."""
     d = (getattr(getattr(model, "observation_space", None), "shape", None) or (-1,))[0]
     if not (normalize is None or isinstance(normalize, bool)):
         return statistics_of(normalize, d)
@@ -135,10 +126,8 @@ def checked(moments: dict, epsilon: float, clip: float, d: int, where: str) -> N
 
 
 def statistics_beside(path: Path) -> Path | None:
-    """Return the file of `VecNormalize` that lies beside the zip at `path`; None: there is none.
-
-    A file that is named after another zip in the same folder is that agent's.
-    """
+    """Return the file of `VecNormalize` that lies beside the zip at `path`; None: there is none. A file that is named
+    after another zip in the same folder is that agent's."""
     name, zips = path.with_suffix(""), [one.stem for one in path.parent.glob("*.zip")]
     named = [file for folder in _folders(path) for file in sorted(folder.iterdir()) if _NAMED.search(file.name)]
     owners = {file: max((stem for stem in zips if file.name.startswith(stem)), key=len, default="") for file in named}
@@ -188,9 +177,7 @@ def trained_on(path: Path) -> str:
 
 def _told(path: Path, name: str) -> list[Any]:
     """Return what a file of settings says of `name`, anywhere in it. Its YAML is read as plain nodes: nothing is built.
-
-    Raises ValueError for a file that is not read whole.
-    """
+    Raises ValueError for a file that is not read whole."""
     import yaml  # here: few agents have such a file
 
     with open(path, "rb") as file:

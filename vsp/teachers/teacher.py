@@ -1,7 +1,5 @@
 """Load a trained actor as a teacher and act with it in batches. This needs only NumPy: some matrix products."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -13,8 +11,7 @@ import numpy as np
 
 from ..checks import check_choice, check_observations
 from ..run import atomic, listed
-from ..tasks.base import Task
-from ..tasks.registry import get_task, task_names
+from ..tasks import Task, get_task, task_names
 from . import actors
 from .actors import Actor, layers_of, part_of
 
@@ -44,7 +41,7 @@ class Teacher:
         *,
         card: dict | None = None,
         critic: dict[str, np.ndarray] | None = None,
-        normalization: Normalization | None = None,
+        normalization: "Normalization | None" = None,
     ):
         self.task, self.card, self.critic = get_task(task), card or {}, critic or {}
         self.actor = weights if isinstance(weights, Actor) else Actor(layers_of(weights, "mu"))

@@ -3,8 +3,8 @@
 `faithful.py` fits a few cells to the teacher's actions and return, `tuned.py` to the return alone, `limit.py` does so
 from the best policy. `simplification.py` reduces cells and numbers.
 
-They share, from the ground up: `units.py`, cells and labelled states as arrays; `anneal.py` and `search.py`, which fit
-the ones to the others; `population.py` and `tune.py`, which play candidates and raise their return.
+They share, from the ground up: `units.py`, cells and labelled states as arrays; `search.py`, which fits the ones to
+the others; `tune.py`, which plays candidates and raises their return.
 """
 
 from .config import Faithful, Tuned, faithful_preset, tuned_preset

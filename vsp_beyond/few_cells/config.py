@@ -1,7 +1,5 @@
 """`Tuned` and `Faithful`: the settings of `distill_tuned` and `distill_faithfully`, and presets for any task."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 
@@ -65,7 +63,7 @@ class Tuned:
         if last > first:
             raise ValueError(f"final_temperature is {last}, expected at most initial_temperature = {first}")
 
-    def quick(self) -> Tuned:
+    def quick(self) -> "Tuned":
         """The same method in a tenth of the steps: for a first look, not for results."""
         return _tenth(self, "n_episodes", "n_steps", "n_correction_episodes", "n_generations", "n_validation")
 
@@ -113,7 +111,7 @@ class Faithful:
         if self.min_r2 is not None:
             check_number("min_r2", self.min_r2, least=0.0, most=1.0)
 
-    def quick(self) -> Faithful:
+    def quick(self) -> "Faithful":
         """The same method in a tenth of the work: for a first look, not for results."""
         return _tenth(self, "n_episodes", "n_restarts", "n_generations", "n_validation")
 
@@ -153,11 +151,9 @@ _FAITHFUL = {
 
 
 def faithful_preset(task: str | Task, *, n_cells: int | None = None, min_r2: float | None = None) -> Faithful:
-    """Return the settings of `distill_faithfully` for any task; `n_cells` and `min_r2` as in `Faithful`.
-
-    For a task without tested settings, they follow from its dimensions, its length, and whether it has a physics
-    engine, which steps one state at a time.
-    """
+    """Return the settings of `distill_faithfully` for any task; `n_cells` and `min_r2` as in `Faithful`. For a task
+    without tested settings, they follow from its dimensions, its length, and whether it has a physics engine, which
+    steps one state at a time."""
     task = get_task(task)
     generations, tuning, validation = (40, 20, 200) if task.one_by_one else (100, 100, 1000)
     by_size = Faithful(
@@ -191,10 +187,8 @@ TUNED = {
 
 
 def tuned_preset(task: str | Task) -> Tuned:
-    """Return the settings of `distill_tuned` for any task, chosen for a high return.
-
-    For a task without tested settings, they follow from its size, as those of `faithful_preset` do.
-    """
+    """Return the settings of `distill_tuned` for any task, chosen for a high return. For a task without tested
+    settings, they follow from its size, as those of `faithful_preset` do."""
     task = get_task(task)
     tuning, validation = (20, 200) if task.one_by_one else (60, 500)
     by_size = Tuned(

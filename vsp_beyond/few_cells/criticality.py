@@ -1,7 +1,5 @@
 """What the critics of a teacher say: the value of an action, and the cost of a wrong one."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 
@@ -11,10 +9,8 @@ from vsp.teachers.actors import Actor, layers_of
 
 
 class Critics:
-    """The critics of a teacher. Values are in units of the discounted return.
-
-    Raises ValueError for a teacher without critics, or whose critics give more than a value, as TQC's quantiles.
-    """
+    """The critics of a teacher. Values are in units of the discounted return. Raises ValueError for a teacher without
+    critics, or whose critics give more than a value, as TQC's quantiles."""
 
     def __init__(self, teacher: Any):
         tensors, self.teacher = getattr(teacher, "critic", {}), teacher
@@ -26,11 +22,9 @@ class Critics:
             raise ValueError("the critics give several numbers for an action, expected one value: not those of TQC")
 
     def criticality(self, obs: np.ndarray) -> np.ndarray:
-        """Return the cost of a wrong action in the states (n, d): the weights of VIPER (Bastani et al. 2018). (n,)
-
-        This is the value of the teacher's own action minus that of the worst corner of the action box, by the lower of
-        its critics; at least 0.
-        """
+        """Return the cost of a wrong action in the states (n, d), the weights of VIPER (Bastani et al. 2018): the value
+        of the teacher's own action minus that of the worst corner of the action box, by the lower of its critics; at
+        least 0. (n,)"""
         states = self.teacher.inputs(obs)
         corners = np.array(list(itertools.product((-1, 1), repeat=len(self.teacher.half))), dtype=np.float32)
         # The critics see actions in units of the action box, from -1 to 1

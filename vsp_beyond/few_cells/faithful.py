@@ -4,8 +4,6 @@ First it finds the cells with the least action error. Then CMA-ES raises their r
 the least error. The return is a constraint, not the objective: a return above the teacher's earns nothing.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,17 +12,15 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
+from vsp import Policy, Task, VoronoiPolicy, get_task
 from vsp.checks import check_seed
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, visited_states
+from vsp.rollouts import rollout, visited_states
 from vsp.run.progress import steps
-from vsp.tasks.base import GOAL, Task
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL
 
 from .config import Faithful
-from .population import rollout_population
 from .search import even_moves, least_error
-from .tune import cma_es, is_snapshot, score
+from .tune import cma_es, is_snapshot, rollout_population, score
 from .units import LabelledStates, ScaledCells, Scaling, needed_only, spread, squared_error, unexplained, warn_outside
 
 VERSION = 1  # raise it when the same arguments give another policy
@@ -44,11 +40,9 @@ def distill_faithfully(
     teacher: Policy, task: str | Task, config: Faithful, *, seed: int
 ) -> tuple[VoronoiPolicy, pd.DataFrame]:
     """Distil `teacher` to at most `config.n_cells` cells that act like it and are as good. Same arguments, same policy.
-
     Returns the policy and its history, one row per candidate: stage ("fit", "tune"), r2 (of the limited actions, on the
     states of the fit), gap (mean return less the failure penalty, minus the teacher's from the same starts), kept. The
-    most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does.
-    """
+    most visited cell comes first. Warns if no such policy is found. Raises ValueError as `distill` does."""
     check_seed(seed)
     task = get_task(task)
     starts, init, validation, search = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(4))
@@ -139,12 +133,10 @@ class _Candidates:
 
 
 def kept(r2: np.ndarray, gap: np.ndarray, *, least_gap: float, min_r2: float | None) -> int:
-    """Return which candidate is kept, by the R² (c,) and the gap (c,) of all candidates. The first is the closest.
-
-    It is the one with the highest R² among those with a gap of at least `least_gap`. If there is none, it is the one
-    with the highest return among those with at most `NEAR` times the error of the first. With `min_r2`, it is the one
-    with the highest return among those with at least this R², or else the one with the highest R².
-    """
+    """Return which candidate is kept, by the R² (c,) and the gap (c,) of all candidates. The first is the closest. It
+    is the one with the highest R² among those with a gap of at least `least_gap`. If there is none, it is the one with
+    the highest return among those with at most `NEAR` times the error of the first. With `min_r2`, it is the one with
+    the highest return among those with at least this R², or else the one with the highest R²."""
     if min_r2 is not None:
         accepted, value, instead = r2 >= min_r2, gap, r2
     else:
@@ -159,9 +151,7 @@ def _tune(
 ) -> Iterator[ScaledCells]:  # fmt: skip
     """Run CMA-ES (Hansen 2016) on the error plus a penalty for a return below its target; yield the solution
     `SNAPSHOTS` times. Each generation is rolled out from some starts of the `pool`, where the teacher scores `goals`.
-
-    Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little.
-    """
+    Steps are scaled so that each raises the error equally. So the search goes where fidelity costs little."""
     config, scaling = candidates.config, candidates.scaling
     move = even_moves(labelled, cells)
     step = np.sqrt(FIRST_STEP * max(squared_error(labelled, cells), 1e-6) / cells.vector.size)
@@ -179,11 +169,8 @@ def _tune(
 
 
 def _cost(errors: np.ndarray, missed: np.ndarray, tolerance: float, min_r2: float | None) -> np.ndarray:
-    """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,).
-
-    It is the error plus a penalty for a missed return. With `min_r2`, it is the missed return plus a penalty for an
-    error beyond it.
-    """
+    """Return the cost to minimise, from the unexplained variances `errors` and the missed returns `missed` (p,): the
+    error plus a penalty for a missed return; with `min_r2`, the missed return plus a penalty for an error beyond it."""
     if min_r2 is None:
         return errors + PRICE / tolerance * np.maximum(0.0, missed)
     return missed / tolerance + np.maximum(0.0, errors - (1.0 - min_r2)) / BEYOND

@@ -5,8 +5,6 @@ is at most `LOSS` below the highest and whose return is level with the agent's. 
 tuned on the return. Finished stages are kept in files, from which a longer call goes on.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os
@@ -19,13 +17,12 @@ from functools import cached_property
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from vsp.evaluation import Likeness, likeness, start_states
-from vsp.policy import VoronoiPolicy
-from vsp.protocol import interval
-from vsp.protocol.job import Job, make_all, provenance
-from vsp.rollouts import Policy, rollout, visited_states
-from vsp.tasks.base import Task
-from vsp.teachers.agents import digest_of
+from vsp import Policy, Task, VoronoiPolicy, start_states
+from vsp.evaluation import Likeness, likeness
+from vsp.protocol import Job, interval
+from vsp.protocol.job import make_all, provenance
+from vsp.rollouts import rollout, visited_states
+from vsp.teachers import digest_of
 
 from .config import Faithful, faithful_preset
 from .faithful import distill_faithfully
@@ -121,12 +118,9 @@ class Tried:
     level: bool
 
     @classmethod
-    def of(cls, stage: Stage, folder: str | os.PathLike) -> Tried:
-        """Make the stage, unless its file exists, and judge it.
-
-        It is level if it falls short by no more than half of the paired 95 % interval, or than `SHARE` of the agent's
-        distance to the best constant action.
-        """
+    def of(cls, stage: Stage, folder: str | os.PathLike) -> "Tried":
+        """Make the stage, unless its file exists, and judge it. It is level if it falls short by no more than half of
+        the paired 95 % interval, or than `SHARE` of the agent's distance to the best constant action."""
         make_all([stage], folder, stage.name)
         arrays, task = stage.load(folder)[0], stage.seen.task
         maps = arrays.pop("coefficients")
@@ -144,10 +138,8 @@ def fewest(
     sizes: Sequence[int] = SIZES,
 ) -> tuple[Tried, list[Tried], list[str]]:  # fmt: skip
     """Return the chosen stage, all finished ones, and the names of those that were left out because the time was over.
-
     `until` is a time of `time.monotonic`; it decides only which stages are finished, not what they give. Raises
-    `TimeUp` if none is.
-    """
+    `TimeUp` if none is."""
     seen, tried = Seen(agent, task, replace(faithful_preset(task), margin=0.0), seed), list[Tried]()
     work = [Stage(seen, size, seed) for size in sizes]
     for stage in work:  # which may grow

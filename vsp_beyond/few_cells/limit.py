@@ -1,23 +1,15 @@
-"""Find how close a few cells come to the best return: distil the best policy, then tune on the return.
-
-The result of such a search depends on its initial policy. So several are tuned briefly, and only the best is tuned to
-the end.
-"""
-
-from __future__ import annotations
+"""Find how close a few cells come to the best return: distil the best policy, then tune on the return. The result
+depends on the initial policy, so several are tuned briefly, and only the best to the end."""
 
 import warnings
 from dataclasses import replace
 
 import numpy as np
 
+from vsp import Policy, Task, VoronoiPolicy, get_task, load_teacher, task_names
 from vsp.checks import check_seed
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout
+from vsp.rollouts import rollout
 from vsp.run.progress import steps
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task, task_names
-from vsp.teachers.teacher import load_teacher
 
 from ..optimum.references import TASKS, best_policy
 from .config import TUNED, Tuned, faithful_preset, tuned_preset
@@ -90,6 +82,5 @@ def _screened(teacher: Policy, task: Task, config: Tuned, seed: int, *, closest:
 
 
 def _tuned(policy: VoronoiPolicy, teacher: Policy, task: Task, config: Tuned, seed: int) -> VoronoiPolicy:
-    """Tune `policy` with the settings `config`."""
     config = replace(config, n_cells=len(policy), n_restarts=1, n_corrections=0)
     return distill_tuned(teacher, task, config, seed=seed, start=policy)[0]

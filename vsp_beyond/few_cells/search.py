@@ -5,16 +5,16 @@ and a small slope beyond the limits. Softness and slope both fall stage by stage
 Descents that fall behind are stopped early (successive halving, Jamieson & Talwalkar 2016).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 
 from vsp.run.progress import steps
 
-from .units import LabelledStates, ScaledCells, expected_loss, squared_error, temperature_unit
+from .units import LabelledStates, ScaledCells, expected_loss, joined, squared_error, temperature_unit
 
 N_STAGES = 16
 TEMPERATURES = np.geomspace(1.0, 0.002, N_STAGES)  # units as in `anneal`
@@ -66,21 +66,24 @@ def descend(
     """Optimise `cells` by L-BFGS on the expected loss, stage by stage, in units in which the inputs of a cell are
     uncorrelated."""
     for stage in stages:
-        cells = _descend_at(stage, labelled, cells, n_iterations)
+        temperature = temperature_unit(labelled, len(cells)) * TEMPERATURES[stage]
+        bases = uncorrelated(labelled, cells.shares(labelled.states, temperature))
+        loss = partial(whole_loss, labelled=labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
+        cells = least(loss, cells, bases, np.sqrt(TEMPERATURES[stage]), n_iterations)
     return cells
 
 
-def _descend_at(stage: int, labelled: LabelledStates, cells: ScaledCells, n_iterations: int) -> ScaledCells:
-    temperature = temperature_unit(labelled, len(cells)) * TEMPERATURES[stage]
-    bases = uncorrelated(labelled, cells.shares(labelled.states, temperature))
-    move, pull_back = moves(cells, bases, np.sqrt(TEMPERATURES[stage]))
+def least(loss: Callable[..., tuple], start: Any, bases: np.ndarray, units: float, n_iterations: int) -> Any:
+    """Minimise `loss`, a function of such as `start` that returns a value and its gradient with respect to `vector`, by
+    L-BFGS in the units of `moves`."""
+    move, pull_back = moves(start, bases, units)
 
-    def loss(step: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = whole_loss(move(step), labelled, temperature=temperature, clip_slope=CLIP_SLOPES[stage])
+    def of_step(step: np.ndarray) -> tuple[float, np.ndarray]:
+        value, gradient = loss(move(step))
         return value, pull_back(gradient)
 
     options = {"maxiter": n_iterations, "maxcor": 20}
-    return move(minimize(loss, np.zeros(cells.vector.size), jac=True, method="L-BFGS-B", options=options).x)
+    return move(minimize(of_step, np.zeros(start.vector.size), jac=True, method="L-BFGS-B", options=options).x)
 
 
 def whole_loss(cells: ScaledCells, labelled: LabelledStates, **about: float) -> tuple[float, np.ndarray]:
@@ -100,28 +103,25 @@ def whole_loss(cells: ScaledCells, labelled: LabelledStates, **about: float) -> 
 
 
 def uncorrelated(labelled: LabelledStates, shares: np.ndarray) -> np.ndarray:
-    """Return bases of the coefficients in which a step of length 1 changes the mean squared output of a cell by
-    about 1. (k, p, p)
-
-    `shares` (k, n): how much of each state belongs to each cell.
-    """
+    """Return bases of the coefficients in which a step of length 1 changes the mean squared output of a cell by about
+    1. (k, p, p) `shares` (k, n): how much of each state belongs to each cell."""
     inputs, p = labelled.inputs, labelled.inputs.shape[1]
     products = np.stack([(inputs * share[:, None]).T @ inputs for share in shares]) / len(inputs)
     return np.linalg.cholesky(np.linalg.inv(products + RIDGE * np.eye(p)))
 
 
-def moves(cells: ScaledCells, bases: np.ndarray, codeword_units: np.ndarray | float):
-    """Return two functions: one from a step in these units to the moved cells, and one from a gradient with respect to
-    `ScaledCells.vector` to the gradient with respect to the step."""
-    cut, shape = cells.codewords.size, cells.coefficients.shape
+def moves(start: Any, bases: np.ndarray, units: np.ndarray | float):
+    """Return two functions: one from a step to the moved `start`, and one from a gradient with respect to its `vector`
+    to the gradient with respect to the step. The last of its `parts` are maps, which move in the `bases`; its other
+    numbers move in `units`."""
+    vector, maps = start.vector, start.parts[-1]
+    cut = vector.size - maps.size
 
-    def move(step: np.ndarray) -> ScaledCells:
-        codewords = cells.codewords + (codeword_units * step[:cut]).reshape(cells.codewords.shape)
-        return ScaledCells(codewords, cells.coefficients + bases @ step[cut:].reshape(shape))
+    def move(step: np.ndarray) -> Any:
+        return start.like(vector + joined([units * step[:cut], bases @ step[cut:].reshape(maps.shape)]))
 
     def pull_back(gradient: np.ndarray) -> np.ndarray:
-        by_coefficients = bases.transpose(0, 2, 1) @ gradient[cut:].reshape(shape)
-        return np.concatenate([codeword_units * gradient[:cut], by_coefficients.ravel()])
+        return joined([units * gradient[:cut], bases.transpose(0, 2, 1) @ gradient[cut:].reshape(maps.shape)])
 
     return move, pull_back
 

@@ -1,19 +1,15 @@
 """`simplify`: the fewest cells, then the fewest and shortest coefficients, that keep the return within a tolerance."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import pandas as pd
 
+from vsp import Policy, Task, VoronoiPolicy, get_task, start_states
 from vsp.checks import check_number, check_seed
-from vsp.evaluation import start_states
-from vsp.policy import VoronoiPolicy
-from vsp.rollouts import Policy, rollout, visited_states
+from vsp.rollouts import rollout, visited_states
 from vsp.run.progress import progress
-from vsp.tasks.base import GOAL, Task
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL
 
 from .config import Tuned, check_kind
 from .tune import score
@@ -72,12 +68,10 @@ def simplify(
 
 
 def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
-    """Move the codewords nearer to `states` (n, d) without changing the cells: tuning fixes the borders only.
-
-    The borders of up to d + 1 Euclidean cells have a point in common, at the same distance from all codewords. Moving
-    all codewords towards it by the same proportion moves no border. Where the borders have no common point, the policy
-    is returned unchanged.
-    """
+    """Move the codewords nearer to `states` (n, d) without changing the cells: tuning fixes the borders only. The
+    borders of up to d + 1 Euclidean cells have a point in common, at the same distance from all codewords. Moving all
+    codewords towards it by the same proportion moves no border. Where the borders have no common point, the policy is
+    returned unchanged."""
     points = policy.codewords / policy.scale
     k, d = points.shape
     if not 1 < k <= d + 1:
@@ -97,10 +91,8 @@ def gathered(policy: VoronoiPolicy, states: np.ndarray) -> VoronoiPolicy:
 
 
 def prune(policy: VoronoiPolicy, good) -> VoronoiPolicy:
-    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True.
-
-    Coefficients are tried in order of increasing effect on the action, for a change of the input by `policy.scale`.
-    """
+    """Set coefficients to zero one by one, as long as `good`, a function of a policy, returns True. Coefficients are
+    tried in order of increasing effect on the action, for a change of the input by `policy.scale`."""
     sizes = np.abs(policy.coefficients) * np.append(policy.scale, 1.0)[:, None]
     for place in np.argsort(sizes, axis=None, kind="stable"):
         coefficients = policy.coefficients.copy()

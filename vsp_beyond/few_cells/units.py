@@ -1,8 +1,5 @@
-"""Cells and labelled states, in units in which one step size fits all: inputs of mean 0 and deviation 1, actions in
-[-1, 1].
-
-Everything here is arrays: no episode is played, and no teacher asked.
-"""
+"""Cells and labelled states as arrays, in units in which one step size fits all: inputs of mean 0 and deviation 1,
+actions in [-1, 1]."""
 
 from __future__ import annotations
 
@@ -13,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from vsp.policy import VoronoiPolicy
+from vsp import Task, VoronoiPolicy
 from vsp.rollouts import standard
-from vsp.tasks.base import Task
 
 METRIC = "euclidean"  # of the scaled states: borders between cells are then straight
 
@@ -138,10 +134,8 @@ class ScaledCells:
         return ScaledCells(on_border + np.outer([-1.0, 1.0], np.abs(beyond).mean() * across), self.coefficients)
 
     def closeness(self, states: np.ndarray) -> np.ndarray:
-        """Return how near each codeword is to each of `states` (n, d), largest for the nearest. (k, n)
-
-        |x|² - |x - c|² = 2 x·c - |c|²: one matrix product.
-        """
+        """Return how near each codeword is to each of `states` (n, d), largest for the nearest. (k, n) |x|² - |x - c|²
+        = 2 x·c - |c|²: one matrix product."""
         return 2 * self.codewords @ states.T - np.square(self.codewords).sum(axis=1)[:, None]
 
     def nearest(self, states: np.ndarray) -> np.ndarray:
@@ -236,10 +230,7 @@ def unexplained(labelled: LabelledStates, cells: ScaledCells) -> float:
 
 def temperature_unit(labelled: LabelledStates, k: int) -> float:
     """Return the variance of the states inside one of k cells. At much higher temperatures, codewords collapse onto
-    each other and stay there.
-
-    A single state has no variance; its unit is 1.
-    """
+    each other and stay there. A single state has no variance; its unit is 1."""
     states = labelled.states
     return (states.var(axis=0).sum() or 1.0) * k ** (-2 / states.shape[1])
 
@@ -247,10 +238,8 @@ def temperature_unit(labelled: LabelledStates, k: int) -> float:
 def expected_loss(
     cells: ScaledCells, inputs: np.ndarray, actions: np.ndarray, *, temperature: float, clip_slope: float
 ) -> tuple[float, np.ndarray]:
-    """Mean squared error of the limited actions, weighted by each cell's share of a state, and its gradient.
-
-    `inputs` (n, d + 1) and `actions` (n, m); the gradient is with respect to `cells.vector`.
-    """
+    """Mean squared error of the limited actions, weighted by each cell's share of a state, and its gradient. `inputs`
+    (n, d + 1) and `actions` (n, m); the gradient is with respect to `cells.vector`."""
     n, (k, rows, m), states = len(inputs), cells.coefficients.shape, inputs[:, :-1]
     raw = cells.outputs(inputs)
     limited = np.clip(raw, -1.0, 1.0)

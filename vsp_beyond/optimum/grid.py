@@ -4,20 +4,21 @@ Values are interpolated between the points of the grid, so one sparse matrix des
 action. The error falls with the spacing of the grid; comparing two spacings shows its size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from scipy import sparse
 
-from vsp.tasks.base import RUNNING, Task
+from vsp.rollouts import Policy, visited_states
+from vsp.tasks import RUNNING, Task, get_task
 
 SWEEPS = 60  # sweeps of evaluation between two improvements (modified policy iteration, Puterman & Shin 1978)
 MOST_IMPROVEMENTS = 1000
 AT_ONCE = 5000  # states in which `GridPolicy` compares actions at once
 CLOSE = 1e-6  # the iteration ends when the values change by less
+UPRIGHT, SLOW = 0.5, 2.0  # rad and rad/s: Pendulum is held if angle and velocity are below these
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Grid:
     shape: tuple[int, int]
     periodic: tuple[bool, bool] = (False, False)
 
-    def finer(self, times: float) -> Grid:
+    def finer(self, times: float) -> "Grid":
         """Return a grid over the same box, with the spacing of the points divided by `times`."""
         ends = [not closed for closed in self.periodic]  # an axis has one point more than steps, unless it is a circle
         m, n = (2 * round(times * (n - end) / 2) + end for n, end in zip(self.shape, ends))
@@ -64,11 +65,9 @@ class Grid:
 
 
 def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0.0) -> np.ndarray:
-    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step. (n,)
-
-    The task must have one action, and the grid's variables as its state. Episodes have no step limit here; a price
-    keeps them short. Raises RuntimeError if the values do not converge.
-    """
+    """Return the highest return from every point of `grid` with `actions` (a,), minus `price` for each step: (n,). The
+    task must have one action, and the grid's variables as its state. Episodes have no step limit here; a price keeps
+    them short. Raises RuntimeError if the values do not converge."""
     moves = [_move(task, grid, action, price) for action in actions]
     rewards = np.concatenate([of_action for of_action, _ in moves])  # (a n,)
     matrix = sparse.vstack([of_action for _, of_action in moves], format="csr")  # (a n, n)
@@ -87,10 +86,8 @@ def best_values(task: Task, grid: Grid, actions: np.ndarray, *, price: float = 0
 
 
 def _move(task: Task, grid: Grid, action: float, price: float) -> tuple[np.ndarray, sparse.csr_array]:
-    """Return the rewards of one action at all points, and the matrix that maps values to those after the step.
-
-    Its rows are 0 where the episode ended.
-    """
+    """Return the rewards of one action at all points, and the matrix that maps values to those after the step. Its rows
+    are 0 where the episode ended."""
     points = grid.points()
     after, rewards, outcomes = task.step(points, np.full((len(points), 1), action))
     goes_on = sparse.diags_array((outcomes == RUNNING).astype(np.float64))
@@ -115,11 +112,9 @@ class GridPolicy:
         return np.concatenate([self._best(part) for part in parts])[:, None], None
 
     def lost(self, obs: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return.
-
-        The shape is (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible
-        after its end.
-        """
+        """Return what `actions` (n, 1) cost in the observations (n, d) if the best actions follow, in units of return:
+        (n,). The sum over an episode is its regret, up to the grid's error, if no more return is possible after its
+        end."""
         states, best = self.state_of(obs.astype(np.float64)), self.predict(obs)[0]
         return self._offers(states, best[:, 0]) - self._offers(states, np.asarray(actions, dtype=np.float64)[:, 0])
 
@@ -138,3 +133,31 @@ class GridPolicy:
     def _offers(self, states: np.ndarray, actions: np.ndarray) -> np.ndarray:
         after, rewards, outcomes = self.task.step(states, actions[:, None])
         return rewards - self.price + (outcomes == RUNNING) * (self.grid.interpolation(after) @ self.values)
+
+
+# What a policy loses
+
+
+def held(obs: np.ndarray) -> np.ndarray:
+    """Return whether Pendulum is held upright in the observations (n, 3): cos θ, sin θ, ω. (n,)"""
+    angle, velocity = np.arctan2(obs[:, 1], obs[:, 0]), obs[:, 2]
+    return (np.abs(angle) < UPRIGHT) & (np.abs(velocity) < SLOW)
+
+
+Region = Callable[[np.ndarray], np.ndarray]  # maps observations (n, d) to whether they are in the region (n,)
+PENDULUM_REGIONS: dict[str, Region] = {"swing-up": lambda obs: ~held(obs), "hold": held}
+
+
+def losses(
+    policy: Policy, best: GridPolicy, task: str | Task, starts: np.ndarray, regions: dict[str, Region]
+) -> pd.DataFrame:
+    """Return what `policy` loses in each of the `regions`, such as `PENDULUM_REGIONS`, one row per region. Columns:
+    steps (share of the policy's steps that are in the region) and lost (return lost there per episode). The sum of all
+    losses of an episode is its regret, up to the grid's error, if no more return is possible after its end. Raises
+    ValueError as `visited_states` does."""
+    task = get_task(task)
+    states = visited_states(policy, task, starts)
+    lost = best.lost(states, np.asarray(policy.predict(states)[0], dtype=np.float64))
+    where = {name: region(states) for name, region in regions.items()}
+    rows = {name: {"steps": here.mean(), "lost": lost[here].sum() / len(starts)} for name, here in where.items()}
+    return pd.DataFrame(rows).T.rename_axis("region")

@@ -6,16 +6,12 @@ nearest to the origin, on an edge at distance 0.1. From a start at distance d, t
 starts inside the goal at d < 0.1, entering at once is better and returns 10.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
 
+from vsp import Policy, Task, get_task
 from vsp.checks import check_array, check_choice, check_number
-from vsp.rollouts import Policy
-from vsp.tasks.base import Task
-from vsp.tasks.registry import get_task
 from vsp.tasks.simplegoal import GOAL_EDGE, PIT_HIGH, PIT_LOW, STRIDE
 
 from .grid import Grid, GridPolicy, best_values
@@ -70,14 +66,11 @@ TASKS = ("SimpleGoal-v0", *_SOLVABLE)
 
 
 def best_policy(task: str | Task, *, finer: float = 1.0, price: float | None = None) -> Policy:
-    """Compute the policy with the highest mean return for one of `TASKS`. Takes some seconds.
-
-    SimpleGoal's is exact up to 2e-5 in return, and needs neither `finer` nor `price`. The others are solved on a grid
-    with `finer` times as many points in each variable. `price` is subtracted in each step; by default it is 0, or, on
-    MountainCar, just high enough that every start tried reaches the goal in time. With a higher price the policy
-    reaches a goal sooner. Raises ValueError for a task whose optimum is not known, `finer` outside 0.1 to 10, and a
-    negative price.
-    """
+    """Compute the policy with the highest mean return for one of `TASKS`. Takes some seconds. SimpleGoal's is exact up
+    to 2e-5 in return, and needs neither `finer` nor `price`. The others are solved on a grid with `finer` times as many
+    points in each variable. `price` is subtracted in each step; by default it is 0, or, on MountainCar, just high
+    enough that every start tried reaches the goal in time. With a higher price the policy reaches a goal sooner. Raises
+    ValueError for a task whose optimum is not known, `finer` outside 0.1 to 10, and a negative price."""
     task = get_task(task)
     check_choice("the task", task.name, TASKS)
     check_number("finer", finer, least=0.1, most=10.0)

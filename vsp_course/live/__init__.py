@@ -1,7 +1,5 @@
 """The page `live.html`: parts of the lessons that live without Python. It uses the explorer's scripts."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Explorer`: policies of one task to explore in a browser, as an element of a page or as a standalone file."""
 
-from __future__ import annotations
-
 import html
 import io
 import json
@@ -34,12 +32,9 @@ def standalone(title: str, body: str, style: str = "", script: str = f"{SCRIPT}\
 
 
 class Explorer:
-    """Policies of one task, to replay, query and change in a browser.
-
-    `policies`: policies with linear maps by name, all of one task that the script plays: SimpleGoal,
-    MountainCarContinuous or Pendulum. `history`: replays the first of them. Raises ValueError for other policies and
-    tasks, and for the history of another run.
-    """
+    """Policies of one task, to replay, query and change in a browser. `policies`: policies with linear maps by name,
+    all of one task that the script plays: SimpleGoal, MountainCarContinuous or Pendulum. `history`: replays the first
+    of them. Raises ValueError for other policies and tasks, and for the history of another run."""
 
     def __init__(
         self, policies: dict[str, VoronoiPolicy], *, teacher: Policy | None = None, history: History | None = None
@@ -61,10 +56,8 @@ class Explorer:
         atomic.write_text(path, standalone(f"{self.task.name}: explore the policy", self.element()))
 
     def element(self, *, sources: dict[str, str] | None = None) -> str:
-        """Return HTML with the script's scene inside, and a picture to show without it.
-
-        `sources`: files with scenes to choose from, by name, instead of that scene.
-        """
+        """Return HTML with the script's scene inside, and a picture to show without it. `sources`: files with scenes to
+        choose from, by name, instead of that scene."""
         caption = f"<figcaption>{html.escape(self._alt())}</figcaption>"
         picture = f"<figure>{style.embedded(self._still(), self._alt(), width=440)}{caption}</figure>"
         if sources is not None:

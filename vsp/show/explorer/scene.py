@@ -1,7 +1,5 @@
 """Collect what an explorer shows, as plain data for its script: task, policies, replay, teacher, starts."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections import defaultdict
@@ -14,10 +12,8 @@ from ...geometry import METRICS
 from ...history import History
 from ...policy import VoronoiPolicy
 from ...rollouts import Policy, rollout
-from ...tasks import GOAL, PIT, RUNNING
-from ...tasks.base import Task
-from ...tasks.registry import get_task
-from ...teachers.teacher import Teacher, load_teacher
+from ...tasks import GOAL, PIT, RUNNING, Task, get_task
+from ...teachers import Teacher, load_teacher
 
 # The tasks that the script plays: lower and upper limits of the plane, and its axis labels
 PLANES: dict[str, tuple[list, list, list[str]]] = {
@@ -34,11 +30,9 @@ N_MOMENTS = 80  # of a replay, beside those with a split or merge
 def scene_of(
     policies: dict[str, VoronoiPolicy], task: Task, teacher: Policy | None = None, history: History | None = None
 ) -> dict:
-    """Return the scene of some policies; `history` replays the first.
-
-    Keys: task (names and limits), plane (low, high, labels), starts (n, 2), lost (which outcomes are failures),
-    policies, and teacher: its mean return. Raises ValueError for a task that the script does not play.
-    """
+    """Return the scene of some policies; `history` replays the first. Keys: task (names and limits), plane (low, high,
+    labels), starts (n, 2), lost (which outcomes are failures), policies, and teacher: its mean return. Raises
+    ValueError for a task that the script does not play."""
     if task.name not in PLANES:
         raise ValueError(f"the browser plays {', '.join(PLANES)}, so {task.name} cannot be explored")
     (low, high, labels), starts = PLANES[task.name], starts_of(task)

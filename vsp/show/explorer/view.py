@@ -1,7 +1,5 @@
 """`View`: the explorer in JupyterLab, where a kernel runs."""
 
-from __future__ import annotations
-
 import anywidget
 import traitlets
 
