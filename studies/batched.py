@@ -1,7 +1,5 @@
 """A `Task` as Stable-Baselines3 wants many environments: all of them advance together."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
@@ -20,10 +18,8 @@ class Batched(VecEnv):
     def reset(self):
         """Begin everywhere. Returns observations (n, d)."""
         self._states = self._task.start(self._rng, self.num_envs)
-        self._steps, self._returns = (
-            self._rng.integers(self._task.max_steps, size=self.num_envs),
-            np.zeros(self.num_envs),
-        )
+        self._steps = self._rng.integers(self._task.max_steps, size=self.num_envs)
+        self._returns = np.zeros(self.num_envs)
         return self._task.observe(self._states)
 
     def step_async(self, actions):
@@ -38,11 +34,8 @@ class Batched(VecEnv):
         ended = (outcomes != RUNNING) | (self._steps >= self._task.max_steps)
         for i in np.flatnonzero(ended):
             episode = {"r": self._returns[i], "l": self._steps[i], "t": 0.0}
-            infos[i] = {
-                "terminal_observation": seen[i],
-                "TimeLimit.truncated": outcomes[i] == RUNNING,
-                "episode": episode,
-            }
+            cut = outcomes[i] == RUNNING
+            infos[i] = {"terminal_observation": seen[i], "TimeLimit.truncated": cut, "episode": episode}
         self._states[ended] = self._task.start(self._rng, int(ended.sum()))
         self._steps[ended], self._returns[ended] = 0, 0.0
         return self._task.observe(self._states), rewards.astype(np.float32), ended, infos

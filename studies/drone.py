@@ -4,8 +4,6 @@ Without AGENT it is our own teacher. With the file of the network that flew (`vs
 rows come of it, with the file's checksum; no number of the file, and no map fitted to it, is kept.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -119,7 +117,7 @@ def rows(agent: str, folder: Path) -> list[dict]:
                 "agent": "flown" if agent else "own", "flies": flies, "condition": condition,
                 "starts": "hard" if starts in HARD else "easy", "tilt": starts.tilt,
                 "kept": values["kept"][:, i].mean(), "more": more.mean(), "more_low": low, "more_high": high,
-                "change": np.nanmean(values["change"][:, i]), "distance": np.nanmean(values["distance"][:, i]),
+                **{kind: pd.Series(values[kind][:, i].ravel()).mean() for kind in ("change", "distance")},  # without NaN
                 "radius": radii.max(), "r2": np.mean([one["r2"] for one in about]),
                 "numbers": about[0]["numbers"], "seeds": len(work), "checksum": network(agent)[1],
                 **work[0].provenance,

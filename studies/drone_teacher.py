@@ -1,7 +1,5 @@
 """Train our own network that flies a quadrotor, by PPO of Stable-Baselines3: 5 to 10 minutes of `make teachers`."""
 
-from __future__ import annotations
-
 import json
 from importlib.metadata import version
 from pathlib import Path
@@ -47,9 +45,8 @@ def export(model: PPO, folder: Path) -> None:
     tensors = {}
     for i, (weight, bias) in enumerate(layers):
         tensors |= {f"actor.mu.{2 * i}.weight": weight.T.copy(), f"actor.mu.{2 * i}.bias": bias}
-    result = rollout_from_seed(
-        Teacher(Actor(layers, **ACTS), quadrotor()), quadrotor(), SCORE_EPISODES, seed=SCORE_SEED
-    )
+    teacher = Teacher(Actor(layers, **ACTS), quadrotor())
+    result = rollout_from_seed(teacher, quadrotor(), SCORE_EPISODES, seed=SCORE_SEED)
     card = {
         "task": "Quadrotor-v0",
         "algorithm": f"PPO of Stable-Baselines3, MlpPolicy, layers {WIDTHS}, tanh, limited output",

@@ -12,8 +12,7 @@ from .comparison.rows import committed_rows, make_all
 
 def main() -> None:
     """Make the rows that are not committed, and write all to data/beyond/<table>_<task>.csv, with what stands beside
-    them. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks that take hours.
-    """
+    them. Times go to <table>_seconds.csv, or to <table>_seconds_long.csv for the tasks that take hours."""
     parser = command.parser(main.__doc__, "results go to OUT/data/beyond, rows to OUT/build/beyond")
     parser.add_argument("--long", action="store_true", help="make the tasks whose rows take hours instead")
     arguments = parser.parse_args()

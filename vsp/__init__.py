@@ -51,8 +51,7 @@ def distill(
     `teacher` is whatever `agent` takes. `config` defaults to the paper's preset of the task. `split` and `merge`
     replace `split_regions` and `merge_regions`. The same arguments give the same policy. `progress` shows how far it
     is, and at last how alike teacher and policy are. Raises ValueError if the teacher does not fit the task, if states
-    or actions are not finite, for a task without a preset, or if `seed` is not a non-negative integer.
-    """
+    or actions are not finite, for a task without a preset, or if `seed` is not a non-negative integer."""
     check_seed(seed)
     task = get_task(task)
     if config is None:

@@ -36,8 +36,7 @@ def distill(
     """Algorithm 1: imitate `teacher` by sub-policies, each valid in the Voronoi cell of its codeword.
 
     `split` and `merge` replace Algorithms 2 and 3, as `paper.readings` does. Returns the policy and the history of the
-    run. The same arguments give the same policy. `vsp.distill` checks the arguments first.
-    """
+    run. The same arguments give the same policy. `vsp.distill` checks the arguments first."""
     split, merge = split or split_regions, merge or merge_regions
     starts, init, batches = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
     partition, history = Partition(task, config), History(config.n_iterations)

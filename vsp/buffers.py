@@ -15,8 +15,7 @@ class Buffers:
 
     Rows live until all cells are empty, so the period of such a reset bounds the memory. With r rows between two of
     them, the log takes at most 16 (q + 1 + m) r bytes, since it doubles as it grows. The lists of k cells take at most
-    8 k r bytes; the worst case is all rows in one cell.
-    """
+    8 k r bytes; the worst case is all rows in one cell."""
 
     def __init__(self, q: int, m: int):
         self._inputs = np.ones((1024, q + 1))  # features, then a column of ones for the bias

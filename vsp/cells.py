@@ -21,8 +21,7 @@ class Cells(Protocol):
     """k cells that fill the space of the states (d,), numbered from 0. Methods do not check states.
 
     A file of the policy holds `arrays` and `options`, from which the class makes the same cells:
-    `Class(**arrays, **options)`. `valid` ends the sentence "each map is valid ..."; `column` heads a table of cells.
-    """
+    `Class(**arrays, **options)`. `valid` ends the sentence "each map is valid ..."; `column` heads a table of cells."""
 
     d: int
     valid: str
@@ -59,8 +58,7 @@ class Nearest:
     """The cells around codewords (k, d): a state belongs to the nearest, the lowest index if several are as near.
 
     Distances are taken between states divided by `scale` (d,); None: raw states. Raises ValueError for wrong shapes,
-    equal codewords, and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`.
-    """
+    equal codewords, and numbers that are not finite or beyond the limits `MOST` and `LEAST_SCALE`."""
 
     valid, column = "where its codeword is the nearest", "codeword"
 
@@ -159,8 +157,7 @@ class Halfspaces:
 
     A state x is beyond node s if `normals[s] @ x > thresholds[s]`; it goes on to `children[s, 1]`, else to
     `children[s, 0]`: a later node, or a cell c written as -1 - c. Node 0 is the root; without nodes there is one cell.
-    Raises ValueError for wrong shapes, numbers beyond `MOST`, and children that are not a tree.
-    """
+    Raises ValueError for wrong shapes, numbers beyond `MOST`, and children that are not a tree."""
 
     valid, column = "in one cell of a tree of half-spaces", "cell"
     options: dict[str, Any] = {}

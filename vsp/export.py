@@ -39,8 +39,7 @@ class Exportable:
 
         `digits` is the number of decimals. None prints each number exactly and leaves out terms that are zero, which
         suits policies of `simplify`.
-        Raises ValueError for a cell that does not exist.
-        """
+        Raises ValueError for a cell that does not exist."""
         check_count("cell", cell, least=0, most=len(self) - 1)
         return tuple(
             f"{output} = {self.policy_class.expression(self.coefficients[cell, :, j], digits)}"
@@ -68,8 +67,7 @@ class Exportable:
         """Return a Python module with `cell(state)` and `act(state)`, which returns a list of actions.
 
         It imports only the standard library. For a state that is not finite the functions return -1 and nan.
-        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written.
-        """
+        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written."""
         task = self.task
         numbers = {"LOW": task.action_low, "HIGH": task.action_high}
         numbers["COEFFICIENTS"] = self.coefficients.transpose(0, 2, 1)
@@ -106,8 +104,7 @@ class Exportable:
         """Return C99 code: `int vsp_cell(const double *state)`, `void vsp_act(const double *state, double *action)`.
 
         It needs only the standard library. For a state that is not finite the functions give -1 and NAN.
-        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written.
-        """
+        Raises ValueError for features that are not plain arithmetic, and for cells that cannot be written."""
         (k, p, m), d, inputs = self.coefficients.shape, len(self.task.low), len(self.policy_class.code) + 1
         return f"""/* {escaped(_headline(self))}
    state: {_names(self.task.inputs)}; action: {_names(self.task.outputs)}. */

@@ -26,8 +26,7 @@ class Metric:
     follows from it. Another distance is a sum over the inputs: `between(states, codewords)` returns (n, k) for arrays
     (n, d) and (k, d). `term` is the code of one input's share in terms of `gap`, the difference there, valid in C and
     Python as `PolicyClass.code` is. Without it exports refuse the metric by its name, and the explorer always does.
-    Raises ValueError unless there is either a positive order or a function.
-    """
+    Raises ValueError unless there is either a positive order or a function."""
 
     name: str
     order: float | None = None
@@ -53,8 +52,7 @@ class Metric:
         """One input's share in the distance as code of `gap`, and the root of their sum as code of `distance`.
 
         Both are valid in C and Python; of the order inf, shares are not added but their maximum is taken. Raises
-        ValueError for a metric without code.
-        """
+        ValueError for a metric without code."""
         if self.order is None:
             if not self.term:
                 raise ValueError(f"metric {self.name!r} has no code, expected its `term`: it cannot be exported")
@@ -89,8 +87,7 @@ def nearest(codewords: np.ndarray, states: np.ndarray, metric: str | Metric = LO
     """Index of the nearest codeword (k, d) of each state (n, d); the lowest index if several are equally near. (n,)
 
     Paper, Algorithm 1 line 6: kd-tree(C, s_t). Brute force gives the same indices and is faster for the few dozen
-    codewords of the paper. So the kd-tree is used for `KDTREE_FROM` codewords or more.
-    """
+    codewords of the paper. So the kd-tree is used for `KDTREE_FROM` codewords or more."""
     metric, codewords, states = _checked(codewords, states, metric)
     return look_up(codewords, states, metric)
 
@@ -116,8 +113,7 @@ def delaunay_neighbours(codewords: np.ndarray) -> np.ndarray:
 
     Qhull rejects points on a line or plane, so they are first projected onto the affine subspace that they span. Up to
     r + 1 points in r dimensions are all neighbours. Raises ValueError for duplicate codewords, because Qhull
-    leaves them without neighbours.
-    """
+    leaves them without neighbours."""
     codewords = check_codewords(codewords)
     k = len(codewords)
     if not all_differ(codewords):
@@ -141,8 +137,7 @@ def lookup_neighbours(
 
     Two cells are neighbours when some witness has their codewords as its two nearest (Martinetz & Schulten 1994), for
     any metric and dimension. The witnesses are an unscrambled Halton sequence, so the result is deterministic. They
-    fill the box, much of which a task may never visit. A border without a witness near it is missed.
-    """
+    fill the box, much of which a task may never visit. A border without a witness near it is missed."""
     from scipy.stats import qmc
 
     k, d = check_codewords(codewords).shape
@@ -181,8 +176,7 @@ def _triangulated(points: np.ndarray) -> np.ndarray:
     """Pairs of `points` (k, r) that share an edge. (e, 2)
 
     If Qhull leaves points out because of rounding, the points are centred, which reduces rounding, and triangulated
-    again. A point that is still left out becomes a neighbour of its nearest vertex.
-    """
+    again. A point that is still left out becomes a neighbour of its nearest vertex."""
     mesh = Delaunay(points)
     if len(mesh.coplanar):
         mesh = Delaunay(points - points.mean(axis=0))

@@ -24,8 +24,7 @@ class Event(NamedTuple):
 
     The cause of a split is the running mean loss, which exceeded `Config.max_pol_loss`. That of a merge is the
     L-infinity distance between the maps of the removed and the remaining cell, which was below
-    `Config.min_param_distance`.
-    """
+    `Config.min_param_distance`."""
 
     iteration: int
     kind: str  # "split" or "merge"

@@ -39,8 +39,7 @@ class Explanation:
     nearest other cell, that of the second nearest codeword, None if there is one cell. `margin` is the distance to its
     border; with codewords the distance to the second nearest minus that to the nearest, in the look-up metric.
     `borders` has a row per input: the least change of it alone that reaches another cell, and that cell; NaN and -1 if
-    no value in the box does.
-    """
+    no value in the box does."""
 
     cell: int
     codeword: np.ndarray | None
@@ -67,8 +66,7 @@ class PiecewisePolicy(Exportable):
 
     `coefficients` are (k, p, m); `policy_class.rows` names the p rows: for linear sub-policies d weights, then the
     bias. `sub_policy` is one of `subpolicies.POLICY_CLASSES`, or a function of the task that makes a `PolicyClass`. All
-    arrays are float64. Raises ValueError for wrong shapes and numbers that are not finite or beyond `cells.MOST`.
-    """
+    arrays are float64. Raises ValueError for wrong shapes and numbers that are not finite or beyond `cells.MOST`."""
 
     kind = "PiecewisePolicy"  # in files
 
@@ -110,8 +108,7 @@ class PiecewisePolicy(Exportable):
         """Return actions within the task's limits, in Stable-Baselines3's convention.
 
         `obs` is one observation (d,) or a batch (n, d). Returns actions (m,) or (n, m) in float64, and None in place of
-        a recurrent state. Raises ValueError for a wrong shape or numbers that are not finite.
-        """
+        a recurrent state. Raises ValueError for a wrong shape or numbers that are not finite."""
         return np.minimum(np.maximum(self.linear(obs), self.task.action_low), self.task.action_high), None
 
     def explain(self, obs: np.ndarray) -> Explanation:
@@ -139,8 +136,7 @@ class PiecewisePolicy(Exportable):
         and cell (-1 there).
 
         Tries `_STEPS` points on each axis, then refines between two of them. A very thin cell may be missed. Where the
-        box has no limit, it looks as far as twice the range of the codewords.
-        """
+        box has no limit, it looks as far as twice the range of the codewords."""
         import pandas as pd  # here, because it takes long to import
 
         rows = []
@@ -203,8 +199,7 @@ class PiecewisePolicy(Exportable):
 
         It can act even if the task is not registered. `known` are objects from outside vsp that the file names: a class
         of cells, a `Metric`, a function that makes a `PolicyClass`. Raises FileNotFoundError, and
-        `run.atomic.DamagedFile` if a bit is missing or altered, or if the file holds no such policy.
-        """
+        `run.atomic.DamagedFile` if a bit is missing or altered, or if the file holds no such policy."""
         arrays, about = sealed.load_arrays(path, kind=(cls.kind, VoronoiPolicy.kind))
         try:
             box = {limit: arrays.pop(limit) for limit in BOX}
@@ -238,8 +233,7 @@ class VoronoiPolicy(PiecewisePolicy):
     """k sub-policies, each valid in the Voronoi cell of its codeword (paper, section "Voronoi quantization").
 
     `codewords` are (k, d); `metric` and `scale` as in `cells.Nearest`, the rest as in `PiecewisePolicy`. Raises
-    ValueError as both do.
-    """
+    ValueError as both do."""
 
     kind = "VoronoiPolicy"
     where: Nearest

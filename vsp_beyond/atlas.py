@@ -4,8 +4,6 @@ n polygons are an array of corners (n, k, 2), in order around each; one with few
 function is two slopes and its value at 0 (3,). All is float64 with the weights as stored; bounds are rounded outwards.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -78,8 +76,7 @@ class Comparison(NamedTuple):
 def pieces_of(teacher: Teacher) -> Pieces:
     """Cut the box of the teacher's task along the border of every unit of its network, layer by layer.
 
-    Raises ValueError unless the network sees two raw observations, and has rectified units (ReLU) and a tanh.
-    """
+    Raises ValueError unless the network sees two raw observations, and has rectified units (ReLU) and a tanh."""
     task, actor = teacher.task, teacher.actor
     form = (len(task.low), actor.activation, actor.squashed, actor.clip_mean, bool(teacher.normalization))
     if form != (2, "ReLU", True, np.inf, False):
@@ -102,8 +99,7 @@ def compare(pieces: Pieces, policy: VoronoiPolicy) -> Comparison:
 
     Pieces are cut along borders of cells, at limits of actions, and at `KNOTS`, between which the tanh lies between a
     chord and a tangent. Raises ValueError unless the policy has the network's task, linear maps, and the Euclidean or
-    the Manhattan distance.
-    """
+    the Manhattan distance."""
     policy.check_linear()
     task = pieces.teacher.task
     if policy.task.name != task.name or policy.metric not in ("euclidean", "manhattan"):

@@ -1,7 +1,5 @@
 """Draw a drone's flight as a film strip, and its linear map as what it does to thrust, roll, pitch and yaw."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from vsp.policy import VoronoiPolicy
-from vsp_beyond.drone.quadrotor import ARM, ATTITUDE, POSITION
+from vsp_beyond.drone.quadrotor import ARM, ATTITUDE, POSITION, rotation
 
 APART, SIZE = 0.6, 5.0  # m between frames; how much larger a drone is drawn
 TURN, RISE = np.deg2rad(25), np.deg2rad(12)  # from where one looks
@@ -22,11 +20,10 @@ MIXES = {  # of the four commands: what all do, and what turns the body about x,
 def film(ax: Axes, states: np.ndarray, moments: Sequence[float], *, step_seconds: float, color: str) -> None:
     """Draw the drone at `moments` (s) of its flight, `states` (t, 17 or more), side by side at its true height.
 
-    Its front arms are drawn in `color`, the line upwards is the direction of its thrust.
-    """
+    Its front arms are drawn in `color`, the line upwards is the direction of its thrust."""
     for i, moment in enumerate(moments):
         state = states[round(moment / step_seconds)]
-        turned = rotation(state[ATTITUDE])
+        turned = rotation(state[None, ATTITUDE])[0]
         middle = np.array([i * APART, state[POSITION][2]])
         corners = middle + seen(SIZE * CORNERS @ turned.T)
         for one, other in ((0, 2), (1, 3)):
@@ -39,13 +36,6 @@ def film(ax: Axes, states: np.ndarray, moments: Sequence[float], *, step_seconds
     ax.set(ylabel="height (m)", aspect="equal", xlim=(-APART / 2, (len(moments) - 0.5) * APART))
 
 
-def rotation(attitude: np.ndarray) -> np.ndarray:
-    """Return the matrix (3, 3) of a unit quaternion w, x, y, z."""
-    w, (x, y, z) = attitude[0], attitude[1:]
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * skew + 2 * skew @ skew
-
-
 def seen(points: np.ndarray) -> np.ndarray:
     """Return where points (..., 3) lie in the picture (..., 2): from the side, a little from above."""
     x, y, z = np.moveaxis(points, -1, 0)
@@ -56,8 +46,7 @@ def seen(points: np.ndarray) -> np.ndarray:
 def mixed(policy: VoronoiPolicy) -> pd.DataFrame:
     """Return the numbers of one map as what each input adds to thrust, roll, pitch and yaw, the `MIXES` of commands.
 
-    What it remembers of the four motors is mixed likewise.
-    """
+    What it remembers of the four motors is mixed likewise."""
     mixes = np.array(list(MIXES.values()))
     numbers = policy.coefficients[0] @ mixes.T / 4
     numbers[12:16] = mixes @ numbers[12:16]

@@ -21,8 +21,7 @@ def spread(returns: np.ndarray) -> dict[str, float]:
     Keys, in units of return: min, max, mean, std (of the sample, n - 1), q1, median, q3, iqr; lower_fence and
     upper_fence, 1.5 interquartile ranges beyond the quartiles, which the paper calls bounds; outliers_below and
     outliers_above, counts of returns outside the fences; coverage, the share inside. Raises ValueError if there are
-    no returns, or some are not finite.
-    """
+    no returns, or some are not finite."""
     returns = check_finite("returns", returns).ravel()
     if not len(returns):
         raise ValueError("no returns, expected at least one")
@@ -74,8 +73,7 @@ def resample(returns: np.ndarray, *, n_resamples: int = 2000, seed: int = 0) -> 
 
     Resamples policies, the rows of `returns` (p, n), *and* start states, the columns; of a single policy the starts
     alone. How often each is drawn is multinomial, and a return counts as often as its policy times as its start.
-    Coverage and shares are in percent. A statistic of a set that a resample leaves empty is NaN.
-    """
+    Coverage and shares are in percent. A statistic of a set that a resample leaves empty is NaN."""
     check_seed(seed)
     order = np.argsort(returns, axis=None, kind="stable")
     values, places = returns.ravel()[order], np.divmod(order, returns.shape[1])

@@ -47,8 +47,7 @@ def save_table(
 
     A name "beyond/x" writes OUT/figures/beyond/tables/x. `shown` replaces the whole table for readers: a part of it, or
     equations as LaTeX code. The default `caption` is in notebooks/captions.toml. The LaTeX needs the package booktabs,
-    and longtable for more than `PAGE` rows.
-    """
+    and longtable for more than `PAGE` rows."""
     path, shown = file_of("tables", name, out), frame if shown is None else shown
     rounded = frame.map(lambda value: float(f"{value:.8g}") if isinstance(value, float) else value)
     atomic.write_text(path.with_suffix(".csv"), rounded.to_csv(index=False, lineterminator="\n"))
@@ -79,8 +78,7 @@ def present(frame: pd.DataFrame) -> pd.DataFrame:
 
     A named index becomes a column, tasks get their short names, true or false becomes "yes" or nothing ("no" among
     other values), and shares become percentages. `low` and `high` become one column of text, and headings are in words.
-    Where each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts.
-    """
+    Where each row is another quantity (`QUANTITIES`), a row of whole numbers has no decimals: they are counts."""
     frame = frame.reset_index(drop=frame.index.names == [None]).apply(_in_words)
     frame = _counts(frame) if QUANTITIES & {*frame} else frame
     for name in frame:

@@ -40,8 +40,7 @@ class Comparison:
 
     Columns: task, method, policies (how many), mean (return), low and high (its 95 % interval over policies *and* start
     states), failing (share of the episodes that miss the goal; NaN for a task where nobody reaches one, and for returns
-    from elsewhere), cells (mean), r2 (median R² of the actions on the agent's own states) and seconds (median).
-    """
+    from elsewhere), cells (mean), r2 (median R² of the actions on the agent's own states) and seconds (median)."""
 
     frame: pd.DataFrame
     returns: dict[tuple[str, str], np.ndarray]
@@ -132,8 +131,7 @@ def compare(
     `agents`: by name of the task, as `vsp.agent` takes them; None: those shipped. Each trial is a file below `runs` and
     is made once; `jobs` as in `run.workers`. Episodes start from `start_states(task, n_episodes, 1)`, which no method
     may train on; a task whose engine is slow plays fewer. Raises ValueError for a method or an agent that cannot be
-    identified, and for returns that do not fit.
-    """
+    identified, and for returns that do not fit."""
     asked, seeds = {get_task(task).name: task for task in tasks}, list(seeds)
     made = {name: one if isinstance(one, Method) else Method(one) for name, one in methods.items() if callable(one)}
     if AGENT in methods or not seeds:

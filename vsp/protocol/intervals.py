@@ -29,8 +29,7 @@ def interval(
     It resamples policies, which are the rows of `returns` (p, ...). All policies share start states, so episodes are
     not independent and are never resampled alone. `vectorized` calls `statistic(resamples, axis=1)` once for all
     resamples; `returns` are then one number per policy (p,). Raises ValueError if there are no returns, or some are not
-    finite.
-    """
+    finite."""
     returns = check_finite("returns", returns)
     if not returns.size or not returns.ndim:
         raise ValueError(f"returns have shape {returns.shape}, expected a row per policy")
@@ -52,8 +51,7 @@ def crossed_interval(values: np.ndarray) -> tuple[float, float]:
 
     Policies may be so alike (twenty fits to almost the same data) that the starts matter most. How often each row or
     column is drawn is multinomial. This is the distribution of the counts in `bootstrap_draws`, without drawing p + n
-    indices per resample.
-    """
+    indices per resample."""
     rng = np.random.default_rng(0)
     policies, starts = (rng.multinomial(k, np.full(k, 1 / k), size=2000) for k in values.shape)
     return percentile_interval(np.einsum("rn,rn->r", policies @ values, starts) / values.size)

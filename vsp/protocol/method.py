@@ -20,8 +20,7 @@ class Method:
     `data` are `n_data` episodes of the agent, whose starts follow from the seed; None if `n_data` is 0, for a method
     that needs none or plays its own. `version` is raised when `make` returns something else; None: the source of `make`
     stands for it, and so does a change of what `make` uses from its own module (`run.identity`). `settings` of a task
-    are what else the policy depends on. Raises ValueError if `make` cannot be identified.
-    """
+    are what else the policy depends on. Raises ValueError if `make` cannot be identified."""
 
     make: Callable[[Policy, Task, Episodes | None, int], Policy]
     n_data: int = 0

@@ -24,8 +24,7 @@ def identity(thing: Any, above: tuple = ()) -> Any:
 
     An attribute `version` stands for the source, and `settings`, a dictionary, for the attributes of an object. Raises
     ValueError for code from outside that has neither a source of its own, as a lambda or a partial, nor a version.
-    `above`: what uses `thing`, so that a circle ends.
-    """
+    `above`: what uses `thing`, so that a circle ends."""
     if isinstance(thing, _PLAIN):
         return thing
     if any(thing is one for one in above):

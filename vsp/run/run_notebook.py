@@ -56,8 +56,7 @@ def run_notebook(
     `expect` names files, relative to `out`, that the notebook must make. An executed copy, without anything that varies
     between runs, goes to the folder `executed` in `out`. Raises CommandError if another process runs the same notebook
     into the same `out` or if a cell fails, MissingFile, or OSError for a full or read-only disk. The earlier files of
-    `out` then stay, unless the disk fails while files are moved.
-    """
+    `out` then stay, unless the disk fails while files are moved."""
     notebook, out = Path(notebook).resolve(), Path(out).resolve()
     source = nbformat.reads(read_bytes(notebook).decode(), as_version=4)
     running = out / "build" / "running" / notebook.stem

@@ -35,8 +35,7 @@ def results(
     `total` includes jobs that were done before. `jobs` is the number of worker processes (-1: one per core) or the
     address of a Dask scheduler, such as `tcp://127.0.0.1:8786`; its owner can run code here and on the workers. Every
     job runs with one thread. Raises what `work` raises, and CommandError if a worker was killed (on a cluster, after
-    one job killed four workers), if a worker's code or libraries differ from those here, or if no scheduler answers.
-    """
+    one job killed four workers), if a worker's code or libraries differ from those here, or if no scheduler answers."""
     if not arguments:
         return
     done = total - len(arguments)

@@ -23,8 +23,7 @@ def birth_colours(
 
     The number counts the births before. A newborn takes the colour whose nearest living bearer is farthest away; one
     that nobody has comes first. Codewords are born in their order. With the `history` of a run, `policy` is that after
-    iteration `n`, each split gives birth, and each merge ends a life.
-    """
+    iteration `n`, each split gives birth, and each merge ends a life."""
     living: dict[tuple, tuple[int, int]] = {}
     born = 0
     changes = [("split", word) for word in (history.policy_at(0) if history else policy).codewords]

@@ -89,8 +89,7 @@ def save_figure(fig: Figure, name: str, *, out: str | os.PathLike, quick: bool =
 
     `alt` describes the figure for readers who cannot see it; both files contain it. By default it comes, as the caption
     does, from notebooks/captions.toml. `quick` adds a watermark. The files contain no dates or version
-    numbers, so the same figure gives the same bytes. Raises ValueError for a figure without an alternative text.
-    """
+    numbers, so the same figure gives the same bytes. Raises ValueError for a figure without an alternative text."""
     about = caption_of("figures", name, alt=alt)
     if quick:
         fig.text(0.5, 0.5, "quick run", fontsize=36, color="0.5", alpha=0.4, ha="center", va="center", rotation=20)

@@ -29,8 +29,7 @@ class PolicyClass:
     """A class of sub-policy that is linear in its coefficients: output = features @ weights + bias.
 
     Features are in the units of the task, and so are the equations. Training divides features by `sizes`, so that one
-    step size suits all of them.
-    """
+    step size suits all of them."""
 
     name: str
     terms: tuple[str, ...]  # symbols of the q features
@@ -68,8 +67,7 @@ class PolicyClass:
         """Return outputs (c, B, m) of c cells with coefficients (c, p, m) at `inputs` (c, B, q + 1): features and a 1.
 
         Also returns a function that maps the gradient of the loss with respect to these outputs to the gradient with
-        respect to the coefficients.
-        """
+        respect to the coefficients."""
         return inputs @ coefficients, lambda error: inputs.transpose(0, 2, 1) @ error
 
     def contributions(self, state: np.ndarray, coefficients: np.ndarray) -> "pd.DataFrame":

@@ -55,8 +55,7 @@ class SubPolicies:
         """Take one Adam step for each of `cells` (c,) on its own minibatch of B states.
 
         `inputs` (c, B, q + 1) are features and a final column of ones; `actions` are (c, B, m). Returns the mean
-        squared error of each minibatch before the step. (c,)
-        """
+        squared error of each minibatch before the step. (c,)"""
         chosen = slice(None) if len(cells) == len(self.coefficients) else cells  # all cells: views, no copies
         theta, steps = self.coefficients[chosen], self._steps[chosen] + 1
         outputs, pull_back = self.policy_class.batch(inputs, theta)
@@ -74,8 +73,7 @@ class SubPolicies:
         """Solve least squares for each of `cells` (c,) from `SufficientStatistics`: X'X (c, p, p) and X'y (c, p, m).
 
         A small ridge term pulls towards the current coefficients, so coefficients that the states do not determine keep
-        their values. Repeated solutions with the same sums converge to plain least squares.
-        """
+        their values. Repeated solutions with the same sums converge to plain least squares."""
         theta, units = self.coefficients[cells], self._units
         slope = (targets - products @ theta) / units
         ridged = products / units / units.T + RIDGE * np.eye(len(units))

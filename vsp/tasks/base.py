@@ -27,8 +27,7 @@ class Task:
     `start(rng, n)` draws n starts (n, s) in float64. `begin` turns starts into states, a batch of n. `step(states,
     actions)` takes actions (n, m) and returns the next states, the rewards (n,) and the outcomes (n,), indices of
     `OUTCOMES`. The caller counts steps, truncates, and at last calls `end` with what `begin` returned. `see` turns
-    states into observations (n, d). In most tasks start, state and observation are the same array (n, d).
-    """
+    states into observations (n, d). In most tasks start, state and observation are the same array (n, d)."""
 
     name: str
     inputs: tuple[str, ...]  # symbols of the d observed variables, as the paper prints them

@@ -101,8 +101,7 @@ def gymnasium_task(name: str, outcome: Outcome | None = None) -> Task:
     `outcome` tells whether an episode that ended succeeded; None: success is undefined. Raises ValueError for other
     spaces, an action box of integers or without limits, an environment without a step limit, one that normalises its
     observations by their running statistics, and an old version that is gone. An environment that is registered anew
-    gives a new task.
-    """
+    gives a new task."""
     entry, known = gymnasium.registry.get(name), _KNOWN.get((name, outcome))
     if known is None or known[0] is not entry:
         known = _KNOWN[name, outcome] = entry, _made(name, outcome)

@@ -77,8 +77,7 @@ def register(
     `inputs` and `outputs` name its observed variables and its actions; None: s0, s1, ... and a0, a1, ...
     `outcome(observation, reward, info)` tells whether an episode that ended succeeded; None: failures are undefined.
     A `Task` has its own names and outcomes. Raises ValueError for one of vsp's own tasks, for names that are too few,
-    too many or not distinct, and as `get_task` does.
-    """
+    too many or not distinct, and as `get_task` does."""
     task, name = (name, name.name) if isinstance(name, Task) else (None, _registered(name))
     if name in (*_TASKS, *_LATER):
         raise ValueError(f"{name!r} is one of vsp's own tasks, expected the name of another")

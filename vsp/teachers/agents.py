@@ -56,8 +56,7 @@ def agent(
     file of `VecNormalize`, such an object, or (mean, variance). Stochastic agents (PPO, SAC, ...) give their most
     probable actions, because sampling noise carries no information. `name` identifies a function where its runs are
     stored: give another name to another function. What is a teacher already stays as it is. Raises ValueError for any
-    other `source`, and for a model whose spaces are not those of `task`.
-    """
+    other `source`, and for a model whose spaces are not those of `task`."""
     task = None if task is None else get_task(task)
     if isinstance(source, str | os.PathLike):
         return load_teacher(source, task, normalize=normalize)

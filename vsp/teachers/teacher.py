@@ -31,8 +31,7 @@ class Teacher:
     `weights` is an `Actor`, or maps Stable-Baselines3's names of a TD3 actor's tensors ("mu.0.weight", ...) to arrays.
     `critic` does the same for the critics ("qf0.0.weight", ...), which are only kept. With `normalization` it takes raw
     observations all the same. Raises ValueError if the actor does not fit the task, and for numbers that are not finite
-    or beyond `actors.MOST_WEIGHT`.
-    """
+    or beyond `actors.MOST_WEIGHT`."""
 
     def __init__(
         self,
@@ -88,8 +87,7 @@ def load_teacher(
     of `VecNormalize` for an agent that was trained on normalised observations; False says that it was not. Only numbers
     are read: no code from a file runs. Raises ValueError for an unknown task, an agent that does not fit it or that
     says what is not modelled here, and without `normalize` where something shows that it is needed; FileNotFoundError,
-    and `run.atomic.DamagedFile`.
-    """
+    and `run.atomic.DamagedFile`."""
     path = Path(source)
     if path.suffix.lower() == ".zip":
         if task is None:

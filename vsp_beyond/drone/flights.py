@@ -1,7 +1,5 @@
 """Fly many times at once, and measure: how often a drone stays in the room, how far from its aim, how calm."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,7 +21,7 @@ from .quadrotor import (
     Starts,
     advance,
     see,
-)  # fmt: skip
+)
 
 Command = Callable[[np.ndarray], np.ndarray]  # states with a history (n, 149) to commands (n, 4)
 STEPS, LAST = 500, 100  # of a flight, and of its last second

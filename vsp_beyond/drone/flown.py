@@ -4,8 +4,6 @@ The file lies at github.com/arplaboratory/learning_to_fly_controller, `data/acto
 nor anything fitted to it is part of this project.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re
@@ -24,8 +22,7 @@ EXACT = 1e-6  # of the file's own test
 class Flown:
     """The network of the file at `path`: `command(states)` flies, `digest` is the SHA-256 of the file.
 
-    Raises ValueError unless the file holds three layers of these sizes, finite, and its own test comes out.
-    """
+    Raises ValueError unless the file holds three layers of these sizes, finite, and its own test comes out."""
 
     def __init__(self, path: str | os.PathLike):
         with Path(path).open("rb") as file:

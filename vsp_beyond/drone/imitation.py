@@ -5,8 +5,6 @@ It is fitted to the network's commands on the network's own flights, then also o
 So what the loop's largest eigenvalue exceeds costs, for each of `flights.BODIES`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -15,20 +13,7 @@ from vsp.run.progress import shown, steps
 from vsp.subpolicies.stacked import BETA1, adam
 
 from .flights import BODIES, Command, command_of, fly, with_history
-from .quadrotor import (
-    ATTITUDE,
-    CRAZYFLIE,
-    HOVER,
-    MOST_RPM,
-    MOTORS,
-    THRUST,
-    Body,
-    G,
-    Starts,
-    advance,
-    quadrotor,
-    see,
-)
+from .quadrotor import ATTITUDE, CRAZYFLIE, HOVER, MOST_RPM, MOTORS, THRUST, Body, G, Starts, advance, quadrotor, see
 
 VERSION = 1  # raise it when the same arguments give another map
 STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=150.0)
@@ -67,8 +52,7 @@ def loop_of(body: Body) -> Loop:
 def radius(weights: np.ndarray, loop: Loop) -> tuple[float, np.ndarray]:
     """Return the closed loop's largest absolute eigenvalue under the map `weights` (16, 4), and its gradient.
 
-    What trembles counts `TREMBLE` more, so that it dies out sooner.
-    """
+    What trembles counts `TREMBLE` more, so that it dies out sooner."""
     here, steer, seen = loop
     values, right = np.linalg.eig(here + steer @ weights.T @ seen)
     sizes = np.abs(values) + TREMBLE * (np.abs(np.angle(values)) > TURN)
@@ -99,8 +83,7 @@ def one_map(
     """Distil what flies by `command` into one linear map. The same arguments give the same map.
 
     Without `calm` it only imitates; without `memory` it does not see the remembered motor speeds. `progress` shows how
-    far it is.
-    """
+    far it is."""
     used = np.ones((17, 1))
     used[12:16] = memory
     rng = np.random.default_rng(np.random.SeedSequence(seed))

@@ -5,8 +5,6 @@ arXiv 2311.13081) was trained: github.com/arplaboratory/learning-to-fly, `simula
 There is no air drag, no wind and no ground.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 
@@ -21,9 +19,8 @@ STEP = 0.01  # s
 HISTORY = 32  # commands that the flown network sees
 ROOM = 3.0  # m from the origin along each axis
 ARM, TORQUE = 0.028, 0.005964552  # m from the axes to a motor; m of yaw torque per thrust
-TORQUES = np.array(
-    [[-ARM, -ARM, -TORQUE], [-ARM, ARM, TORQUE], [ARM, ARM, -TORQUE], [ARM, -ARM, TORQUE]]
-)  # of four motors about the body's axes x, y, z, per thrust: front right, back right, back left, front left
+# Of four motors about the body's axes x, y, z, per thrust: front right, back right, back left, front left
+TORQUES = np.array([[-ARM, -ARM, -TORQUE], [-ARM, ARM, TORQUE], [ARM, ARM, -TORQUE], [ARM, -ARM, TORQUE]])
 INPUTS = ("x", "y", "z", "ex", "ey", "ez", "vx", "vy", "vz", "p", "q", "r", "n1", "n2", "n3", "n4")
 LABELS = (
     *(f"position {axis} (m)" for axis in "xyz"), *(f"attitude error {axis} (sin of the angle)" for axis in "xyz"),
@@ -96,8 +93,7 @@ def derivative(states: np.ndarray, commands: np.ndarray, body: Body) -> np.ndarr
 def advance(states: np.ndarray, commands: np.ndarray, body: Body = CRAZYFLIE) -> np.ndarray:
     """Return the states (n, 21 or more) after one step: Runge-Kutta 4, the attitude set to length 1 again.
 
-    What a controller remembers moves on, too: the motor speeds as they would be in a Crazyflie, from its commands.
-    """
+    What a controller remembers moves on, too: the motor speeds as they would be in a Crazyflie, from its commands."""
     commands, now = np.clip(commands, -1.0, 1.0), states[:, :17]
     first = derivative(now, commands, body)
     second = derivative(now + STEP / 2 * first, commands, body)
@@ -110,11 +106,21 @@ def advance(states: np.ndarray, commands: np.ndarray, body: Body = CRAZYFLIE) ->
     return np.hstack([after, memory, history])
 
 
+def rotation(attitudes: np.ndarray) -> np.ndarray:
+    """Return the matrices (n, 3, 3) of the unit quaternions w, x, y, z (n, 4)."""
+    w, x, y, z = attitudes.T
+    rows = [
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    ]  # fmt: skip
+    return np.stack(rows, axis=1).reshape(-1, 3, 3)
+
+
 def see(states: np.ndarray) -> np.ndarray:
     """Return the 16 inputs of a controller (n, 16), position, velocity and rates limited to `HIGH`.
 
-    The attitude's error is half the skew part of the rotation matrix: the sine of the angle times the axis.
-    """
+    The attitude's error is half the skew part of the rotation matrix: the sine of the angle times the axis."""
     error = 2 * states[:, 3:4] * states[:, 4:7]
     seen = np.hstack([states[:, POSITION], error, states[:, VELOCITY], states[:, RATES], states[:, MEMORY]])
     return np.clip(seen, -HIGH, HIGH)
@@ -123,14 +129,8 @@ def see(states: np.ndarray) -> np.ndarray:
 def see_all(states: np.ndarray) -> np.ndarray:
     """Return the 146 inputs of the flown network in states with a history (n, 149): instead of the error the rotation
     matrix, instead of the motor speeds the last 32 commands, oldest first."""
-    w, x, y, z = states[:, ATTITUDE].T
-    matrix = [
-        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-    ]  # fmt: skip
     seen = see(states)
-    return np.hstack([seen[:, :3], np.stack(matrix, axis=1), seen[:, 6:12], states[:, 21:]])
+    return np.hstack([seen[:, :3], rotation(states[:, ATTITUDE]).reshape(-1, 9), seen[:, 6:12], states[:, 21:]])
 
 
 def step(states: np.ndarray, actions: np.ndarray, body: Body = CRAZYFLIE) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -146,17 +146,7 @@ def step(states: np.ndarray, actions: np.ndarray, body: Body = CRAZYFLIE) -> tup
 def quadrotor(starts: Starts = Starts(), body: Body = CRAZYFLIE) -> Task:
     """Return the task: to hover at the origin for 5 s. An episode fails ("pit") that leaves the room."""
     return Task(
-        name="Quadrotor-v0",
-        inputs=INPUTS,
-        outputs=("u1", "u2", "u3", "u4"),
-        input_labels=LABELS,
-        low=-HIGH,
-        high=HIGH,
-        action_low=-np.ones(4),
-        action_high=np.ones(4),
-        max_steps=500,
-        start=starts,
-        step=partial(step, body=body),
-        see=see,
-        start_size=21,
-    )
+        name="Quadrotor-v0", inputs=INPUTS, outputs=("u1", "u2", "u3", "u4"), input_labels=LABELS,
+        low=-HIGH, high=HIGH, action_low=-np.ones(4), action_high=np.ones(4), max_steps=500,
+        start=starts, step=partial(step, body=body), see=see, start_size=21,
+    )  # fmt: skip

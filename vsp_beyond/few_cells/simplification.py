@@ -29,8 +29,7 @@ def simplify(
     Returns the policy, its codewords `gathered`, and one row per candidate: stage ("cells", "prune", "round"), cells,
     nonzero coefficients, digits (0: not rounded), mean return, failing, kept. The rows of stage "cells" are the curve
     of return over cells. If no number of cells suffices, the best one is simplified, and `tolerance` counts from its
-    return. Raises ValueError as `distill_tuned` does, and for a tolerance below 0.
-    """
+    return. Raises ValueError as `distill_tuned` does, and for a tolerance below 0."""
     check_seed(seed)
     check_kind(config, Tuned)
     check_number("tolerance", tolerance, least=0)

@@ -34,8 +34,7 @@ def at_rest(policy: VoronoiPolicy) -> pd.DataFrame:
 
     Columns: low, high (the positions of both ends), cell; g_low, g_high, the acceleration at both ends, times 1000;
     dead, whether the acceleration changes its sign between them, so that there is a dead point. Exact except for the
-    rounding of g. Raises ValueError for a policy of another task or class, and for the metric "chebyshev".
-    """
+    rounding of g. Raises ValueError for a policy of another task or class, and for the metric "chebyshev"."""
     check_provable(policy, TASK)
     parts, rows = list[tuple[Fraction, Fraction, int]](), []
     for low, high in pairwise(_possible_borders(policy)):

@@ -21,8 +21,7 @@ def basins(ax: Axes, polygons: list[np.ndarray], steps: np.ndarray, reached: np.
     """Draw the pieces of SimpleGoal's starts.
 
     Each of the n `polygons` (k, 2) has the `steps` (n,) of its episodes and whether these `reached` (n,) the goal.
-    Colours run to `most` steps. Failing pieces are vermilion, with an outline that keeps narrow ones visible.
-    """
+    Colours run to `most` steps. Failing pieces are vermilion, with an outline that keeps narrow ones visible."""
     colours = ScalarMappable(Normalize(0, most), STEPS)
     faces = colours.to_rgba(np.asarray(steps, dtype=float))
     faces[~reached] = mpl.colors.to_rgba(FAILING)
@@ -42,8 +41,7 @@ def upright(ax: Axes, numbers: np.ndarray, most: int) -> ScalarMappable:
     """Draw what is proved for boxes of Pendulum's states: angle by angular velocity.
 
     `numbers` (n, n) are the steps to a set around upright that is never left. They are -1 in the set (grey) and 0 where
-    nothing is proved (white). Colours run to `most` steps.
-    """
+    nothing is proved (white). Colours run to `most` steps."""
     colours = ScalarMappable(Normalize(0, most), STEPS)
     pixels = colours.to_rgba(np.maximum(numbers.T, 0).astype(float))
     pixels[numbers.T == 0] = 1.0

@@ -37,8 +37,7 @@ def steps_into(target: np.ndarray, ways: Sequence[Way], most: int, *, periodic: 
     `target` (n, n); 0 where that is not proved. (n, n)
 
     A box may have several ways, all of which can happen. `periodic`: the first coordinate is an angle, and rectangles
-    may end up to one turn beyond the grid.
-    """
+    may end up to one turn beyond the grid."""
     steps = np.zeros(target.shape, dtype=np.int32)
     for t in range(1, most + 1):
         waiting = steps == 0
@@ -94,8 +93,7 @@ def _all_within(good: np.ndarray, ways: Sequence[Way], periodic: bool) -> np.nda
 def touches(policy: VoronoiPolicy, cell: int, low: np.ndarray, high: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Return which boxes of observations, from `low` to `high` (d, m), may hold one in `cell`. (m,)
 
-    Rounding may decide between codewords that are nearly as near, for observations up to `reach` (d,) in size.
-    """
+    Rounding may decide between codewords that are nearly as near, for observations up to `reach` (d,) in size."""
     power = 1 if policy.metric == "manhattan" else 2  # Euclidean distances are squared, as in the look-up
     sizes = (np.abs(policy.codewords).max(axis=0) + reach) / policy.scale
     tie = TIES * float(np.sum(sizes**power))

@@ -109,8 +109,7 @@ def prove_mountaincar(policy: VoronoiPolicy, *, jobs: int | str = -1) -> Mountai
     """Run the program from every start. Takes four minutes on two cores.
 
     `jobs` as in `vsp.run.workers`. Raises ValueError for a policy that is not made of linear
-    maps and Euclidean cells for MountainCar, and for one with a start from which the car hardly moves.
-    """
+    maps and Euclidean cells for MountainCar, and for one with a start from which the car hardly moves."""
     check_provable(policy, TASK, ["euclidean"])
     if len(policy) > MOST_CELLS:
         raise ValueError(f"the policy has {len(policy)} cells, expected at most {MOST_CELLS}")
@@ -139,8 +138,7 @@ def first_steps(program: Program, seen: np.ndarray, low: np.ndarray, high: np.nd
     """Compute the states after the first step from starts between `low` and `high` (n,), all of which are observed as
     `seen` (n,).
 
-    Returns the states (m, 2), the index of the observation that each comes from (m,), and their returns (m,).
-    """
+    Returns the states (m, 2), the index of the observation that each comes from (m,), and their returns (m,)."""
     near = program.slopes[:, :1] * seen - program.offsets[:, None]
     cells, index = np.nonzero(near >= near.max(axis=0) - program.tie)
     along, bias = program.maps[cells, 0] * seen[index], program.maps[cells, 2]

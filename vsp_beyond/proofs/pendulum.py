@@ -68,8 +68,7 @@ def prove_pendulum(policy: VoronoiPolicy, *, n: int = 1008) -> PendulumProof:
     """Prove from which boxes the pendulum gets upright within 200 steps, and stays. Takes seconds, and 200 bytes a box.
 
     Raises ValueError for a policy that is not made of linear maps and Euclidean or Manhattan cells for Pendulum, and
-    for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000.
-    """
+    for an `n` that is not divisible by 16 (else starts are not whole boxes) or above 8000."""
     check_provable(policy, TASK)
     check_count("n", n, most=8000)
     if n % 16:

@@ -58,8 +58,7 @@ def shares_of_starts(proof: PendulumProof) -> list[float]:
     grid's `proof`, then by smaller and smaller boxes. Takes a minute.
 
     Boxes of starts that the grid leaves unproved are cut into `PARTS` x `PARTS` boxes, which are followed. Those that
-    stay unproved are cut again, `LEVELS` times in all. Returns `LEVELS` + 1 shares.
-    """
+    stay unproved are cut again, `LEVELS` times in all. Returns `LEVELS` + 1 shares."""
     n = len(proof.steps)
     half = np.array([np.pi, FASTEST]) / n
     left = np.argwhere((proof.steps == 0) & proof.starts).T

@@ -26,8 +26,7 @@ class Polygon:
     def cut(self, line: Line) -> tuple[Polygon | None, Polygon | None]:
         """Return the parts on the negative and on the positive side; None for a part without area.
 
-        For a line (0, 0, c), everything lies on the side of the sign of c. The line (0, 0, 0) has no sides.
-        """
+        For a line (0, 0, c), everything lies on the side of the sign of c. The line (0, 0, 0) has no sides."""
         sides = [_side(line, corner) for corner in self.corners]
         if min(sides) >= 0:
             return None, self

@@ -26,8 +26,7 @@ def steps_to_goal(policy: VoronoiPolicy, *, disturbance: float = 0.0, n: int = 1
     proved. (n, n)
 
     Row i, column j: the box from (i / n, j / n). Each step may be disturbed by up to `disturbance` in both coordinates.
-    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, and for numbers out of range.
-    """
+    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, and for numbers out of range."""
     check_provable(policy, TASK)
     check_number("disturbance", disturbance, least=0.0, most=1.0)
     check_count("n", n, most=4000)

@@ -92,8 +92,7 @@ def follow(policy: VoronoiPolicy, *, most: int = MOST) -> list[Piece]:
     """Cut the square of starts into pieces and follow each to its end: at the goal, in the pit, or truncated.
 
     Raises ValueError for a policy of another task or class, for the metric "chebyshev", and for more than
-    `most` pieces: a policy that wanders cuts the square ever finer.
-    """
+    `most` pieces: a policy that wanders cuts the square ever finer."""
     loop, ended, running = Loop(policy), list[Piece](), [Piece(SQUARE)]
     for t in range(TASK.max_steps):
         moved = [after for piece in running for after in loop.advance(piece)]

@@ -65,8 +65,7 @@ class SimpleGoalProof(Proof):
 def prove_simplegoal(policy: VoronoiPolicy) -> SimpleGoalProof:
     """Follow `policy` from every start of SimpleGoal to the end, in exact arithmetic. Takes seconds to a minute.
 
-    Raises ValueError for a policy of another task or class, or with the metric "chebyshev".
-    """
+    Raises ValueError for a policy of another task or class, or with the metric "chebyshev"."""
     return SimpleGoalProof(policy, tuple(follow(policy)))
 
 

@@ -35,8 +35,7 @@ def simplegoal_table() -> pd.DataFrame:
     Columns: policy; cells; failing, the exact area of starts that do not reach the goal; outside, the same for starts
     outside the pit; sampled, the share of 10^6 episodes that fail; steps, the most; mean, the lower bound on the mean
     return; program, the share of starts outside the pit that the program surely takes to the goal; disturbance, the
-    largest one under which all of these are proved to reach it.
-    """
+    largest one under which all of these are proved to reach it."""
     rows = read_results("proofs", RESULTS).set_index("name").loc[list(NAMES)]
     failing, sampled = (rows[f"{prefix}pit"] + rows[f"{prefix}left"] for prefix in ("", "sampled_"))
     rows = rows.assign(policy=rows.index.map(NAMES), failing=failing, sampled=sampled)
@@ -49,8 +48,7 @@ def dead_point_table(policies: dict[str, VoronoiPolicy]) -> pd.DataFrame:
     """Return whether policies for MountainCar have a dead point, and their returns.
 
     Columns: policy; left and right, 1000 times the acceleration at rest at both ends of the starts; borders, the number
-    of cell borders between them; dead point, its position (NaN: none); mean return; failing, the share of starts.
-    """
+    of cell borders between them; dead point, its position (NaN: none); mean return; failing, the share of starts."""
     rows = []
     for name, policy in policies.items():
         parts = at_rest(policy)

@@ -5,8 +5,6 @@ Policy.v as it is: we trust that `files` writes the certificate's numbers exactl
 which is about rational numbers, to the episodes of `vsp.evaluate`.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys
@@ -44,8 +42,7 @@ def steps(policy: VoronoiPolicy) -> np.ndarray:
     """Return the most steps from any state of each box to the goal, as Coq checks them; `UNPROVED` where the pit may be
     entered or the boxes are too coarse. (N, N)
 
-    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, with Euclidean distances.
-    """
+    Raises ValueError for a policy that is not made of linear maps for SimpleGoal, with Euclidean distances."""
     check_provable(policy, TASK, ["euclidean"])
     boxes = np.stack(np.meshgrid(np.arange(N), np.arange(N), indexing="ij")).reshape(2, -1)
     goal = (boxes < N // 10).all(axis=0).reshape(N, N)

@@ -125,8 +125,7 @@ def explore(
     `policies`: one policy with linear maps, or several by name; None: a `Workbench`, which distils in the browser.
     `teacher`: its mean return is shown beside theirs. `history`: replays the distillation of the first policy. The
     browser plays SimpleGoal, MountainCarContinuous and Pendulum. Raises ValueError for other policies and tasks, and
-    for a history of another method or task.
-    """
+    for a history of another method or task."""
     if policies is None:
         return Workbench()
     shown: dict[str, Any] = policies if isinstance(policies, dict) else {"policy": policies}

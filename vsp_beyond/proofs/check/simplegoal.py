@@ -42,8 +42,7 @@ def check_content(content: dict) -> dict:
 def followed(policy: Policy, polygons: list, pieces: list[tuple[list[str], str]], depth: int):
     """Yield end, depth and area of all `pieces`, which share their first `depth` steps; `polygons` are their starts.
 
-    A polygon is a list of corners made by `corner`.
-    """
+    A polygon is a list of corners made by `corner`."""
     ended = {end for steps, end in pieces if len(steps) == depth}
     if ended and depth == N_STEPS:
         if ended != {"left"}:
@@ -140,8 +139,7 @@ class Policy:
         """Return other codewords that may be nearer to some of `polygon`, be it only by rounding.
 
         In the Manhattan distance, each coordinate adds a monotone function to the difference, which is largest at an
-        end.
-        """
+        end."""
         far = np.zeros(len(self.codewords), dtype=bool)
         if self.metric == "manhattan":
             states = np.array([rough for _, _, rough in polygon]) / self.sizes
@@ -171,8 +169,7 @@ class Policy:
     def gap(self, number: int, other: int, at: tuple) -> Form:
         """Return the distance to codeword `number` minus that to `other`; Euclidean distances are squared.
 
-        `at`: on which side of each of the two codewords the first coordinate is, then the second.
-        """
+        `at`: on which side of each of the two codewords the first coordinate is, then the second."""
         slopes, constant = [], Fraction(0)
         for axis, scale in enumerate(self.scale):
             c, d = self.codewords[number][axis], self.codewords[other][axis]
