@@ -1,4 +1,4 @@
-"""`make drone [AGENT=actor.h]`: one linear map of what flies, and how both fly: rows into data/beyond/.
+"""`make drone [AGENT=actor.h]`: linear maps of what flies, and how both fly: rows into data/beyond/.
 
 Without AGENT it is our own teacher. With the file of the network that flew (`vsp_beyond.drone.flown`), only measured
 rows come of it, with the file's checksum; no number of the file, and no map fitted to it, is kept.
@@ -25,9 +25,13 @@ from .committed import RESULTS, read_results, write_results
 
 N, START_SEED, PUSH_SEED = 300, 1000, 1001  # flights of each kind, from starts of their own
 TEACHER = SHIPPED / "Quadrotor-v0.safetensors"
-WAYS = {"one map": {}, "that only imitates": {"calm": False}, "without past commands": {"calm": False, "memory": False}}
-SEEDS = {"network": range(1), **dict.fromkeys(WAYS, range(3)), "one map": range(10)}
-WHOLE = ("network", "one map")  # under all conditions; the others as built, from the easier starts
+WAYS: dict[str, dict] = {
+    "one map": {}, "four cells": {"n_cells": 4},
+    "one map that only imitates": {"calm": False},
+    "one map without past commands": {"calm": False, "memory": False},
+}  # fmt: skip
+SEEDS = {"network": range(1)} | {flies: range(10 if how.get("calm", True) else 3) for flies, how in WAYS.items()}
+WHOLE = ("network", "one map", "four cells")  # under all conditions; the others as built, from the easier starts
 CONDITIONS = (*BODIES, "push of .5 m/s")
 KINDS = ("kept", "distance", "change")
 
@@ -68,8 +72,9 @@ class Measured(Job):
         if self.flies == "network":
             ours, r2 = theirs, 1.0
         else:
-            policy = imitation.one_map(theirs, seed=self.seed, progress=False, **WAYS[self.flies])
+            policy = imitation.few_maps(theirs, seed=self.seed, progress=False, **WAYS[self.flies])
             numbers, ours = int(np.count_nonzero(policy.coefficients)), command_of(policy)
+            numbers += policy.codewords.size * (len(policy) > 1)
             r2 = _r2(ours, theirs)
         loops = {name: imitation.radius_at_rest(ours, body) for name, body in BODIES.items()}
         radii = {name: radius if np.isfinite(radius) else None for name, radius in loops.items()}  # JSON has no NaN
@@ -117,7 +122,7 @@ def rows(agent: str, folder: Path) -> list[dict]:
                 "agent": "flown" if agent else "own", "flies": flies, "condition": condition,
                 "starts": "hard" if starts in HARD else "easy", "tilt": starts.tilt,
                 "kept": values["kept"][:, i].mean(), "more": more.mean(), "more_low": low, "more_high": high,
-                **{kind: pd.Series(values[kind][:, i].ravel()).mean() for kind in ("change", "distance")},  # without NaN
+                **{kind: pd.Series(values[kind][:, i].ravel()).mean() for kind in KINDS[1:]},  # without NaN
                 "radius": radii.max(), "r2": np.mean([one["r2"] for one in about]),
                 "numbers": about[0]["numbers"], "seeds": len(work), "checksum": network(agent)[1],
                 **work[0].provenance,

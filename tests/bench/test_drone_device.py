@@ -7,7 +7,7 @@ import pytest
 
 from studies.drone import own_teacher
 from vsp_beyond import device
-from vsp_beyond.drone import one_map
+from vsp_beyond.drone import few_maps
 from vsp_beyond.drone.flights import command_of
 
 ARM = "arm-none-eabi-gcc -mcpu=cortex-m4 -mthumb -mfpu=fpv4-sp-d16 -mfloat-abi=hard -O2".split()
@@ -30,7 +30,7 @@ int main(void) {
 @pytest.mark.skipif(not all(map(shutil.which, (ARM[0], QEMU[0]))), reason="no compiler for ARM, or no QEMU")
 def test_one_map_on_a_microcontroller(tmp_path, record):
     """QEMU counts no cycles; what a call executes is the difference between two calls and one."""
-    policy = one_map(command_of(own_teacher()), seed=0)
+    policy = few_maps(command_of(own_teacher()), seed=0)
     (tmp_path / "policy.c").write_text(device.to_c(policy, real="float"), "utf-8")
     (tmp_path / "policy.h").write_text(device.to_header(policy, real="float"), "utf-8")
     subprocess.run([*ARM, "-c", "policy.c"], check=True, cwd=tmp_path)

@@ -47,14 +47,31 @@ def test_a_map_is_found_again(monkeypatch):
     monkeypatch.setattr(imitation, "FLIGHTS", 100)
     monkeypatch.setattr(imitation, "ROUNDS", 1)
     known = simple()
-    found = imitation.one_map(command_of(known), seed=0, calm=False)
+    found = imitation.few_maps(command_of(known), seed=0, calm=False)
     seen = see(Starts(0.3, 1.0, 1.0, 90.0)(RNG, 500))
-    assert r_squared(found.predict(seen)[0], known.predict(seen)[0]) > 0.9999
+    assert r_squared(found.predict(seen)[0], known.predict(seen)[0]) > 0.9995
     assert np.abs(found.coefficients - known.coefficients)[0, :12].max() < 0.02  # motors say partly what others say
     monkeypatch.setattr(imitation, "N_STEPS", 50)
     monkeypatch.setattr(imitation, "BODIES", {"as built": CRAZYFLIE})
-    blind, again = (imitation.one_map(command_of(known), seed=0, calm=False, memory=False) for _ in range(2))
+    blind, again = (imitation.few_maps(command_of(known), seed=0, calm=False, memory=False) for _ in range(2))
     assert not blind.coefficients[0, 12:16].any() and np.array_equal(blind.coefficients, again.coefficients)
+
+
+def test_two_maps_are_found_in_two_cells(monkeypatch):
+    """On one side of the origin the height counts six times as much as on the other."""
+    known, other = simple(), simple().coefficients[0].copy()
+    other[2] *= 6
+    known = VoronoiPolicy(
+        np.array([[-0.2], [0.2]]) * np.eye(16)[0], np.stack([known.coefficients[0], other]), task=known.task
+    )
+    few = {"FLIGHTS": 100, "OWN_FLIGHTS": 20, "ROUNDS": 1, "DIVIDED": 1, "N_STEPS": 400, "BODIES": {"": CRAZYFLIE}}
+    for name, value in few.items():
+        monkeypatch.setattr(imitation, name, value)
+    seen = see(Starts(0.3, 1.0, 1.0, 30.0)(RNG, 500))
+    found = [imitation.few_maps(command_of(known), seed=0, n_cells=n, calm=False, progress=False) for n in (1, 2)]
+    left = [r_squared(policy.predict(seen)[0], known.predict(seen)[0]) for policy in found]
+    assert left[0] < 0.7 and left[1] > 0.85
+    assert abs(np.corrcoef(found[1].cells(seen), known.cells(seen))[0, 1]) > 0.7
 
 
 def test_what_an_eigenvalue_exceeds_costs(monkeypatch):
@@ -63,7 +80,7 @@ def test_what_an_eigenvalue_exceeds_costs(monkeypatch):
     monkeypatch.setattr(imitation, "ROUNDS", 0)
     strong = simple(4.0)
     loops = [imitation.loop_of(body) for body in BODIES.values()]
-    fits = {calm: imitation.one_map(command_of(strong), seed=0, calm=calm) for calm in (False, True)}
+    fits = {calm: imitation.few_maps(command_of(strong), seed=0, calm=calm) for calm in (False, True)}
     radii = {
         calm: [imitation.radius(fit.coefficients[0, :16], loop)[0] for loop in loops] for calm, fit in fits.items()
     }

@@ -47,7 +47,7 @@ def test_rows_of_small_maps(monkeypatch, tmp_path):
         (imitation, "N_STEPS", 200), (drone, "HARD", drone.HARD[:1]), (drone, "EASY", drone.EASY[:2]),
         (drone, "CONDITIONS", ("as built", drone.CONDITIONS[-1])), (drone, "BODIES", {"as built": drone.CRAZYFLIE}),
         (imitation, "BODIES", {"as built": drone.CRAZYFLIE}),
-        (drone, "SEEDS", {"network": range(1), "one map": range(2), "without past commands": range(1)}),
+        (drone, "SEEDS", {"network": range(1), "one map": range(2), "one map without past commands": range(1)}),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     monkeypatch.setattr("sys.argv", ["drone", "--jobs=1", f"--out={tmp_path}"])
@@ -59,7 +59,7 @@ def test_rows_of_small_maps(monkeypatch, tmp_path):
     assert rows["agent"].tolist() == ["flown"] + ["own"] * 14 and rows["kept"][0] == 2
     mine = rows[1:].set_index(["flies", "condition", "starts", "tilt"])
     assert mine["numbers"].groupby("flies").first().to_dict() == {
-        "network": 5508, "one map": 68, "without past commands": 52,
+        "network": 5508, "one map": 68, "one map without past commands": 52,
     }  # fmt: skip
     network, ours = (mine.loc[flies, "as built", "easy", 60] for flies in ("network", "one map"))
     assert network["kept"] == 1 and network["more"] == 0 and network["r2"] == 1

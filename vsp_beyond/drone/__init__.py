@@ -1,4 +1,4 @@
-"""A quadrotor that hovers: its task, the network that flew, and one linear map that flies as a network does."""
+"""A quadrotor that hovers: its task, the network that flew, and linear maps that fly as a network does."""
 
 from .flown import Flown
-from .imitation import one_map
+from .imitation import few_maps

@@ -1,4 +1,5 @@
-"""One linear map of 16 inputs, limited to the commands' range, that flies as a network flies.
+"""One linear map of 16 inputs, or one for each of a few cells, limited to the commands' range, that flies as a network
+flies.
 
 It is fitted to the network's commands on the network's own flights, then also on those of the map (DAgger, Ross et al.
 2011). A map that only imitates may chatter: imitation does not see whether its closed loop near hovering is stable.
@@ -11,17 +12,21 @@ from threadpoolctl import threadpool_limits
 from vsp.policy import VoronoiPolicy
 from vsp.run.progress import shown, steps
 from vsp.subpolicies.stacked import BETA1, adam
+from vsp_beyond.few_cells.search import least_error
+from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
 from .flights import BODIES, Command, command_of, fly, with_history
 from .quadrotor import ATTITUDE, CRAZYFLIE, HOVER, MOST_RPM, MOTORS, THRUST, Body, G, Starts, advance, quadrotor, see
 
 VERSION = 1  # raise it when the same arguments give another map
-STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=150.0)
+STARTS = Starts(position=0.3, velocity=1.0, rates=1.0, tilt=180.0)
 FLIGHTS, OWN_FLIGHTS, ROUNDS = 800, 50, 4  # of the network; of the map with each body in each round of corrections
 EVERY, SEEN = 3, 300  # every third state of a flight's first 300 is kept
 N_STEPS, BATCH, RATE = 1200, 2048, 0.02  # of Adam, for each round
 SLOPE = 0.01  # of a limited command beyond its limits, in the gradient, so that this does not vanish
-CALM, PRICE = 0.99, 1000.0  # largest eigenvalue of a loop that is free; the price of 1 beyond it, squared
+DIVIDED = 3  # the first round with cells; before it there is one map
+N_STATES, N_DESCENTS = 10_000, 4  # states and descents in the search for cells
+CALM, PRICE = 0.986, 1000.0  # largest eigenvalue of a loop that is free; the price of 1 beyond it, squared
 TREMBLE, TURN = 0.05, 0.2  # an eigenvalue that turns by more than so many rad a step counts so much more
 PARTS = [0, 1, 2, *range(4, 21)]  # of a state near hovering: the attitude's w follows from x, y, z
 
@@ -77,29 +82,38 @@ def radius_at_rest(command: Command, body: Body = CRAZYFLIE) -> float:
 
 
 @threadpool_limits.wrap(limits=1)
-def one_map(
-    command: Command, *, seed: int, calm: bool = True, memory: bool = True, progress: bool = True
+def few_maps(
+    command: Command, *, seed: int, n_cells: int = 1, calm: bool = True, memory: bool = True, progress: bool = True
 ) -> VoronoiPolicy:
-    """Distil what flies by `command` into one linear map. The same arguments give the same map.
+    """Distil what flies by `command` into a linear map for each of `n_cells`. The same arguments give the same maps.
 
-    Without `calm` it only imitates; without `memory` it does not see the remembered motor speeds. `progress` shows how
+    Without `calm` they only imitate; without `memory` they do not see the remembered motor speeds. `progress` shows how
     far it is."""
     used = np.ones((17, 1))
     used[12:16] = memory
     rng = np.random.default_rng(np.random.SeedSequence(seed))
     loops = [loop_of(body) for body in BODIES.values()] if calm else []
     seen, taken = _flown(command, command, STARTS(rng, FLIGHTS))
-    coefficients = np.zeros((17, 4))
-    coefficients[16] = HOVER
+    hovering = np.zeros((1, 17, 4))
+    hovering[:, 16] = HOVER
+    policy = VoronoiPolicy(np.zeros((1, 16)), hovering, task=quadrotor())
     with shown(progress):
-        for round_ in steps(range(ROUNDS + 1), "one map", total=ROUNDS + 1, unit="rounds"):
-            coefficients = used * _fitted(coefficients, used[:16, 0] * seen, taken, loops, rng)
-            policy = VoronoiPolicy(np.zeros((1, 16)), coefficients[None], task=quadrotor())
+        for round_ in steps(range(ROUNDS + 1), "maps", total=ROUNDS + 1, unit="rounds"):
+            if n_cells > 1 and round_ >= DIVIDED:
+                policy = _cells(seen, taken, n_cells, rng)
+            policy = _fitted(policy, used, seen, taken, loops, rng)
             if round_ < ROUNDS:
                 for body in BODIES.values():
                     more = _flown(command_of(policy), command, STARTS(rng, OWN_FLIGHTS), body)
                     seen, taken = (np.concatenate(both) for both in zip((seen, taken), more))
     return policy
+
+
+def _cells(seen: np.ndarray, taken: np.ndarray, n_cells: int, rng: np.random.Generator) -> VoronoiPolicy:
+    """Return cells with the maps that imitate best."""
+    scaling = Scaling.of(quadrotor(), seen)
+    labelled = LabelledStates(scaling.inputs(seen), taken).thinned(N_STATES, rng)
+    return scaling.policy(least_error(labelled, n_cells, N_DESCENTS, rng))
 
 
 def _flown(flies: Command, says: Command, starts: np.ndarray, body: Body = CRAZYFLIE) -> tuple[np.ndarray, np.ndarray]:
@@ -120,20 +134,24 @@ def _flown(flies: Command, says: Command, starts: np.ndarray, body: Body = CRAZY
 
 
 def _fitted(
-    coefficients: np.ndarray, seen: np.ndarray, taken: np.ndarray, loops: list[Loop], rng: np.random.Generator
-) -> np.ndarray:
-    """Return the coefficients (17, 4) after Adam's steps on the squared error of the limited commands."""
+    policy: VoronoiPolicy, used: np.ndarray, seen: np.ndarray, taken: np.ndarray, loops: list[Loop],
+    rng: np.random.Generator,
+) -> VoronoiPolicy:  # fmt: skip
+    """Return `policy` with maps after Adam's steps on the squared error of the limited commands; the map that hovers
+    pays for its loops."""
+    own, hovers = policy.cells(seen), policy.cells(np.append(np.zeros(12), np.full(4, HOVER))[None])[0]
     scale = np.append(seen.std(axis=0) + 1e-9, 1.0)[:, None]
-    features, theta = np.hstack([seen, np.ones((len(seen), 1))]) / scale[:, 0], coefficients * scale
+    features, theta = np.hstack([seen, np.ones((len(seen), 1))]) * (used / scale)[:, 0], policy.coefficients * scale
     mean = square = np.zeros_like(theta)
     for i in range(N_STEPS):
         rows = rng.integers(len(features), size=BATCH)
-        raw = features[rows] @ theta
+        inputs, cells = features[rows], own[rows]
+        raw = (inputs[:, None] @ theta[cells])[:, 0]
         error = (np.clip(raw, -1, 1) - taken[rows]) * np.where(np.abs(raw) <= 1, 1, SLOPE)
-        gradient = features[rows].T @ error / BATCH
+        gradient = np.stack([inputs[cells == cell].T @ error[cells == cell] for cell in range(len(policy))]) / BATCH
         for loop in loops:
-            largest, towards = radius(theta[:16] / scale[:16], loop)
-            gradient[:16] += 2 * PRICE * max(0.0, largest - CALM) * towards / scale[:16]
+            largest, towards = radius(theta[hovers, :16] / scale[:16], loop)
+            gradient[hovers, :16] += 2 * PRICE * max(0.0, largest - CALM) * towards / scale[:16]
         mean, square, spread = adam(gradient, mean, square, i + 1)
         theta = theta - RATE * (1 - i / N_STEPS) * mean / (1 - BETA1 ** (i + 1)) / spread
-    return theta / scale
+    return policy.with_maps(used * theta / scale)
