@@ -15,10 +15,9 @@ from scipy.spatial import Delaunay, KDTree
 from torch.nn.functional import mse_loss
 
 import vsp
-from vsp import algorithms
-from vsp.config import Config
+from vsp import Config, algorithms
 from vsp.rollouts import Episode
-from vsp.teachers.teacher import SHIPPED
+from vsp.teachers import SHIPPED
 
 
 def evaluate_directly(policy, task: str, n_episodes: int, *, seed: int) -> np.ndarray:

@@ -15,15 +15,11 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from vsp import geometry
-from vsp.config import Config
-from vsp.partition import Partition
-from vsp.policy import VoronoiPolicy
+from vsp import Config, Partition, VoronoiPolicy, geometry, get_task
 from vsp.rollouts import Episode
-from vsp.run.atomic import ROOT
+from vsp.run import ROOT
 from vsp.subpolicies import policy_class
-from vsp.tasks.registry import get_task
-from vsp.teachers.teacher import Teacher
+from vsp.teachers import Teacher
 
 
 def nearest_from(least, codewords, states, metric):

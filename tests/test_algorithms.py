@@ -9,12 +9,11 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TINY, CurvedTeacher, PumpingTeacher
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import vsp
-from vsp import algorithms, distill
+from vsp import algorithms, distill, get_task
 from vsp.algorithms import due, may_alter, merge_regions, split_regions, teacher_episodes
 from vsp.rollouts import Episode
 from vsp.run import kernels
-from vsp.subpolicies.stacked import SubPolicies
-from vsp.tasks.registry import get_task
+from vsp.subpolicies import SubPolicies
 
 GOLDEN = Path(__file__).parent / "golden" / "distill.json"
 ROW = [[0.125, 0.5], [0.5, 0.5], [0.875, 0.5]]  # three cells in a row: each touches the next

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from support import SIMPLEGOAL, nearest_brute, nearest_kdtree
 
-from vsp.cells import Halfspaces, Nearest
-from vsp.geometry import Metric
-from vsp.policy import PiecewisePolicy
+from vsp import Halfspaces, Metric, Nearest, PiecewisePolicy
 
 # x > 0.5 is cell 1; left of it, y > 0.3 is cell 2, else cell 0
 HAND = Halfspaces([[1.0, 0.0], [0.0, 2.0]], [0.5, 0.6], [[1, -2], [-1, -3]])

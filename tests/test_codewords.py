@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import nearest_brute, nearest_kdtree, partition_of
 
-from vsp import VoronoiPolicy
+from vsp import Task, VoronoiPolicy
 from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours
-from vsp.tasks import Task
 
 
 def unit(vectors):

@@ -8,10 +8,9 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, acted, compiled, random_policy
 
 from studies import zoo as agents
+from vsp import VoronoiPolicy, get_task
 from vsp.export import symbol
 from vsp.paper import published_policy
-from vsp.policy import VoronoiPolicy
-from vsp.tasks import get_task
 
 
 def states_of(policy, n):

@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, random_policy, same_arrays
 
 import vsp
+from vsp import VoronoiPolicy, get_task
 from vsp.checks import check_finite
 from vsp.geometry import METRICS, distances
 from vsp.paper.baselines import refit
-from vsp.policy import VoronoiPolicy
 from vsp.run import sealed
 from vsp.run.atomic import DamagedFile
 from vsp.subpolicies import POLICY_CLASSES, policy_class
-from vsp.tasks import get_task
 
 TWO = VoronoiPolicy(  # cells left and right; the right one answers constants, one of them beyond the limits
     [[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], [[0, 0], [0, 0], [3, -0.5]]], task=SIMPLEGOAL

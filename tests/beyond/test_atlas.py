@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TASKS, network_teacher, random_policy
 
-from vsp import show
-from vsp.policy import VoronoiPolicy
-from vsp.tasks import get_task
+from vsp import VoronoiPolicy, get_task, show
 from vsp.teachers import Teacher, load_teacher
 from vsp.teachers.actors import Actor
 from vsp.teachers.normalization import Normalization

@@ -6,10 +6,9 @@ from support import PENDULUM, SIMPLEGOAL, Constant, CurvedTeacher
 
 from vsp.evaluation import rollout_from_seed
 from vsp.rollouts import rollout, visited_states
-from vsp.tasks import GOAL
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL, get_task
+from vsp_beyond import Faithful
 from vsp_beyond.few_cells import faithful as module
-from vsp_beyond.few_cells.config import Faithful
 from vsp_beyond.few_cells.faithful import distill_faithfully, kept
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, needed_only, squared_error, warn_outside
 

@@ -7,10 +7,9 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher
 
 import vsp
-from vsp.evaluation import Likeness
-from vsp.tasks import get_task
+from vsp import Likeness, get_task
+from vsp_beyond import Faithful
 from vsp_beyond.few_cells import fewest as module
-from vsp_beyond.few_cells.config import Faithful
 
 QUICK = Faithful(
     n_cells=8, n_episodes=20, n_states=2000, n_restarts=2, n_generations=2, n_tuning_episodes=3, n_validation=20

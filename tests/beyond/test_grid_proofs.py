@@ -11,9 +11,8 @@ from test_simplegoal_proof import refuse
 
 import vsp
 from studies import comparison
-from vsp_beyond.proofs import check, pendulum, pendulum_starts
+from vsp_beyond.proofs import check, pendulum, pendulum_starts, prove_pendulum
 from vsp_beyond.proofs.grid import Way, around, steps_into
-from vsp_beyond.proofs.pendulum import prove_pendulum
 from vsp_beyond.proofs.pendulum_starts import Boxes, shares_of_starts, stepped
 
 N = 400

@@ -6,8 +6,7 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeache
 
 import vsp
 import vsp_beyond
-from vsp.evaluation import start_states
-from vsp.policy import VoronoiPolicy
+from vsp import VoronoiPolicy, start_states
 from vsp.rollouts import rollout
 from vsp.tasks import GOAL, get_task
 from vsp_beyond.few_cells import limit

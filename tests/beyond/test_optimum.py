@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 
-from vsp.evaluation import start_states
+from vsp import load_teacher, start_states
 from vsp.rollouts import rollout, visited_states
 from vsp.tasks import GOAL, RUNNING, get_task
-from vsp.teachers.teacher import load_teacher
 from vsp_beyond.optimum import PENDULUM_REGIONS, TASKS, best_policy, best_returns, losses
 from vsp_beyond.optimum.grid import Grid, GridPolicy, best_values
 

@@ -6,10 +6,8 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, PumpingTeacher
 from test_tuned import SMALL
 
-from vsp.evaluation import start_states
-from vsp.policy import VoronoiPolicy
+from vsp import VoronoiPolicy, get_task, start_states
 from vsp.rollouts import rollout
-from vsp.tasks.registry import get_task
 from vsp_beyond.few_cells.simplification import gathered, prune, rounded, simplify
 from vsp_beyond.few_cells.tune import score
 

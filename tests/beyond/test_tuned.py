@@ -8,13 +8,12 @@ from scipy.special import softmax
 from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, CurvedTeacher, RandomPolicy
 
 import vsp_beyond
+from vsp import VoronoiPolicy, load_teacher
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
-from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
-from vsp.teachers.teacher import load_teacher
-from vsp_beyond.few_cells.config import Tuned
+from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, is_snapshot, score, tune
 from vsp_beyond.few_cells.tuned import anneal, distill_tuned, random_init
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss

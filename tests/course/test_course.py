@@ -18,11 +18,9 @@ from IPython.core.interactiveshell import InteractiveShell
 from support import python
 
 import vsp
-from vsp import distill, show
-from vsp.algorithms import split_regions, teacher_episodes
-from vsp.paper import baselines
+from vsp import distill, show, split_regions, teacher_episodes
+from vsp.paper import baselines, spread
 from vsp.paper.readings import Readings
-from vsp.paper.statistics import spread
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
 from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, slides

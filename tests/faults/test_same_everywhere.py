@@ -14,11 +14,10 @@ from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, distilled_elsewhere, threads
 
 import vsp
 from vsp import algorithms
-from vsp.paper.results import read_results
+from vsp.paper import read_results, spread
 from vsp.paper.runs import N_RUNS, make_runs, paper_experiment
-from vsp.paper.statistics import spread
 from vsp.rollouts import visited_states
-from vsp.run.atomic import ROOT
+from vsp.run import ROOT
 
 ROW_BY_ROW = {SIMPLEGOAL: "curved", MOUNTAINCAR: "pumping"}  # teachers of which the batch has no say in the numbers
 PRESCOTT = {  # an old processor for NumPy, OpenBLAS and the C library

@@ -8,11 +8,10 @@ from sklearn.tree import DecisionTreeRegressor
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, TEACHERS, examples
 
 from studies.comparison.makers import dagger
+from vsp import VoronoiPolicy, get_task
 from vsp.evaluation import evaluate
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from vsp.policy import VoronoiPolicy
 from vsp.rollouts import visited_states
-from vsp.tasks.registry import get_task
 
 # One linear map
 

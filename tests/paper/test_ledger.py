@@ -8,18 +8,16 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
+from vsp import VoronoiPolicy, get_task
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import ledger, tables
 from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
 from vsp.paper.statistics import resample
-from vsp.policy import VoronoiPolicy
 from vsp.rollouts import Outcomes
 from vsp.run.notebook import nbformat
-from vsp.tasks import registry, simplegoal
-from vsp.tasks.base import GOAL
-from vsp.tasks.registry import get_task
+from vsp.tasks import GOAL, registry, simplegoal
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULT = "_spread_|_drl_|_ours_"  # what the ids of the results in text and tables hold

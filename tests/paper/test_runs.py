@@ -13,16 +13,14 @@ from threadpoolctl import threadpool_limits
 from vsp import distill
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import make_runs as command
+from vsp.paper import read_results, spread, tables
 from vsp.paper import runs as runs_module
-from vsp.paper import tables
 from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
-from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, make_runs, paper_results
-from vsp.paper.statistics import spread
 from vsp.protocol import job
 from vsp.run import atomic, sealed
-from vsp.tasks.base import GOAL, PIT, TRUNCATED
+from vsp.tasks import GOAL, PIT, TRUNCATED
 
 CONFIG = support.tiny(n_epochs=30, n_freeze=5)
 SMALL = runs_module.Experiment(SIMPLEGOAL, CONFIG, CurvedTeacher(), n_episodes=20)

@@ -12,8 +12,7 @@ import scipy.linalg
 from numpy.lib.introspect import opt_func_info
 from threadpoolctl import threadpool_info
 
-from vsp.run import kernels
-from vsp.run.atomic import ROOT
+from vsp.run import ROOT, kernels
 from vsp.run.workers import results
 
 CALLERS = [{}, {"OPENBLAS_CORETYPE": "Prescott"}, {"NPY_ENABLE_CPU_FEATURES": "X86_V2"},

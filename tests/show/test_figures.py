@@ -12,12 +12,11 @@ from PIL import Image, UnidentifiedImageError
 from support import python
 
 import vsp
-from vsp import geometry, show
+from vsp import geometry, get_task, show
 from vsp.rollouts import Episode
-from vsp.run.atomic import ROOT
+from vsp.run import ROOT
 from vsp.show import state_space, style
 from vsp.show.style import TEXT_WIDTH, letter, panels, save_figure
-from vsp.tasks.registry import get_task
 
 mpl.use("Agg")
 ALT = 'Two "cells" & their border <drawn> in grey'

@@ -20,9 +20,8 @@ from studies.robots import Walking
 from vsp import algorithms, get_task
 from vsp.paper.runs import Experiment, Run
 from vsp.run import kernels
-from vsp_beyond import Faithful, simplify
+from vsp_beyond import Faithful, search_limit, simplify
 from vsp_beyond.few_cells import limit
-from vsp_beyond.few_cells.limit import search_limit
 from vsp_beyond.optimum import TASKS as SOLVED
 from vsp_beyond.optimum import best_policy
 

@@ -11,15 +11,12 @@ import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
 from studies.reproduction import hidden
-from vsp import VoronoiPolicy
+from vsp import VoronoiPolicy, get_task
 from vsp.algorithms import distill
 from vsp.config import EXTENSIONS, Config, paper_preset
-from vsp.paper import printed
-from vsp.paper.ledger import ledger_table
+from vsp.paper import ledger_table, printed, read_results
 from vsp.paper.readings import OPEN, Readings, defaults
-from vsp.paper.results import read_results
 from vsp.paper.runs import paper_experiment
-from vsp.tasks import get_task
 
 
 def test_settings_are_drawn_from_the_prior_with_its_weights():

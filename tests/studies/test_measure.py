@@ -9,8 +9,7 @@ from studies.comparison.makers import dagger
 from studies.comparison.measure import action_error, common_states, fidelity, measure, sameness
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout_from_seed, start_states
 from vsp.paper.baselines import Tree
-from vsp_beyond import Tuned
-from vsp_beyond.few_cells.tuned import distill_tuned
+from vsp_beyond import Tuned, distill_tuned
 
 
 def test_what_is_reported_by_hand(monkeypatch):

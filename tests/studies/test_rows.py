@@ -10,11 +10,10 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Cons
 
 from studies import make_rows
 from studies.committed import RESULTS, keys, read_results
-from studies.comparison import beside, measure, rows
+from studies.comparison import beside, measure, read_rows, rows
 from studies.comparison.beside import kept_jobs
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Entry, Table
 from studies.comparison.rows import Row, jobs_of, make_all
-from studies.comparison.summary import read_rows
 from studies.robots import Walking
 from vsp import VoronoiPolicy, get_task, load_teacher, rollout, start_states
 from vsp_beyond import Faithful

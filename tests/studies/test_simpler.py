@@ -8,13 +8,11 @@ from support import SIMPLEGOAL, TASKS, TEACHERS, called, tiny
 from studies import make_study
 from studies.reproduction import simpler, verdicts
 from studies.reproduction.simpler import LEAVES, compare_simpler, fit, teacher_data
-from vsp import algorithms, distill
+from vsp import Partition, algorithms, distill
 from vsp.evaluation import evaluate, rollout_from_seed
-from vsp.paper import printed
+from vsp.paper import printed, read_results
 from vsp.paper.baselines import Tree, kmeans_cells, linear_map, refit, rule_of_thumb
-from vsp.paper.results import read_results
 from vsp.paper.runs import EVALUATION_SEED, Experiment, Results, make_runs
-from vsp.partition import Partition
 from vsp.protocol import crossed_interval
 
 CONFIG = tiny(n_epochs=30, n_freeze=5)

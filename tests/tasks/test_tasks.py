@@ -12,8 +12,7 @@ from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, TAS
 import vsp
 from studies.robots import tasks as robots
 from vsp.rollouts import collect_episodes, rollout
-from vsp.tasks import simplegoal
-from vsp.tasks.base import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task
+from vsp.tasks import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task, simplegoal
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import BOX, get_task, task_names
 from vsp.tasks.simplegoal import SimpleGoalEnv

@@ -11,8 +11,7 @@ from zips import bomb, rewritten, saved
 
 from vsp.run import listed
 from vsp.run.atomic import DamagedFile
-from vsp.teachers import agent_zip, normalization
-from vsp.teachers.teacher import SHIPPED, Teacher, load_teacher
+from vsp.teachers import SHIPPED, Teacher, agent_zip, load_teacher, normalization
 
 
 def layer(inputs, outputs, weight=0.0):
