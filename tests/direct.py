@@ -8,6 +8,8 @@ first parameters and minibatches. Codewords in a line are not provided for.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import gymnasium
 import numpy as np
 import torch
@@ -27,18 +29,9 @@ def evaluate_directly(policy, task: str, n_episodes: int, *, seed: int) -> np.nd
 
     env = gymnasium.make(task)
     env.unwrapped.np_random = np.random.default_rng(np.random.SeedSequence(seed))
-    returns, _ = evaluate_policy(Model(policy), Monitor(env), n_episodes, return_episode_rewards=True)
+    model = SimpleNamespace(predict=lambda obs, **_: policy.predict(obs))  # asked as recurrent ones are, too
+    returns, _ = evaluate_policy(model, Monitor(env), n_episodes, return_episode_rewards=True)
     return np.array(returns)
-
-
-class Model:
-    """A policy as `evaluate_policy` asks for it: with the arguments that recurrent and random ones need."""
-
-    def __init__(self, policy):
-        self.policy = policy
-
-    def predict(self, obs, state=None, episode_start=None, deterministic=True):
-        return self.policy.predict(obs)
 
 
 class OneByOne:

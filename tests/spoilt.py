@@ -4,6 +4,7 @@ import math
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -64,21 +65,12 @@ def name(good):
     return Argument(good, ["", "x", good + " ", good.upper() + "!", None, 3, [good], np.nan, {}])
 
 
-class Broken:
-    """A policy whose `predict` gives something else than actions and a state."""
-
-    def __init__(self, answer):
-        self.answer = answer
-
-    def predict(self, obs):
-        return self.answer
-
-
 def actor(good, m=2):
     """A policy for a task with m actions."""
     values, answers = [np.nan, np.inf, "up", 1j, True, None], [None, 3.0, (), np.zeros(m)]
     bad = [Constant(*[value] * m) for value in values] + [Constant(*[0.0] * n) for n in (0, m - 1, m + 1)]
-    return Argument(good, [*bad, *map(Broken, answers), None, 3, "TD3", np.zeros(2)])
+    bad += [SimpleNamespace(predict=lambda obs, answer=answer: answer) for answer in answers]
+    return Argument(good, [*bad, None, 3, "TD3", np.zeros(2)])
 
 
 def settings(good, *, from_zero=(), any_sign=()):

@@ -120,7 +120,7 @@ def slopes(function, vector):
     return np.array([function(vector + step) - function(vector - step) for step in 1e-6 * np.eye(len(vector))]) / 2e-6
 
 
-def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL, filled=True):
+def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL):
     """A partition with these codewords; each cell's map has zero weights, its bias for every action, and one sample."""
     partition = Partition(get_task(task), config)
     for codeword in np.asarray(codewords, dtype=np.float64):
@@ -128,9 +128,8 @@ def partition_of(codewords, biases=None, *, config=TINY, task=SIMPLEGOAL, filled
     partition.models.coefficients[:] = 0.0
     if biases is not None:
         partition.models.coefficients[:, -1, :] = np.asarray(biases, dtype=np.float64)[:, None]
-    if filled:
-        m = len(partition.task.action_low)
-        partition.observe(Episode(partition.codewords.copy(), np.zeros((len(codewords), m))))
+    m = len(partition.task.action_low)
+    partition.observe(Episode(partition.codewords.copy(), np.zeros((len(codewords), m))))
     return partition
 
 

@@ -77,15 +77,11 @@ def test_a_metric_is_an_order_or_a_function():
     for wrong in ({}, {"order": 2, "between": max}, {"order": -1.0}, {"order": 0.5}):
         with pytest.raises(ValueError, match="metric 'mine'"):
             Metric("mine", **wrong)
-    where = Nearest([[0, 0], [1, 1]], Metric("mine", between=gaps_of))
+    where = Nearest([[0, 0], [1, 1]], Metric("mine", between=max))
     policy = PiecewisePolicy(where, np.zeros((2, 3, 2)), task=SIMPLEGOAL)
     for export in (policy.to_c, policy.to_python):
         with pytest.raises(ValueError, match="metric 'mine' has no code"):
             export()
-
-
-def gaps_of(states, codewords):
-    return np.abs(states[:, None] - codewords).sum(axis=2)
 
 
 def test_cells_and_maps_must_fit():

@@ -3,10 +3,9 @@
 import itertools
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import nearest_brute, nearest_kdtree, partition_of
+from support import nearest_brute, nearest_kdtree
 
 from vsp import Task, VoronoiPolicy
 from vsp.geometry import METRICS, delaunay_neighbours, distances, lookup_neighbours
@@ -96,18 +95,6 @@ def test_a_policy_acts_and_explains_itself_there(kind, d, seed, metric):
     why = policy.explain(states[0])
     assert why.margin >= 0 and why.cell == policy.cells(states[0]) != why.next_cell
     assert len(policy.to_frame()) == len(codewords) and policy.to_c() and policy.to_python() and policy.to_text(None)
-
-
-@given(st.sampled_from(sorted(KINDS)), st.integers(1, 8), st.integers(0, 2**32))
-def test_what_is_a_codeword_already_is_refused(kind, d, seed):
-    codewords, _ = codewords_of(kind, d, seed)
-    twice = np.concatenate([codewords, codewords[[seed % len(codewords)]]])
-    partition = partition_of(codewords, task=box(d))
-    for call in (
-        lambda: policy_of(twice), lambda: delaunay_neighbours(twice), lambda: partition.add(twice[-1], None)
-    ):  # fmt: skip
-        with pytest.raises(ValueError, match="expected .*(differ|different|another)"):
-            call()
 
 
 # The order of the codewords is a matter of labels

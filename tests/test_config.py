@@ -4,13 +4,6 @@ import pytest
 from support import TASKS, TINY, tiny
 
 from vsp.config import EXTENSIONS, paper_preset
-from vsp.paper.printed import printed_hyperparameters
-
-
-@pytest.mark.parametrize("task", TASKS)
-def test_a_preset_is_the_papers_table(task):
-    printed = printed_hyperparameters(task)
-    assert {name: getattr(paper_preset(task), name) for name in printed} == printed
 
 
 def test_a_freeze_longer_than_the_run_is_refused():

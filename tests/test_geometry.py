@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from support import nearest_brute, nearest_kdtree
 
-from vsp import geometry, nearest
+from vsp import nearest
 from vsp.geometry import METRICS, all_differ, delaunay_neighbours, distances, lookup_neighbours
 from vsp.show import grid
 
@@ -76,23 +76,6 @@ def test_all_differ():
     assert not all_differ(points[[0, 1, 0]]) and not all_differ(np.array([[0.0, 1.0], [-0.0, 1.0]]))
 
 
-def test_every_delaunay_edge_has_an_empty_circle():
-    """The property that defines the graph: some circle through both ends holds no third codeword.
-
-    With its centre t steps along the bisector, a point is outside where a linear function of t is positive.
-    """
-    points = np.random.default_rng(3).random((15, 2))
-    graph = delaunay_neighbours(points)
-    for i in range(15):
-        for j in range(i):
-            middle, bisector = (points[i] + points[j]) / 2, (points[i] - points[j])[::-1] * [1, -1]
-            others = np.delete(points, [i, j], axis=0)
-            at_0 = np.square(middle - others).sum(axis=1) - np.square(middle - points[i]).sum()
-            slope = 2 * (points[i] - others) @ bisector
-            zeros = -at_0 / slope
-            assert (zeros[slope > 0].max(initial=-np.inf) < zeros[slope < 0].min(initial=np.inf)) == graph[i, j]
-
-
 # Look-up neighbours
 
 
@@ -122,12 +105,3 @@ def test_lookup_neighbours_repeat_and_follow_the_box():
     graph = lookup_neighbours(codewords, np.zeros(3), np.ones(3))
     assert np.array_equal(lookup_neighbours(codewords, np.zeros(3), np.ones(3)), graph)
     assert np.array_equal(lookup_neighbours(codewords * 4 - 2, np.full(3, -2.0), np.full(3, 2.0)), graph)
-
-
-def test_a_kdtree_is_used_from_its_threshold_on(monkeypatch):
-    built, tree = [], geometry.cKDTree
-    monkeypatch.setattr(geometry, "KDTREE_FROM", 4)
-    monkeypatch.setattr(geometry, "cKDTree", lambda codewords: built.append(len(codewords)) or tree(codewords))
-    for k in (3, 4, 5):
-        assert geometry.nearest(np.arange(2.0 * k).reshape(k, 2), np.zeros((1, 2))).tolist() == [0]
-    assert built == [4, 5]

@@ -44,17 +44,6 @@ def test_policy_at_follows_the_partition_in_every_iteration(run):
     assert np.array_equal(history.policy_at(len(history.cells) - 1).codewords, policy.codewords)
 
 
-def test_policy_at_is_right_where_one_cell_comes_and_another_goes():
-    history, old = History(), partition_of([[0.1, 0.1], [0.9, 0.9]])
-    history.observe(0, 1.0, old)
-    new = partition_of([[0.1, 0.1], [0.5, 0.9]])
-    history.add_events(1, "split", [(np.array([0.5, 0.9]), 1.5)])
-    history.add_events(1, "merge", [(np.array([0.9, 0.9]), 0.1)])
-    history.observe(1, 1.0, new)
-    assert history.policy_at(1).codewords.tolist() == new.codewords.tolist()
-    assert [event.cause for event in history.events] == [1.5, 0.1]
-
-
 @pytest.mark.parametrize("n", [35, 5500])
 def test_a_snapshot_is_at_most_so_many_iterations_old(n):
     """A long run keeps no more snapshots than a short one."""

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, random_policy, same_arrays
 
 import vsp
-from vsp import VoronoiPolicy, get_task
 from vsp.checks import check_finite
 from vsp.geometry import METRICS, distances
 from vsp.paper.baselines import refit
@@ -15,15 +14,15 @@ from vsp.run import sealed
 from vsp.run.atomic import DamagedFile
 from vsp.subpolicies import POLICY_CLASSES, policy_class
 
-TWO = VoronoiPolicy(  # cells left and right; the right one answers constants, one of them beyond the limits
+TWO = vsp.VoronoiPolicy(  # cells left and right; the right one answers constants, one of them beyond the limits
     [[0.0, 0.5], [1.0, 0.5]], [[[1, 0], [0, 2], [0.25, -0.5]], [[0, 0], [0, 0], [3, -0.5]]], task=SIMPLEGOAL
 )
 
 
 def motionless(codewords, *, task=SIMPLEGOAL, **options):
     """A policy whose actions are zero."""
-    task, (k, d) = get_task(task), np.shape(codewords)
-    return VoronoiPolicy(codewords, np.zeros((k, d + 1, len(task.action_low))), task=task, **options)
+    task, (k, d) = vsp.get_task(task), np.shape(codewords)
+    return vsp.VoronoiPolicy(codewords, np.zeros((k, d + 1, len(task.action_low))), task=task, **options)
 
 
 # predict
@@ -39,7 +38,7 @@ def test_predict_by_hand():
 
 @pytest.mark.parametrize("task", [SIMPLEGOAL, MOUNTAINCAR, PENDULUM])
 def test_a_batch_is_its_rows(task):
-    policy, task = random_policy(20, task=task), get_task(task)
+    policy, task = random_policy(20, task=task), vsp.get_task(task)
     obs = np.random.default_rng(1).uniform(task.low, task.high, size=(300, len(task.low))).astype(np.float32)
     actions, _ = policy.predict(obs)
     assert actions.shape == (300, len(task.action_low)) and actions.dtype == np.float64
@@ -59,14 +58,14 @@ def test_whole_numbers_are_observations_too(kind):
 
 def test_each_action_has_its_own_limits():
     high = np.array([0.5, 2.0])
-    task = dataclasses.replace(get_task(SIMPLEGOAL), action_low=-high, action_high=high)
-    policy = VoronoiPolicy([[0, 0]], [[[0, 0], [0, 0], [3, 1.5]]], task=task)
+    task = dataclasses.replace(vsp.get_task(SIMPLEGOAL), action_low=-high, action_high=high)
+    policy = vsp.VoronoiPolicy([[0, 0]], [[[0, 0], [0, 0], [3, 1.5]]], task=task)
     assert policy.predict([0.5, 0.5])[0].tolist() == [0.5, 1.5]
 
 
 def test_the_caller_cannot_change_a_policy_through_its_arrays():
     codewords, coefficients, scale = np.array([[0.2, 0.5], [0.8, 0.5]]), np.zeros((2, 3, 2)), np.ones(2)
-    policy = VoronoiPolicy(codewords, coefficients, task=SIMPLEGOAL, scale=scale)
+    policy = vsp.VoronoiPolicy(codewords, coefficients, task=SIMPLEGOAL, scale=scale)
     codewords[0], coefficients[:], scale[0] = 9.0, 9.0, 9.0
     assert policy.cells([[0.3, 0.5], [0.7, 0.5]]).tolist() == [0, 1] and not policy.predict([0.3, 0.5])[0].any()
     for array in (policy.codewords, policy.scale):
@@ -86,7 +85,7 @@ def test_the_caller_cannot_change_a_policy_through_its_arrays():
 def test_a_policy_of_numbers_beyond_all_bounds_is_one_clear_error(change, message):
     good = {"codewords": TWO.codewords, "coefficients": TWO.coefficients, "task": SIMPLEGOAL}
     with pytest.raises(ValueError, match=message):
-        VoronoiPolicy(**good | change)
+        vsp.VoronoiPolicy(**good | change)
 
 
 def test_what_knows_linear_policies_alone_refuses_others():
@@ -115,7 +114,7 @@ given_a_class = st.sampled_from(list(POLICY_CLASSES))
 
 @given(st.integers(1, 9), st.integers(0, 99), st.sampled_from([SIMPLEGOAL, PENDULUM]), given_a_class, st.booleans())
 def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, form, scaled):
-    task = get_task(task)
+    task = vsp.get_task(task)
     policy = random_policy(k, seed=seed, task=task, form=form, scaled=scaled)
     state = np.random.default_rng(seed + 1).uniform(task.low, task.high)
     told = policy.explain(state)
@@ -141,7 +140,7 @@ def test_an_explanation_is_the_prediction_taken_apart(k, seed, task, form, scale
 )
 def test_expressions_lose_zeros_but_no_digit_where_they_are_exact(coefficients, two_digits, exact):
     for digits, text in ((2, two_digits), (None, exact)):
-        assert policy_class("linear", get_task(SIMPLEGOAL)).expression(np.array(coefficients), digits) == text
+        assert policy_class("linear", vsp.get_task(SIMPLEGOAL)).expression(np.array(coefficients), digits) == text
 
 
 # How far the borders are
@@ -164,7 +163,7 @@ def test_without_another_cell_there_is_no_border():
 
 
 def test_borders_where_the_box_has_no_limits():
-    task = dataclasses.replace(get_task(SIMPLEGOAL), low=np.full(2, -np.inf), high=np.full(2, np.inf))
+    task = dataclasses.replace(vsp.get_task(SIMPLEGOAL), low=np.full(2, -np.inf), high=np.full(2, np.inf))
     told = motionless([[0.0, 0.0], [4.0, 0.0]], task=task).explain([1.5, 0.0])
     assert told.borders["cell"].tolist() == [1, -1]
     assert told.borders.at["x", "change"] == pytest.approx(0.5, abs=1e-9)
@@ -206,7 +205,7 @@ def test_to_frame_has_a_row_per_cell_and_every_number():
 )
 def test_save_and_load_are_exact(policy, tmp_path):
     policy.save(tmp_path / "p.voronoi")
-    back = VoronoiPolicy.load(tmp_path / "p.voronoi")
+    back = vsp.VoronoiPolicy.load(tmp_path / "p.voronoi")
     assert same_arrays(*((getattr(policy, a), getattr(back, a)) for a in ("codewords", "coefficients", "scale")))
     assert (back.metric, back.policy_class.name, back.task) == (policy.metric, policy.policy_class.name, policy.task)
 
@@ -214,9 +213,9 @@ def test_save_and_load_are_exact(policy, tmp_path):
 def test_the_names_of_a_saved_policy_win_and_it_acts_even_if_its_task_is_not_registered(tmp_path):
     states, names = np.random.default_rng(0).random((9, 2)), {"inputs": ("east", "north"), "outputs": ("push", "pull")}
     for name in (SIMPLEGOAL, "Nowhere-v0"):
-        policy = random_policy(task=dataclasses.replace(get_task(SIMPLEGOAL), name=name, **names))
+        policy = random_policy(task=dataclasses.replace(vsp.get_task(SIMPLEGOAL), name=name, **names))
         policy.save(tmp_path / name)
-        back = VoronoiPolicy.load(tmp_path / name)
+        back = vsp.VoronoiPolicy.load(tmp_path / name)
         assert np.array_equal(back.predict(states)[0], policy.predict(states)[0])
         assert back.to_text() == policy.to_text() and "east" in back.to_text() and "push" in back.to_c()
         if name == SIMPLEGOAL:
@@ -239,4 +238,4 @@ def test_a_sealed_file_that_holds_no_policy_is_refused(change, tmp_path):
         (arrays if isinstance(value, np.ndarray) else about)[name] = value
     sealed.save_arrays(tmp_path / "p.vsp", arrays, about)
     with pytest.raises(DamagedFile, match="p.vsp: the checksum is right, but the file (holds no|lacks or names)"):
-        VoronoiPolicy.load(tmp_path / "p.vsp")
+        vsp.VoronoiPolicy.load(tmp_path / "p.vsp")

@@ -12,7 +12,6 @@ from spoilt import STATES, TWO, Argument, actor, array, but_for_none, count, nam
 from support import SIMPLEGOAL, CurvedTeacher, network_teacher, partition_of, tiny
 
 import vsp
-from vsp import geometry
 from vsp.paper import baselines, statistics
 from vsp.rollouts import Episode, standard
 from vsp.subpolicies import policy_class
@@ -75,9 +74,9 @@ CASES = {
     "standard": (standard, {"states": array(STATES, free=(0, 1), nonempty=True)}),
     # Cells
     "nearest": (vsp.nearest, cells_of_states | {"states": states}),
-    "geometry.distances": (geometry.distances, cells_of_states | {"states": states}),
-    "geometry.delaunay_neighbours": (geometry.delaunay_neighbours, codewords),
-    "geometry.lookup_neighbours": (geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
+    "geometry.distances": (vsp.geometry.distances, cells_of_states | {"states": states}),
+    "geometry.delaunay_neighbours": (vsp.geometry.delaunay_neighbours, codewords),
+    "geometry.lookup_neighbours": (vsp.geometry.lookup_neighbours, cells_of_states | {"low": low, "high": high}),
     "Partition.observe": (observe, pairs),
     "History.policy_at": (HISTORY.policy_at, {"n": count(3, least=0, most=23)}),
     "policy_class": (functools.partial(policy_class, task=vsp.get_task(SIMPLEGOAL)), {"sub_policy": name("linear")}),

@@ -6,7 +6,6 @@ from support import SIMPLEGOAL, TASKS, TEACHERS, Constant, same_arrays
 
 import vsp
 from vsp import collect_episodes, get_task, rollout, rollouts, visited_states
-from vsp.rollouts import standard
 
 
 def test_visited_states_by_hand():
@@ -45,7 +44,7 @@ def test_the_policy_gets_float32_of_the_episodes_that_still_run():
 def test_a_constant_variable_keeps_its_unit():
     """The standard deviation of a thousand times 0.1 is a rounding error above 0."""
     states = np.column_stack([np.full(1000, 0.1), np.arange(1000.0)])
-    assert states[:, 0].std() > 0 and standard(states)[1].tolist() == [1.0, states[:, 1].std()]
+    assert states[:, 0].std() > 0 and rollouts.standard(states)[1].tolist() == [1.0, states[:, 1].std()]
 
 
 def test_rewards_that_are_no_numbers_are_one_clear_error():

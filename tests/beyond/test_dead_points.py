@@ -9,7 +9,6 @@ from studies import comparison
 from vsp.paper.baselines import rule_of_thumb
 from vsp.tasks import GOAL, mountaincar
 from vsp_beyond.proofs import at_rest, dead_points, tables
-from vsp_beyond.proofs.dead_points import acceleration
 
 
 def policy_of(codewords, coefficients, **more):
@@ -19,7 +18,7 @@ def policy_of(codewords, coefficients, **more):
 def test_the_acceleration_is_that_of_the_task():
     x, push = np.linspace(-0.6, -0.4, 9), np.linspace(-1.5, 1.5, 9)
     moved, _, _ = mountaincar.step(np.column_stack([x, np.zeros(9)]), push[:, None])
-    assert np.allclose(moved[:, 1], acceleration(x, push), atol=1e-9)
+    assert np.allclose(moved[:, 1], dead_points.acceleration(x, push), atol=1e-9)
 
 
 DOWNHILL = [[0, 0, 0.1], [0, 0, -0.1]]  # with the slope, on both sides of the bottom at -0.524

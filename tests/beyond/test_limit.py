@@ -6,7 +6,6 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeache
 
 import vsp
 import vsp_beyond
-from vsp import VoronoiPolicy, start_states
 from vsp.rollouts import rollout
 from vsp.tasks import GOAL, get_task
 from vsp_beyond.few_cells import limit
@@ -28,7 +27,7 @@ def quick(monkeypatch):
 
 def test_a_short_search_comes_near_the_best():
     policy = vsp_beyond.at_the_limit(SIMPLEGOAL, FEW, seed=0)
-    starts = start_states(SIMPLEGOAL, 500, 7)
+    starts = vsp.start_states(SIMPLEGOAL, 500, 7)
     result = rollout(policy, SIMPLEGOAL, starts)
     regret = (best_returns(starts) - result.returns)[result.outcomes == GOAL].mean()
     assert len(policy) <= 4 and 0 < regret < 0.3 and (result.outcomes == GOAL).mean() > 0.95
@@ -39,7 +38,7 @@ class Recorded:
 
     def __init__(self, monkeypatch, task):
         self.calls, d, m = [], len(get_task(task).low), len(get_task(task).action_low)
-        self.policy = VoronoiPolicy(np.zeros((1, d)), np.zeros((1, d + 1, m)), task=task)
+        self.policy = vsp.VoronoiPolicy(np.zeros((1, d)), np.zeros((1, d + 1, m)), task=task)
         for name in ("distill_tuned", "distill_faithfully"):
             monkeypatch.setattr(limit, name, self)
 

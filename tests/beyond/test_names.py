@@ -8,15 +8,14 @@ from support import LUNARLANDER, MOUNTAINCAR
 from vsp.tasks import get_task
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp_beyond import names
-from vsp_beyond.names import BIPEDAL, named
 
 
 def test_names_of_gymnasium_are_those_it_documents_and_own_ones_stay(monkeypatch):
     monkeypatch.setattr(names, "task_names", lambda: [LUNARLANDER])  # studies name the walker themselves
-    walker = named(gymnasium_task("BipedalWalker-v3"))
-    assert list(walker.inputs) == BIPEDAL[0] and walker.inputs[8:10] == ("contact 1", "hip 2")
+    walker = names.named(gymnasium_task("BipedalWalker-v3"))
+    assert list(walker.inputs) == names.BIPEDAL[0] and walker.inputs[8:10] == ("contact 1", "hip 2")
     assert walker.outputs == ("hip 1 torque", "knee 1 torque", "hip 2 torque", "knee 2 torque")
-    assert named(get_task(LUNARLANDER)) is get_task(LUNARLANDER)
+    assert names.named(get_task(LUNARLANDER)) is get_task(LUNARLANDER)
 
 
 class Arm(gymnasium.Env):
@@ -31,14 +30,14 @@ class Arm(gymnasium.Env):
 
 def test_mujocos_names_come_from_its_model(monkeypatch):
     gymnasium.register("Arm-v0", entry_point=Arm, max_episode_steps=5)
-    assert named(get_task("Arm-v0")).inputs[0] == "s0"  # somebody else's numbers may mean something else
+    assert names.named(get_task("Arm-v0")).inputs[0] == "s0"  # somebody else's numbers may mean something else
     spec = types.SimpleNamespace(entry_point="gymnasium.envs.mujoco:Arm")
     monkeypatch.setattr(gymnasium, "spec", lambda name: spec)
-    task = named(get_task("Arm-v0"))
+    task = names.named(get_task("Arm-v0"))
     assert task.inputs[:7] == ("root z", "root.w", "root.x", "root.y", "root.z", "elbow", "root x speed")
     assert task.inputs[-2:] == ("root turn z speed", "elbow speed") and task.outputs == ("elbow torque",)
     monkeypatch.setattr(Arm, "observation_structure", {"qpos": 3})
-    assert named(get_task("Arm-v0")).inputs[0] == "s0"
+    assert names.named(get_task("Arm-v0")).inputs[0] == "s0"
     ball = [types.SimpleNamespace(name="b", type=[1])]
     assert list(names._numbers(ball, names.PLACES)) == ["b.w", "b.x", "b.y", "b.z"]
 
@@ -50,7 +49,7 @@ def test_mujocos_names_come_from_its_model(monkeypatch):
 )  # fmt: skip
 def test_a_file_names_all_or_is_refused(text, said, tmp_path):
     (tmp_path / "names.json").write_text(json.dumps({"inputs": ["place", "speed"], "outputs": ["push"]}))
-    assert named(get_task(MOUNTAINCAR), tmp_path / "names.json").input_labels == ("place", "speed")
+    assert names.named(get_task(MOUNTAINCAR), tmp_path / "names.json").input_labels == ("place", "speed")
     (tmp_path / "names.json").write_text(text)
     with pytest.raises(ValueError, match=said):
-        named(get_task(MOUNTAINCAR), tmp_path / "names.json")
+        names.named(get_task(MOUNTAINCAR), tmp_path / "names.json")

@@ -72,12 +72,6 @@ def test_failures_are_defined_where_a_success_is(distilled):
     assert set(vsp.evaluate(pilot, task, n_episodes=20, seed=1)["outcome"]) == {expected}
 
 
-def test_without_an_outcome_an_episode_just_ends(monkeypatch):
-    """Its last reward decides nothing."""
-    monkeypatch.setattr("vsp.tasks.registry._ADDED", {})
-    assert set(vsp.evaluate(vsp.agent(own_tasks.dock_pilot), "Dock-v0", n_episodes=5, seed=1)["outcome"]) == {"ended"}
-
-
 def test_one_call_with_defaults_and_one_line_for_each(capsys, monkeypatch):
     """Of the settings by size, a part of the work."""
     less = {"n_episodes": 10, "n_restarts": 1, "n_generations": 2, "n_tuning_episodes": 5, "n_validation": 5}

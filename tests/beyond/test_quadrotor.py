@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from support import Constant
 
 from vsp.rollouts import rollout
 from vsp.tasks import PIT, TRUNCATED
@@ -10,15 +11,9 @@ from vsp_beyond.drone.flights import BODIES, command_of, fly, with_history
 from vsp_beyond.drone.quadrotor import CRAZYFLIE, HOVER, Starts
 
 RNG = np.random.default_rng(0)
+STILL = Constant(*4 * [HOVER])  # keeps a level drone where it is
 STATES = Starts(0.3, 1.0, 5.0, 180.0)(RNG, 50)
 COMMANDS = RNG.uniform(-1, 1, (50, 4))
-
-
-class Still:
-    """Commands what keeps a level drone where it is."""
-
-    def predict(self, obs):
-        return np.full((len(obs), 4), HOVER), None
 
 
 def second_route(state, command, body):
@@ -100,11 +95,11 @@ def test_episodes_end_outside_the_room():
     starts = Starts(tilt=0.0)(RNG, 2)
     starts[0, 7:10], starts[1, 7:10] = (0.7, 0, 0), 0.0
     starts[:, 10:13] = 0
-    played = rollout(Still(), q.quadrotor(), starts)
+    played = rollout(STILL, q.quadrotor(), starts)
     assert played.outcomes.tolist() == [PIT, TRUNCATED] and 380 < played.lengths[0] < 440 and played.lengths[1] == 500
     distance = np.linalg.norm(starts[1, :3])
     assert played.returns[1] == pytest.approx(500 * (0.1 - 0.05 * distance)) and played.returns[0] < 50 - 2
-    flown = fly(command_of(Still()), starts)
+    flown = fly(command_of(STILL), starts)
     assert flown.kept.tolist() == [False, True] and flown.distance[1] == pytest.approx(distance)
     assert np.isnan(flown.distance[0]) and flown.change[1] == 0
 
@@ -112,6 +107,6 @@ def test_episodes_end_outside_the_room():
 def test_a_push_comes_after_two_seconds():
     seen = []
     starts = Starts(0, 0, 0, 0)(RNG, 1)
-    fly(command_of(Still()), starts, pushes=np.array([[0.5, 0, 0]]), watch=lambda t, s, c: seen.append(s[0, 7]))
+    fly(command_of(STILL), starts, pushes=np.array([[0.5, 0, 0]]), watch=lambda t, s, c: seen.append(s[0, 7]))
     assert seen[:201] == [0.0] * 200 + [0.5] and seen[-1] == pytest.approx(0.5)
-    assert fly(command_of(Still()), starts, CRAZYFLIE).kept.all()
+    assert fly(command_of(STILL), starts, CRAZYFLIE).kept.all()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import support
 from scipy.special import softmax
-from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, CurvedTeacher, RandomPolicy
+from support import LUNARLANDER, PENDULUM, SIMPLEGOAL, CurvedTeacher
 
 import vsp_beyond
 from vsp import VoronoiPolicy, load_teacher
@@ -13,12 +13,11 @@ from vsp.evaluation import rollout_from_seed
 from vsp.paper import printed
 from vsp.rollouts import Outcomes
 from vsp.tasks import GOAL, PIT, TRUNCATED, get_task
-from vsp_beyond import Tuned
 from vsp_beyond.few_cells.tune import SNAPSHOTS, Candidates, is_snapshot, score, tune
 from vsp_beyond.few_cells.tuned import anneal, distill_tuned, random_init
 from vsp_beyond.few_cells.units import LabelledStates, ScaledCells, Scaling, expected_loss
 
-SMALL = Tuned(
+SMALL = vsp_beyond.Tuned(
     n_cells=3, n_episodes=60, n_restarts=2, n_steps=300, batch_size=128, n_corrections=1, n_correction_episodes=30,
     n_generations=3, n_tuning_episodes=50, failure_penalty=100.0, n_validation=100,
 )  # fmt: skip
@@ -111,24 +110,17 @@ def test_failures_cost_their_penalty():
     assert score(ended([10, 20], [GOAL, PIT]), 4.0) == score(ended([10, 20], [TRUNCATED, GOAL]), 4.0) == 13
 
 
-def test_the_first_of_the_best_candidates_is_kept():
-    candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.array([[0.9, 0.05], [0.05, 0.9]]), 1000.0)
-    still, home = (ScaledCells(np.zeros((1, 2)), np.array([[[0.0, 0], [0, 0], [step, step]]])) for step in (0.0, -1.0))
-    for restart, cells in enumerate((still, home, ScaledCells(home.codewords + 1, home.coefficients))):
-        candidates.add("fit", restart, cells)
-    rows = candidates.rows
-    assert candidates.best is home and candidates.best_restart == 1
-    assert [row["failing"] for row in rows] == [1, 0, 0] and rows[1]["mean"] > rows[0]["mean"]
-
-
 @pytest.mark.parametrize(("penalty", "best"), [(0.0, 0), (10.0, 1)])
-def test_the_penalty_decides_between_a_higher_mean_and_fewer_failures(monkeypatch, penalty, best):
-    results = iter([ended([9, 1], [GOAL, PIT]), ended([3, 3], [GOAL, GOAL])])
+def test_the_first_of_the_best_candidates_is_kept(monkeypatch, penalty, best):
+    """The penalty decides between a higher mean and fewer failures."""
+    results = iter([ended([9, 1], [GOAL, PIT]), *2 * [ended([3, 3], [GOAL, GOAL])]])
     monkeypatch.setattr("vsp_beyond.few_cells.tune.rollout", lambda *_: next(results))
     candidates = Candidates(UNSCALED.policy, UNSCALED.task, np.zeros((2, 2)), penalty)
-    for restart in range(2):
-        candidates.add("fit", restart, SLOW)
-    assert candidates.best_restart == best
+    three = [SLOW.like(i * SLOW.vector) for i in range(3)]
+    for restart, cells in enumerate(three):
+        candidates.add("fit", restart, cells)
+    assert candidates.best is three[best] and candidates.best_restart == best
+    assert [(row["mean"], row["failing"]) for row in candidates.rows] == [(5, 0.5), (3, 0), (3, 0)]
 
 
 def test_tuning_returns_more():
@@ -253,11 +245,3 @@ def test_a_task_of_one_start_state_is_no_trouble():
     """All initial codewords would coincide."""
     task = dataclasses.replace(get_task(SIMPLEGOAL), start=lambda rng, n: np.full((n, 2), 0.05))
     assert len(distill_tuned(CurvedTeacher(), task, SMALL, seed=0)[0]) == 3
-
-
-@pytest.mark.parametrize("task", [PENDULUM, LUNARLANDER])
-def test_tasks_of_more_dimensions(task):
-    tiny = dataclasses.replace(SMALL, n_episodes=4, n_correction_episodes=2, n_tuning_episodes=2, n_validation=3)
-    teacher = RandomPolicy(len(get_task(task).action_low))
-    policy, _ = distill_tuned(teacher, task, dataclasses.replace(tiny, n_generations=1), seed=0)
-    assert isinstance(policy, VoronoiPolicy) and policy.codewords.shape == (3, len(get_task(task).low))

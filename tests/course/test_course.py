@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from course_answers import EXERCISES
 from IPython.core.interactiveshell import InteractiveShell
-from support import python
+from support import SIMPLEGOAL, python
 
 import vsp
 from vsp import distill, show, split_regions, teacher_episodes
@@ -24,10 +24,8 @@ from vsp.paper.readings import Readings
 from vsp.run import atomic
 from vsp.run.notebook import nbformat
 from vsp_course import build, drawing, feedback, handout, lesson_1, lesson_2, lesson_3, slides
-from vsp_course.lesson_2 import _algorithm_1
 
 LESSONS = build.read_sources()
-SIMPLEGOAL = "SimpleGoal-v0"
 RUNS = {}
 
 
@@ -151,16 +149,9 @@ def test_the_same_copies_every_time_and_sources_untouched(tmp_path):
     copies = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.*") if path.name != build.MADE)
     kinds = {"student": ".ipynb", "solution": ".ipynb", "slides": ".html"}
     lessons = [f"{kind}/{name.split('.')[0]}{ending}" for kind, ending in kinds.items() for name in LESSONS]
-    texts = [
-        "exam.md",
-        "exam_answers.md",
-        "guide.md",
-        "half_hour.md",
-        "project.md",
-        "project_marking.md",
-        "project_solution.py",
-    ]
-    assert copies == sorted(["handout.zip", "live.html", "slides/half_hour.html", *texts, *lessons])
+    texts = [f"{name}.md" for name in "exam exam_answers guide half_hour project project_marking".split()]
+    others = ["handout.zip", "live.html", "slides/half_hour.html", "project_solution.py"]
+    assert copies == sorted([*texts, *others, *lessons])
     asked, answered = ((folder / name).read_text("utf-8") for name in ("exam.md", "exam_answers.md"))
     assert asked.count(". Lesson ") == answered.count("\n") - 2 == 22 and "*Answer" not in asked + answered
 
@@ -233,11 +224,11 @@ def test_vsps_passes_stand_in_for_stubs_and_for_nothing_else(capsys):
     task, teacher, *_ = examples()
     config = vsp.preset(SIMPLEGOAL).quick()
     stub.__name__ = "merge_regions"
-    own, ours = lesson_2.grown(split_nothing, stub, _algorithm_1, teacher, task, config)
+    own, ours = lesson_2.grown(split_nothing, stub, lesson_2._algorithm_1, teacher, task, config)
     out = capsys.readouterr().out
     assert "Yours: split_regions, algorithm_1. Not written yet, so vsp's: merge_regions." in out
     assert len(own) == 1 < len(ours) and "not the same codewords" in out
-    own, ours = lesson_2.grown(split_regions, stub, _algorithm_1, teacher, task, config)
+    own, ours = lesson_2.grown(split_regions, stub, lesson_2._algorithm_1, teacher, task, config)
     assert np.array_equal(own.codewords, ours.codewords) and ": the same codewords" in capsys.readouterr().out
 
 

@@ -8,7 +8,6 @@ import pickle
 import shutil
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -19,10 +18,8 @@ from support import SIMPLEGOAL, TINY, CurvedTeacher, Payload, flipped
 import vsp
 from studies import training
 from studies.comparison.rows import Row, make_all
-from studies.training import Recipe
 from vsp.paper import results, runs
 from vsp.run import atomic
-from vsp.run.atomic import DamagedFile
 from vsp.run.listed import MANIFEST, list_folder, read_listed
 from vsp.run.notebook import nbformat
 from vsp.run.sealed import load_arrays, read_sealed
@@ -31,21 +28,12 @@ from vsp_course import build
 FLIPS, TRUNCATIONS = 100, 50
 PARSERS = ("json.loads", "numpy.load", "pandas.read_csv", "pickle.load", "pickle.loads", "safetensors.numpy.load",
            "torch.load")  # fmt: skip
-RECIPE = Recipe(steps=40, batch_size=8, learning_starts=20, buffer_size=200)
+RECIPE = training.Recipe(steps=40, batch_size=8, learning_starts=20, buffer_size=200)
 EXPERIMENT = runs.Experiment(SIMPLEGOAL, TINY, CurvedTeacher(), 5)
 WEIGHTS, CARD = f"teachers/{SIMPLEGOAL}.safetensors", f"teachers/{SIMPLEGOAL}.json"
 
 
 # Damage
-
-
-@dataclass
-class Kind:
-    """A kind of data file: what makes one in a folder, what reads it, and what may not be called if it is damaged."""
-
-    make: Callable[[Path], Path]
-    read: Callable[[Path], object]
-    parsers: tuple[str, ...] = PARSERS
 
 
 def copied(*names: str) -> Callable[[Path], Path]:
@@ -83,15 +71,15 @@ def of_study(path: Path) -> object:
     return results.read_results(path.stem, path.parent)
 
 
-KINDS = {
-    "run": Kind(run, lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2])),
-    "row of the comparison": Kind(row, partial(load_arrays, kind="Row")),
-    "policy": Kind(copied("beyond/limit_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
-    "checkpoint of a training": Kind(checkpoint, training.read_checkpoint),
-    "weights": Kind(copied(WEIGHTS, CARD), vsp.load_teacher),
-    "card": Kind(copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
-    "results of a study": Kind(copied("results/simpler.csv"), of_study),
-    "what the course has made": Kind(course, read_sealed),
+KINDS = {  # what makes such a file in a folder, and what reads it
+    "run": (run, lambda path: runs.Distillation(EXPERIMENT, 3).run(path.parents[2])),
+    "row of the comparison": (row, partial(load_arrays, kind="Row")),
+    "policy": (copied("beyond/limit_LunarLanderContinuous-v3.policy"), vsp.VoronoiPolicy.load),
+    "checkpoint of a training": (checkpoint, training.read_checkpoint),
+    "weights": (copied(WEIGHTS, CARD), vsp.load_teacher),
+    "card": (copied(CARD, WEIGHTS), lambda path: vsp.load_teacher(path.with_suffix(".safetensors"))),
+    "results of a study": (copied("results/simpler.csv"), of_study),
+    "what the course has made": (course, read_sealed),
 }
 TALLY = {}  # kind: refused, tried
 
@@ -107,7 +95,7 @@ def damage(content: bytes) -> list[bytes]:
 def refused(read: Callable[[], object]) -> bool:
     try:
         read()
-    except DamagedFile:
+    except atomic.DamagedFile:
         return True
     return False
 
@@ -118,20 +106,20 @@ def parse(*given, **options):
 
 @pytest.mark.parametrize("name", KINDS)
 def test_a_damaged_file_is_refused_before_it_is_parsed(name, tmp_path, monkeypatch):
-    kind = KINDS[name]
-    path = kind.make(tmp_path)
+    make, read = KINDS[name]
+    path = make(tmp_path)
     content, found = path.read_bytes(), []
-    kind.read(path)
-    for parser in kind.parsers:
+    read(path)
+    for parser in PARSERS:
         monkeypatch.setattr(parser, parse)
     for damaged in damage(content):
         path.write_bytes(damaged)
-        found.append(refused(partial(kind.read, path)))
+        found.append(refused(partial(read, path)))
     TALLY[name] = sum(found), len(found)
     path.write_bytes(content)
-    if kind.read not in (read_listed, read_sealed):  # which parse nothing
+    if read is not read_sealed:  # which parses nothing
         with pytest.raises(AssertionError, match="parsed"):
-            kind.read(path)
+            read(path)
     assert all(found)
 
 

@@ -13,7 +13,6 @@ from scipy.stats import norm
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS, distilled_elsewhere, threads
 
 import vsp
-from vsp import algorithms
 from vsp.paper import read_results, spread
 from vsp.paper.runs import N_RUNS, make_runs, paper_experiment
 from vsp.rollouts import visited_states
@@ -75,7 +74,7 @@ def test_a_network_in_a_batch_and_alone(record, monkeypatch):
         gaps.append(np.abs(teacher.predict(states)[0] - [teacher.predict(state)[0] for state in states]).max())
         made = []
         for ahead in (1, 500):
-            monkeypatch.setattr(algorithms, "EPISODES_AHEAD", ahead)
+            monkeypatch.setattr(vsp.algorithms, "EPISODES_AHEAD", ahead)
             made.append(vsp.distill(teacher, task, seed=seed)[0])
         alone, batched = made
         same.append(

@@ -2,11 +2,10 @@
 
 import os
 import signal
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from support import SIMPLEGOAL, CurvedTeacher, tiny
+from support import SIMPLEGOAL, CurvedTeacher, tiny, until
 
 from vsp.paper.runs import Experiment, make_runs
 
@@ -27,12 +26,10 @@ def files(folder):
 
 def kill_one_of(cluster, folder):
     """SIGKILL to a worker process as soon as a run is there; how many were there by then."""
-    victim, end = next(iter(cluster.workers.values())), time.monotonic() + 60
-    while not (done := len(files(folder))):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    victim = next(iter(cluster.workers.values()))
+    until(lambda: files(folder))
     os.kill(victim.pid, signal.SIGKILL)
-    return done
+    return len(files(folder))
 
 
 def test_a_cluster_makes_the_same_runs_and_the_death_of_a_worker_changes_nothing(cluster, tmp_path):

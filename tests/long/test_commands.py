@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from subprocess import PIPE
 
 import pytest
 from support import write_story
@@ -41,7 +40,7 @@ def test_commands_run_without_a_warning():
     """Of a module that its package has imported already, `python -m` warns."""
     commands = ["studies.comparison.stale", "studies.make_rows --help"]
     commands += ["vsp.paper.make_runs --help"]
-    how = {"cwd": ROOT, "stdout": PIPE, "stderr": PIPE, "text": True}
+    how = {"cwd": ROOT, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     running = [subprocess.Popen([sys.executable, "-m", *command.split()], **how) for command in commands]
     said = [(*process.communicate(), process.returncode) for process in running]
     assert said[0] == ("", "", 0)  # nothing is stale

@@ -9,7 +9,6 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, QUICK, SIMPLEGOAL
 
 import vsp
-from vsp import paper
 from vsp.run.atomic import ROOT
 from vsp.run.notebook import nbformat
 from vsp.tasks import simplegoal
@@ -68,14 +67,11 @@ def test_or_stops_with_one_line(number, values, said, tmp_path):
 
 @pytest.mark.parametrize(("edge", "task", "gain"), [(0.7, None, 12), (0.75, PENDULUM, 20)])
 def test_a_wider_pit_catches_the_teacher_and_pushing_along_beats_the_other(edge, task, gain, tmp_path, monkeypatch):
-    class Push:
-        def predict(self, obs):
-            return np.clip(gain * obs[..., 1:], -1, 1), None
-
+    push = vsp.agent(lambda obs: np.clip(gain * obs[:, 1:], -1, 1))
     monkeypatch.setattr(simplegoal, "PIT_HIGH", edge)
     scores = run("01", tmp_path, another_task=task, seed=2)["scores"]
     assert scores.loc["ends: pit", SIMPLEGOAL] > 0 and len(scores.columns) == 2 + bool(task)
-    assert vsp.evaluate(Push(), MOUNTAINCAR, 100, seed=2)["return"].mean() > scores[MOUNTAINCAR]["mean return"] + 1
+    assert vsp.evaluate(push, MOUNTAINCAR, 100, seed=2)["return"].mean() > scores[MOUNTAINCAR]["mean return"] + 1
 
 
 def test_what_02_says_of_seed_1_holds(tmp_path):
@@ -85,7 +81,7 @@ def test_what_02_says_of_seed_1_holds(tmp_path):
 
 @pytest.mark.parametrize("row", [0, 1])
 def test_what_03_and_04_let_try_changes_the_policy(row, tmp_path):
-    first, second = (paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in paper.TASKS)
+    first, second = (vsp.paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in vsp.paper.TASKS)
     of, start, maps = second.experiment, vsp.start_states(MOUNTAINCAR, 1, row), first.best.policy.coefficients.copy()
     boxed, _ = vsp.distill(of.teacher, of.task, replace(of.config, scale="box"), seed=row)
     assert not np.array_equal(boxed.codewords, second.runs[row].policy.codewords)
@@ -99,8 +95,8 @@ def test_what_03_and_04_let_try_changes_the_policy(row, tmp_path):
 
 @pytest.mark.parametrize("n_minibatches", [3, 5])
 def test_05_judges_runs_of_ones_own(n_minibatches, tmp_path):
-    results = {task: paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in paper.TASKS}
-    names = {"results": results, "runs": tmp_path, "paper": paper}
+    results = {task: vsp.paper.paper_results(task, n=2, runs=tmp_path, quick=QUICK) for task in vsp.paper.TASKS}
+    names = {"results": results, "runs": tmp_path, "paper": vsp.paper}
     code = to_try("05").replace("=5", f"={n_minibatches}")
     exec(code.replace("range(10)", "range(2)" if QUICK else "range(10)"), names)
     assert names["new"].experiment.config.n_minibatches == n_minibatches

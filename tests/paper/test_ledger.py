@@ -8,16 +8,15 @@ import pandas as pd
 import pytest
 from support import MOUNTAINCAR, SIMPLEGOAL, TASKS
 
-from vsp import VoronoiPolicy, get_task
+from vsp import get_task
 from vsp.evaluation import rollout_from_seed
 from vsp.paper import ledger, tables
 from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOLD, VERDICTS, ledger_gaps
 from vsp.paper.printed import PREFIX, printed_values, spread_id
-from vsp.paper.runs import EVALUATION_SEED, Results, Run, make_runs, paper_experiment
+from vsp.paper.runs import EVALUATION_SEED, Results, make_runs, paper_experiment
 from vsp.paper.statistics import resample
-from vsp.rollouts import Outcomes
 from vsp.run.notebook import nbformat
-from vsp.tasks import GOAL, registry, simplegoal
+from vsp.tasks import registry, simplegoal
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULT = "_spread_|_drl_|_ours_"  # what the ids of the results in text and tables hold
@@ -246,26 +245,9 @@ def test_intervals_resample_runs_and_for_the_teacher_starts(results, task):
     assert frame.loc[f"{prefix}_ours_mean", same].equals(frame.loc[f"{prefix}_spread_ours_mean", same])
 
 
-# Made by hand
-
-
-def run(seed, returns, *, codes=None, cells=1, validation=0.0):
-    returns = np.array(returns, dtype=float)
-    codes = np.full(len(returns), GOAL) if codes is None else np.array(codes)
-    codewords = np.linspace(0.0, 0.9, cells)[:, None] * np.ones(2)
-    policy = VoronoiPolicy(codewords, np.zeros((cells, 3, 2)), task=SIMPLEGOAL)
-    played = Outcomes(returns, np.ones(len(returns), dtype=int), codes)
-    return Run(seed, policy, played, validation, np.ones(3, dtype=int), 0, 0)
-
-
-RUNS = [
-    run(0, [6, 6, 6, 6], cells=3, validation=1.0), run(1, [5, 5, 5, 2], cells=5, validation=3.0),
-    run(2, [4, 4, 4, 0], cells=4, validation=2.0), run(3, [9, 0, 9, 0], cells=9, validation=0.0),
-]  # fmt: skip
-
-
 def test_the_cells_of_the_best_run_are_set_against_those_of_single_runs():
-    best, low, high = ledger.of_cells(ledger.means_and_cells(RUNS)).loc["cells", ["here", "low", "high"]]
+    runs = np.array([(1.0, 3), (3.0, 5), (2.0, 4), (0.0, 9)])  # mean on the validation starts, cells
+    best, low, high = ledger.of_cells(runs).loc["cells", ["here", "low", "high"]]
     assert (best, low, high) == (5, *np.quantile([3, 5, 4, 9], [0.025, 0.975]))
     assert [verdict(row(cells, best, low, high), unit=np.nan) for cells in ("9", "3", "10")] == [
         REPRODUCED, REPRODUCED, DIFFERS

@@ -58,8 +58,6 @@ def test_missing_and_altered_files_are_named(tmp_path, monkeypatch):
     copy.write_text(copy.read_text(encoding="utf-8").replace("16.599", "16.598"), encoding="utf-8")
     with pytest.raises(ValueError, match="spread.csv: SHA-256 is .* `python -m vsp.run.manifest .*accepts it"):
         printed_spread(SIMPLEGOAL)
-    listed.list_folder(tmp_path)  # as `python -m vsp.run.manifest` does: the edit is accepted
-    assert printed_spread(SIMPLEGOAL).at["Mean", "drl"] == 16.598
 
 
 # Every printed value
@@ -103,7 +101,6 @@ def test_values_of_the_tables_are_among_the_printed(printed, task, prefix):
 
 
 def test_digits_and_terms_are_those_that_the_paper_prints(printed):
-    assert printed_module.linear_policies(SIMPLEGOAL).at[2, "dx_printed"] == "3.175y-1.000"
     assert "sg_cell_3_dx_x" not in printed.index and printed.at["sg_cell_3_dx_bias", "paper"] == "-1.000"
     assert printed.at["mc_spread_ours_min", "paper"] == "71.050"  # its last digit decides on its verdict
 

@@ -15,7 +15,6 @@ from vsp.evaluation import rollout_from_seed
 from vsp.paper import make_runs as command
 from vsp.paper import read_results, spread, tables
 from vsp.paper import runs as runs_module
-from vsp.paper.make_runs import main
 from vsp.paper.readings import Readings
 from vsp.paper.runs import EVALUATION_SEED, N_RUNS, Distillation, Results, make_runs, paper_results
 from vsp.protocol import job
@@ -217,6 +216,6 @@ def test_the_command_makes_the_runs(tmp_path, monkeypatch, options, quick, jobs)
     made = []
     monkeypatch.setattr(command, "paper_results", lambda task, **named: made.append((task, named)) or results)
     results = SimpleNamespace(runs=[])
-    called(main, "--out", tmp_path, *options)
+    called(command.main, "--out", tmp_path, *options)
     named = {"runs": tmp_path / "data" / "runs", "quick": quick, "jobs": jobs}
     assert made == [(task, named) for task in N_RUNS]

@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_info
 from vsp.run import workers
 from vsp.run.command import CommandError
 from vsp.run.listed import MANIFEST
-from vsp.run.workers import _call, results
 
 
 def power(base, exponent):
@@ -29,7 +28,7 @@ def threads():
 
 
 def ask(work, arguments, jobs, *, done=0):
-    return dict(results(work, arguments, "a study", jobs=jobs, total=done + len(arguments), unit="rows"))
+    return dict(workers.results(work, arguments, "a study", jobs=jobs, total=done + len(arguments), unit="rows"))
 
 
 @pytest.mark.parametrize("jobs", [1, 2, -1])
@@ -61,7 +60,7 @@ def test_a_killed_worker_is_named():
 
 
 def test_a_worker_with_other_code_is_refused(monkeypatch):
-    call = _call
+    call = workers._call
     monkeypatch.setattr(workers, "_call", lambda expected, *rest: call({**expected, "numpy": "1.0"}, *rest))
     with pytest.raises(CommandError, match="expected .*'numpy': '1.0'.*same checkout"):
         ask(power, [(1, 1)], 1)

@@ -124,12 +124,6 @@ def test_a_failed_save_says_why_and_leaves_the_previous_figure(saved, limit_file
     assert saved[1].read_bytes() == before and len(list(saved[1].parent.iterdir())) == 2
 
 
-def test_what_goes_beyond_the_paper_has_a_folder_of_its_own(saved, tmp_path):
-    save_figure(drawn(), "beyond/cells_example", alt=ALT, out=tmp_path)
-    for before in saved[1:]:
-        assert (tmp_path / "figures" / "beyond" / before.name).read_bytes() == before.read_bytes()
-
-
 # What is drawn
 
 

@@ -8,7 +8,6 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL, CurvedTeacher, PumpingTeacher, tiny
 
 import vsp
-from vsp import distill
 from vsp.show import Laboratory, page
 
 VIEW = "application/vnd.jupyter.widget-view+json"
@@ -50,7 +49,7 @@ def test_a_trial_is_a_distillation_and_its_evaluation(lab):
     changes = {}, {"min_pol_distance": 0.6}
     for (config, policy, _), (_, row), changed in zip(lab.trials[:2], lab.to_frame().iterrows(), changes):
         assert config == dataclasses.replace(CONFIG, **changed)
-        same, _ = distill(CurvedTeacher(), SIMPLEGOAL, config, seed=3)
+        same, _ = vsp.distill(CurvedTeacher(), SIMPLEGOAL, config, seed=3)
         assert np.array_equal(policy.codewords, same.codewords)
         assert np.array_equal(policy.coefficients, same.coefficients)
         result = vsp.rollout(

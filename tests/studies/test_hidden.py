@@ -146,30 +146,25 @@ def test_a_search_is_made_once_and_selects_on_other_seeds(small, tmp_path, monke
 
 
 def test_an_interrupted_search_goes_on_and_other_settings_are_other_rows(small, tmp_path, monkeypatch):
-    tried, asked = hidden.tried, []
-    monkeypatch.setattr(hidden, "tried", lambda *given: asked.append(given) or tried(*given))
-    first = hidden.rows_of(SIMPLEGOAL, "screening", range(3), tmp_path, 1)
-    second = hidden.rows_of(SIMPLEGOAL, "screening", range(5), tmp_path, 1)
-    assert [k for _, _, k in asked] == [0, 1, 2, 3, 4] == second["k"].tolist()
-    pd.testing.assert_frame_equal(second[:3], first, check_dtype=False)
-    assert hidden.rows_of(SIMPLEGOAL, "screening", range(1, 3), tmp_path, 1)["k"].tolist() == [1, 2]
-    monkeypatch.setattr(hidden, "VERSION", 99)
-    hidden.rows_of(SIMPLEGOAL, "screening", range(2), tmp_path, 1)
-    assert len(asked) == 7
+    facts, asked = hidden.printed_facts(SIMPLEGOAL), []
 
-
-def test_rows_are_kept_from_time_to_time(small, tmp_path, monkeypatch):
-    known = hidden.printed_facts(SIMPLEGOAL)
-
-    def fails_late(task, stage, k):
-        if k == 57:
+    def tried(task, stage, k):
+        asked.append(k)
+        if len(asked) == 58:
             raise RuntimeError("stopped")
-        return known
+        return facts | {"mean": k}
 
-    monkeypatch.setattr(hidden, "tried", fails_late)
+    monkeypatch.setattr(hidden, "tried", tried)
+    screened = partial(hidden.rows_of, SIMPLEGOAL, "screening", out=tmp_path, jobs=1)
     with pytest.raises(RuntimeError, match="stopped"):
-        hidden.rows_of(SIMPLEGOAL, "screening", range(60), tmp_path, 1)
+        screened(range(60))
     assert len(read_results(f"hidden_{SIMPLEGOAL}", tmp_path / "data" / "results")) == 50
+    rows = screened(range(60))
+    assert asked[58:] == [*range(50, 60)] and rows["k"].tolist() == rows["mean"].tolist() == [*range(60)]
+    assert screened(range(1, 3))["k"].tolist() == [1, 2]
+    monkeypatch.setattr(hidden, "VERSION", 99)
+    screened(range(2))
+    assert asked[68:] == [0, 1]
 
 
 def test_answers_are_counted_among_the_nearest(monkeypatch):

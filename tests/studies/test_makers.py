@@ -6,7 +6,6 @@ import small
 from support import SIMPLEGOAL, CurvedTeacher
 
 from studies.comparison import makers
-from studies.comparison.makers import corrected
 from studies.comparison.methods import FOUND, METHODS, methods_of
 from vsp import get_task, load_teacher
 from vsp.paper import printed
@@ -44,7 +43,7 @@ def test_a_fit_by_chance_gets_the_restarts_of_the_budget_and_the_best_is_correct
         return printed.published_policy(SIMPLEGOAL)
 
     monkeypatch.setitem(makers.FITS, "published", fit)
-    corrected(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL, 5, fit="published", rounds=2, by_chance=by_chance)
+    makers.corrected(CurvedTeacher(), get_task(SIMPLEGOAL), SMALL, 5, fit="published", rounds=2, by_chance=by_chance)
     assert [seed for seed, _ in asked] == seeds
     *first, second, third = [size for _, size in asked]
     assert len(set(first)) == 1 and first[0] < second < third

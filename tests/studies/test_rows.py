@@ -11,7 +11,6 @@ from support import LUNARLANDER, MOUNTAINCAR, PENDULUM, SIMPLEGOAL, WALKER, Cons
 from studies import make_rows
 from studies.committed import RESULTS, keys, read_results
 from studies.comparison import beside, measure, read_rows, rows
-from studies.comparison.beside import kept_jobs
 from studies.comparison.methods import METHODS, PRESETS, TABLES, TASKS, Entry, Table
 from studies.comparison.rows import Row, jobs_of, make_all
 from studies.robots import Walking
@@ -191,17 +190,17 @@ def test_of_a_robot_a_policy_and_its_gait_are_kept(small, tmp_path):
 
 
 def test_kept_policies_are_the_first_of_the_presets_size_and_of_some_others():
-    ((name, job),) = kept_jobs(WALKER, "robots").items()
+    ((name, job),) = beside.kept_jobs(WALKER, "robots").items()
     assert (name, job.method, job.size, job.seed) == (f"robots_{WALKER}.policy", "cells, trained further", 8, 0)
     for task in (*TASKS, LUNARLANDER):
-        assert {*kept_jobs(task, "faithful").values()} <= {*jobs_of(task, "faithful")}
+        assert {*beside.kept_jobs(task, "faithful").values()} <= {*jobs_of(task, "faithful")}
 
 
 @pytest.mark.parametrize("table", ["faithful", "limit"])
 def test_a_kept_policy_acts_as_its_row_says(table):
     """Returns, failures and, of a faithful one, R² on new states of the teacher."""
     rows, task, teacher = read_results(f"{table}_{SIMPLEGOAL}"), get_task(SIMPLEGOAL), load_teacher(SIMPLEGOAL)
-    for file, job in kept_jobs(SIMPLEGOAL, table).items():
+    for file, job in beside.kept_jobs(SIMPLEGOAL, table).items():
         policy, row = VoronoiPolicy.load(RESULTS / file), rows[rows["size"] == job.size].iloc[0]  # of seed 0
         played = measure.measure(policy, teacher, task) | measure.fidelity(policy, teacher, task)
         assert all(played[name] == pytest.approx(row[name], abs=1e-5) for name in {*played} & {*row.index})

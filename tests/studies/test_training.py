@@ -118,18 +118,6 @@ def test_a_changed_recipe_does_not_resume():
         assert dataclasses.replace(SHORT, **{field.name: altered}).id != SHORT.id
 
 
-def test_export_writes_what_load_teacher_reads(short, tmp_path, monkeypatch):
-    monkeypatch.setattr(make_teachers, "BARS", {SIMPLEGOAL: (-100.0, 1.0)})
-    path = training.train(SIMPLEGOAL, seed=0, cache=tmp_path, report=lambda line: None)
-    export(SIMPLEGOAL, path, tmp_path / "out")
-    teacher = load_teacher(tmp_path / "out" / f"{SIMPLEGOAL}.safetensors")
-    assert teacher.card["seed"] == 0 and [t["seed"] for t in teacher.card["seeds_tried"]] == [0]
-    assert np.array_equal(teacher.layers[0][0].T, weights(path)["actor.mu.0.weight"])
-    assert [point["steps"] for point in teacher.card["learning_curve"]] == [31, 62, 90]
-    found = training.score(teacher, SIMPLEGOAL)
-    assert {name: teacher.card["score"][name] for name in found} == found
-
-
 def test_where_training_rises_and_falls_the_best_of_the_curve_is_kept(short, tmp_path, monkeypatch):
     """The curve is made up: the second of three points is the best."""
     monkeypatch.setattr(training, "BEST_OF_CURVE", (SIMPLEGOAL,))

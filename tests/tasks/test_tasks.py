@@ -15,11 +15,16 @@ from vsp.rollouts import collect_episodes, rollout
 from vsp.tasks import GOAL, OUTCOMES, PIT, RUNNING, TRUNCATED, Task, simplegoal
 from vsp.tasks.gym_adapter import gymnasium_task
 from vsp.tasks.registry import BOX, get_task, task_names
-from vsp.tasks.simplegoal import SimpleGoalEnv
 
 
 def step(state, action):
+    """As on arrays, so in Gymnasium."""
     (moved,), (reward,), (outcome,) = simplegoal.step(np.array([state]), np.array([action]))
+    env = simplegoal.SimpleGoalEnv()
+    env.state = np.array(state)
+    seen, *others = env.step(np.array(action))
+    assert others == [reward, outcome != RUNNING, False, {"outcome": OUTCOMES[outcome]}]
+    assert seen.dtype == np.float32 and np.array_equal(seen, moved.astype(np.float32))
     return moved.tolist(), reward, outcome
 
 
@@ -96,7 +101,7 @@ def test_the_picture_shows_agent_goal_and_pit_in_their_places():
 
 @pytest.mark.parametrize("action", [[np.nan, 0], [0, 0, 0], 0.5])
 def test_a_bad_action_is_refused(action):
-    env = SimpleGoalEnv()
+    env = simplegoal.SimpleGoalEnv()
     env.reset(seed=0)
     before = env.state.copy()
     with pytest.raises(ValueError, match="expected"):
@@ -104,40 +109,7 @@ def test_a_bad_action_is_refused(action):
     assert np.array_equal(env.state, before)
 
 
-# Batched = Gymnasium, step by step
-
-
-def replay(env, task, start, actions):
-    """One episode in Gymnasium: states before each step and after the last, rewards, outcome."""
-    env.reset(seed=0)
-    env.unwrapped.state = np.array(start)
-    states, rewards = [start.astype(np.float32)], []
-    for action in actions:
-        state, reward, terminated, truncated, info = env.step(action)
-        states.append(state)
-        rewards.append(reward)
-        if terminated or truncated:
-            break
-    outcome = info.get("outcome", "goal") if terminated else "truncated" if truncated else "running"
-    return np.array(states), rewards, outcome
-
-
-@pytest.mark.parametrize(
-    ("name", "n", "outcomes"), [(SIMPLEGOAL, 300, {GOAL, PIT, TRUNCATED}), (MOUNTAINCAR, 20, {TRUNCATED})]
-)
-def test_batched_equals_step_by_step(name, n, outcomes):
-    task = get_task(name)
-    starts = task.start(np.random.default_rng(7), n)
-    m = len(task.action_low)
-    episodes, result = (play(RandomPolicy(m), task, starts) for play in (collect_episodes, rollout))
-    env = gymnasium.make(name, disable_env_checker=True)
-    for i, (start, episode) in enumerate(zip(starts, episodes)):
-        states, rewards, outcome = replay(env, task, start, episode.actions.astype(np.float32))
-        assert len(rewards) == len(episode.actions) == result.lengths[i]
-        assert outcome == OUTCOMES[result.outcomes[i]]
-        assert np.abs(states[:-1] - episode.states).max() <= 1e-3
-        assert sum(rewards) == pytest.approx(result.returns[i], abs=1e-3)
-    assert outcomes <= set(result.outcomes)
+# Batched = Gymnasium
 
 
 @pytest.mark.parametrize(

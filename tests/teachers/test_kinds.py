@@ -17,7 +17,6 @@ from zips import CAR, Car, bomb, in_float64, made, retold, rewritten, saved
 
 from vsp import load_teacher, rollout_from_seed
 from vsp.teachers import agent_zip
-from vsp.teachers.agent_zip import read_zip
 from vsp.teachers.inert import array, described
 
 SMALL, SDE = {"net_arch": [12, 8]}, {"use_sde": True}
@@ -214,7 +213,7 @@ def as_library(path, name, task):
     """The library's own agent, made anew with the tensors of an old zip that it may not load."""
     import torch
 
-    saved = read_zip(path)
+    saved = agent_zip.read_zip(path)
     told = saved.setting("policy_kwargs")
     options = {"use_sde": saved.settings["use_sde"]} if name.upper() not in ("DDPG", "ARS") else {}
     shape = {key: told[key] for key in ("net_arch", "n_critics") if key in told}

@@ -9,7 +9,6 @@ from support import SIMPLEGOAL
 from zips import made
 
 import vsp
-from vsp import load_teacher
 
 OBS = np.random.default_rng(0).random((10_000, 2)).astype(np.float32)
 RMS = {"count": 9.0, "mean": np.array([0.25, 0.5]), "var": np.array([0.25, 0.0])}
@@ -43,10 +42,10 @@ def trained(tmp_path_factory):
 def test_an_agent_with_its_statistics_acts_as_the_library_does_and_asks_for_them(trained):
     folder, model, env = trained
     path, given = folder / "ppo.zip", {"normalize": folder / "statistics.pkl"}
-    alone, unaware = type(model).load(path), load_teacher(path, SIMPLEGOAL, normalize=False)
+    alone, unaware = type(model).load(path), vsp.load_teacher(path, SIMPLEGOAL, normalize=False)
     expected = model.predict(env.normalize_obs(OBS), deterministic=True)[0]
     by_object = (vsp.agent(source, SIMPLEGOAL, normalize=env) for source in (path, alone))
-    for agent in (load_teacher(path, SIMPLEGOAL, **given), vsp.agent(model), vsp.agent(alone, **given), *by_object):
+    for agent in (vsp.load_teacher(path, SIMPLEGOAL, **given), vsp.agent(model), vsp.agent(alone, **given), *by_object):
         assert np.abs(agent.predict(OBS)[0] - expected).max() < 1e-4
     for agent in (unaware, vsp.agent(alone, normalize=False), vsp.agent(model, normalize=False)):
         assert np.abs(agent.predict(OBS)[0] - expected).max() > 0.05
@@ -63,7 +62,7 @@ def test_an_agent_with_its_statistics_acts_as_the_library_does_and_asks_for_them
 )
 def test_statistics_are_used_as_the_library_does(changes, small, tmp_path):
     env = written(tmp_path / "s.pkl", **changes)
-    teacher, raw = (load_teacher(small, SIMPLEGOAL, normalize=n) for n in (str(tmp_path / "s.pkl"), False))
+    teacher, raw = (vsp.load_teacher(small, SIMPLEGOAL, normalize=n) for n in (str(tmp_path / "s.pkl"), False))
     assert np.abs(teacher.predict(OBS)[0] - raw.predict(env.normalize_obs(OBS))[0]).max() < 1e-6
     assert (teacher.normalization is not None) == env.norm_obs == (teacher.digest != raw.digest)
     assert teacher.card["recipe"]["steps"] == raw.card["recipe"]["steps"] >= 0
@@ -83,7 +82,7 @@ def test_statistics_are_used_as_the_library_does(changes, small, tmp_path):
 def test_statistics_that_do_not_fit_are_refused(changes, message, small, tmp_path):
     written(tmp_path / "s.pkl", **changes)
     with pytest.raises(ValueError, match=rf"s.pkl: .*{message}"):
-        load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.pkl")
+        vsp.load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.pkl")
 
 
 # Signs
@@ -109,11 +108,11 @@ def test_settings_nearby_may_say_so_or_not(small, tmp_path):
     path = shutil.copy(small, tmp_path / "x.zip")
     for text in NO_SIGNS:
         (tmp_path / "config.yml").write_text(text)
-        load_teacher(path, SIMPLEGOAL)
+        vsp.load_teacher(path, SIMPLEGOAL)
     for content in [*UNREADABLE, *map(str.encode, HIDDEN)]:
         (tmp_path / "config.yml").write_bytes(content)
         with pytest.raises(ValueError, match="x.zip: .*config.yml (may say so, but cannot be read|says so)"):
-            load_teacher(path, SIMPLEGOAL)
+            vsp.load_teacher(path, SIMPLEGOAL)
 
 
 LAYOUTS = {  # of RL Zoo, and names that people give
@@ -132,18 +131,18 @@ def test_statistics_and_settings_are_found_wherever_people_keep_them(zip_file, n
     path, said = shutil.copy(small, tmp_path / zip_file), "says so" if name.endswith(".yml") else "lies beside it"
     (tmp_path / name).write_text(SIGNS.get(name, "normalize: true"))
     with pytest.raises(ValueError, match=f"{zip_file}: .*{name} {said}.*Pass their statistics, normalize="):
-        load_teacher(path, SIMPLEGOAL)
-    load_teacher(path, SIMPLEGOAL, normalize=False)
+        vsp.load_teacher(path, SIMPLEGOAL)
+    vsp.load_teacher(path, SIMPLEGOAL, normalize=False)
 
 
 def test_statistics_named_after_another_agent_are_that_agents(small, tmp_path):
     for name in ("sac", "ppo", "ppo_best"):
         shutil.copy(small, tmp_path / f"{name}.zip")
     written(tmp_path / "ppo_vecnormalize.pkl")
-    load_teacher(tmp_path / "sac.zip", SIMPLEGOAL)
+    vsp.load_teacher(tmp_path / "sac.zip", SIMPLEGOAL)
     for name in ("ppo", "ppo_best"):  # the second may be a copy of the first
         with pytest.raises(ValueError, match="ppo_vecnormalize.pkl lies beside it"):
-            load_teacher(tmp_path / f"{name}.zip", SIMPLEGOAL)
+            vsp.load_teacher(tmp_path / f"{name}.zip", SIMPLEGOAL)
 
 
 def test_another_version_of_the_environment_is_named(small, tmp_path):
@@ -151,9 +150,9 @@ def test_another_version_of_the_environment_is_named(small, tmp_path):
     (tmp_path / "args.yml").write_text("!!python/object/apply:collections.OrderedDict\n- - - env\n    - SimpleGoal-v9")
     said = "x.zip was trained on SimpleGoal-v9, and acts on SimpleGoal-v0: they may differ"
     with pytest.warns(UserWarning, match=said):
-        load_teacher(path, SIMPLEGOAL)
+        vsp.load_teacher(path, SIMPLEGOAL)
     (tmp_path / "args.yml").write_text("env: SimpleGoal-v0")
-    load_teacher(path, SIMPLEGOAL)
+    vsp.load_teacher(path, SIMPLEGOAL)
 
 
 # What a user gives
@@ -187,7 +186,7 @@ def test_anything_else_is_refused(given, small):
 def test_statistics_of_numpy_are_refused_with_the_way_out(small, tmp_path):
     np.savez(tmp_path / "s.npz", mean=np.zeros(2), var=np.ones(2))
     with pytest.raises(ValueError, match="pass normalize=.mean, variance."):
-        load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.npz")
+        vsp.load_teacher(small, SIMPLEGOAL, normalize=tmp_path / "s.npz")
 
 
 def test_a_wrapper_that_normalises_is_seen(small, tmp_path):
@@ -203,10 +202,10 @@ def test_a_wrapper_that_normalises_is_seen(small, tmp_path):
     assert np.abs(teacher.predict(OBS)[0] - expected[0]).max() < 1e-6
     model.save(tmp_path / "x.zip")
     with pytest.warns(UserWarning, match="observations have no limits.*pass normalize=.mean, variance."):
-        load_teacher(tmp_path / "x.zip", SIMPLEGOAL)
+        vsp.load_teacher(tmp_path / "x.zip", SIMPLEGOAL)
 
 
 def test_what_has_no_normalisation_refuses_one(small):
-    for source in (SIMPLEGOAL, load_teacher(small, SIMPLEGOAL)):
+    for source in (SIMPLEGOAL, vsp.load_teacher(small, SIMPLEGOAL)):
         with pytest.raises(ValueError, match="normalize.*expected no"):
             vsp.agent(source, normalize="statistics.pkl")
