@@ -44,6 +44,14 @@ def test_policy_at_follows_the_partition_in_every_iteration(run):
     assert np.array_equal(history.policy_at(len(history.cells) - 1).codewords, policy.codewords)
 
 
+def test_policy_at_is_right_where_one_cell_comes_and_another_goes():
+    history = History()
+    for n, x in enumerate((0.9, 0.5)):
+        history.add_events(n, "split", [(np.array([x, 0.9]), 1.5)])
+        history.observe(n, 1.0, partition_of([[0.1, 0.1], [x, 0.9]]))
+    assert history.policy_at(1).codewords.tolist() == [[0.1, 0.1], [0.5, 0.9]]
+
+
 @pytest.mark.parametrize("n", [35, 5500])
 def test_a_snapshot_is_at_most_so_many_iterations_old(n):
     """A long run keeps no more snapshots than a short one."""

@@ -228,13 +228,18 @@ def better_mean(blocks, claim, policy):
         part["mean_low"], part["mean_high"] = part["mean_low"] + 0.02, part["mean_high"] + 0.02
 
 
+def other_policy(blocks, claim, policy):
+    worst = min(blocks, key=lambda block: block["least"])
+    policy["coefficients"][worst["n"] % 3][1][0] += 2.0
+
+
 MUTANTS = {
     "drop": lambda blocks, claim, policy: blocks.pop(7),
     "claim": lambda blocks, claim, policy: claim.update(least=claim["least"] + 1e-3),
     "metric": lambda blocks, claim, policy: policy.update(metric="manhattan"),
     "least": too_good("least", 0.1, max), "longest": too_good("longest", -50, min),
     "end": no_end, "one": one_block, "left": more_left, "stuck": stuck, "nan": not_a_number, "mean": better_mean,
-    "more": perfect,
+    "policy": other_policy, "more": perfect,
 }  # fmt: skip
 
 

@@ -1,7 +1,6 @@
 import dataclasses
 import re
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -15,10 +14,10 @@ from vsp.paper.ledger import CONTRADICTED, DIFFERS, REPRODUCED, UNCHECKED, UNTOL
 from vsp.paper.printed import PREFIX, printed_values, spread_id
 from vsp.paper.runs import EVALUATION_SEED, Results, make_runs, paper_experiment
 from vsp.paper.statistics import resample
+from vsp.run import ROOT
 from vsp.run.notebook import nbformat
 from vsp.tasks import registry, simplegoal
 
-ROOT = Path(__file__).resolve().parents[2]
 RESULT = "_spread_|_drl_|_ours_"  # what the ids of the results in text and tables hold
 SEEDS, N_RESAMPLES = range(4), 40
 

@@ -11,11 +11,11 @@ import sys
 import tempfile
 import time
 import urllib.request
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from vsp.run import ROOT
+
 NOTEBOOK = "02_distillation.ipynb"
 GONE = "Error displaying widget"  # what JupyterLab says of a widget without a kernel
 UNDER_A_BUSY_MACHINE = 300_000  # ms

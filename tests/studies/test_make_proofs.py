@@ -17,7 +17,8 @@ def policy_of(codewords, coefficients, **more):
 
 
 STRAIGHT = policy_of([[0.5, 0.5]], [[[0, 0], [0, 0], [-1, -1]]])
-TWO = policy_of([[0.25, 0.25], [0.75, 0.75]], [[[0, 0], [0, 0], [-1, -1]], [[0, 0], [0, 0], [-1, 0]]])
+ACTIONS = [[[0, 0], [0, 0], action] for action in ([-1, -1], [-2, 1.5])]  # the second is limited on both sides
+TWO = policy_of([[0.25, 0.25], [0.75, 0.75]], ACTIONS, scale=[0.5, 2.0])
 
 
 def test_returns_are_those_of_the_pieces():
