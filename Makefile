@@ -4,7 +4,7 @@
 # files have the times of the checkout, so outputs are never compared with inputs: a fresh clone makes everything.
 
 PAPER := 02_distillation 01_teacher 05_ledger 03_evaluation 04_appendix_tables # in an order in which no core waits
-BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents
+BEYOND := 08_proofs 09_methods 06_few_equations 07_limits 10_robots 11_agents 12_drone
 NOTEBOOKS := $(sort $(PAPER) $(BEYOND))
 USE_RUNS := 03_evaluation 04_appendix_tables 05_ledger
 SUMMARIES := data/results/SimpleGoal-v0.csv data/results/MountainCarContinuous-v0.csv

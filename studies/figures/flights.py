@@ -54,11 +54,12 @@ def mixed(policy: VoronoiPolicy) -> pd.DataFrame:
     return pd.DataFrame(numbers, index=pd.Index(names, name="input"), columns=list(MIXES))
 
 
-def shares(ax: Axes, rows: pd.DataFrame, *, colors: dict[str, str]) -> None:
-    """Draw how often each controller stays in the room, a line for each condition; bars are intervals of the gap."""
+def shares(ax: Axes, rows: pd.DataFrame, looks: dict[str, dict]) -> None:
+    """Draw how often those in `looks` stay in the room, a line for each condition; bars are intervals of the gap."""
     names = list(rows["condition"].unique())[::-1]
-    for flies, color in colors.items():
+    for i, (flies, look) in enumerate(looks.items()):
         mine = rows[rows["flies"] == flies].set_index("condition").loc[names]
         error = [mine["more"] - mine["more_low"], mine["more_high"] - mine["more"]]
-        ax.errorbar(mine["kept"], range(len(names)), xerr=error, fmt="o", color=color, ms=4, lw=1, label=flies)
-    ax.set(yticks=range(len(names)), yticklabels=names, xlabel="share of flights that stay in the room")
+        heights = np.arange(len(names)) + 0.22 * ((len(looks) - 1) / 2 - i)  # beside each other
+        ax.errorbar(mine["kept"], heights, xerr=error, lw=1, ls="none", label=flies, **look)
+    ax.set(yticks=range(len(names)), yticklabels=names, xlabel="share of flights that stay")

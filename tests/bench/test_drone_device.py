@@ -1,4 +1,4 @@
-"""The drone's one map in C for a Crazyflie's kind of processor: its size, and the instructions that QEMU executes."""
+"""The drone's maps in C for a Crazyflie's kind of processor: its size, and the instructions that QEMU executes."""
 
 import shutil
 import subprocess
@@ -28,9 +28,10 @@ int main(void) {
 
 
 @pytest.mark.skipif(not all(map(shutil.which, (ARM[0], QEMU[0]))), reason="no compiler for ARM, or no QEMU")
-def test_one_map_on_a_microcontroller(tmp_path, record):
+@pytest.mark.parametrize(("name", "n_cells"), [("one map", 1), ("four cells", 4)])
+def test_maps_on_a_microcontroller(name, n_cells, tmp_path, record):
     """QEMU counts no cycles; what a call executes is the difference between two calls and one."""
-    policy = few_maps(command_of(own_teacher()), seed=0)
+    policy = few_maps(command_of(own_teacher()), seed=0, n_cells=n_cells)
     (tmp_path / "policy.c").write_text(device.to_c(policy, real="float"), "utf-8")
     (tmp_path / "policy.h").write_text(device.to_header(policy, real="float"), "utf-8")
     subprocess.run([*ARM, "-c", "policy.c"], check=True, cwd=tmp_path)
@@ -41,15 +42,7 @@ def test_one_map_on_a_microcontroller(tmp_path, record):
         subprocess.run(QEMU, check=True, cwd=tmp_path, timeout=60)
         executed.append(len((tmp_path / "log").read_bytes().splitlines()))
     size = subprocess.run(["arm-none-eabi-size", "policy.o"], check=True, cwd=tmp_path, capture_output=True, text=True)
+    size, executed = int(size.stdout.split()[-3]), executed[1] - executed[0]
     note = "Cortex-M4 with floating point, gcc -O2"
-    record(
-        "speed",
-        "a drone's one map: program and numbers",
-        int(size.stdout.split()[-3]),
-        "bytes",
-        at_most=1000,
-        note=note,
-    )
-    record(
-        "speed", "a drone's one map: a call in QEMU", executed[1] - executed[0], "instructions", at_most=1000, note=note
-    )
+    record("speed", f"a drone's {name}: program and numbers", size, "bytes", at_most=1000 * n_cells, note=note)
+    record("speed", f"a drone's {name}: a call in QEMU", executed, "instructions", at_most=1000 * n_cells, note=note)

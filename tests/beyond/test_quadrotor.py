@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -110,3 +112,14 @@ def test_a_push_comes_after_two_seconds():
     fly(command_of(STILL), starts, pushes=np.array([[0.5, 0, 0]]), watch=lambda t, s, c: seen.append(s[0, 7]))
     assert seen[:201] == [0.0] * 200 + [0.5] and seen[-1] == pytest.approx(0.5)
     assert fly(command_of(STILL), starts, CRAZYFLIE).kept.all()
+
+
+def test_a_late_command_reaches_the_motors_later():
+    before, commands = with_history(Starts()(RNG, 4)), RNG.uniform(-1, 1, (3, 4, 4))
+    late, hovering = before, np.full((4, 4), HOVER)
+    for i, command in enumerate(commands):
+        late = q.advance(late, command, replace(CRAZYFLIE, delay=2))
+        driven = q.advance(before, hovering if i < 2 else commands[0])
+        assert np.array_equal(late[:, :17], driven[:, :17])
+        assert np.array_equal(late[:, -4:], command)  # the controller remembers what it has sent
+        before = driven

@@ -10,7 +10,10 @@ from studies.committed import read_results
 from vsp.evaluation import rollout_from_seed
 from vsp.tasks import PIT
 from vsp_beyond.drone import imitation
+from vsp_beyond.drone.flights import command_of, fly
 from vsp_beyond.drone.quadrotor import Starts, quadrotor
+
+RNG = np.random.default_rng(0)
 
 
 def test_the_teacher_is_what_its_card_says():
@@ -41,13 +44,36 @@ def test_environments_advance_as_the_task_does():
     assert ends > whole > 0
 
 
+BLIND = "one map without past commands"
+
+
+def test_the_regulator_costs_least_and_stays():
+    policy = drone.regulator()
+    here, steer, seen = imitation.loop_of(drone.CRAZYFLIE)
+    begin = np.append(RNG.normal(size=12), np.tile(RNG.normal(size=4), 2))
+
+    def cost(gain):
+        state, total = begin, 0.0
+        for _ in range(3000):
+            inputs, command = seen @ state, gain @ seen @ state
+            total += inputs @ np.diag(np.repeat([1, 10, 1, 1, 0.1, 0], [3, 2, 1, 3, 3, 4])) @ inputs + command @ command
+            state = here @ state + steer @ command
+        return total
+
+    gain = policy.coefficients[0, :16].T
+    others = [gain * (1 + 0.05 * RNG.normal(size=gain.shape)) for _ in range(5)]
+    assert cost(gain) < min(map(cost, others))
+    flown = fly(command_of(policy), Starts(tilt=120.0)(RNG, 50))
+    assert flown.kept.all() and flown.distance.max() < 0.05
+
+
 def test_rows_of_small_maps(monkeypatch, tmp_path):
     for module, name, value in (
         (drone, "N", 20), (imitation, "FLIGHTS", 40), (imitation, "OWN_FLIGHTS", 20), (imitation, "ROUNDS", 1),
         (imitation, "N_STEPS", 200), (drone, "HARD", drone.HARD[:1]), (drone, "EASY", drone.EASY[:2]),
         (drone, "CONDITIONS", ("as built", drone.CONDITIONS[-1])), (drone, "BODIES", {"as built": drone.CRAZYFLIE}),
         (imitation, "BODIES", {"as built": drone.CRAZYFLIE}),
-        (drone, "SEEDS", {"network": range(1), "one map": range(2), "one map without past commands": range(1)}),
+        (drone, "SEEDS", {"network": range(1), "LQR": range(1), "one map": range(2), BLIND: range(1)}),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     monkeypatch.setattr("sys.argv", ["drone", "--jobs=1", f"--out={tmp_path}"])
@@ -56,11 +82,23 @@ def test_rows_of_small_maps(monkeypatch, tmp_path):
     monkeypatch.setattr(drone, "read_results", lambda name: pd.DataFrame({"agent": ["flown", "own"], "kept": [2, 3]}))
     drone.main()
     rows = read_results("drone", tmp_path / "data/beyond")
-    assert rows["agent"].tolist() == ["flown"] + ["own"] * 14 and rows["kept"][0] == 2
+    assert rows["agent"].tolist() == ["flown"] + ["own"] * 20 and rows["kept"][0] == 2
     mine = rows[1:].set_index(["flies", "condition", "starts", "tilt"])
-    assert mine["numbers"].groupby("flies").first().to_dict() == {
-        "network": 5508, "one map": 68, "one map without past commands": 52,
-    }  # fmt: skip
+    numbers = mine["numbers"].groupby("flies").first()
+    assert numbers.to_dict() == {"network": 5508, "LQR": 68, "one map": 68, BLIND: 52}
     network, ours = (mine.loc[flies, "as built", "easy", 60] for flies in ("network", "one map"))
     assert network["kept"] == 1 and network["more"] == 0 and network["r2"] == 1
     assert ours["more"] == pytest.approx(ours["kept"] - 1) and ours["more_low"] <= ours["more"] <= ours["more_high"]
+
+
+@pytest.mark.parametrize(("agent", "fewest"), [("flown", "one map"), ("own", "four cells")])
+def test_committed_rows_are_current_and_reach_the_goal(agent, fewest):
+    rows = read_results("drone").query("agent == @agent")
+    assert set(rows["flies"]) == set(drone.SEEDS)
+    for flies, mine in rows.groupby("flies"):
+        today = drone.Measured("", flies, 0).provenance
+        assert set(mine["settings"]) == {today["settings"]} and set(mine["version"]) == {today["version"]}
+        assert agent == "flown" or set(mine["teacher"]) == {today["teacher"]}
+    ours = rows[rows["flies"] == fewest]
+    assert len(ours) == 56 and (ours["numbers"] <= 350).all() and (ours["seeds"] == 10).all()
+    assert (ours["more_high"] >= 0).all() and ours["radius"][ours["condition"] == "as built"].max() < 0.995

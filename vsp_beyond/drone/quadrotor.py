@@ -40,6 +40,7 @@ class Body:
     mass: float = 0.027  # kg
     inertia: tuple[float, float, float] = (3.85e-6, 3.85e-6, 5.9675e-6)  # kg m2
     lag: float = 0.15  # s, time constant of the motors
+    delay: int = 0  # steps until the motors get a command, in states with a history
 
 
 CRAZYFLIE = Body()
@@ -95,10 +96,11 @@ def advance(states: np.ndarray, commands: np.ndarray, body: Body = CRAZYFLIE) ->
 
     What a controller remembers moves on, too: the motor speeds as they would be in a Crazyflie, from its commands."""
     commands, now = np.clip(commands, -1.0, 1.0), states[:, :17]
-    first = derivative(now, commands, body)
-    second = derivative(now + STEP / 2 * first, commands, body)
-    third = derivative(now + STEP / 2 * second, commands, body)
-    fourth = derivative(now + STEP * third, commands, body)
+    got = np.hstack([states[:, 21:], commands])[:, -4 * (body.delay + 1) :][:, :4]
+    first = derivative(now, got, body)
+    second = derivative(now + STEP / 2 * first, got, body)
+    third = derivative(now + STEP / 2 * second, got, body)
+    fourth = derivative(now + STEP * third, got, body)
     after = now + STEP / 6 * (first + 2 * second + 2 * third + fourth)
     after[:, ATTITUDE] /= np.linalg.norm(after[:, ATTITUDE], axis=1, keepdims=True)
     memory = commands + np.exp(-STEP / CRAZYFLIE.lag) * (states[:, MEMORY] - commands)
