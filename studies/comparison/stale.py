@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from vsp.run import atomic, command
 
-from .. import zoo
+from .. import drone, zoo
 from ..committed import differing
 from .beside import beside
 from .methods import LONG, TABLES
@@ -40,6 +40,7 @@ def committed() -> Iterator[tuple[str, str, list[dict]]]:
                 yield file.name, target, file.today
     for name in zoo.TABLES:
         yield f"{name}.csv", "agents", zoo.current(name)[1]
+    yield "drone.csv", "drone", drone.current()
 
 
 def main() -> None:

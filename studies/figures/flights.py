@@ -20,7 +20,7 @@ MIXES = {  # of the four commands: what all do, and what turns the body about x,
 def film(ax: Axes, states: np.ndarray, moments: Sequence[float], *, step_seconds: float, color: str) -> None:
     """Draw the drone at `moments` (s) of its flight, `states` (t, 17 or more), side by side at its true height.
 
-    Its front arms are drawn in `color`, the line upwards is the direction of its thrust."""
+    Its front motors are drawn in `color`, the line upwards is the direction of its thrust."""
     for i, moment in enumerate(moments):
         state = states[round(moment / step_seconds)]
         turned = rotation(state[None, ATTITUDE])[0]

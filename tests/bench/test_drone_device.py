@@ -43,6 +43,7 @@ def test_maps_on_a_microcontroller(name, n_cells, tmp_path, record):
         executed.append(len((tmp_path / "log").read_bytes().splitlines()))
     size = subprocess.run(["arm-none-eabi-size", "policy.o"], check=True, cwd=tmp_path, capture_output=True, text=True)
     size, executed = int(size.stdout.split()[-3]), executed[1] - executed[0]
+    assert executed > 200  # it multiplies
     note = "Cortex-M4 with floating point, gcc -O2"
     record("speed", f"a drone's {name}: program and numbers", size, "bytes", at_most=1000 * n_cells, note=note)
     record("speed", f"a drone's {name}: a call in QEMU", executed, "instructions", at_most=1000 * n_cells, note=note)

@@ -9,7 +9,7 @@ from support import Constant
 from vsp.rollouts import rollout
 from vsp.tasks import PIT, TRUNCATED
 from vsp_beyond.drone import quadrotor as q
-from vsp_beyond.drone.flights import BODIES, command_of, fly, with_history
+from vsp_beyond.drone.flights import BODIES, EASY, HARD, command_of, fly, with_history
 from vsp_beyond.drone.quadrotor import CRAZYFLIE, HOVER, Starts
 
 RNG = np.random.default_rng(0)
@@ -123,3 +123,9 @@ def test_a_late_command_reaches_the_motors_later():
         assert np.array_equal(late[:, :17], driven[:, :17])
         assert np.array_equal(late[:, -4:], command)  # the controller remembers what it has sent
         before = driven
+
+
+def test_the_bodies_and_starts_are_those_that_are_named():
+    bodies = np.array([[body.mass / 0.027, body.inertia[2] / 5.9675e-6, body.lag / 0.15] for body in BODIES.values()])
+    assert np.allclose(bodies, [[1, 1, 1], [1.2, 1, 1], [0.8, 1, 1], [1, 2, 1], [1, 1, 1.5], [1, 1, 0.5]])
+    assert EASY[-1] == Starts(0.2, 0.3, 0.3, 180) and HARD[-1] == Starts(0.3, 1.0, 1.0, 180)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from support import CHEETAH, LUNARLANDER, MOUNTAINCAR, SIMPLEGOAL
 
+from studies import drone
 from studies.committed import RESULTS
 from studies.comparison import beside, rows, stale
 from studies.comparison.methods import METHODS, PRESETS, TASKS
@@ -86,8 +87,9 @@ OF_CART.append(says(f"methods_{LUNARLANDER}.csv", "version", "beyond-long"))
         (lambda patch: patch.setattr(beside, "OPTIMUM_VERSION", 2), [says("optimum.csv", "version")]),
         (lambda patch: patch.setattr(beside, "GAIT_VERSION", 9),
          [says(f"gait_{CHEETAH}.csv", "version", "beyond-long")]),
+        (lambda patch: patch.setattr(drone, "HARD", drone.HARD[1:]), [says("drone.csv", "settings", "drone")]),
     ],
-    ids=["CART", "optimum", "gait"],
+    ids=["CART", "optimum", "gait", "drone"],
 )  # fmt: skip
 def test_results_of_another_version_are_stale(patch, change, expected):
     change(patch)
@@ -105,4 +107,4 @@ def test_all_results_of_another_teacher_are_stale(patch):
     patch.setattr(rows, "_digest", lambda task, agent: other.digest)
     patch.setattr(beside, "load_teacher", lambda task: other)
     named = [message.split()[0].removeprefix("data/beyond/") for message in stale.stale()]
-    assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents"))]
+    assert named == [name for name, _, _ in stale.committed() if not name.startswith(("optimum", "agents", "drone"))]

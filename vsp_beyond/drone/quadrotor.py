@@ -1,8 +1,8 @@
 """A Crazyflie quadrotor that has to hover at the origin: rigid body and motor lag, on arrays of states.
 
-Dynamics and parameters are those in which the network of "Learning to Fly in Seconds" (Eschmann, Albani, Loianno 2024,
+Dynamics and constants are those in which the network of "Learning to Fly in Seconds" (Eschmann, Albani, Loianno 2024,
 arXiv 2311.13081) was trained: github.com/arplaboratory/learning-to-fly, `simulator/parameters/dynamics/crazy_flie.h`.
-There is no air drag, no wind and no ground.
+There is no air drag, wind, ground or noise.
 """
 
 from dataclasses import dataclass
