@@ -5,11 +5,10 @@ import pytest
 from support import MOUNTAINCAR, PENDULUM, SIMPLEGOAL
 from test_tries import run
 
-from vsp import VoronoiPolicy
 from vsp.run.command import CommandError
 
 # The last cell that it concerns
-LAST = {"06": "read-figure", "07": "cells", "08": "imports", "10": "state", "11": "fit", "12": "film"}
+LAST = {"06": "read-figure", "07": "cells", "10": "state", "11": "fit", "12": "film"}
 
 
 EDITS = [
@@ -57,12 +56,3 @@ def test_other_values_run_through(number, changes, tmp_path, capsys):
 def test_what_is_not_possible_is_one_line(number, changes, said, tmp_path):
     with pytest.raises(CommandError, match=said):
         run(number, tmp_path, last=LAST[number], **changes)
-
-
-@pytest.mark.parametrize(("by", "fails_outside"), [(0.02, False), (0.3, True)])
-def test_the_try_of_the_proofs(by, fails_outside, tmp_path):
-    names = run("08", tmp_path, last=LAST["08"])
-    tuned = names["proofs"].load_certificate("simplegoal_tuned")[0]
-    codewords = tuned.codewords - by * np.outer(np.arange(len(tuned)) == 1, [1, 0])
-    moved = VoronoiPolicy(codewords, tuned.coefficients, task=tuned.task, metric=tuned.metric, scale=tuned.scale)
-    assert (names["prove"](moved).failing_outside > 0) == fails_outside
