@@ -41,7 +41,6 @@ def test_environments_advance_as_the_task_does():
             whole += infos[i]["TimeLimit.truncated"]
         ends += ended.sum()
         before = many._states.copy()
-        assert (np.abs(before[ended, :3]) <= 3).all()
     assert ends > whole > 0
 
 
