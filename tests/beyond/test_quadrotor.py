@@ -113,9 +113,8 @@ def test_the_change_is_that_of_the_last_second_in_rpm():
 
 
 def test_a_push_comes_after_two_seconds():
-    seen = []
-    starts = Starts(0, 0, 0, 0)(RNG, 1)
-    fly(command_of(STILL), starts, pushes=np.array([[0.5, 0, 0]]), watch=lambda t, s, c: seen.append(s[0, 7]))
+    seen, start, push = [], Starts(0, 0, 0, 0)(RNG, 1), np.array([[0.5, 0, 0]])
+    fly(command_of(STILL), start, pushes=push, watch=lambda t, s, c: seen.append(s[0, 7]))
     assert seen[:201] == [0.0] * 200 + [0.5] and seen[-1] == pytest.approx(0.5)
 
 
