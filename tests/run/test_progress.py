@@ -16,15 +16,16 @@ def test_a_log_says_how_many_are_done_and_what_was_done_before_counts(capsys):
 def test_a_bar_stays_except_in_a_notebook_and_is_rare_in_a_log(monkeypatch, where):
     shown = []
 
-    class Bar(notebook.tqdm if where == "notebook" else std.tqdm):
-        def __new__(cls, items, name, **options):
-            shown.append((name, options["total"], options["initial"], options["leave"], options["mininterval"]))
-            return iter(items)
+    def bar(items, name, **options):
+        stays = options.get("leave", True), options.get("file", sys.stderr) is sys.stderr
+        shown.append((name, options["total"], options["initial"], *stays, options["mininterval"]))
+        return items
 
-    monkeypatch.setattr(auto, "tqdm", Bar)
+    monkeypatch.setattr(auto, "tqdm", notebook.tqdm if where == "notebook" else std.tqdm)
+    monkeypatch.setattr(std, "tqdm", bar)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: where == "terminal", raising=False)
     assert list(progress([1, 2], "work", total=5, unit="steps", done=3)) == [1, 2]
-    assert shown == [("work", 5, 3, where != "notebook", 10.0 if where == "log" else 0.1)]
+    assert shown == [("work", 5, 3, *[where != "notebook"] * 2, 10.0 if where == "log" else 0.1)]
 
 
 def test_a_search_shows_its_steps_where_somebody_reads_them(monkeypatch, capsys):

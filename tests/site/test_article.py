@@ -146,8 +146,8 @@ def test_a_link_of_version_1_stays_readable_and_marked_words_set_scenes(shown):
             assert any(text.startswith(said) for text in article.section.locator("output").all_inner_texts())
 
 
-def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown):
-    article, rng = shown(), np.random.default_rng(0)
+def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown, where):
+    article, rng = shown(), np.random.default_rng(where == FILE.as_uri())
     article.to("you")
     GESTURES["you"](article)
     article.rest()
@@ -157,7 +157,7 @@ def test_a_thousand_wrong_addresses_show_the_first_scene_and_one_sentence(shown)
         "v=1" + "&a=1e999" * 600, "v=1&s=<img src=x onerror=alert(1)>&p=three&a=0,1", "v=1&s=cells&p=run&a=0,1&n=501",
     ]  # fmt: skip
     wrong = [signed(text) for text in wrong] + [whole[:-1], whole + "0", "#none"]
-    while len(wrong) < 1000:  # with a right checksum, so that what it protects is read
+    while len(wrong) < 500:  # here, and as many others there; with a right checksum, so that what it protects is read
         text = list(whole[1 : whole.index("&k=")])
         for at in rng.integers(4, len(text), rng.integers(1, 4)):
             text[at] = rng.choice([*"&=,.-e9<x ", "NaN"])

@@ -114,16 +114,10 @@ def test_every_cell_of_a_notebook_runs(notebook):
     assert sum("<figure>" in "".join(output.get("data", {}).get("text/html", "")) for output in _outputs(notebook)) >= 6
 
 
-def _below(page, place):
-    """The first such place, which is drawn when one scrolls there."""
-    for _ in range(200):
-        if page.locator(place).count():
-            page.locator(place).first.scroll_into_view_if_needed()
-            return page.locator(place).first
-        page.mouse.move(900, 500)
-        page.mouse.wheel(0, 800)
-        page.wait_for_timeout(100)
-    raise AssertionError(f"nothing here is {place}")
+def _found(page, place):
+    """The first such place. JupyterLab draws the cells of a page one by one, as it finds time, so this may wait."""
+    page.locator(place).first.scroll_into_view_if_needed()
+    return page.locator(place).first
 
 
 def _reads(place, text):
@@ -133,13 +127,13 @@ def _reads(place, text):
 @pytest.fixture(scope="module")
 def explorer(notebook):
     """That of SimpleGoal, the first."""
-    _below(notebook, ".vsp-explorer.vsp-controls .vsp-stage > canvas")
+    _found(notebook, ".vsp-explorer.vsp-controls .vsp-stage > canvas")
     return notebook.locator(".vsp-explorer.vsp-controls").first
 
 
 @pytest.fixture(scope="module")
 def laboratory(notebook, explorer):  # further down
-    return _below(notebook, ".vsp-controls:has(.widget-label:text-is('min_pol_distance'))")
+    return _found(notebook, ".vsp-controls:has(.widget-label:text-is('min_pol_distance'))")
 
 
 def _drawn(explorer):
@@ -192,7 +186,7 @@ def test_the_strip_stands_in_for_the_controls_once_the_kernel_is_gone(lab, noteb
         urllib.request.urlopen(end)
     _go(notebook, lab, NOTEBOOK)
     for i in range(3):  # two explorers and the laboratory
-        place = _below(notebook, f".vsp-strip >> nth={i}")
+        place = _found(notebook, f".vsp-strip >> nth={i}")
         place.locator("img").wait_for()
     notebook.get_by_text(GONE).nth(1).wait_for(state="attached")
     assert not any(word.is_visible() for word in notebook.get_by_text(GONE).all())

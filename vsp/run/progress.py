@@ -12,14 +12,15 @@ DELAY = 2.0  # seconds of work without a bar
 
 
 def progress(items: Iterable, name: str, *, total: int, unit: str, done: int = 0, delay: float = 0.0) -> Iterator:
-    """Yield `items` and show on standard error how many of `total` are done, and the time left. `done` of them were
-    done before this call; the bar appears after `delay` seconds."""
-    from tqdm import auto, notebook
+    """Yield `items` and show how many of `total` are done, and the time left: on standard error, or below the cell of a
+    notebook. `done` of them were done before this call; the bar appears after `delay` seconds."""
+    from tqdm import auto, notebook, std
 
-    widget = issubclass(auto.tqdm, notebook.tqdm)  # it disappears when the work is done
-    every = 0.1 if widget or sys.stderr.isatty() else 10.0  # seconds
-    options = {"leave": not widget, "mininterval": every, "delay": delay}
-    return iter(auto.tqdm(items, name, total=total, initial=done, unit=f" {unit}", **options))
+    # There it is no widget, because in the place of one that has ended JupyterLab would later show an error
+    in_notebook = issubclass(auto.tqdm, notebook.tqdm)
+    every = 0.1 if in_notebook or sys.stderr.isatty() else 10.0  # seconds
+    options = {"mininterval": every, "delay": delay} | ({"leave": False, "file": sys.stdout} if in_notebook else {})
+    return iter(std.tqdm(items, name, total=total, initial=done, unit=f" {unit}", **options))
 
 
 @contextlib.contextmanager
