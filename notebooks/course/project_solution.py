@@ -26,12 +26,13 @@ OURS = f"{CELLS} cells, faithful", f"{CELLS} cells of my own"
 
 
 @functools.cache
-def made(teacher: Policy, seed: int) -> dict[str, Policy]:
+def made(seed: int) -> dict[str, Policy]:
     """The four policies of a seed, fitted to as many episodes of the teacher.
 
     Why `faithful`? The project asks how well the policy acts like the teacher, and this method looks for just that. Mine
     takes the best of 50 pairs of visited states as codewords (my rule of 1.7), and exact maps: what more does it need?
     """
+    teacher = vsp.load_teacher(TASK)
     episodes = vsp.collect_episodes(teacher, TASK, vsp.start_states(TASK, N_EPISODES, seed))
     states, actions = (np.concatenate([getattr(e, name) for e in episodes]) for name in ("states", "actions"))
     config = replace(vsp_beyond.faithful_preset(TASK, n_cells=CELLS), n_episodes=N_EPISODES)
@@ -62,7 +63,7 @@ def measured(policy: Policy, teacher: Policy, starts_seed: int) -> dict[str, flo
 def report(seeds: range = SEEDS, starts_seed: int = REPORTED) -> pd.DataFrame:
     """One row per method: mean return with its 95 % interval over seeds, the most failures of a seed, the median R²."""
     teacher = vsp.load_teacher(TASK)
-    policies = [named for seed in seeds for named in made(teacher, seed).items()]
+    policies = [named for seed in seeds for named in made(seed).items()]
     rows = [{"method": name, **measured(policy, teacher, starts_seed)} for name, policy in policies]
     rows.append({"method": "teacher", **measured(teacher, teacher, starts_seed)})
     table = []
@@ -78,7 +79,7 @@ def main() -> None:
     teacher, table = vsp.load_teacher(TASK), report()
     best = table[table["method"] != "teacher"].sort_values("mean").iloc[-1]
     tried = report(starts_seed=CHOSEN).set_index("method")["mean"]
-    policy = made(teacher, 0)[tried[list(OURS)].idxmax()]
+    policy = made(0)[tried[list(OURS)].idxmax()]
     visited = vsp.visited_states(policy, TASK, vsp.start_states(TASK, N_STARTS, REPORTED))
     difference = np.abs(policy.predict(visited)[0] - teacher.predict(visited)[0])[:, 0]
     state = visited[difference.argmax()].round(3)
