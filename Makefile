@@ -136,11 +136,11 @@ site: begin venv-site ## the companion as pages for a browser, into build/site/:
 ## Develop
 PYTEST = tmp=$$(mktemp -d) && trap 'rm -rf "$$tmp"' EXIT && TMPDIR="$$tmp" MPLBACKEND=Agg $(PY) -m pytest -q -rs
 
-test: venv-test-train-dask ## runs the tests: 2 to 5 minutes; FILES=tests/test_geometry.py: one module, in seconds
+test: venv-test-train-dask ## runs the tests: 2 to 6 minutes; FILES=tests/test_geometry.py: one module, in seconds
 	@$(PYTEST) $${FILES:--n logical --maxprocesses 4 --dist worksteal --durations=10 tests}
 
-test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 3 to 10 minutes
-	@$(PYTEST) tests/long
+test-long: venv-test-train-dask ## runs tests of whole commands, kills and a cluster: 2 to 8 minutes
+	@$(PYTEST) -n 2 --dist worksteal tests/long
 test-tries: venv-test-train-dask ##- runs what the notebooks suggest to try, and other parameters, at full size: 2 to 10 minutes
 	@VSP_FULL=1 $(PYTEST) tests/long/test_tries.py tests/long/test_edits.py
 
@@ -151,8 +151,9 @@ test-js: ##- tests the scripts of explorer, article and site without a browser, 
 lint: venv-test-train ## runs ruff and mypy, as .pre-commit-config.yaml does before a commit; `ruff format` repairs the layout
 	@$(PY) -m ruff check && $(PY) -m ruff format --check && $(PY) -m mypy
 
-test-site: site venv-train-site-test ##- tests site and JupyterLab in a browser, which needs Chromium: 10 to 20 minutes
-	@$(PYTEST) tests/site
+test-site: site venv-train-site-test ##- tests site and JupyterLab in a browser, which needs Chromium: 7 to 15 minutes
+	@$(PYTEST) -n 2 --dist loadfile -k 'not smoothly and not meanwhile' tests/site
+	@$(PYTEST) -k 'smoothly or meanwhile' tests/site # alone, because they measure times
 
 manifest: venv ##- accepts the files of data/ as they are, after you changed one on purpose: at once
 	@$(PY) -m vsp.run.manifest

@@ -86,6 +86,11 @@ def test_what_an_eigenvalue_exceeds_costs(monkeypatch):
     fits = {calm: imitation.few_maps(command_of(strong), seed=0, calm=calm) for calm in (False, True)}
     radii = [max(imitation.radius(fit.coefficients[0, :16], loop)[0] for loop in loops) for fit in fits.values()]
     assert radii[0] > 1 and radii[1] < 0.995
+    two = VoronoiPolicy(np.array([[9.0], [0.0]]) * np.ones(16), strong.coefficients.repeat(2, axis=0), task=strong.task)
+    flown = imitation._flown(command_of(strong), command_of(strong), imitation.STARTS(RNG, 100))
+    maps = imitation._fitted(two, np.ones((17, 1)), *flown, loops, RNG).coefficients[:, :16]
+    paid = [max(imitation.radius(one, loop)[0] for loop in loops) for one in maps]
+    assert paid[0] > 1 and paid[1] < 0.995  # the cell that hovers is the second
 
 
 def header(layers, inputs, outputs, spoilt=lambda text: text):

@@ -97,7 +97,7 @@ def notebook(lab, browser):
     page.context.close()
 
 
-# JupyterLab draws only the cells in view, but knows of all
+# JupyterLab draws the cells of a page one by one, as it finds time, but knows of all
 _CELLS = "window.jupyterapp.shell.currentWidget.content.model.sharedModel.cells.filter(c => c.cell_type == 'code')"
 _ENDED = f"""() => {{
     const failed = {_CELLS}.some(c => c.outputs.some(o => o.output_type == 'error'))
@@ -114,12 +114,6 @@ def test_every_cell_of_a_notebook_runs(notebook):
     assert sum("<figure>" in "".join(output.get("data", {}).get("text/html", "")) for output in _outputs(notebook)) >= 6
 
 
-def _found(page, place):
-    """The first such place. JupyterLab draws the cells of a page one by one, as it finds time, so this may wait."""
-    page.locator(place).first.scroll_into_view_if_needed()
-    return page.locator(place).first
-
-
 def _reads(place, text):
     place.filter(has_text=text).wait_for(timeout=60_000)
 
@@ -127,13 +121,12 @@ def _reads(place, text):
 @pytest.fixture(scope="module")
 def explorer(notebook):
     """That of SimpleGoal, the first."""
-    _found(notebook, ".vsp-explorer.vsp-controls .vsp-stage > canvas")
     return notebook.locator(".vsp-explorer.vsp-controls").first
 
 
 @pytest.fixture(scope="module")
 def laboratory(notebook, explorer):  # further down
-    return _found(notebook, ".vsp-controls:has(.widget-label:text-is('min_pol_distance'))")
+    return notebook.locator(".vsp-controls:has(.widget-label:text-is('min_pol_distance'))").first
 
 
 def _drawn(explorer):
@@ -186,7 +179,6 @@ def test_the_strip_stands_in_for_the_controls_once_the_kernel_is_gone(lab, noteb
         urllib.request.urlopen(end)
     _go(notebook, lab, NOTEBOOK)
     for i in range(3):  # two explorers and the laboratory
-        place = _found(notebook, f".vsp-strip >> nth={i}")
-        place.locator("img").wait_for()
+        notebook.locator(".vsp-strip").nth(i).locator("img").wait_for()
     notebook.get_by_text(GONE).nth(1).wait_for(state="attached")
     assert not any(word.is_visible() for word in notebook.get_by_text(GONE).all())

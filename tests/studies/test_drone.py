@@ -90,6 +90,13 @@ def test_rows_of_small_maps(monkeypatch, tmp_path):
     assert ours["more_low"] <= ours["more"] <= ours["more_high"]
     assert blind["more"] == pytest.approx(blind["kept"] - 1) and blind["kept"] < 0.5
     assert mine.loc["network", drone.CONDITIONS[-1], "easy", 60]["change"] > 2 * network["change"]
+    made = (drone.Measured("", "one map", i).load(tmp_path / "build/drone")[1]["radii"]["as built"] for i in range(2))
+    assert ours["radius"] == pytest.approx(max(made), abs=1e-6)
+
+
+def test_every_push_is_as_long_as_it_says(monkeypatch):
+    monkeypatch.setattr(drone, "fly", lambda *about, pushes: np.linalg.norm(pushes, axis=1))
+    assert np.allclose(drone._flights(command_of(drone.regulator()), drone.CONDITIONS[-1], drone.EASY[0]), 0.5)
 
 
 @pytest.mark.parametrize(("agent", "fewest"), [("flown", "one map"), ("own", "four cells")])
