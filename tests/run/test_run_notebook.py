@@ -65,14 +65,14 @@ def test_success_twice(tmp_path):
 
 def test_of_a_widget_its_still_picture_is_left(tmp_path):
     """No view, which has a random name, no state, and nothing of widgets without a picture: the same bytes twice."""
-    bar = "from tqdm.auto import tqdm\nfor _ in tqdm(range(3)):\n    print('step')"
-    notebook = write(tmp_path, WIDGET, "display(Explorer())", "ipywidgets.IntSlider()", bar, "'text'")
+    bar = "from vsp.run.progress import progress\n_ = [*progress('ab', 'work', total=2, unit='steps')]\n"
+    notebook = write(tmp_path, WIDGET, "display(Explorer())", "ipywidgets.IntSlider()", bar, bar + "print(1)", "'text'")
     copy = tmp_path / "figures" / "executed" / "story.ipynb"
     assert run_notebook.run_notebook(notebook, tmp_path) == ["figures/executed/story.ipynb"]
     executed = nbformat.read(copy, as_version=4)
     outputs = [[output.get("data", output.get("text")) for output in cell.outputs] for cell in executed.cells]
     still = {"text/html": "strip", "text/plain": "IntSlider(value=0)"}
-    assert outputs == [[], [still], [still], [], ["step\nstep\nstep\n"], [{"text/plain": "'text'"}]]
+    assert outputs == [[], [still], [still], [], [], ["1\n"], [{"text/plain": "'text'"}]]
     assert "widget" not in str(executed.metadata) and "widget-view" not in copy.read_text()
     assert run_notebook.run_notebook(notebook, tmp_path) == []
 

@@ -41,6 +41,7 @@ _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 # A user can fix these: a damaged file, a full or read-only disk, a cluster
 _MENDABLE = ("CommandError", "DamagedFile", "MissingFile", "OSError", "PermissionError")
 _WIDGET_VIEW = "application/vnd.jupyter.widget-view+json"
+_OVERWRITTEN = re.compile(r".*\r(?!\n)")  # a line up to its last carriage return
 
 
 def run_notebook(
@@ -142,8 +143,8 @@ def _write_copy(source: NotebookNode, cells: list[NotebookNode], path: Path) -> 
 
 
 def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode]:
-    """Return the outputs of code cell `number` in a form that is the same for every run. Text is joined into one piece.
-    Widgets are replaced by their static image; a widget without one, such as a progress bar, is removed."""
+    """Return the outputs of code cell `number` in a form that is the same for every run. Text is joined into one piece,
+    without what a progress bar wrote over. Widgets are replaced by their static image; one without is removed."""
     result: list[NotebookNode] = []
     for output in outputs:
         data = output.get("data", {})
@@ -155,7 +156,10 @@ def clean_outputs(outputs: list[NotebookNode], number: int) -> list[NotebookNode
             result[-1].text += output.text
         else:
             result.append(output)
-    return result
+    for output in result:
+        if output.output_type == "stream":
+            output.text = _OVERWRITTEN.sub("", output.text)
+    return [output for output in result if output.get("text") != ""]
 
 
 def _publish(staging: Path, out: Path) -> list[str]:
