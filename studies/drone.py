@@ -19,9 +19,9 @@ from vsp.protocol.job import provenance
 from vsp.run import command
 from vsp.teachers.teacher import SHIPPED, load_teacher
 from vsp_beyond.drone import flights, imitation
-from vsp_beyond.drone.flights import BODIES, EASY, HARD, PUSH, command_of, fly
+from vsp_beyond.drone.flights import BODIES, EASY, HARD, PUSH, command_of, fly, with_history
 from vsp_beyond.drone.flown import Flown
-from vsp_beyond.drone.quadrotor import CRAZYFLIE, HOVER, quadrotor
+from vsp_beyond.drone.quadrotor import CRAZYFLIE, HOVER, Body, Starts, advance, quadrotor
 
 from .committed import RESULTS, read_results, write_results
 
@@ -97,11 +97,25 @@ class Measured(Job):
             numbers, ours = int(np.count_nonzero(policy.coefficients)), command_of(policy)
             numbers += policy.codewords.size * (len(policy) > 1)
             r2 = _r2(ours, theirs)
-        loops = {name: imitation.radius_at_rest(ours, body) for name, body in BODIES.items()}
+        loops = {name: radius_at_rest(ours, body) for name, body in BODIES.items()}
         radii = {name: radius if np.isfinite(radius) else None for name, radius in loops.items()}  # JSON has no NaN
         made = [_flights(ours, name, starts) for name, starts in conditions(self.flies)]
         arrays = {kind: np.stack([getattr(one, kind) for one in made]) for kind in KINDS}
         return arrays, {"numbers": numbers, "r2": r2, "radii": radii}
+
+
+def radius_at_rest(ours: flights.Command, body: Body = CRAZYFLIE) -> float:
+    """Return the largest absolute eigenvalue of the whole loop, a network's history included, where it comes to rest.
+
+    By central differences; NaN if half a minute of flight from the origin does not end in rest."""
+    states = with_history(Starts(0.0, 0.0, 0.0, 0.0)(np.random.default_rng(0), 1))
+    for _ in range(3000):
+        before, states = states, advance(states, ours(states), body)
+    if np.abs(states - before).max() > 1e-6:
+        return np.nan
+    tiny = 1e-4 * np.eye(states.size)  # a network's float32 rounds smaller steps away
+    after = [advance(states + way, ours(states + way), body) for way in (tiny, -tiny)]
+    return float(np.abs(np.linalg.eigvals((after[0] - after[1]) / 2e-4)).max())
 
 
 def conditions(flies: str) -> list[tuple[str, flights.Starts]]:

@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from vsp.policy import VoronoiPolicy
+from vsp_beyond.drone.flights import Command, fly
 from vsp_beyond.drone.quadrotor import ARM, ATTITUDE, POSITION, rotation
 
 APART, SIZE = 0.6, 5.0  # m between frames; how much larger a drone is drawn
@@ -15,6 +16,14 @@ CORNERS = ARM * np.array([[1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])  # of
 MIXES = {  # of the four commands: what all do, and what turns the body about x, y, z
     "thrust": (1, 1, 1, 1), "roll": (-1, -1, 1, 1), "pitch": (-1, 1, 1, -1), "yaw": (-1, 1, -1, 1),
 }  # fmt: skip
+
+
+def record_flight(command: Command, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the states (500, 149) and commands (500, 4) of one flight from `start` (21,)."""
+    seen: list[tuple[np.ndarray, np.ndarray]] = []
+    fly(command, start[None], watch=lambda step, states, commands: seen.append((states[0].copy(), commands[0])))
+    states, commands = map(np.array, zip(*seen))
+    return states, commands
 
 
 def film(ax: Axes, states: np.ndarray, moments: Sequence[float], *, step_seconds: float, color: str) -> None:

@@ -37,15 +37,6 @@ def test_the_gradient_of_an_eigenvalue_is_its_slope():
     assert imitation.radius(trembling, loop)[0] == pytest.approx(largest + imitation.TREMBLE)
 
 
-@pytest.mark.parametrize("body", [CRAZYFLIE, BODIES["mass - 20 %"]])
-def test_the_loop_at_rest_has_the_eigenvalue_of_the_linear_step(body, monkeypatch):
-    monkeypatch.setattr(imitation, "TREMBLE", 0.0)
-    policy = simple()
-    at_rest = imitation.radius_at_rest(command_of(policy), body)
-    assert at_rest == pytest.approx(imitation.radius(policy.coefficients[0, :16], imitation.loop_of(body))[0], abs=3e-4)
-    assert np.isnan(imitation.radius_at_rest(lambda states: np.zeros((len(states), 4)), body))
-
-
 def test_a_map_is_found_again(monkeypatch):
     monkeypatch.setattr(imitation, "FLIGHTS", 100)
     monkeypatch.setattr(imitation, "ROUNDS", 1)

@@ -66,6 +66,15 @@ def test_the_regulator_costs_least_and_stays():
     assert flown.kept.all() and flown.distance.max() < 0.05
 
 
+@pytest.mark.parametrize(("condition", "rests"), [("motor lag x 1.5", True), ("mass - 20 %", False)])
+def test_the_loop_at_rest_has_the_eigenvalue_of_the_linear_step(condition, rests):
+    """With another mass the regulator drifts and never rests."""
+    policy, body = drone.regulator(), drone.BODIES[condition]
+    at_rest, linear = drone.radius_at_rest(command_of(policy), body), imitation.loop_of(body)
+    by_hand = imitation.radius(policy.coefficients[0, :16], linear)[0] if rests else np.nan
+    assert at_rest == pytest.approx(by_hand, abs=1e-9, nan_ok=True)
+
+
 def test_rows_of_small_maps(monkeypatch, tmp_path):
     for module, name, value in (
         (drone, "N", 20), (imitation, "FLIGHTS", 40), (imitation, "OWN_FLIGHTS", 20), (imitation, "ROUNDS", 1),

@@ -79,11 +79,3 @@ def fly(
     distance = np.linalg.norm(states[:, POSITION], axis=1)
     change *= MOST_RPM / 2 / LAST
     return Flights(kept, *(np.where(kept, numbers, np.nan) for numbers in (distance, change)))
-
-
-def record_flight(command: Command, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (500, 149) and commands (500, 4) of one flight from `start` (21,)."""
-    seen: list[tuple[np.ndarray, np.ndarray]] = []
-    fly(command, start[None], watch=lambda step, states, commands: seen.append((states[0].copy(), commands[0])))
-    states, commands = map(np.array, zip(*seen))
-    return states, commands

@@ -15,7 +15,7 @@ from vsp.subpolicies.stacked import BETA1, adam
 from vsp_beyond.few_cells.search import least_error
 from vsp_beyond.few_cells.units import LabelledStates, Scaling
 
-from .flights import BODIES, Command, command_of, fly, with_history
+from .flights import BODIES, Command, command_of, fly
 from .quadrotor import ATTITUDE, CRAZYFLIE, HOVER, MOST_RPM, MOTORS, THRUST, Body, G, Starts, advance, quadrotor, see
 
 VERSION = 1  # raise it when the same arguments give another map
@@ -65,20 +65,6 @@ def radius(weights: np.ndarray, loop: Loop) -> tuple[float, np.ndarray]:
     left = np.linalg.inv(right)[i]
     towards = np.conj(values[i]) / abs(values[i]) * np.outer(seen @ right[:, i], left @ steer)
     return float(sizes[i]), towards.real
-
-
-def radius_at_rest(command: Command, body: Body = CRAZYFLIE) -> float:
-    """Return the largest absolute eigenvalue of the whole loop, a network's history included, where it comes to rest.
-
-    By central differences; NaN if half a minute of flight from the origin does not end in rest."""
-    states = with_history(Starts(0.0, 0.0, 0.0, 0.0)(np.random.default_rng(0), 1))
-    for _ in range(3000):
-        before, states = states, advance(states, command(states), body)
-    if np.abs(states - before).max() > 1e-6:
-        return np.nan
-    tiny = 1e-4 * np.eye(states.size)  # a network's float32 rounds smaller steps away
-    after = [advance(states + way, command(states + way), body) for way in (tiny, -tiny)]
-    return float(np.abs(np.linalg.eigvals((after[0] - after[1]) / 2e-4)).max())
 
 
 @threadpool_limits.wrap(limits=1)
